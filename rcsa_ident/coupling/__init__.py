@@ -1,0 +1,1 @@
+"""Substructures meet: joints, receptance coupling, assembly."""

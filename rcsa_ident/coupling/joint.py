@@ -1,0 +1,45 @@
+"""The lumped joint between holder and spindle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+from rcsa_ident.errors import non_negative, positive
+
+
+@dataclass(frozen=True, slots=True)
+class LumpedJoint:
+    """Springs and dampers in translation and rotation (the paper's eq. 11).
+
+    Parameters
+    ----------
+    translational_stiffness : float [N/m]
+    rotational_stiffness : float [N m/rad]
+    translational_damping : float [N s/m]
+    rotational_damping : float [N m s/rad]
+    """
+
+    translational_stiffness: float
+    rotational_stiffness: float
+    translational_damping: float = 0.0
+    rotational_damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive("joint translational_stiffness", self.translational_stiffness, "N/m")
+        positive("joint rotational_stiffness", self.rotational_stiffness, "N m/rad")
+        non_negative("joint translational_damping", self.translational_damping, "N s/m")
+        non_negative("joint rotational_damping", self.rotational_damping, "N m s/rad")
+
+    def compliance(self, omega: FloatArray, planes: int = 1) -> ComplexArray:
+        """Return K(omega)^-1 over (translation, slope) of each bending plane, shape (n, 2 planes, 2 planes)."""
+        omega = np.asarray(omega, dtype=float)
+        translation = 1.0 / (self.translational_stiffness + 1j * omega * self.translational_damping)
+        slope = 1.0 / (self.rotational_stiffness + 1j * omega * self.rotational_damping)
+        values = np.zeros((omega.size, 2 * planes, 2 * planes), dtype=complex)
+        for k in range(planes):
+            values[:, 2 * k, 2 * k] = translation
+            values[:, 2 * k + 1, 2 * k + 1] = slope
+        return values

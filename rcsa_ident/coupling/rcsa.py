@@ -1,0 +1,50 @@
+"""Receptance coupling of a tool-holder and a spindle through a lumped joint (the paper's eqs. 10 and 12)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.errors import InputError
+
+SPINDLE = "spindle"
+
+
+def couple(tool_holder: Receptance, spindle: Receptance, joint: LumpedJoint) -> Receptance:
+    """Return the receptances of the coupled machine at the tip (point 1) and at the spindle's flange (point 3).
+
+    C11 = A11 - A12 Z A21,  C31 = B33 Z A21,  C33 = B33 - B33 Z B33,  Z = [A22 + K^-1 + B33]^-1.
+
+    Parameters
+    ----------
+    tool_holder : Receptance
+        Points ``tip`` and ``flange``; per point translation and slope of one bending plane, or of both (4 x 4 blocks).
+    spindle : Receptance
+        Point ``flange`` with the same directions, at the same frequencies.
+
+    Returns
+    -------
+    Receptance
+        Points ``tip`` and ``spindle``.
+    """
+    if tool_holder.omega.shape != spindle.omega.shape or not np.array_equal(tool_holder.omega, spindle.omega):
+        raise InputError("spindle receptance", f"{spindle.omega.size} frequencies", "the tool-holder's frequencies")
+    a11, a12 = tool_holder["tip", "tip"], tool_holder["tip", "flange"]
+    a21, a22 = tool_holder["flange", "tip"], tool_holder["flange", "flange"]
+    b33 = spindle["flange", "flange"]
+    if b33.shape != a22.shape:
+        raise InputError("spindle receptance", b33.shape, f"the shape of the tool-holder's flange block, {a22.shape}")
+    size = a22.shape[1]
+    interface = a22 + joint.compliance(tool_holder.omega, size // 2) + b33
+    carried = np.linalg.solve(interface, np.concatenate([a21, b33], axis=2))
+    from_tip, from_spindle = carried[:, :, :size], carried[:, :, size:]
+    c11 = a11 - a12 @ from_tip
+    c31 = b33 @ from_tip
+    c13 = a12 @ from_spindle
+    c33 = b33 - b33 @ from_spindle
+    values = np.concatenate([np.concatenate([c11, c13], axis=2), np.concatenate([c31, c33], axis=2)], axis=1)
+    tips = tuple(c for c in tool_holder.rows if c.point == "tip")
+    coordinates = (*tips, *(Coordinate(SPINDLE, c.dof) for c in tips))
+    return Receptance(tool_holder.omega, values, coordinates, coordinates)

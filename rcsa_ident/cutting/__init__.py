@@ -1,0 +1,1 @@
+"""How a tooth cuts: cutter, conditions, coefficients, forces, directional coefficients."""

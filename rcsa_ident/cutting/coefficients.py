@@ -1,0 +1,35 @@
+"""Cutting force coefficients of a pair of cutter and workpiece material."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rcsa_ident.errors import InputError, non_negative, positive
+
+
+@dataclass(frozen=True, slots=True)
+class CuttingCoefficients:
+    """Linear force model: F = K_c h b + K_e b for each direction, b the width of cut.
+
+    Parameters
+    ----------
+    tangential : float [N/m^2]
+        K_tc.
+    radial_ratio, axial_ratio : float [-]
+        k_rc and k_ac, times K_tc.
+    tangential_edge, radial_edge, axial_edge : float [N/m]
+    """
+
+    tangential: float
+    radial_ratio: float
+    axial_ratio: float = 0.0
+    tangential_edge: float = 0.0
+    radial_edge: float = 0.0
+    axial_edge: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive("tangential coefficient", self.tangential, "N/m^2")
+        if not -1.0 <= self.radial_ratio <= 5.0:
+            raise InputError("radial_ratio", self.radial_ratio, "a ratio from -1 to 5")
+        for name in ("tangential_edge", "radial_edge", "axial_edge"):
+            non_negative(name, getattr(self, name), "N/m")

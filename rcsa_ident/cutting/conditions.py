@@ -1,0 +1,75 @@
+"""What the machinist sets: speed, depth, feed, immersion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.errors import InputError, non_negative, positive
+
+
+@dataclass(frozen=True, slots=True)
+class Engagement:
+    """Between which immersion angles the teeth cut.
+
+    Angles are measured clockwise from the normal direction Y (the feed is X), as the paper does: half-immersion
+    down-milling is pi/2 to pi, slotting 0 to pi.
+
+    Parameters
+    ----------
+    entry, exit : float [rad], 0 <= entry < exit <= pi
+    """
+
+    entry: float
+    exit: float
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.entry < self.exit <= np.pi + 1e-9):
+            degrees = f"{np.degrees(self.entry):g} and {np.degrees(self.exit):g} degrees"
+            raise InputError("entry and exit angle", degrees, "0 <= entry < exit <= 180 degrees")
+
+    @classmethod
+    def from_immersion(cls, immersion: float, strategy: str) -> Engagement:
+        """Return the engagement of a radial immersion a_e/D in (0, 1] for ``up`` or ``down`` milling."""
+        if not 0.0 < positive("immersion", immersion) <= 1.0:
+            raise InputError("immersion", immersion, "radial depth over diameter, above 0 and not above 1")
+        if strategy == "up":
+            return cls(0.0, float(np.arccos(1.0 - 2.0 * immersion)))
+        if strategy == "down":
+            return cls(float(np.arccos(2.0 * immersion - 1.0)), float(np.pi))
+        raise InputError("strategy", strategy, "up or down")
+
+
+@dataclass(frozen=True, slots=True)
+class CuttingConditions:
+    """A cut with constant conditions.
+
+    Parameters
+    ----------
+    spindle_speed : float [rad/s]
+    axial_depth : float [m]
+    feed_per_tooth : float [m]
+    engagement : Engagement
+    feed_angle : float [rad], default 0
+        Direction of the feed in the machine's X-Y plane, from +X towards +Y.
+    """
+
+    spindle_speed: float
+    axial_depth: float
+    feed_per_tooth: float
+    engagement: Engagement
+    feed_angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive("spindle_speed", self.spindle_speed, "rad/s")
+        non_negative("axial_depth", self.axial_depth, "m")
+        non_negative("feed_per_tooth", self.feed_per_tooth, "m")
+        if not np.isfinite(self.feed_angle):
+            raise InputError("feed_angle", self.feed_angle, "a finite angle [rad]")
+
+    @property
+    def machine_from_feed(self) -> np.ndarray:
+        """Rotation from (feed, normal) to machine (X, Y), shape (2, 2)."""
+        c, s = np.cos(self.feed_angle), np.sin(self.feed_angle)
+        return np.array([[c, -s], [s, c]])

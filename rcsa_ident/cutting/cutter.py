@@ -1,0 +1,59 @@
+"""The cutter: teeth, pitch, helix, run-out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rcsa_ident.dynamics.arrays import FloatArray, frozen
+from rcsa_ident.errors import InputError, non_negative, positive
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cutter:
+    """A cylindrical end mill.
+
+    Parameters
+    ----------
+    teeth : int
+    diameter : float [m]
+    helix : float [rad], default 0
+        A point of an edge at height z above the tip lags the tip by 2 z tan(helix) / diameter.
+    pitch : array, shape (teeth,) [rad], default equal
+        `pitch[j]` is the angle from tooth j to tooth j + 1, which runs ahead of it and has cut there before.
+    runout : array, shape (teeth,) [m], default none
+        Radial offset of each edge.
+    """
+
+    teeth: int
+    diameter: float
+    helix: float = 0.0
+    pitch: FloatArray = field(default=None)  # type: ignore[assignment]
+    runout: FloatArray = field(default=None)  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        if isinstance(self.teeth, bool) or int(self.teeth) != self.teeth or not 1 <= self.teeth <= 100:
+            raise InputError("teeth", self.teeth, "a whole number from 1 to 100")
+        positive("diameter", self.diameter, "m")
+        if not 0.0 <= non_negative("helix", self.helix, "rad") < 0.45 * np.pi:
+            raise InputError("helix", self.helix, "0 to 81 degrees")
+        equal = np.full(self.teeth, 2.0 * np.pi / self.teeth)
+        pitch = frozen(equal if self.pitch is None else self.pitch)
+        runout = frozen(np.zeros(self.teeth) if self.runout is None else self.runout)
+        if pitch.shape != (self.teeth,) or np.any(pitch <= 0.0) or abs(pitch.sum() - 2.0 * np.pi) > 1e-6:
+            raise InputError("pitch", pitch.tolist(), f"{self.teeth} positive angles that add up to a full turn")
+        if runout.shape != (self.teeth,):
+            raise InputError("runout", runout.tolist(), f"{self.teeth} radial offsets [m]")
+        object.__setattr__(self, "pitch", pitch)
+        object.__setattr__(self, "runout", runout)
+
+    @property
+    def tooth_angle(self) -> FloatArray:
+        """Angle of each tooth ahead of tooth 1, shape (teeth,) [rad]."""
+        return np.concatenate([[0.0], np.cumsum(self.pitch)[:-1]])
+
+    @property
+    def equally_spaced(self) -> bool:
+        """True where all teeth are alike, so that only multiples of the tooth-passing frequency are excited."""
+        return bool(np.ptp(self.pitch) < 1e-9 and np.ptp(self.runout) == 0.0)

@@ -1,0 +1,33 @@
+"""Directional coefficients: dynamic force per regenerated displacement."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.dynamics.arrays import FloatArray
+
+
+def mean_directional_matrix(
+    teeth: int, engagement: Engagement, coefficients: CuttingCoefficients, feed_angle: float = 0.0
+) -> FloatArray:
+    """Return the mean over a revolution of the directional matrix [alpha] (the paper's eq. 3), in machine axes.
+
+    F = a K_tc [alpha] {X(t) - X(t - tau)}; closed form, exact.
+
+    Returns
+    -------
+    array, shape (2, 2) [-]
+    """
+
+    def primitive(phi: float) -> FloatArray:
+        # integrals of sin cos, sin^2, cos^2
+        sc, ss, cc = -0.25 * np.cos(2 * phi), 0.5 * phi - 0.25 * np.sin(2 * phi), 0.5 * phi + 0.25 * np.sin(2 * phi)
+        kr = coefficients.radial_ratio
+        return np.array([[-sc - kr * ss, -cc - kr * sc], [ss - kr * sc, sc - kr * cc]])
+
+    alpha = teeth / (2.0 * np.pi) * (primitive(engagement.exit) - primitive(engagement.entry))
+    c, s = np.cos(feed_angle), np.sin(feed_angle)
+    rotation = np.array([[c, -s], [s, c]])
+    return rotation @ alpha @ rotation.T

@@ -1,0 +1,159 @@
+"""Milling force in a stable cut: Fourier lines and time histories (the paper's eqs. 2-4, with edges and helix)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import CuttingConditions
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+
+
+def tooth_force(phi: FloatArray, chip: FloatArray, coefficients: CuttingCoefficients) -> FloatArray:
+    """Return the force of one cutting tooth on the tool per unit axial depth, (feed, normal, axial).
+
+    Parameters
+    ----------
+    phi : array, shape (n,) [rad]
+        Immersion, clockwise from the normal direction.
+    chip : array, shape (n,) [m]
+        Chip thickness; the tooth is taken to be in the material.
+
+    Returns
+    -------
+    array, shape (n, 3) [N/m]
+    """
+    s, c = np.sin(phi), np.cos(phi)
+    tangential = coefficients.tangential * chip + coefficients.tangential_edge
+    radial = coefficients.tangential * coefficients.radial_ratio * chip + coefficients.radial_edge
+    axial = coefficients.tangential * coefficients.axial_ratio * chip + coefficients.axial_edge
+    return np.stack([-c * tangential - s * radial, s * tangential - c * radial, axial], axis=-1)
+
+
+def force_lines(
+    cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, orders: np.ndarray
+) -> ComplexArray:
+    """Return the amplitudes of the milling force at multiples of the spindle frequency.
+
+    The force is F(t) = Re sum_m lines[m] e^{i m Omega t} with tooth 1 (at the tip) at immersion 0 when t = 0. Exact
+    for any pitch and helix as long as each tooth cuts through the whole immersion; with run-out the chip thickness of
+    a tooth may end early and `runout_force_lines` applies.
+
+    Parameters
+    ----------
+    orders : array of int, shape (m,)
+        Multiples of the spindle frequency; tooth-passing harmonics are multiples of the number of teeth. Order 0
+        gives the mean.
+
+    Returns
+    -------
+    complex array, shape (m, 2) [N]
+        In machine axes X, Y.
+
+    Notes
+    -----
+    A tooth's force per depth is a sum of e^{i q phi}, q = -2..2, in its engagement, so each line is a sum of
+    integrals of e^{i (q - m) phi}; a helix multiplies line m by the mean of e^{-i m 2 z tan(helix) / D} over the depth.
+    """
+    orders = np.asarray(orders)
+    entry, exit_ = conditions.engagement.entry, conditions.engagement.exit
+    chip_lines, edge_lines = _trigonometric_form(coefficients)
+    # teeth: sum_j e^{i m psi_j}, weighted by the feed that tooth j takes (its pitch)
+    phases = np.exp(1j * np.outer(orders, cutter.tooth_angle))
+    feed = conditions.feed_per_tooth * cutter.pitch * cutter.teeth / (2.0 * np.pi)
+    q = np.arange(-2, 3)
+    window = _exponential_integral(q[None, :] - orders[:, None], entry, exit_) / (2.0 * np.pi)
+    lines = (phases @ feed)[:, None] * (window @ chip_lines) + phases.sum(axis=1)[:, None] * (window @ edge_lines)
+    lag = orders * np.tan(cutter.helix) / cutter.diameter * conditions.axial_depth
+    lines = lines * (conditions.axial_depth * np.exp(-1j * lag) * np.sinc(lag / np.pi))[:, None]
+    lines = np.where(orders[:, None] == 0, 1.0, 2.0) * lines
+    return lines @ conditions.machine_from_feed.T
+
+
+def _trigonometric_form(coefficients: CuttingCoefficients) -> tuple[ComplexArray, ComplexArray]:
+    """Coefficients of e^{i q phi}, q = -2..2, of the (feed, normal) force per depth: per unit feed, and of the edge."""
+    k, kr = coefficients.tangential, coefficients.tangential * coefficients.radial_ratio
+    te, re = coefficients.tangential_edge, coefficients.radial_edge
+    # rows q = -2..2 of sin cos, sin^2, cos, sin
+    sin_cos = np.array([0.25j, 0, 0, 0, -0.25j])
+    sin_sin = np.array([-0.25, 0, 0.5, 0, -0.25])
+    cos = np.array([0, 0.5, 0, 0.5, 0])
+    sin = np.array([0, 0.5j, 0, -0.5j, 0])
+    chip = np.stack([-k * sin_cos - kr * sin_sin, k * sin_sin - kr * sin_cos], axis=1)
+    edge = np.stack([-te * cos - re * sin, te * sin - re * cos], axis=1)
+    return chip, edge
+
+
+def _exponential_integral(n: np.ndarray, start: float, end: float) -> ComplexArray:
+    """Integral of e^{i n phi} from start to end for whole n."""
+    half = 0.5 * (end - start)
+    return 2.0 * half * np.exp(0.5j * n * (start + end)) * np.sinc(n * half / np.pi)
+
+
+def force_history(
+    cutter: Cutter,
+    conditions: CuttingConditions,
+    coefficients: CuttingCoefficients,
+    angle: FloatArray,
+    slices: int = 32,
+) -> FloatArray:
+    """Return the force over the rotation angle of tooth 1, in machine axes, with run-out and teeth that miss.
+
+    The chip of a tooth is what the teeth before it left, over up to one revolution of them; a tooth whose path lies
+    inside their surface cuts nothing.
+
+    Parameters
+    ----------
+    angle : array, shape (n,) [rad]
+        Immersion of tooth 1 at the tip.
+    slices : int
+        Axial slices of the depth, for the helix.
+
+    Returns
+    -------
+    array, shape (n, 3) [N]
+        X, Y, axial.
+    """
+    angle = np.asarray(angle, dtype=float)
+    total = np.zeros((angle.size, 3))
+    height = (np.arange(slices) + 0.5) / slices * conditions.axial_depth
+    lag = 2.0 * height * np.tan(cutter.helix) / cutter.diameter
+    feed = conditions.feed_per_tooth * cutter.teeth * cutter.pitch / (2.0 * np.pi)
+    for j in range(cutter.teeth):
+        for each in lag:
+            phi = np.mod(angle + cutter.tooth_angle[j] - each, 2.0 * np.pi)
+            chip = _kinematic_chip(j, np.sin(phi), feed, cutter.runout)
+            cuts = (phi >= conditions.engagement.entry) & (phi < conditions.engagement.exit) & (chip > 0.0)
+            force = tooth_force(phi, chip, coefficients)
+            total += np.where(cuts[:, None], force, 0.0) * conditions.axial_depth / slices
+    total[:, :2] = total[:, :2] @ conditions.machine_from_feed.T
+    return total
+
+
+def _kinematic_chip(j: int, sine: FloatArray, feed: FloatArray, runout: FloatArray) -> FloatArray:
+    """Chip of tooth j: the smallest distance to the surfaces left by the teeth ahead, over one revolution of them."""
+    teeth = feed.size
+    moved = 0.0
+    chip = np.full(sine.shape, np.inf)
+    for back in range(1, teeth + 1):
+        moved += feed[(j + back - 1) % teeth]
+        chip = np.minimum(chip, moved * sine + runout[j] - runout[(j + back) % teeth])
+    return chip
+
+
+def runout_force_lines(
+    cutter: Cutter,
+    conditions: CuttingConditions,
+    coefficients: CuttingCoefficients,
+    orders: np.ndarray,
+    samples: int = 4096,
+) -> ComplexArray:
+    """Return the lines as `force_lines` does, from a sampled revolution: for run-out, where teeth may miss.
+
+    The error falls as 1/samples^2 except for the jumps at entry and exit, where it is 1/samples.
+    """
+    angle = 2.0 * np.pi * np.arange(samples) / samples
+    history = force_history(cutter, conditions, coefficients, angle, slices=64)[:, :2]
+    lines = np.exp(-1j * np.outer(orders, angle)) @ history / samples
+    return np.where(np.asarray(orders)[:, None] == 0, 1.0, 2.0) * lines

@@ -1,0 +1,1 @@
+"""How things vibrate: coordinates, receptances, second-order structures, modes."""

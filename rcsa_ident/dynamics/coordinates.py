@@ -1,0 +1,54 @@
+"""Where and in which direction something moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from rcsa_ident.errors import InputError
+
+
+class Dof(StrEnum):
+    """A direction of motion.
+
+    `SLOPE_X` is the rotation of the cross-section in the X bending plane, positive as dx/dz with z from the tip
+    towards the spindle; a moment in its direction is its work conjugate. `SLOPE_Y` likewise.
+    """
+
+    X = "x"
+    Y = "y"
+    Z = "z"
+    SLOPE_X = "x'"
+    SLOPE_Y = "y'"
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinate:
+    """A named point and a direction, written as engineers do: ``tip.x``.
+
+    >>> str(Coordinate.parse("flange.x'"))
+    "flange.x'"
+    """
+
+    point: str
+    dof: Dof
+
+    @classmethod
+    def parse(cls, text: str) -> Coordinate:
+        """Read ``point.dof``."""
+        point, _, dof = text.rpartition(".")
+        try:
+            return cls(point, Dof(dof))
+        except ValueError:
+            raise InputError("coordinate", text, "point.dof with dof one of " + ", ".join(Dof)) from None
+
+    def __str__(self) -> str:
+        return f"{self.point}.{self.dof}"
+
+
+def plane(point: str, axis: Dof = Dof.X) -> tuple[Coordinate, Coordinate]:
+    """Return translation and slope of `point` in the bending plane of `axis` (X or Y)."""
+    slopes = {Dof.X: Dof.SLOPE_X, Dof.Y: Dof.SLOPE_Y}
+    if axis not in slopes:
+        raise InputError("axis", axis, "x or y: a bending plane")
+    return Coordinate(point, axis), Coordinate(point, slopes[axis])

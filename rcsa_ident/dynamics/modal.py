@@ -1,0 +1,155 @@
+"""Modes: poles with shapes at named coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.dynamics._kernels import pole_sum
+from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoleModel:
+    """Receptance as sum of outputs inputs / (i omega - pole), for omega > 0.
+
+    Parameters
+    ----------
+    pole : complex array, shape (m,) [rad/s]
+    outputs : complex array, shape (p, m)
+    inputs : complex array, shape (m, p)
+    coordinates : tuple of Coordinate, length p
+
+    Notes
+    -----
+    With material loss factors the poles do not come in conjugate pairs: the loss factor's sign belongs to positive
+    frequencies.
+    """
+
+    pole: ComplexArray
+    outputs: ComplexArray
+    inputs: ComplexArray
+    coordinates: tuple[Coordinate, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("pole", "outputs", "inputs"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.complex128))
+
+    def receptance(self, omega: FloatArray) -> Receptance:
+        """Return the receptance between all coordinates; cost about 8 p^2 m n flops."""
+        omega = frozen(omega)
+        p, m = self.outputs.shape
+        residues = np.einsum("pk,kq->kpq", self.outputs, self.inputs).reshape(m, p * p)
+        values = pole_sum(omega, self.pole, np.ascontiguousarray(residues)).reshape(omega.size, p, p)
+        return Receptance(omega, values, self.coordinates, self.coordinates)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModalModel:
+    """Complex modes and a residual compliance (the paper's eq. 13, plus the modes above the band).
+
+    h_pq = sum_n phi_pn phi_qn / (i omega - lambda_n) + conj(phi_pn phi_qn) / (i omega - conj(lambda_n)) + R_pq,
+    lambda_n = -zeta_n omega_n + i omega_n sqrt(1 - zeta_n^2).
+
+    Parameters
+    ----------
+    omega_n : array, shape (m,) [rad/s]
+    zeta : array, shape (m,) [-]
+        In (0, 1]; at 1 the pole is real and the pair coincides.
+    phi : complex array, shape (m, d) [sqrt(s/kg), sqrt(s/(kg m^2))]
+        A normal mode with mass-normalised shape psi has phi = psi (1 - i) / (2 sqrt(omega_d)).
+    residual : array, shape (d, d) [m/N, rad/N, m/(N m), rad/(N m)]
+        Symmetric; positive semidefinite where the model is passive.
+    coordinates : tuple of Coordinate, length d
+    """
+
+    omega_n: FloatArray
+    zeta: FloatArray
+    phi: ComplexArray
+    residual: FloatArray
+    coordinates: tuple[Coordinate, ...]
+
+    def __post_init__(self) -> None:
+        for name, dtype in (("omega_n", float), ("zeta", float), ("phi", complex), ("residual", float)):
+            object.__setattr__(self, name, frozen(getattr(self, name), dtype))
+        m, d = self.omega_n.size, len(self.coordinates)
+        if self.phi.shape != (m, d):
+            raise InputError("phi", self.phi.shape, f"shape {(m, d)}: modes, coordinates")
+        if self.residual.shape != (d, d):
+            raise InputError("residual", self.residual.shape, f"shape {(d, d)}")
+        if self.zeta.shape != (m,) or np.any(self.zeta <= 0.0) or np.any(self.zeta > 1.0):
+            raise InputError("zeta", self.zeta.tolist(), f"{m} damping ratios above 0 and not above 1")
+
+    @property
+    def pole(self) -> ComplexArray:
+        """Poles with non-negative imaginary part, shape (m,) [rad/s]."""
+        return -self.zeta * self.omega_n + 1j * self.omega_n * np.sqrt(1.0 - self.zeta**2)
+
+    def receptance(self, omega: FloatArray) -> Receptance:
+        """Return the receptance between all coordinates."""
+        omega = frozen(omega)
+        m, d = self.phi.shape
+        residues = np.einsum("mp,mq->mpq", self.phi, self.phi).reshape(m, d * d)
+        both = np.concatenate([residues, residues.conj()])
+        values = pole_sum(omega, np.concatenate([self.pole, self.pole.conj()]), both)
+        values = values.reshape(omega.size, d, d) + self.residual
+        return Receptance(omega, values, self.coordinates, self.coordinates)
+
+
+def normal_modes(
+    omega_n: FloatArray, zeta: FloatArray, psi: FloatArray, coordinates: tuple[Coordinate, ...], residual: FloatArray | None = None
+) -> ModalModel:
+    """Return the modal model of proportionally damped modes.
+
+    Parameters
+    ----------
+    omega_n : array, shape (m,) [rad/s]
+    zeta : array, shape (m,) [-], below 1
+    psi : array, shape (m, d) [1/sqrt(kg), 1/sqrt(kg m^2)]
+        Mass-normalised shapes.
+    """
+    omega_n, zeta, psi = (np.asarray(a, dtype=float) for a in (omega_n, zeta, psi))
+    omega_d = omega_n * np.sqrt(1.0 - zeta**2)
+    phi = psi * ((1.0 - 1.0j) / (2.0 * np.sqrt(omega_d)))[:, None]
+    d = len(coordinates)
+    return ModalModel(omega_n, zeta, phi, np.zeros((d, d)) if residual is None else residual, coordinates)
+
+
+def damped_modes(omega_n: FloatArray, damping: FloatArray, psi: FloatArray, residual: FloatArray, coordinates: tuple[Coordinate, ...]) -> ModalModel:
+    """Return the complex modes of real modes coupled by a full damping matrix.
+
+    Solves q'' + D q' + diag(omega_n^2) q = psi f, w = psi^T q, exactly; a real pole becomes a mode with zeta = 1 and
+    half its residue, so that the pair of eq. 13 sums to it.
+
+    Parameters
+    ----------
+    omega_n : array, shape (m,) [rad/s]
+    damping : array, shape (m, m) [rad/s]
+        Symmetric positive semidefinite.
+    psi : array, shape (m, d)
+        Mass-normalised shapes.
+    residual : array, shape (d, d)
+    """
+    m = omega_n.size
+    state = np.zeros((2 * m, 2 * m))
+    state[:m, m:] = np.eye(m)
+    state[m:, :m] = -np.diag(omega_n**2)
+    state[m:, m:] = -damping
+    values, right = np.linalg.eig(state)
+    # left vectors of this companion form follow from the right ones: q^T [s + D, 1], with q^T (2 s + D) q as norm
+    q = right[:m]
+    norm = np.einsum("ik,ik->k", q, 2.0 * values * q + damping @ q)
+    shapes = (psi.T @ q) / np.sqrt(norm.astype(complex))
+    tolerance = 1e-9 * np.abs(values)
+    pairs = values.imag > tolerance
+    real = np.abs(values.imag) <= tolerance
+    lam = np.concatenate([values[pairs], values[real].real.astype(complex)])
+    phi = np.concatenate([shapes.T[pairs], shapes.T[real] / np.sqrt(2.0)])
+    frequency = np.abs(lam)
+    order = np.argsort(frequency, kind="stable")
+    zeta = np.clip(-lam.real / frequency, 1e-9, 1.0)
+    return ModalModel(frequency[order], zeta[order], phi[order], residual, coordinates)

@@ -1,0 +1,95 @@
+"""Receptance: displacement per force over frequency, the only thing that substructures exchange."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Receptance:
+    """Displacements of `rows` per unit force on `cols`.
+
+    Parameters
+    ----------
+    omega : array, shape (n,) [rad/s]
+    values : complex array, shape (n, r, c) [m/N, rad/N, m/(N m), rad/(N m)]
+        Time dependence e^{+i omega t}.
+    rows, cols : tuple of Coordinate, lengths r and c
+
+    Examples
+    --------
+    >>> h = Receptance([1.0], [[[2.0]]], (Coordinate.parse("tip.x"),), (Coordinate.parse("tip.x"),))
+    >>> h["tip", "tip"].shape
+    (1, 1, 1)
+    """
+
+    omega: FloatArray
+    values: ComplexArray
+    rows: tuple[Coordinate, ...]
+    cols: tuple[Coordinate, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "omega", frozen(self.omega))
+        object.__setattr__(self, "values", frozen(self.values, np.complex128))
+        expected = (self.omega.size, len(self.rows), len(self.cols))
+        if self.omega.ndim != 1 or self.values.shape != expected:
+            raise InputError("receptance values", self.values.shape, f"shape {expected}: frequencies, rows, columns")
+
+    def __getitem__(self, points: tuple[str, str]) -> ComplexArray:
+        """Return the block between two points, shape (n, r, c)."""
+        row_point, col_point = points
+        rows = _at(self.rows, row_point)
+        cols = _at(self.cols, col_point)
+        return self.values[:, rows[:, None], cols[None, :]]
+
+    def between(self, row: str, col: str) -> ComplexArray:
+        """Return one entry, named as ``flange.x``, over frequency, shape (n,)."""
+        try:
+            i = self.rows.index(Coordinate.parse(row))
+            j = self.cols.index(Coordinate.parse(col))
+        except ValueError:
+            known = ", ".join(str(c) for c in (*self.rows, *self.cols))
+            raise InputError("coordinate", f"{row} or {col}", f"one of {known}") from None
+        return self.values[:, i, j]
+
+
+def _at(coordinates: tuple[Coordinate, ...], point: str) -> np.ndarray:
+    found = np.array([i for i, c in enumerate(coordinates) if c.point == point], dtype=int)
+    if found.size == 0:
+        raise InputError("point", point, "one of " + ", ".join(sorted({c.point for c in coordinates})))
+    return found
+
+
+class Substructure(Protocol):
+    """Whatever can stand on one side of a coupling: a tool-holder, a spindle, a tap-tested flange, a robot at a posture."""
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """The points where it can be coupled or looked at."""
+        ...
+
+    def receptance(self, omega: FloatArray) -> Receptance:
+        """Return its receptance between all its coordinates."""
+        ...
+
+
+def dissipation(omega: FloatArray, values: ComplexArray) -> FloatArray:
+    """Return the smallest eigenvalue of the mobility's Hermitian part, relative to the mobility's norm, shape (n,).
+
+    A structure without an inner source of energy has none below zero: the mean power that a harmonic force f feeds
+    in is f^H (Y + Y^H) f / 4 with the mobility Y = i omega H.
+    """
+    mobility = 1j * omega[:, None, None] * values
+    hermitian = 0.5 * (mobility + np.conj(np.swapaxes(mobility, 1, 2)))
+    # translations and slopes have different units: a congruence with the diagonal's size makes the figure unit-free
+    scale = np.sqrt(np.abs(np.einsum("nii->ni", mobility)))
+    scale[scale == 0.0] = 1.0
+    hermitian = hermitian / scale[:, :, None] / scale[:, None, :]
+    return np.linalg.eigvalsh(hermitian)[:, 0]

@@ -1,0 +1,1 @@
+"""Substructure B: what stands behind the flange."""

@@ -1,0 +1,32 @@
+"""A spindle as modes at its flange, one bending plane per machine axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.receptance import Receptance
+
+
+@dataclass(frozen=True, slots=True)
+class Spindle:
+    """Modes of machine and spindle at the flange, in one bending plane.
+
+    Parameters
+    ----------
+    modes : ModalModel
+        Coordinates ``flange`` translation and slope.
+    """
+
+    modes: ModalModel
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """Translation and slope of the flange."""
+        return self.modes.coordinates
+
+    def receptance(self, omega: FloatArray) -> Receptance:
+        """Return B33 of the paper's eq. 13, shape (n, 2, 2)."""
+        return self.modes.receptance(omega)

@@ -1,0 +1,1 @@
+"""From recordings to cross FRFs: windows, lines, estimators, verdicts."""

@@ -1,0 +1,104 @@
+"""A recording: one cut or air cut, every channel in SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from rcsa_ident.dynamics.arrays import FloatArray, frozen
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError, positive
+
+
+class Quantity(StrEnum):
+    """What a channel measures."""
+
+    DISPLACEMENT = "displacement"
+    ACCELERATION = "acceleration"
+    TRIGGER = "trigger"
+    FORCE = "force"
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """A channel and what stands behind it.
+
+    Parameters
+    ----------
+    name : str
+        The channel's name in the recordings.
+    quantity : Quantity
+    axis : Dof or None
+        Machine axis, X or Y, positive as the axis; None for a trigger.
+    sensitivity : float [V/m, V/(m/s^2), V/N]
+        Signal per quantity; 1 where the file is in SI.
+    delay : float [s]
+        The channel lags by it.
+    bandwidth : float or None [Hz]
+        First-order low-pass of the sensor.
+    pulses_per_revolution : int
+        Of a trigger.
+    tooth_angle : float or None [rad]
+        Immersion angle of tooth 1 at the trigger's edge, if known.
+    """
+
+    name: str
+    quantity: Quantity
+    axis: Dof | None = None
+    sensitivity: float = 1.0
+    delay: float = 0.0
+    bandwidth: float | None = None
+    pulses_per_revolution: int = 1
+    tooth_angle: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.quantity is not Quantity.TRIGGER and self.axis not in (Dof.X, Dof.Y):
+            raise InputError(f"sensors.{self.name}.axis", self.axis, "X or Y")
+        if not np.isfinite(self.sensitivity) or self.sensitivity == 0.0:
+            raise InputError(f"sensors.{self.name}.sensitivity", self.sensitivity, "a finite number other than 0")
+        if self.bandwidth is not None:
+            positive(f"sensors.{self.name}.bandwidth_hz", self.bandwidth, "Hz")
+
+    def response(self, omega: FloatArray) -> np.ndarray:
+        """Return the sensor's frequency response: delay and first-order bandwidth, shape (n,) [-]."""
+        value = np.exp(-1j * np.asarray(omega) * self.delay)
+        if self.bandwidth is not None:
+            value = value / (1.0 + 1j * np.asarray(omega) / (2.0 * np.pi * self.bandwidth))
+        return value
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """Samples of all channels.
+
+    Parameters
+    ----------
+    rate : float [Hz]
+    samples : array, shape (n, c) [m, m/s^2, N; a trigger as it is]
+        A sample that was lost is NaN.
+    sensors : tuple of Sensor, length c
+    """
+
+    rate: float
+    samples: FloatArray
+    sensors: tuple[Sensor, ...]
+
+    def __post_init__(self) -> None:
+        positive("sampling_rate_hz", self.rate, "Hz")
+        object.__setattr__(self, "samples", frozen(self.samples))
+        if self.samples.ndim != 2 or self.samples.shape[1] != len(self.sensors):
+            raise InputError("samples", self.samples.shape, f"(samples, {len(self.sensors)} channels)")
+
+    @property
+    def time(self) -> FloatArray:
+        """Time from the first sample, shape (n,) [s]."""
+        return np.arange(self.samples.shape[0]) / self.rate
+
+    def channel(self, quantity: Quantity, axis: Dof | None = None) -> tuple[Sensor, FloatArray] | None:
+        """Return the first channel of this quantity and axis with its samples, or None."""
+        for i, sensor in enumerate(self.sensors):
+            if sensor.quantity is quantity and (axis is None or sensor.axis is axis):
+                return sensor, self.samples[:, i]
+        return None

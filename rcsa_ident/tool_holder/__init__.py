@@ -1,0 +1,1 @@
+"""Substructure A: tool and holder as Timoshenko beams with a distributed contact."""

@@ -1,0 +1,189 @@
+"""Tool and holder: materials, segments, insertion. Geometry only, no matrices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rcsa_ident.errors import InputError, non_negative, positive
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """An isotropic elastic material.
+
+    Parameters
+    ----------
+    youngs_modulus : float [Pa]
+    density : float [kg/m^3]
+    poisson : float [-]
+    loss_factor : float [-]
+        Hysteretic: the modulus is E (1 + i loss_factor).
+    """
+
+    youngs_modulus: float
+    density: float
+    poisson: float
+    loss_factor: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive("youngs_modulus", self.youngs_modulus, "Pa")
+        positive("density", self.density, "kg/m^3")
+        non_negative("loss_factor", self.loss_factor)
+        if not 0.0 <= non_negative("poisson", self.poisson) < 0.5:
+            raise InputError("poisson", self.poisson, "a ratio from 0 to below 0.5")
+
+    @property
+    def shear_modulus(self) -> float:
+        """G = E / (2 (1 + nu)) [Pa]."""
+        return self.youngs_modulus / (2.0 * (1.0 + self.poisson))
+
+
+#: Carbide and steel as the project's nominal toolings use them; a tooling file overrides or adds.
+MATERIALS = {
+    "carbide": Material(600e9, 14400.0, 0.22, 0.003),
+    "steel": Material(205e9, 7850.0, 0.3, 0.003),
+    "aluminium": Material(70e9, 2700.0, 0.33, 0.003),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class BeamSegment:
+    """A cylinder or a cone, solid or hollow.
+
+    Parameters
+    ----------
+    length : float [m]
+    diameter : float [m]
+        Outer diameter at the tip's end.
+    material : Material
+    inner_diameter : float [m], default 0
+    end_diameter : float [m], default `diameter`
+        Outer diameter at the flange's end: a taper.
+    area, second_moment : float or None [m^2], [m^4]
+        Of the true section of a fluted part, where known; they replace the circle's.
+    """
+
+    length: float
+    diameter: float
+    material: Material
+    inner_diameter: float = 0.0
+    end_diameter: float | None = None
+    area: float | None = None
+    second_moment: float | None = None
+
+    def __post_init__(self) -> None:
+        positive("length", self.length, "m")
+        positive("outer_diameter", self.diameter, "m")
+        non_negative("inner_diameter", self.inner_diameter, "m")
+        if self.end_diameter is not None:
+            positive("end_diameter", self.end_diameter, "m")
+        if self.inner_diameter >= min(self.diameter, self.end):
+            smallest = min(self.diameter, self.end)
+            raise InputError("inner_diameter", f"{self.inner_diameter * 1e3:g} mm", f"below the outer, {smallest * 1e3:g} mm")
+        for name in ("area", "second_moment"):
+            if getattr(self, name) is not None:
+                positive(name, getattr(self, name))
+        if (self.area is None) != (self.second_moment is None):
+            raise InputError("area and second_moment", f"{self.area} and {self.second_moment}", "both or neither")
+
+    @property
+    def end(self) -> float:
+        """Outer diameter at the flange's end [m]."""
+        return self.diameter if self.end_diameter is None else self.end_diameter
+
+    def part(self, start: float, end: float) -> BeamSegment:
+        """Return the piece between two distances from the segment's tip end [m]."""
+        slope = (self.end - self.diameter) / self.length
+        first, last = self.diameter + slope * start, self.diameter + slope * end
+        tapered = None if self.end_diameter is None else last
+        return BeamSegment(end - start, first, self.material, self.inner_diameter, tapered, self.area, self.second_moment)
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """Distributed tool-holder joint, per metre of insertion.
+
+    Parameters
+    ----------
+    translational_stiffness : float [N/m^2]
+    rotational_stiffness : float [N]
+        N m/rad per m.
+    translational_damping : float [N s/m^2]
+    rotational_damping : float [N s]
+    """
+
+    translational_stiffness: float
+    rotational_stiffness: float
+    translational_damping: float = 0.0
+    rotational_damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive("translational_stiffness", self.translational_stiffness, "N/m per m")
+        for name in ("rotational_stiffness", "translational_damping", "rotational_damping"):
+            non_negative(name, getattr(self, name))
+
+
+@dataclass(frozen=True, slots=True)
+class ToolAssembly:
+    """A tool clamped in a holder; all segments run from the tip's end to the flange.
+
+    Parameters
+    ----------
+    tool : tuple of BeamSegment
+        The tool's length in use: stickout + insertion (see `clamped`).
+    holder : tuple of BeamSegment
+    insertion : float [m]
+        Length of tool inside the holder's bore; 0 is a butt joint.
+    contact : Contact or None
+        None is a rigid connection over the insertion.
+    """
+
+    tool: tuple[BeamSegment, ...]
+    holder: tuple[BeamSegment, ...]
+    insertion: float
+    contact: Contact | None = None
+
+    def __post_init__(self) -> None:
+        if not self.tool:
+            raise InputError("tool segments", "none", "at least one segment")
+        insertion = non_negative("insertion", self.insertion, "m")
+        tool, holder = self.tool_length, self.holder_length
+        if insertion >= tool:
+            raise InputError("insertion", f"{insertion * 1e3:g} mm", f"less than the tool's length, {tool * 1e3:g} mm")
+        if insertion > holder + 1e-12:
+            raise InputError("insertion", f"{insertion * 1e3:g} mm", f"at most the holder's length, {holder * 1e3:g} mm")
+
+    @property
+    def tool_length(self) -> float:
+        """Stickout + insertion [m]."""
+        return sum(s.length for s in self.tool)
+
+    @property
+    def holder_length(self) -> float:
+        """From the holder's nose to the flange face [m]."""
+        return sum(s.length for s in self.holder)
+
+    @property
+    def stickout(self) -> float:
+        """Length of tool in front of the holder [m]."""
+        return self.tool_length - self.insertion
+
+
+def clamped(
+    tool: tuple[BeamSegment, ...], holder: tuple[BeamSegment, ...], stickout: float, insertion: float, contact: Contact | None
+) -> ToolAssembly:
+    """Return the assembly with the tool cut to stickout + insertion; a tool that is too short is an error."""
+    wanted = positive("stickout", stickout, "m") + non_negative("insertion", insertion, "m")
+    length = sum(s.length for s in tool)
+    if wanted > length + 1e-9:
+        raise InputError(
+            "stickout + insertion", f"{wanted * 1e3:g} mm", f"at most the tool's length, {length * 1e3:g} mm (the sum of its segments)"
+        )
+    used: list[BeamSegment] = []
+    left = wanted
+    for segment in tool:
+        if left <= 1e-9:
+            break
+        used.append(segment if segment.length <= left + 1e-9 else segment.part(0.0, left))
+        left -= segment.length
+    return ToolAssembly(tuple(used), holder, insertion, contact)
