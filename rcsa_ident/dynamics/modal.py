@@ -119,7 +119,9 @@ def normal_modes(
     return ModalModel(omega_n, zeta, phi, np.zeros((d, d)) if residual is None else residual, coordinates)
 
 
-def damped_modes(omega_n: FloatArray, damping: FloatArray, psi: FloatArray, residual: FloatArray, coordinates: tuple[Coordinate, ...]) -> ModalModel:
+def damped_modes(
+    omega_n: FloatArray, damping: FloatArray, psi: FloatArray, residual: FloatArray, coordinates: tuple[Coordinate, ...]
+) -> ModalModel:
     """Return the complex modes of real modes coupled by a full damping matrix.
 
     Solves q'' + D q' + diag(omega_n^2) q = psi f, w = psi^T q, exactly; a real pole becomes a mode with zeta = 1 and

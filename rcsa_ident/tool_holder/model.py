@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,20 +11,30 @@ from rcsa_ident.dynamics.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.structure import Structure, poles
-from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
-from rcsa_ident.tool_holder.timoshenko import Section, ShearCoefficient, beam_matrices, cowper, layer_matrices, section
+from rcsa_ident.tool_holder.geometry import BeamSegment, Contact, ToolAssembly
+from rcsa_ident.tool_holder.timoshenko import (
+    Section,
+    ShearCoefficient,
+    cowper,
+    section,
+    refined_beam_matrices,
+    refined_layer_matrices,
+    stacked,
+    together,
+)
 
-#: Elements per bending wavelength at the highest frequency, and per diameter: in slender parts the error of a natural
-#: frequency falls with the fourth power of the element's length, in stubby ones (shear) with the second.
-ELEMENTS_PER_WAVELENGTH = 40.0
-ELEMENTS_PER_DIAMETER = 6.0
+#: Elements per bending wavelength at the highest frequency, and per diameter; the error falls with their fourth power,
+#: on a taper (a stair of mean sections) with the second.
+ELEMENTS_PER_WAVELENGTH = 20.0
+ELEMENTS_PER_DIAMETER = 2.5
+ELEMENTS_PER_TAPER = 16
 
 
 @dataclass(frozen=True, slots=True)
 class _Element:
     body: int
-    start: float
-    length: float
+    first: int
+    """Station at its start; it ends at the next one."""
     section: Section
 
 
@@ -47,49 +58,30 @@ def tool_holder_structure(
 
     Notes
     -----
-    Nodes stand at every step of either body, so that the contact is integrated over elements that match.
+    Stations stand at every step of either body, and both bodies have nodes at all of them over the insertion, so that
+    the contact is integrated over elements that match. A rigid connection makes one beam of the two there.
     """
-    origin = assembly.stickout
-    tool = _cuts(assembly.tool, 0.0)
-    holder = _cuts(assembly.holder, origin)
-    ends = (tool[-1][1] if tool else 0.0, holder[-1][1] if holder else 0.0)
-    steps = sorted({round(z, 12) for first, last, _ in (*tool, *holder) for z in (first, last)})
-    rigid = assembly.contact is None
-    elements: list[_Element] = []
-    for body, pieces in enumerate((tool, holder)):
-        for first, last, segment in pieces:
-            inside = [z for z in steps if first + 1e-9 < z < last - 1e-9]
-            edges = [first, *inside, last]
-            for a, b in zip(edges[:-1], edges[1:], strict=True):
-                elements += _divide(body, a, b, segment.part(a - first, b - first), max_frequency, shear_coefficient, refinement)
-    elements = _match(elements, assembly, shear_coefficient)
-    nodes = _number_nodes(elements, rigid, origin)
-    d = 2 * (max(nodes.values()) + 1)
+    layered = assembly.contact is not None and assembly.insertion > 0.0
+    stations, elements = _mesh(assembly, max_frequency, shear_coefficient, refinement, merged=not layered)
+    length = np.diff(stations)
+    first_freedom, d = _number(elements, stations.size, layered)
     mass, damping, stiffness, loss = (np.zeros((d, d)) for _ in range(4))
-    for e in elements:
-        freedoms = _freedoms(nodes, e)
-        m, k = beam_matrices(e.section, e.length)
-        mass[np.ix_(freedoms, freedoms)] += m
-        stiffness[np.ix_(freedoms, freedoms)] += k
-        loss[np.ix_(freedoms, freedoms)] += k * e.section.loss_factor
-    if assembly.contact is not None:
-        contact = assembly.contact
-        holders = {_key(e.start): e for e in elements if e.body == 1}
-        for e in elements:
-            if e.body == 0 and e.start > origin - 1e-9:
-                other = holders[_key(e.start)]
-                freedoms = np.concatenate([_freedoms(nodes, e), _freedoms(nodes, other)])
-                gap, turn = layer_matrices(e.section, other.section, e.length)
-                stiffness[np.ix_(freedoms, freedoms)] += contact.translational_stiffness * gap + contact.rotational_stiffness * turn
-                damping[np.ix_(freedoms, freedoms)] += contact.translational_damping * gap + contact.rotational_damping * turn
-    tip = 2 * nodes[0, _key(0.0)]
-    flange = 2 * nodes[(1, _key(ends[1])) if holder else (0, _key(ends[0]))]
-    return Structure(
-        mass, damping, stiffness, loss, (*plane("tip", axis), *plane("flange", axis)), np.array([tip, tip + 1, flange, flange + 1])
-    )
+    freedoms = np.array([_freedoms(first_freedom, e) for e in elements])
+    sections = stacked([e.section for e in elements])
+    matrices = refined_beam_matrices(sections, length[[e.first for e in elements]])
+    for total, each in zip((mass, stiffness, loss), matrices, strict=True):
+        _add(total, freedoms, each)
+    if layered:
+        assert assembly.contact is not None
+        _tie(elements, freedoms, length, assembly.contact, stiffness, damping)
+    tip, flange = (first_freedom[_node(e.body, e.first + end)] for e, end in ((elements[0], 0), (elements[-1], 1)))
+    index = np.array([tip, tip + 1, flange, flange + 1])
+    return Structure(mass, damping, stiffness, loss, (*plane("tip", axis), *plane("flange", axis)), index)
 
 
-def tool_holder_receptance(assembly: ToolAssembly, omega: FloatArray, axis: Dof = Dof.X, shear_coefficient: ShearCoefficient = cowper) -> Receptance:
+def tool_holder_receptance(
+    assembly: ToolAssembly, omega: FloatArray, axis: Dof = Dof.X, shear_coefficient: ShearCoefficient = cowper
+) -> Receptance:
     """Return the free-free receptances between tip and flange, shape (n, 4, 4), with mesh and modes chosen for `omega`."""
     omega = np.asarray(omega, dtype=float)
     highest = float(omega.max())
@@ -107,67 +99,93 @@ def mesh_error(assembly: ToolAssembly, omega: FloatArray, shear_coefficient: She
     return float(np.max(np.linalg.norm(coarse - fine, axis=0) / np.linalg.norm(fine, axis=0)))
 
 
-def _cuts(segments: tuple[BeamSegment, ...], origin: float) -> list[tuple[float, float, BeamSegment]]:
-    pieces, z = [], origin
-    for segment in segments:
-        pieces.append((z, z + segment.length, segment))
-        z += segment.length
+def _mesh(
+    assembly: ToolAssembly, max_frequency: float, shear_coefficient: ShearCoefficient, refinement: int, merged: bool
+) -> tuple[FloatArray, list[_Element]]:
+    """Stations along z and the elements between them, from the tip to the flange."""
+    pieces = _pieces(assembly)
+    steps = sorted({_key(z) for _, first, last, _ in pieces for z in (first, last)})
+    stations, elements = [0.0], []
+    for a, b in ((a * 1e-9, b * 1e-9) for a, b in pairwise(steps)):
+        middle = 0.5 * (a + b)
+        here = [(body, first, segment) for body, first, last, segment in pieces if first < middle < last]
+        count = max(_division(segment, b - a, max_frequency, shear_coefficient) for _, _, segment in here) * refinement
+        edges = np.linspace(a, b, count + 1)
+        tapered = any(segment.end_diameter is not None for _, _, segment in here)
+        for i, (start, end) in enumerate(pairwise(edges)):
+            if i == 0 or tapered:
+                parts = [(body, section(segment.part(start - first, end - first), shear_coefficient)) for body, first, segment in here]
+                if merged:
+                    parts = [(parts[0][0], together([each for _, each in parts]))]
+            elements += [_Element(body, len(stations) - 1 + i, each) for body, each in parts]
+        stations += edges[1:].tolist()
+    return np.array(stations), elements
+
+
+def _pieces(assembly: ToolAssembly) -> list[tuple[int, float, float, BeamSegment]]:
+    """Body (0 tool, 1 holder), start, end and segment of all stretches."""
+    pieces = []
+    for body, segments, start in ((0, assembly.tool, 0.0), (1, assembly.holder, assembly.stickout)):
+        z = start
+        for segment in segments:
+            pieces.append((body, z, z + segment.length, segment))
+            z += segment.length
     return pieces
 
 
-def _divide(body, first, last, segment, max_frequency, shear_coefficient, refinement):  # type: ignore[no-untyped-def]
-    """Elements of one uniform or tapered stretch, short against the bending wavelength of its thinnest end."""
+def _division(segment: BeamSegment, length: float, max_frequency: float, shear_coefficient: ShearCoefficient) -> int:
+    """Elements of a stretch, short against the bending wavelength and the diameter."""
     beam = section(segment, shear_coefficient)
-    wavelength = 2.0 * np.pi * (beam.bending / beam.mass) ** 0.25 / np.sqrt(2.0 * np.pi * max(max_frequency, 1.0))
+    wavelength = 2.0 * np.pi * float((beam.bending / beam.mass) ** 0.25) / np.sqrt(2.0 * np.pi * max(max_frequency, 1.0))
     density = max(ELEMENTS_PER_WAVELENGTH / wavelength, ELEMENTS_PER_DIAMETER / max(segment.diameter, segment.end))
-    count = int(np.ceil(segment.length * density))
-    if segment.end_diameter is not None:
-        # a taper is a stair of mean sections: its error falls with the square of the step
-        count = max(count, 12)
-    count = max(count, 2) * refinement
-    edges = np.linspace(0.0, segment.length, count + 1)
-    return [
-        _Element(body, first + a, b - a, section(segment.part(a, b), shear_coefficient)) for a, b in zip(edges[:-1], edges[1:], strict=True)
-    ]
-
-
-def _match(elements: list[_Element], assembly: ToolAssembly, shear_coefficient: ShearCoefficient) -> list[_Element]:
-    """Give both bodies the same nodes over the insertion: the finer division of the two counts."""
-    start, end = assembly.stickout, assembly.tool_length
-    if assembly.insertion <= 0.0:
-        return elements
-    shared = sorted({_key(z) for e in elements for z in (e.start, e.start + e.length) if start - 1e-9 < z < end + 1e-9})
-    matched: list[_Element] = []
-    for e in elements:
-        cuts = [z * 1e-9 for z in shared if e.start + 1e-9 < z * 1e-9 < e.start + e.length - 1e-9]
-        edges = [e.start, *cuts, e.start + e.length]
-        matched += [_Element(e.body, a, b - a, e.section) for a, b in zip(edges[:-1], edges[1:], strict=True)]
-    return matched
+    least = 2 if segment.end_diameter is None else ELEMENTS_PER_TAPER
+    return max(int(np.ceil(length * density)), least)
 
 
 def _key(z: float) -> int:
-    """Nodes are told apart to a nanometre."""
+    """Steps are told apart to a nanometre."""
     return round(z * 1e9)
 
 
-def _number_nodes(elements: list[_Element], rigid: bool, origin: float) -> dict[tuple[int, int], int]:
-    """Number the nodes by position, so that the matrices are banded; a rigid contact shares them over the insertion."""
-    keys = sorted({(_key(z), e.body) for e in elements for z in (e.start, e.start + e.length)})
-    # where there is no layer between the bodies (rigid, or a butt joint), a tool node is the holder's node
-    holders = {z for z, body in keys if body == 1}
-    deepest = max((z for z, body in keys if body == 0), default=0)
-    nodes: dict[tuple[int, int], int] = {}
+def _node(body: int, station: int) -> tuple[int, int]:
+    return station, body
+
+
+def _number(elements: list[_Element], stations: int, layered: bool) -> tuple[dict[tuple[int, int], int], int]:
+    """First freedom of each node, and of each element's inside (keyed by station and body + 2), by position: the matrices are banded."""
+    slots = {(e.first, e.body + 2) for e in elements}
+    slots |= {_node(e.body, e.first + end) for e in elements for end in (0, 1)}
+    numbers: dict[tuple[int, int], int] = {}
     number = 0
-    butt = deepest <= _key(origin)
-    for z, body in keys:
-        if body == 1 and (rigid or butt) and (0, z) in nodes and z in holders:
-            nodes[1, z] = nodes[0, z]
+    for station, kind in sorted(slots):
+        # without a layer between the bodies the tool's last node is the holder's
+        if kind == 1 and not layered and (station, 0) in numbers:
+            numbers[station, 1] = numbers[station, 0]
             continue
-        nodes[body, z] = number
-        number += 1
-    return nodes
+        numbers[station, kind] = number
+        number += 2
+    return numbers, number
 
 
-def _freedoms(nodes: dict[tuple[int, int], int], e: _Element) -> np.ndarray:
-    first, last = nodes[e.body, _key(e.start)], nodes[e.body, _key(e.start + e.length)]
-    return np.array([2 * first, 2 * first + 1, 2 * last, 2 * last + 1])
+def _freedoms(numbers: dict[tuple[int, int], int], e: _Element) -> list[int]:
+    first, last = numbers[_node(e.body, e.first)], numbers[_node(e.body, e.first + 1)]
+    inside = numbers[e.first, e.body + 2]
+    return [first, first + 1, last, last + 1, inside, inside + 1]
+
+
+def _add(total: FloatArray, freedoms: np.ndarray, each: FloatArray) -> None:
+    """Add the elements' matrices, shape (m, q, q), at their freedoms, shape (m, q)."""
+    np.add.at(total, (freedoms[:, :, None], freedoms[:, None, :]), each)
+
+
+def _tie(
+    elements: list[_Element], freedoms: np.ndarray, length: FloatArray, contact: Contact, stiffness: FloatArray, damping: FloatArray
+) -> None:
+    """Add the distributed contact between the elements of both bodies that lie side by side."""
+    holders = {e.first: i for i, e in enumerate(elements) if e.body == 1}
+    pairs = [(i, holders[e.first]) for i, e in enumerate(elements) if e.body == 0 and e.first in holders]
+    tools, bores = (stacked([elements[pair[side]].section for pair in pairs]) for side in (0, 1))
+    both = np.array([[*freedoms[i], *freedoms[j]] for i, j in pairs])
+    gap, turn = refined_layer_matrices(tools, bores, length[[elements[i].first for i, _ in pairs]])
+    _add(stiffness, both, contact.translational_stiffness * gap + contact.rotational_stiffness * turn)
+    _add(damping, both, contact.translational_damping * gap + contact.rotational_damping * turn)

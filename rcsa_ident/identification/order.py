@@ -1,0 +1,104 @@
+"""How many modes: as many as the data pay for, by Laplace's approximation of the evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.identification.misfit import Misfit
+from rcsa_ident.identification.parameters import pack, split, unpack, without_mode
+from rcsa_ident.identification.polish import Solution, polish
+from rcsa_ident.identification.priors import log_volume
+
+#: The walk stops where the evidence lies this far behind the best seen: nothing below comes back from there.
+GIVE_UP = 60.0
+
+
+def evidence(solution: Solution, misfit: Misfit) -> float:
+    """Return minus twice the log evidence, up to a constant of the data: less is better.
+
+    cost + log det(posterior information) - log det(prior information); a mode that the data do not need costs the second
+    term, one that they need costs the first.
+    """
+    assert solution.evaluation.hessian is not None
+    sign, volume = np.linalg.slogdet(solution.evaluation.hessian)
+    if sign <= 0.0:
+        return np.inf
+    return float(solution.cost + volume - log_volume(solution.orders, misfit.priors))
+
+
+def drop_modes(solution: Solution, misfit: Misfit, report: Callable[[str, float], None] | None = None, smallest: int = 2) -> Solution:
+    """Return the best of the models with ever fewer modes, for one axis.
+
+    Every mode in turn is left out for a few steps; the two best omissions are polished and the better one is kept, until the
+    evidence has clearly turned.
+
+    Parameters
+    ----------
+    solution : Solution
+        Of one axis, polished.
+    smallest : int
+        Fewest modes tried.
+    """
+    best, best_evidence = solution, evidence(solution, misfit)
+    here = solution
+    while here.orders[0] > smallest:
+        (part,), joint = split(here.theta, here.orders)
+        m = here.orders[0]
+        axis = unpack(part, m)
+        trials = []
+        for mode in range(m):
+            theta = np.concatenate([pack(without_mode(axis, mode)), joint])
+            trials.append(polish(misfit, theta, (m - 1,), here.evaluation.nuisance, max_steps=5))
+        trials.sort(key=lambda s: s.cost)
+        polished = [polish(misfit, t.theta, t.orders, t.evaluation.nuisance, max_steps=60) for t in trials[:2]]
+        here = min(polished, key=lambda s: s.cost)
+        value = evidence(here, misfit)
+        if report is not None:
+            report(f"{m - 1} modes", value)
+        if value < best_evidence:
+            best, best_evidence = here, value
+        elif value > best_evidence + GIVE_UP:
+            break
+    return best
+
+
+def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> float:
+    """Return the share of each line that the residuals show to be unexplained, beyond the records' noise.
+
+    The share f solves sum |rest|^2 / (variance + f^2 |h|^2 / 2) = degrees of freedom, the data's less those that parameters
+    and cuts have used.
+
+    Parameters
+    ----------
+    smallest : float
+        Floor: no simulated force is better than that.
+    """
+    assert solution.evaluation.hessian is not None
+    prior = np.exp(log_volume(solution.orders, misfit.priors) / solution.theta.size)
+    spectrum = np.linalg.eigvalsh(solution.evaluation.hessian / prior)
+    used = float(np.sum(1.0 - 1.0 / np.maximum(spectrum, 1.0))) + 2.0 * len(misfit.data.cut_ids)
+    freedom = max(misfit.points - used, 0.1 * misfit.points)
+    squares, noise, size = _squares(solution, misfit)
+    low, high = smallest, 1.0
+    if np.sum(squares / (noise + 0.5 * low**2 * size)) <= freedom:
+        return smallest
+    for _ in range(60):
+        middle = float(np.sqrt(low * high))
+        if np.sum(squares / (noise + 0.5 * middle**2 * size)) > freedom:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def _squares(solution: Solution, misfit: Misfit) -> tuple[FloatArray, FloatArray, FloatArray]:
+    squares, noise, size = [], [], []
+    for axis, model, weight in zip(misfit.data.axes, solution.evaluation.models, misfit.weight, strict=True):
+        rest = misfit._rest(axis, model, weight, solution.evaluation.nuisance)
+        squares.append(np.abs(rest) ** 2 / weight)
+        noise.append(axis.variance)
+        size.append(np.abs(axis.measured) ** 2)
+    return np.concatenate(squares), np.concatenate(noise), np.concatenate(size)

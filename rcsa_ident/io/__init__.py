@@ -1,0 +1,1 @@
+"""Files in and out: millimetres, rev/min and GPa live here, SI everywhere inside."""

@@ -1,0 +1,61 @@
+"""Files as a whole: what a reader may open, and writing that leaves the old file or the new one, never half of either."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rcsa_ident.errors import InputError
+
+MEGABYTE = 1_000_000
+
+
+def existing_file(path: str | Path, field: str, largest: int) -> Path:
+    """Return `path` if it is a regular file of at most `largest` bytes, else raise `InputError`."""
+    path = Path(path)
+    try:
+        found = "a folder" if path.is_dir() else None if path.is_file() else "no such file"
+        size = path.stat().st_size if found is None else 0
+    except (OSError, ValueError):
+        found, size = "a path that cannot be opened", 0
+    if found is not None:
+        raise InputError(field, found, "an existing file", str(path))
+    if size > largest:
+        raise InputError(field, f"{size / MEGABYTE:.0f} MB", f"at most {largest / MEGABYTE:.0f} MB", str(path))
+    if size == 0:
+        raise InputError(field, "an empty file", "a file with content", str(path))
+    return path
+
+
+def read_bytes(path: str | Path, field: str, largest: int) -> bytes:
+    """Return the file's bytes; a file that is missing, empty, too large or not readable raises `InputError`."""
+    path = existing_file(path, field, largest)
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(field, error.strerror or "an error on reading", "a file that can be read", str(path)) from None
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary path beside `path`; at the end it takes the place of `path`, after an error it is gone."""
+    path = Path(path)
+    part = path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
+    try:
+        yield part
+        with part.open("rb+") as written:
+            os.fsync(written.fileno())
+        os.replace(part, path)
+    except OSError as error:
+        raise InputError("output file", error.strerror or str(error), "a place that can be written to", str(path)) from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write UTF-8 text with newlines as they are, all or nothing."""
+    with replacing(path) as part:
+        part.write_bytes(text.encode("utf-8"))

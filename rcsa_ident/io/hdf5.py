@@ -1,0 +1,210 @@
+"""HDF5 recordings: one dataset a channel on the root; nothing in the file may point outside of it.
+
+An HDF5 file can link to other files, keep its samples in any file of the machine, or declare terabytes in a few
+kilobytes. All that is looked at before a sample is read.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.errors import InputError, positive
+from rcsa_ident.io.files import MEGABYTE, existing_file, replacing
+from rcsa_ident.io.keys import listed
+
+RATE = "sampling_rate_hz"
+#: Of the file on disk, and of the channels as they are declared.
+LARGEST_FILE = 2048 * MEGABYTE
+LARGEST_DATA = 512 * MEGABYTE
+#: Declared bytes per byte on disk, over all channels that are read: measured signals hardly shrink at all.
+LARGEST_RATIO = 200
+LARGEST_CHUNK = 8 * MEGABYTE
+MOST_CHUNKS = 100_000
+MOST_OBJECTS = 10_000
+FILTERS = {
+    h5py.h5z.FILTER_DEFLATE: "deflate",
+    h5py.h5z.FILTER_SHUFFLE: "shuffle",
+    h5py.h5z.FILTER_FLETCHER32: "fletcher32",
+    h5py.h5z.FILTER_LZF: "lzf",
+}
+_LINKS = {h5py.h5l.TYPE_SOFT: "a soft link", h5py.h5l.TYPE_EXTERNAL: "a link to another file"}
+
+
+def write_hdf5(path: str | Path, rate: float, channels: Mapping[str, ArrayLike]) -> None:
+    """Write channels as float32, contiguous, with the sampling rate on the root.
+
+    Parameters
+    ----------
+    rate : float [Hz]
+    channels : mapping of name to array, shape (n,)
+        In the units of the file: signal, not yet divided by a sensitivity. A lost sample is NaN.
+    """
+    positive(RATE, rate, "Hz")
+    arrays = {name: np.asarray(values, dtype=np.float32) for name, values in channels.items()}
+    shapes = {a.shape for a in arrays.values()}
+    if len(shapes) != 1 or any(len(s) != 1 or s[0] == 0 for s in shapes):
+        raise InputError("channels", ", ".join(map(str, shapes)) or "none", "one or more 1-D arrays of one length", str(path))
+    for name in arrays:
+        if not name or "/" in name or name == ".":
+            raise InputError("channel", name, "a name without '/'", str(path))
+    with replacing(path) as part, h5py.File(part, "w") as file:
+        file.attrs[RATE] = float(rate)
+        for name, values in arrays.items():
+            # times of writing would make equal recordings differ
+            file.create_dataset(name, data=values, track_times=False)
+
+
+def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[FloatArray]]:
+    """Return the sampling rate [Hz] and the named channels as they stand in the file, shape (n,) each."""
+    where = str(path)
+    size = existing_file(path, "recording", LARGEST_FILE).stat().st_size
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            present = _hard_links(file, where)
+            datasets = [_dataset(file, name, present, where) for name in names]
+            _check_size(datasets, names, size, where)
+            rate = _rate(file, datasets, names, default_rate, where)
+            return rate, [dataset[()] for dataset in datasets]
+    except InputError:
+        raise
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, zlib.error) as error:
+        raise InputError("recording", _cause(error), "a complete HDF5 file", where) from None
+
+
+def _cause(error: Exception) -> str:
+    """The library's own reason stands in parentheses behind what it was about to do."""
+    text = str(error.args[0]) if error.args else type(error).__name__
+    inner = text[text.find("(") + 1 : text.rfind(")")] if "(" in text and ")" in text else text
+    return f"one that cannot be read ({' '.join(inner.split())[:90]})"
+
+
+def _hard_links(file: h5py.File, where: str) -> list[str]:
+    """Names on the root; a link that is not to an object of this very file is refused, read or not."""
+    links = file.id.links
+    if len(file.id) > MOST_OBJECTS:
+        raise InputError("recording", f"{len(file.id)} objects", f"at most {MOST_OBJECTS} objects on the root", where)
+    names = []
+    for raw in file.id:
+        kind = links.get_info(raw).type
+        name = listed([raw.decode("utf-8", "replace")])
+        if kind != h5py.h5l.TYPE_HARD:
+            raise InputError(f"channel {name}", _LINKS.get(kind, "a user-defined link"), "a dataset in the file itself", where)
+        names.append(name)
+    return names
+
+
+def _dataset(file: h5py.File, name: str, present: list[str], where: str) -> h5py.Dataset:
+    """The dataset of one channel, of which nothing but the description has been read."""
+    field = f"channel {name}"
+    if name not in present:
+        raise InputError(field, "no such channel", f"a channel of the file: {listed(present) or 'it has none'}", where)
+    dataset = file[name]
+    if not isinstance(dataset, h5py.Dataset):
+        raise InputError(field, f"a {type(dataset).__name__.lower()}", "a dataset", where)
+    plist = dataset.id.get_create_plist()
+    if plist.get_layout() == h5py.h5d.VIRTUAL:
+        raise InputError(field, "a virtual dataset", "samples in the file itself", where)
+    if plist.get_external_count() > 0:
+        raise InputError(field, "samples in an external file", "samples in the file itself", where)
+    if dataset.shape is None or len(dataset.shape) != 1 or dataset.shape[0] == 0:
+        raise InputError(field, f"shape {dataset.shape}", "a 1-D dataset with at least one sample", where)
+    if dataset.dtype.kind not in "biuf":
+        raise InputError(field, f"values of type {dataset.dtype}", "real numbers", where)
+    filters = [plist.get_filter(i)[0] for i in range(plist.get_nfilters())]
+    unknown = [f for f in filters if f not in FILTERS]
+    if unknown or len(set(filters)) < len(filters):
+        found = f"filter number {unknown[0]}" if unknown else "a filter applied twice"
+        raise InputError(field, found, "none of or each once: " + ", ".join(FILTERS.values()), where)
+    if dataset.chunks is not None and (size := math.prod(dataset.chunks) * dataset.dtype.itemsize) > LARGEST_CHUNK:
+        raise InputError(field, f"chunks of {size / MEGABYTE:.0f} MB", f"chunks of at most {LARGEST_CHUNK / MEGABYTE:.0f} MB", where)
+    return dataset
+
+
+def _check_size(datasets: list[h5py.Dataset], names: Sequence[str], size: int, where: str) -> None:
+    """Lengths agree, and what is declared is plausible for a file of `size` bytes and was really written."""
+    lengths = {d.shape[0] for d in datasets}
+    declared = sum(d.shape[0] * max(d.dtype.itemsize, 8) for d in datasets)
+    if declared > LARGEST_DATA:
+        raise InputError(
+            "recording", f"{declared / MEGABYTE:.3g} MB of declared samples", f"at most {LARGEST_DATA / MEGABYTE:.0f} MB", where
+        )
+    if declared > LARGEST_RATIO * size:
+        found = f"{declared} bytes declared in a file of {size} bytes"
+        raise InputError("recording", found, f"at most {LARGEST_RATIO} times the file's size", where)
+    if len(lengths) > 1:
+        found = ", ".join(f"{n}: {d.shape[0]}" for n, d in zip(names, datasets, strict=True))
+        raise InputError("channels", f"different lengths ({found})", "channels of one length", where)
+    for name, dataset in zip(names, datasets, strict=True):
+        if dataset.chunks is None:
+            written = dataset.id.get_storage_size() > 0
+        else:
+            chunks = -(-dataset.shape[0] // dataset.chunks[0])
+            if chunks > MOST_CHUNKS:
+                raise InputError(f"channel {name}", f"{chunks} chunks", f"at most {MOST_CHUNKS} chunks", where)
+            written = dataset.id.get_num_chunks() >= chunks
+        if not written:
+            raise InputError(f"channel {name}", "samples that were never written", "a complete channel", where)
+        _check_chunks(dataset, f"channel {name}", where)
+
+
+def _check_chunks(dataset: h5py.Dataset, field: str, where: str) -> None:
+    """No chunk holds more than it declares: the library would inflate whatever is there."""
+    if dataset.chunks is None:
+        return
+    plist = dataset.id.get_create_plist()
+    filters = [plist.get_filter(i)[0] for i in range(plist.get_nfilters())]
+    declared = dataset.chunks[0] * dataset.dtype.itemsize
+    # filters may add a little of their own to what cannot be compressed
+    largest = declared + declared // 4 + 1024
+    stored: list[tuple[tuple[int, ...], int]] = []
+    dataset.id.chunk_iter(lambda info: stored.append((info.chunk_offset, info.size)))
+    if any(size > largest for _, size in stored):
+        raise InputError(field, "a chunk larger than declared", f"chunks of {declared} bytes", where)
+    if h5py.h5z.FILTER_DEFLATE not in filters:
+        return
+    place = filters.index(h5py.h5z.FILTER_DEFLATE)
+    if any(f != h5py.h5z.FILTER_FLETCHER32 for f in filters[place + 1 :]):
+        raise InputError(field, "a filter after deflate", "deflate as the last, or with fletcher32 after it", where)
+    for offset, _ in stored:
+        mask, raw = dataset.id.read_direct_chunk(offset)
+        if not mask >> place & 1 and len(zlib.decompressobj().decompress(raw, largest + 1)) > largest:
+            raise InputError(field, "a chunk that inflates to more than declared", f"chunks of {declared} bytes", where)
+
+
+def _rate(file: h5py.File, datasets: list[h5py.Dataset], names: Sequence[str], default: float | None, where: str) -> float:
+    """A dataset's own attribute, else the root's, else the campaign's; all channels agree."""
+    root = _attribute(file, "the file", where)
+    rates = {}
+    for name, dataset in zip(names, datasets, strict=True):
+        own = _attribute(dataset, f"channel {name}", where)
+        rate = own if own is not None else root if root is not None else default
+        if rate is None:
+            raise InputError(RATE, "nothing", "an attribute of the file, or the campaign's rate [Hz]", where)
+        rates[name] = rate
+    if len(set(rates.values())) > 1:
+        found = ", ".join(f"{n}: {r:g}" for n, r in rates.items())
+        raise InputError(RATE, f"different rates ({found})", "one rate for all channels [Hz]", where)
+    return positive(RATE, next(iter(rates.values())), "Hz")
+
+
+def _attribute(item: h5py.File | h5py.Dataset, of: str, where: str) -> float | None:
+    # a missing attribute is the usual case for datasets, and asking costs less than an exception
+    if not h5py.h5a.exists(item.id, RATE.encode()):
+        return None
+    described = h5py.h5a.open(item.id, RATE.encode())
+    if described.dtype.kind not in "iuf" or math.prod(described.shape) != 1:
+        found = "a text" if described.dtype.kind in "OSU" else f"{described.dtype} of shape {described.shape}"
+        raise InputError(f"{RATE} of {of}", found, "one number [Hz]", where)
+    value = float(np.ravel(item.attrs[RATE])[0])
+    try:
+        return positive(f"{RATE} of {of}", value, "Hz")
+    except InputError as error:
+        raise error.at(where) from None

@@ -1,0 +1,185 @@
+"""MACHINE.toml: a virtual machine, its sensors and the cuts that it shall make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.io.keys import Table, as_number, describe
+from rcsa_ident.io.setups import _RPM, _WORKPIECE, _feed_angle, _workpiece, beam_segments, material_library, read_toml
+from rcsa_ident.machining_setup import Workpiece
+from rcsa_ident.virtual.machine import Bearing, CutPlan, FlangeJoint, Housing, PerAxis, VirtualSpindle
+from rcsa_ident.virtual.sensors import SensorSuite
+
+_TOP = ("machine", "shaft", "materials", "bearings", "housing", "joint", "sensors", "workpiece", "cuts")
+_BEARING = ("position_mm", "stiffness", "damping", "softening_per_rpm")
+_HOUSING = ("position_mm", "mass", "inertia", "stiffness", "damping", "tilting_stiffness", "tilting_damping")
+_JOINT = ("translational_stiffness", "translational_damping", "rotational_stiffness", "rotational_damping")
+_SENSORS = (
+    "sampling_rate_hz", "fixture_position_mm", "flange_sensitivity", "flange_noise_nm", "flange_drift_um", "flange_delay_s",
+    "flange_bandwidth_hz", "fixture_sensitivity", "fixture_noise", "fixture_delay_s", "fixture_bandwidth_hz", "roundness_um",
+    "roundness_orders", "cutter_runout_um", "speed_error_percent", "trigger", "tooth_angle_deg",
+)  # fmt: skip
+_CUTS = (
+    "toolings", "truth_toolings", "spindle_speeds_rpm", "axial_depth_mm", "feed_per_tooth_mm", "entry_angle_deg", "exit_angle_deg",
+    "feed_direction", "duration_s", "settling_s",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MachineFile:
+    """What a machine file says.
+
+    Parameters
+    ----------
+    name : str
+    spindle : VirtualSpindle
+    sensors : SensorSuite
+    workpiece : Workpiece
+    plan : CutPlan
+    toolings : tuple of Path
+        Tooling files of the cuts.
+    truth_toolings : tuple of Path
+        Toolings that never cut, whose receptances are wanted.
+    """
+
+    name: str
+    spindle: VirtualSpindle
+    sensors: SensorSuite
+    workpiece: Workpiece
+    plan: CutPlan
+    toolings: tuple[Path, ...]
+    truth_toolings: tuple[Path, ...] = ()
+
+
+def read_machine(path: str | Path) -> MachineFile:
+    """Return what a machine file says; paths of toolings are relative to it.
+
+    Raises
+    ------
+    InputError
+        Names the file, the key, what was found and what is allowed.
+    """
+    path = Path(path)
+    top = Table(read_toml(path, "machine"), str(path), known=_TOP)
+    head = top.table("machine", ("name", "gyroscopic"), {})
+    sensors = top.table("sensors", _SENSORS, {})
+    cuts = top.table("cuts", _CUTS)
+    with top.naming({}):
+        spindle = VirtualSpindle(
+            shaft=beam_segments(top.table("shaft", ("segments",)), material_library(top)),
+            bearings=tuple(_bearing(table) for table in top.tables("bearings", _BEARING)),
+            housing=_housing(top.table("housing", _HOUSING)),
+            joint=_joint(top.table("joint", _JOINT)),
+            gyroscopic=_flag(head, "gyroscopic"),
+            fixture_position=sensors.number("fixture_position_mm", "mm", 0.0, least=-1000.0, most=5000.0) * 1e-3,
+        )
+        return MachineFile(
+            name=head.text("name", path.stem),
+            spindle=spindle,
+            sensors=_sensors(sensors),
+            workpiece=_workpiece(top.table("workpiece", _WORKPIECE)),
+            plan=_plan(cuts),
+            toolings=_paths(cuts, "toolings", path.parent, required=True),
+            truth_toolings=_paths(cuts, "truth_toolings", path.parent, required=False),
+        )
+
+
+def _bearing(table: Table) -> Bearing:
+    return Bearing(
+        table.number("position_mm", "mm", least=0.0, most=5000.0) * 1e-3,
+        _pair(table, "stiffness", "N/m"),
+        _pair(table, "damping", "N s/m"),
+        table.number("softening_per_rpm", "1/(rev/min)", 0.0, least=-1e-3, most=1e-3) / _RPM,
+    )
+
+
+def _housing(table: Table) -> Housing:
+    return Housing(
+        position=table.number("position_mm", "mm", least=-5000.0, most=5000.0) * 1e-3,
+        mass=table.number("mass", "kg", above=0.0),
+        inertia=table.number("inertia", "kg m^2", above=0.0),
+        stiffness=_pair(table, "stiffness", "N/m"),
+        damping=_pair(table, "damping", "N s/m"),
+        tilting_stiffness=_pair(table, "tilting_stiffness", "N m/rad"),
+        tilting_damping=_pair(table, "tilting_damping", "N m s/rad"),
+    )
+
+
+def _joint(table: Table) -> FlangeJoint:
+    units = ("N/m", "N s/m", "N m/rad", "N m s/rad")
+    return FlangeJoint(*(table.number(key, unit, least=0.0) for key, unit in zip(_JOINT, units, strict=True)))
+
+
+def _sensors(table: Table) -> SensorSuite:
+    usual = SensorSuite()
+    return SensorSuite(
+        rate=table.number("sampling_rate_hz", "Hz", usual.rate, above=0.0, most=1e6),
+        gap_noise=table.number("flange_noise_nm", "nm", usual.gap_noise * 1e9, least=0.0) * 1e-9,
+        gap_drift=table.number("flange_drift_um", "um", usual.gap_drift * 1e6, least=0.0) * 1e-6,
+        acceleration_noise=table.number("fixture_noise", "m/s^2", usual.acceleration_noise, least=0.0),
+        roundness=table.number("roundness_um", "um", usual.roundness * 1e6, least=0.0) * 1e-6,
+        roundness_orders=table.number("roundness_orders", "", usual.roundness_orders, least=0, most=64, whole=True),
+        cutter_runout=table.number("cutter_runout_um", "um", usual.cutter_runout * 1e6, least=0.0) * 1e-6,
+        speed_error=table.number("speed_error_percent", "%", usual.speed_error * 1e2, least=0.0, most=4.0) * 1e-2,
+        trigger=_flag(table, "trigger"),
+        tooth_angle=float(np.radians(table.number("tooth_angle_deg", "deg", 0.0, least=-360.0, most=360.0))),
+        gap_sensitivity=table.number("flange_sensitivity", "V/m", 1.0),
+        acceleration_sensitivity=table.number("fixture_sensitivity", "V/(m/s^2)", 1.0),
+        gap_delay=table.number("flange_delay_s", "s", 0.0, least=0.0, most=2e-4),
+        acceleration_delay=table.number("fixture_delay_s", "s", 0.0, least=0.0, most=2e-4),
+        gap_bandwidth=table.number("flange_bandwidth_hz", "Hz", None, above=0.0),
+        acceleration_bandwidth=table.number("fixture_bandwidth_hz", "Hz", None, above=0.0),
+    )
+
+
+def _plan(table: Table) -> CutPlan:
+    entry = table.number("entry_angle_deg", "deg", least=0.0, most=180.0)
+    exit_ = table.number("exit_angle_deg", "deg", least=0.0, most=180.0)
+    if exit_ <= entry:
+        table.refuse("exit_angle_deg", f"{exit_:g}", f"above entry_angle_deg, {entry:g}, and at most 180 [deg]")
+    return CutPlan(
+        spindle_speeds=tuple(float(speed) * _RPM for speed in _speeds(table)),
+        axial_depth=table.number("axial_depth_mm", "mm", above=0.0, most=500.0) * 1e-3,
+        feed_per_tooth=table.number("feed_per_tooth_mm", "mm", above=0.0, most=10.0) * 1e-3,
+        engagement=Engagement(float(np.radians(entry)), float(np.radians(exit_))),
+        feed_angle=_feed_angle(table),
+        duration=table.number("duration_s", "s", 0.3, above=0.0, most=60.0),
+        settling=table.number("settling_s", "s", 0.15, least=0.0, most=60.0),
+    )
+
+
+def _speeds(table: Table) -> list[float]:
+    """A list of speeds, or from, to and count."""
+    value = table.value("spindle_speeds_rpm", "a list of speeds, or { from, to, count } [rev/min]")
+    if not isinstance(value, dict):
+        speeds = table.numbers("spindle_speeds_rpm", None, "rev/min")
+        if not speeds or min(speeds) <= 0.0 or max(speeds) > 500000.0:
+            table.refuse("spindle_speeds_rpm", f"{speeds}", "one or more speeds above 0 and at most 500000 [rev/min]")
+        return speeds
+    limits = table.table("spindle_speeds_rpm", ("from", "to", "count"))
+    first, last = (limits.number(key, "rev/min", above=0.0, most=500000.0) for key in ("from", "to"))
+    return np.linspace(first, last, limits.number("count", "", least=1, most=10000, whole=True)).tolist()
+
+
+def _pair(table: Table, key: str, unit: str) -> PerAxis:
+    x, y = table.numbers(key, 2, unit)
+    return x, y
+
+
+def _flag(table: Table, key: str) -> bool:
+    value = table.value(key, "true or false", False)
+    if not isinstance(value, bool):
+        table.refuse(key, describe(value), "true or false")
+    return value
+
+
+def _paths(table: Table, key: str, folder: Path, required: bool) -> tuple[Path, ...]:
+    allowed = "a list of paths of tooling files, relative to the machine file"
+    found = table.value(key, allowed) if required else table.value(key, allowed, [])
+    if not isinstance(found, list) or (required and not found) or not all(isinstance(p, str) and p for p in found):
+        table.refuse(key, describe(found) if as_number(found) is None else found, allowed)
+    return tuple(folder / p for p in found)

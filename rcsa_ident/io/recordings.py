@@ -1,0 +1,56 @@
+"""Recordings in and out: one door for all formats, samples in SI behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.errors import InputError
+from rcsa_ident.io import delimited, hdf5
+from rcsa_ident.io.hdf5 import write_hdf5
+from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+
+__all__ = ["READERS", "read_recording", "write_hdf5"]
+
+Reader = Callable[[Path, Sequence[str], float | None], tuple[float, list[FloatArray]]]
+
+#: A format is a suffix and a function of path, channel names and the campaign's rate, which returns rate and channels.
+READERS: dict[str, Reader] = {".h5": hdf5.read_channels, ".hdf5": hdf5.read_channels, ".csv": delimited.read_channels}
+
+
+def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: float | None = None) -> Recording:
+    """Return the sensors' channels of a recording in SI; other channels of the file are left alone.
+
+    Parameters
+    ----------
+    path : path
+        The suffix says the format: one of `READERS`.
+    sensors : tuple of Sensor
+        Signals are divided by the sensor's sensitivity; a trigger stays as it is.
+    default_rate : float or None [Hz]
+        For a file that carries no rate.
+
+    Raises
+    ------
+    InputError
+        The file is broken, hostile or lacks a channel; nothing is half read.
+    """
+    path = Path(path)
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise InputError("recording", f"suffix '{path.suffix}'", "one of " + ", ".join(READERS), str(path))
+    if not sensors:
+        raise InputError("sensors", "none", "at least one sensor", str(path))
+    rate, channels = reader(path, [sensor.name for sensor in sensors], default_rate)
+    samples = np.empty((channels[0].size, len(sensors)))
+    for i, (sensor, values) in enumerate(zip(sensors, channels, strict=True)):
+        samples[:, i] = values
+        if sensor.quantity is not Quantity.TRIGGER:
+            samples[:, i] /= sensor.sensitivity
+    # an overflow in the acquisition is a lost sample like any other
+    samples[np.isinf(samples)] = np.nan
+    samples.setflags(write=False)
+    return Recording(rate, samples, sensors)

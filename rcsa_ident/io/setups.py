@@ -1,0 +1,272 @@
+"""Toolings and campaigns: TOML files in the machinist's units become nouns in SI."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.files import MEGABYTE, read_bytes
+from rcsa_ident.io.keys import Table, as_number, describe
+from rcsa_ident.machining_setup import Campaign, Cut, Tooling, Workpiece
+from rcsa_ident.signals.recording import Quantity, Sensor
+from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, clamped
+
+CAMPAIGN_FILE = "campaign.toml"
+LARGEST_SETUP = 4 * MEGABYTE
+FEED_DIRECTIONS = {"+X": 0.0, "-X": np.pi, "+Y": 0.5 * np.pi, "-Y": -0.5 * np.pi}
+_RPM = np.pi / 30.0
+
+_TOOLING = ("name", "cutter", "tool", "holder", "contact", "materials")
+_CUTTER = ("teeth", "diameter_mm", "helix_deg", "pitch_deg")
+_SEGMENT = (
+    "length_mm", "outer_diameter_mm", "inner_diameter_mm", "end_diameter_mm", "material", "area_mm2", "second_moment_mm4",
+)  # fmt: skip
+_CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
+_MATERIAL = ("youngs_modulus_gpa", "density", "poisson", "loss_factor")
+_CAMPAIGN = ("campaign", "sensors", "workpiece", "toolings", "cuts")
+_SENSOR = ("quantity", "axis", "sensitivity", "delay_s", "bandwidth_hz")
+_TRIGGER = ("quantity", "sensitivity", "delay_s", "bandwidth_hz", "pulses_per_revolution", "tooth_angle_deg")
+_WORKPIECE = (
+    "name", "tangential_coefficient_mpa", "radial_ratio", "axial_ratio",
+    "tangential_edge_n_per_mm", "radial_edge_n_per_mm", "axial_edge_n_per_mm",
+)  # fmt: skip
+_CUT = (
+    "id", "tooling", "spindle_speed_rpm", "axial_depth_mm", "feed_per_tooth_mm", "entry_angle_deg", "exit_angle_deg",
+    "feed_direction", "cut", "air",
+)  # fmt: skip
+
+
+def read_toml(path: str | Path, field: str) -> dict[str, Any]:
+    """Return the content of a TOML file; a syntax error names its line."""
+    raw = read_bytes(path, field, LARGEST_SETUP)
+    try:
+        return tomllib.loads(raw.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise InputError(field, "a character that is not UTF-8", "text in UTF-8", f"{path} line {line}") from None
+    except RecursionError:
+        raise InputError(field, "lists in lists without end", "TOML", str(path)) from None
+    except ValueError as error:
+        text = str(error)
+        line_found = re.search(r"\(at line (\d+), column \d+\)", text)
+        where = f"{path} line {line_found[1]}" if line_found else str(path)
+        found = text[: line_found.start()].strip() if line_found else text
+        raise InputError(field, f"a TOML error ({found})", "TOML", where) from None
+
+
+def read_tooling(path: str | Path) -> Tooling:
+    """Return a cutter with the tool and holder that carry it, the tool cut to stickout + insertion.
+
+    Raises
+    ------
+    InputError
+        Names the file, the key, what was found and what is allowed.
+    """
+    top = Table(read_toml(path, "tooling"), str(path), known=_TOOLING)
+    materials = material_library(top)
+    tool = top.table("tool", ("stickout_mm", "segments"))
+    holder = top.table("holder", ("insertion_mm", "segments"))
+    name = top.text("name", Path(path).stem)
+    cutter = _cutter(top.table("cutter", _CUTTER))
+    pieces = beam_segments(tool, materials)
+    stickout = tool.number("stickout_mm", "mm", above=0.0, most=5000.0) * 1e-3
+    insertion = holder.number("insertion_mm", "mm", least=0.0, most=5000.0) * 1e-3
+    carriers = beam_segments(holder, materials)
+    contact = _contact(top.table("contact", _CONTACT)) if "contact" in top else None
+    with top.naming({"stickout + insertion": "tool.stickout_mm + holder.insertion_mm", "insertion": "holder.insertion_mm"}):
+        return Tooling(name, cutter, clamped(pieces, carriers, stickout, insertion, contact))
+
+
+def material_library(top: Table) -> dict[str, Material]:
+    """The built-in library, and the file's own over it; a known material may change single values."""
+    materials = dict(MATERIALS)
+    for name, table in top.named_tables("materials", _MATERIAL, {}).items():
+        base = MATERIALS.get(name)
+        optional = (base.youngs_modulus, base.density, base.poisson) if base else None
+        modulus = table.number("youngs_modulus_gpa", "GPa", *([optional[0] * 1e-9] if optional else []), above=0.0, most=2000.0)
+        density = table.number("density", "kg/m^3", *([optional[1]] if optional else []), least=100.0, most=30000.0)
+        poisson = table.number("poisson", "", *([optional[2]] if optional else []), least=0.0, most=0.499)
+        loss = table.number("loss_factor", "", base.loss_factor if base else 0.0, least=0.0, most=1.0)
+        materials[name] = Material(modulus * 1e9, density, poisson, loss)
+    return materials
+
+
+def _cutter(table: Table) -> Cutter:
+    teeth = table.number("teeth", least=1, most=100, whole=True)
+    diameter = table.number("diameter_mm", "mm", above=0.0, most=1000.0) * 1e-3
+    helix = float(np.radians(table.number("helix_deg", "deg", 0.0, least=0.0, most=80.0)))
+    if "pitch_deg" not in table:
+        return Cutter(teeth, diameter, helix)
+    degrees = np.array(table.numbers("pitch_deg", teeth, "deg"))
+    if np.any(degrees <= 0.0) or abs(degrees.sum() - 360.0) > 0.01 * teeth:
+        table.refuse("pitch_deg", f"{degrees.tolist()}, sum {degrees.sum():g}", f"{teeth} angles above 0 that add up to 360 [deg]")
+    # angles written with few decimals add up to nearly a turn
+    return Cutter(teeth, diameter, helix, degrees * (2.0 * np.pi / degrees.sum()))
+
+
+def beam_segments(body: Table, materials: Mapping[str, Material]) -> tuple[BeamSegment, ...]:
+    return tuple(_segment(table, materials) for table in body.tables("segments", _SEGMENT))
+
+
+def _segment(table: Table, materials: Mapping[str, Material]) -> BeamSegment:
+    length = table.number("length_mm", "mm", above=0.0, most=5000.0)
+    outer = table.number("outer_diameter_mm", "mm", above=0.0, most=1000.0)
+    end = table.number("end_diameter_mm", "mm", None, above=0.0, most=1000.0)
+    inner = table.number("inner_diameter_mm", "mm", 0.0, least=0.0, most=1000.0)
+    material = materials[table.text("material", choices=tuple(materials))]
+    smallest, largest = min(outer, end or outer), max(outer, end or outer)
+    if inner >= smallest:
+        table.refuse("inner_diameter_mm", f"{inner:g}", f"below the outer diameter, {smallest:g} [mm]")
+    # a true section lies inside the circle around it
+    area = table.number("area_mm2", "mm^2", None, above=0.0, most=np.pi / 4.0 * largest**2)
+    moment = table.number("second_moment_mm4", "mm^4", None, above=0.0, most=np.pi / 64.0 * largest**4)
+    if (area is None) != (moment is None):
+        missing = "area_mm2" if area is None else "second_moment_mm4"
+        table.refuse(missing, "nothing", "given together with the other: area_mm2 and second_moment_mm4, or neither")
+    return BeamSegment(
+        length * 1e-3,
+        outer * 1e-3,
+        material,
+        inner * 1e-3,
+        None if end is None else end * 1e-3,
+        None if area is None else area * 1e-6,
+        None if moment is None else moment * 1e-12,
+    )
+
+
+def _contact(table: Table) -> Contact:
+    return Contact(
+        table.number("translational_stiffness", "N/m per m", above=0.0),
+        table.number("rotational_stiffness", "N m/rad per m", least=0.0),
+        table.number("translational_damping", "N s/m per m", 0.0, least=0.0),
+        table.number("rotational_damping", "N m s/rad per m", 0.0, least=0.0),
+    )
+
+
+def read_campaign(folder: str | Path) -> Campaign:
+    """Return what was on the machine, with every tooling read and every recording's file found.
+
+    Parameters
+    ----------
+    folder : path
+        Holds ``campaign.toml``; every path in it is relative to the folder and stays inside it.
+
+    Raises
+    ------
+    InputError
+        Names the file, the key, what was found and what is allowed.
+    """
+    folder = Path(folder)
+    path = folder / CAMPAIGN_FILE
+    if not folder.is_dir():
+        raise InputError("campaign", "no such folder" if not folder.exists() else "a file", f"a folder with {CAMPAIGN_FILE}", str(folder))
+    top = Table(read_toml(path, "campaign"), str(path), known=_CAMPAIGN)
+    head = top.table("campaign", ("name", "sampling_rate_hz"), {})
+    name = head.text("name", folder.resolve().name)
+    rate = head.number("sampling_rate_hz", "Hz", None, above=0.0, most=1e8)
+    channels = top.table("sensors")
+    sensors = tuple(_sensor(key, channels.data[key], str(path)) for key in channels)
+    if not sensors:
+        top.refuse("sensors", "an empty table", "at least one table [sensors.<channel>]")
+    workpiece = _workpiece(top.table("workpiece", _WORKPIECE))
+    paths = top.table("toolings")
+    toolings = {key: read_tooling(_inside(folder, paths, key)) for key in paths}
+    cuts = tuple(_cut(table, folder, toolings) for table in top.tables("cuts", _CUT))
+    seen: dict[str, int] = {}
+    for i, cut in enumerate(cuts):
+        if cut.id in seen:
+            raise InputError(f"cuts[{i}].id", f'"{cut.id}", the id of cuts[{seen[cut.id]}]', "an id of its own", str(path))
+        seen[cut.id] = i
+    return Campaign(name, rate, sensors, workpiece, toolings, cuts)
+
+
+def _sensor(name: str, data: Any, where: str) -> Sensor:
+    kind = Table(data, where, f"sensors.{name}", sorted({*_SENSOR, *_TRIGGER}))
+    quantity = Quantity(kind.text("quantity", choices=tuple(Quantity)))
+    trigger = quantity is Quantity.TRIGGER
+    table = Table(data, where, f"sensors.{name}", _TRIGGER if trigger else _SENSOR)
+    default = [1.0] if trigger else []
+    sensitivity = table.number("sensitivity", "signal per SI unit", *default)
+    if sensitivity == 0.0:
+        table.refuse("sensitivity", "0", "a number other than 0 [V/m, V/(m/s^2), V/N], 1.0 where the file is in SI")
+    angle = table.number("tooth_angle_deg", "deg", None, least=-360.0, most=360.0)
+    return Sensor(
+        name,
+        quantity,
+        None if trigger else Dof(table.text("axis", choices=("X", "Y")).lower()),
+        sensitivity,
+        table.number("delay_s", "s", 0.0, least=-1.0, most=1.0),
+        table.number("bandwidth_hz", "Hz", None, above=0.0),
+        table.number("pulses_per_revolution", "", 1, least=1, most=100000, whole=True),
+        None if angle is None else float(np.radians(angle)),
+    )
+
+
+def _workpiece(table: Table) -> Workpiece:
+    edges = [table.number(f"{way}_edge_n_per_mm", "N/mm", 0.0, least=0.0, most=1000.0) * 1e3 for way in ("tangential", "radial", "axial")]
+    coefficients = CuttingCoefficients(
+        table.number("tangential_coefficient_mpa", "MPa", above=0.0, most=50000.0) * 1e6,
+        table.number("radial_ratio", "", least=-1.0, most=5.0),
+        table.number("axial_ratio", "", 0.0, least=-5.0, most=5.0),
+        *edges,
+    )
+    return Workpiece(table.text("name"), coefficients)
+
+
+def _cut(table: Table, folder: Path, toolings: Mapping[str, Tooling]) -> Cut:
+    entry = table.number("entry_angle_deg", "deg", least=0.0, most=180.0)
+    exit_ = table.number("exit_angle_deg", "deg", least=0.0, most=180.0)
+    if exit_ <= entry:
+        table.refuse("exit_angle_deg", f"{exit_:g}", f"above entry_angle_deg, {entry:g}, and at most 180 [deg]")
+    conditions = CuttingConditions(
+        table.number("spindle_speed_rpm", "rev/min", above=0.0, most=500000.0) * _RPM,
+        table.number("axial_depth_mm", "mm", above=0.0, most=500.0) * 1e-3,
+        table.number("feed_per_tooth_mm", "mm", above=0.0, most=10.0) * 1e-3,
+        Engagement(float(np.radians(entry)), float(np.radians(exit_))),
+        _feed_angle(table),
+    )
+    name = table.text("id")
+    tooling = table.text("tooling", choices=tuple(toolings))
+    return Cut(name, tooling, conditions, _inside(folder, table, "cut"), _inside(folder, table, "air") if "air" in table else None)
+
+
+def _feed_angle(table: Table) -> float:
+    allowed = f"one of {', '.join(FEED_DIRECTIONS)}, or an angle from +X from -360 to 360 [deg]"
+    value = table.value("feed_direction", allowed)
+    if isinstance(value, str) and value in FEED_DIRECTIONS:
+        return FEED_DIRECTIONS[value]
+    degrees = as_number(value)
+    if degrees is None or abs(degrees) > 360.0:
+        table.refuse("feed_direction", describe(value), allowed)
+    return float(np.radians(degrees))
+
+
+def _inside(folder: Path, table: Table, key: str) -> Path:
+    """The file that a key names; neither its path nor a link on its way leads out of the campaign's folder."""
+    allowed = "a path inside the campaign's folder"
+    text = table.text(key, allowed=allowed)
+    relative = PurePosixPath(text)
+    odd = any(sign in text for sign in ("\\", "\0", ":"))
+    if odd or relative.is_absolute() or ".." in relative.parts or not relative.parts:
+        table.refuse(key, repr(text), f"{allowed}, relative to it, with / and without ..")
+    path = folder / relative
+    try:
+        inside = path.resolve().is_relative_to(folder.resolve())
+        exists = path.is_file()
+    except (OSError, RuntimeError, ValueError):
+        table.refuse(key, describe(text), allowed)
+    if not inside:
+        table.refuse(key, f"{describe(text)}, a link out of the folder", allowed)
+    if not exists:
+        table.refuse(key, f"{describe(text)}, {'no file' if path.exists() else 'which does not exist'}", "an existing file")
+    return path

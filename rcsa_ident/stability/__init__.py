@@ -1,0 +1,1 @@
+"""How deep a cut may be: stability lobes."""

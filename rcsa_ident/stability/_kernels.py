@@ -1,0 +1,262 @@
+"""Zero-order lobes from the trace and determinant of [alpha0] G over frequency; arrays and scalars only.
+
+With mu an eigenvalue of [alpha0] G, the stability boundary a K mu (1 - e^{-i w tau}) = 1 is the curve
+a = 1 / (2 K Re mu), w tau = 2 psi + 2 pi l, psi = pi / 2 + arg mu, for Re mu > 0 and every whole l >= 0.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+
+@numba.njit(cache=True)
+def between_nodes(omega, trace, determinant, k, w):
+    """Return trace and determinant at w in [omega[k], omega[k+1]], on the quintic through six nodes (fewer at the ends)."""
+    first = max(k - 2, 0)
+    last = min(k + 3, omega.size - 1)
+    t, d = 0.0 + 0.0j, 0.0 + 0.0j
+    for i in range(first, last + 1):
+        above, below = 1.0, 1.0
+        for j in range(first, last + 1):
+            if j != i:
+                above *= w - omega[j]
+                below *= omega[i] - omega[j]
+        t += above / below * trace[i]
+        d += above / below * determinant[i]
+    return t, d
+
+
+@numba.njit(cache=True)
+def nearest_root(trace, determinant, guess):
+    """Return the square root of the characteristic polynomial's discriminant / 4 on the side of `guess`."""
+    root = np.sqrt(0.25 * trace * trace - determinant)
+    if root.real * guess.real + root.imag * guess.imag < 0.0:
+        root = -root
+    return root
+
+
+@numba.njit(cache=True)
+def eigenvalue_at(omega, trace, determinant, root, sign, k, w):
+    """Return the eigenvalue on one branch at w in [omega[k], omega[k+1]]; root[k], root[k+1] tell the branch."""
+    x = (w - omega[k]) / (omega[k + 1] - omega[k])
+    t, d = between_nodes(omega, trace, determinant, k, w)
+    return 0.5 * t + sign * nearest_root(t, d, (1.0 - x) * root[k] + x * root[k + 1])
+
+
+@numba.njit(cache=True)
+def roots_along(trace, determinant):
+    """Return the discriminant's root at each node, its sign continued from node to node, shape (n,)."""
+    root = np.empty(trace.size, dtype=np.complex128)
+    guess = 1.0 + 0.0j
+    for k in range(trace.size):
+        root[k] = nearest_root(trace[k], determinant[k], guess)
+        if root[k] != 0.0:
+            guess = root[k]
+    return root
+
+
+@numba.njit(cache=True)
+def largest_real_part(omega, trace, determinant):
+    """Return the largest Re mu over both branches and all frequencies, and its frequency."""
+    root = roots_along(trace, determinant)
+    best, place = -np.inf, omega[0]
+    for sign in (1.0, -1.0):
+        peak = 0
+        for k in range(omega.size):
+            if (0.5 * trace[k] + sign * root[k]).real > (0.5 * trace[peak] + sign * root[peak]).real:
+                peak = k
+        top = (0.5 * trace[peak] + sign * root[peak]).real
+        where = omega[peak]
+        for k in range(max(peak - 1, 0), min(peak + 1, omega.size - 1)):
+            low, high = omega[k], omega[k + 1]
+            for _ in range(40):
+                third = (high - low) / 3.0
+                left = eigenvalue_at(omega, trace, determinant, root, sign, k, low + third).real
+                right = eigenvalue_at(omega, trace, determinant, root, sign, k, high - third).real
+                if left < right:
+                    low += third
+                else:
+                    high -= third
+                if max(left, right) > top:
+                    top, where = max(left, right), 0.5 * (low + high)
+        if top > best:
+            best, place = top, where
+    return best, place
+
+
+@numba.njit(cache=True)
+def phase_steps(trace, root, sign):
+    """Return mu, and psi at both ends of each interval, continuous within it (NaN where Re mu > 0 at neither end)."""
+    n = trace.size
+    mu = np.empty(n, dtype=np.complex128)
+    start = np.full(n - 1, np.nan)
+    end = np.full(n - 1, np.nan)
+    for k in range(n):
+        mu[k] = 0.5 * trace[k] + sign * root[k]
+        # where one direction is rigid an eigenvalue is zero up to rounding
+        if abs(mu[k]) < 1e-12 * abs(trace[k]):
+            mu[k] = 0.0
+    for k in range(n - 1):
+        one, two = mu[k], mu[k + 1]
+        if one.real <= 0.0 and two.real <= 0.0:
+            continue
+        step = two * one.conjugate()
+        turn = math.atan2(step.imag, step.real)
+        if one.real > 0.0:
+            start[k] = math.atan2(one.real, -one.imag)
+            end[k] = start[k] + turn
+        else:
+            end[k] = math.atan2(two.real, -two.imag)
+            start[k] = end[k] - turn
+    return mu, start, end
+
+
+@numba.njit(cache=True)
+def envelope(omega, trace, determinant, stiffness, teeth, speeds):
+    """Return limit depth, chatter frequency and lobe number at each speed: the lowest of all lobes of both branches.
+
+    Parameters
+    ----------
+    omega : array, shape (n,) [rad/s], ascending, above 0
+    trace, determinant : complex arrays, shape (n,), of [alpha0] G
+    stiffness : float [N/m^2], K_tc
+    teeth : int
+    speeds : array, shape (m,) [rad/s], ascending, above 0
+    """
+    m = speeds.size
+    limit = np.full(m, np.inf)
+    chatter = np.full(m, np.nan)
+    lobes = np.full(m, -1, dtype=np.int64)
+    root = roots_along(trace, determinant)
+    n = omega.size
+    last_lobe = int(omega[n - 1] / (teeth * speeds[0])) + 1
+    for sign in (1.0, -1.0):
+        mu, start, end = phase_steps(trace, root, sign)
+        kept = np.flatnonzero(start == start)
+        if kept.size == 0:
+            continue
+        lowest = min(start[kept].min(), end[kept].min()) / math.pi
+        highest = max(start[kept].max(), end[kept].max()) / math.pi
+        place = omega[kept + 1]
+        for lobe in range(last_lobe + 1):
+            j = 0
+            # w = teeth speed (lobe + psi / pi) bounds the intervals that can lie in the range of speeds
+            begin = np.searchsorted(place, teeth * speeds[0] * (lobe + lowest))
+            for k in kept[begin:]:
+                if omega[k] > teeth * speeds[m - 1] * (lobe + highest):
+                    break
+                # the speeds between the interval's ends: w tau / 2 = psi + pi l, tau = 2 pi / (teeth speed)
+                first, second = start[k] + math.pi * lobe, end[k] + math.pi * lobe
+                a = math.pi * omega[k] / (teeth * first) if first > 0.0 else np.inf
+                b = math.pi * omega[k + 1] / (teeth * second) if second > 0.0 else np.inf
+                low, high = min(a, b), max(a, b)
+                if high < speeds[0] or low > speeds[m - 1]:
+                    continue
+                while j > 0 and speeds[j - 1] >= low:
+                    j -= 1
+                while j < m and speeds[j] < low:
+                    j += 1
+                # a peak of Re mu between the nodes may stand above them
+                floor = 0.9 / (2.0 * stiffness * max(mu[k].real, mu[k + 1].real))
+                i = j
+                while i < m and speeds[i] <= high:
+                    if floor < limit[i]:
+                        w = crossing(omega, trace, determinant, root, sign, k, start[k] + math.pi * lobe, math.pi / (teeth * speeds[i]))
+                        real = eigenvalue_at(omega, trace, determinant, root, sign, k, w).real
+                        if real > 0.0 and 1.0 / (2.0 * stiffness * real) < limit[i]:
+                            limit[i] = 1.0 / (2.0 * stiffness * real)
+                            chatter[i] = w
+                            lobes[i] = lobe
+                    i += 1
+    return limit, chatter, lobes
+
+
+@numba.njit(cache=True)
+def crossing(omega, trace, determinant, root, sign, k, phase, half_delay):
+    """Return the w in interval k where psi + pi l = w tau / 2; `phase` is psi + pi l at the interval's start."""
+    first = 0.5 * trace[k] + sign * root[k]
+    a, b = omega[k], omega[k + 1]
+    fa = phase - a * half_delay
+    w, fb = b, 0.0
+    side = 0
+    for step in range(30):
+        if step > 0:
+            w = (fa * b - fb * a) / (fa - fb)
+        turn = eigenvalue_at(omega, trace, determinant, root, sign, k, w) * first.conjugate()
+        f = phase + math.atan2(turn.imag, turn.real) - w * half_delay
+        if step == 0:
+            fb = f
+            if fa * fb > 0.0 or fa == fb:
+                return a if abs(fa) < abs(fb) else b
+            continue
+        if abs(f) < 1e-10:
+            break
+        # Illinois: halve the value at the end that stays
+        if f * fb > 0.0:
+            b, fb = w, f
+            if side == 1:
+                fa *= 0.5
+            side = 1
+        else:
+            a, fa = w, f
+            if side == -1:
+                fb *= 0.5
+            side = -1
+    return w
+
+
+@numba.njit(cache=True)
+def delay_factor(pitch, speed, w):
+    """Return the mean over the teeth of 1 - e^{-i w pitch / speed}."""
+    total = 0.0 + 0.0j
+    for p in pitch:
+        angle = w * p / speed
+        total += complex(1.0 - math.cos(angle), math.sin(angle))
+    return total / pitch.size
+
+
+@numba.njit(cache=True)
+def pitch_envelope(omega, trace, determinant, stiffness, pitch, speeds):
+    """Return what `envelope` does for any pitch, by a walk along the frequencies at each speed.
+
+    Both factors of a K mu W = 1, W the mean of 1 - e^{-i w tau_j}, are followed; Im(mu W) changes sign on the boundary.
+    The lobe number is the whole waves in the mean delay.
+    """
+    m = speeds.size
+    limit = np.full(m, np.inf)
+    chatter = np.full(m, np.nan)
+    lobes = np.full(m, -1, dtype=np.int64)
+    root = roots_along(trace, determinant)
+    longest = pitch.max()
+    for i in range(m):
+        for sign in (1.0, -1.0):
+            a = omega[0]
+            fa = delay_factor(pitch, speeds[i], a) * (0.5 * trace[0] + sign * root[0])
+            for k in range(omega.size - 1):
+                parts = 1 + int((omega[k + 1] - omega[k]) * longest / speeds[i] / 0.3)
+                for part in range(parts):
+                    b = omega[k] + (omega[k + 1] - omega[k]) * (part + 1) / parts
+                    if parts == 1:
+                        fb = delay_factor(pitch, speeds[i], b) * (0.5 * trace[k + 1] + sign * root[k + 1])
+                    else:
+                        fb = delay_factor(pitch, speeds[i], b) * eigenvalue_at(omega, trace, determinant, root, sign, k, b)
+                    highest = max(fa.real, fb.real)
+                    if fa.imag * fb.imag <= 0.0 and highest > 0.0 and 0.9 / (stiffness * highest) < limit[i]:
+                        low, high, from_low = a, b, fa.imag
+                        w, f = b, fb
+                        for _ in range(50):
+                            w = 0.5 * (low + high)
+                            f = delay_factor(pitch, speeds[i], w) * eigenvalue_at(omega, trace, determinant, root, sign, k, w)
+                            if f.imag * from_low > 0.0:
+                                low = w
+                            else:
+                                high = w
+                        if f.real > 0.0 and 1.0 / (stiffness * f.real) < limit[i]:
+                            limit[i] = 1.0 / (stiffness * f.real)
+                            chatter[i] = w
+                            lobes[i] = int(w / speeds[i] / pitch.size)
+                    a, fa = b, fb
+    return limit, chatter, lobes

@@ -1,0 +1,58 @@
+"""The answer of every lobe method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcsa_ident.dynamics.arrays import FloatArray, frozen
+from rcsa_ident.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StabilityLobes:
+    """The smallest depth at which a cut loses stability, over spindle speed.
+
+    Parameters
+    ----------
+    spindle_speed : array, shape (n,) [rad/s]
+    limit_depth : array, shape (n,) [m]
+        Infinite where the cut is stable up to the depth that was asked for.
+    chatter_frequency : array, shape (n,) [rad/s]
+        NaN where `limit_depth` is infinite: nothing vibrates there.
+    lobe : array of int, shape (n,)
+        Whole waves between two teeth; -1 where `limit_depth` is infinite.
+    absolute_limit : float [m]
+        No speed is unstable below it; infinite if there is no such depth.
+    absolute_frequency : float [rad/s]
+        Chatter frequency at the absolute limit, NaN if there is none.
+    method : str
+        What computed it.
+    warnings : tuple of str
+        Why the answer may be wrong; empty where nothing is known against it.
+    """
+
+    spindle_speed: FloatArray
+    limit_depth: FloatArray
+    chatter_frequency: FloatArray
+    lobe: NDArray[np.intp]
+    absolute_limit: float
+    absolute_frequency: float
+    method: str
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("spindle_speed", "limit_depth", "chatter_frequency"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        object.__setattr__(self, "lobe", frozen(self.lobe, np.intp))
+        for name in ("limit_depth", "chatter_frequency", "lobe"):
+            shape = getattr(self, name).shape
+            if shape != self.spindle_speed.shape:
+                raise InputError(name, shape, f"the speeds' shape, {self.spindle_speed.shape}")
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """True where no limit was found up to the depth that was asked for, shape (n,)."""
+        return np.isinf(self.limit_depth)

@@ -1,0 +1,118 @@
+"""Zero-order (single-frequency) stability limit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.directional import mean_directional_matrix
+from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.errors import InputError
+from rcsa_ident.stability._kernels import envelope, largest_real_part, pitch_envelope
+from rcsa_ident.stability.result import StabilityLobes
+
+#: Teeth in the cut, on average, below which the mean directional matrix no longer tells the whole story.
+FEWEST_TEETH_IN_CUT = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class ZeroOrder:
+    """Altintas & Budak's closed form (CIRP Annals 44 (1995) 357), with cross receptances.
+
+    F = a K_tc [alpha0] (1 - e^{-i w tau}) G(w) F with the mean directional matrix [alpha0]: at each frequency the two
+    eigenvalues mu of [alpha0] G give the boundary a = 1 / (2 K_tc Re mu) at w tau = pi + 2 arg mu + 2 pi l. Between the
+    given frequencies trace and determinant of [alpha0] G are interpolated by quintics. Unequal pitch replaces
+    1 - e^{-i w tau} by its mean over the teeth (Altintas, Engin & Budak, J. Manuf. Sci. Eng. 121 (1999) 173) and costs
+    speeds times frequencies.
+    """
+
+    def lobes(
+        self,
+        receptance: Receptance,
+        cutter: Cutter,
+        coefficients: CuttingCoefficients,
+        engagement: Engagement,
+        feed_angle: float,
+        speeds: FloatArray,
+        max_depth: float,
+    ) -> StabilityLobes:
+        """Return the lower envelope of all lobes in the range of `speeds`."""
+        alpha = mean_directional_matrix(cutter.teeth, engagement, coefficients, feed_angle)
+        omega, trace, determinant = _characteristic(receptance, alpha)
+        order = np.argsort(speeds, kind="stable")
+        ascending = np.ascontiguousarray(speeds[order])
+        equal = bool(np.ptp(cutter.pitch) < 1e-9)
+        if equal:
+            curve = envelope(omega, trace, determinant, coefficients.tangential, cutter.teeth, ascending)
+        else:
+            curve = pitch_envelope(omega, trace, determinant, coefficients.tangential, cutter.pitch, ascending)
+        beyond = ~(curve[0] <= max_depth)
+        limit = np.empty(speeds.size)
+        chatter = np.empty(speeds.size)
+        lobe = np.empty(speeds.size, dtype=np.intp)
+        limit[order] = np.where(beyond, np.inf, curve[0])
+        chatter[order] = np.where(beyond, np.nan, curve[1])
+        lobe[order] = np.where(beyond, -1, curve[2])
+        strongest, place = largest_real_part(omega, trace, determinant)
+        exists = strongest > 1e-12 * float(np.max(np.abs(trace)))
+        return StabilityLobes(
+            speeds,
+            limit,
+            chatter,
+            lobe,
+            absolute_limit=1.0 / (2.0 * coefficients.tangential * strongest) if exists else float("inf"),
+            absolute_frequency=place if exists else float("nan"),
+            method="zero-order",
+            warnings=tuple(_doubts(cutter, engagement, receptance, place if exists else None)),
+        )
+
+
+def _characteristic(receptance: Receptance, alpha: FloatArray) -> tuple[FloatArray, ComplexArray, ComplexArray]:
+    """Frequencies above zero, ascending, with trace and determinant of [alpha0] G."""
+    xx, xy = receptance.between("tip.x", "tip.x"), receptance.between("tip.x", "tip.y")
+    yx, yy = receptance.between("tip.y", "tip.x"), receptance.between("tip.y", "tip.y")
+    trace = alpha[0, 0] * xx + alpha[0, 1] * yx + alpha[1, 0] * xy + alpha[1, 1] * yy
+    determinant = (alpha[0, 0] * alpha[1, 1] - alpha[0, 1] * alpha[1, 0]) * (xx * yy - xy * yx)
+    omega = receptance.omega
+    kept = np.flatnonzero(omega > 0.0)
+    if kept.size < 2 or np.any(np.diff(omega[kept]) <= 0.0):
+        raise InputError("tip receptance frequencies", f"{omega.size} frequencies", "two or more above 0, ascending")
+    if not np.all(np.isfinite(trace[kept]) & np.isfinite(determinant[kept])):
+        raise InputError("tip receptance", "values that are not finite", "finite values at every frequency above 0")
+    return np.ascontiguousarray(omega[kept]), np.ascontiguousarray(trace[kept]), np.ascontiguousarray(determinant[kept])
+
+
+def _doubts(cutter: Cutter, engagement: Engagement, receptance: Receptance, critical: float | None) -> list[str]:
+    doubts = []
+    in_cut = cutter.teeth * (engagement.exit - engagement.entry) / (2.0 * np.pi)
+    if in_cut < FEWEST_TEETH_IN_CUT - 1e-9:
+        angle = np.degrees(engagement.exit - engagement.entry)
+        doubts.append(
+            f"low radial immersion: {in_cut:.2f} teeth in the cut on average ({cutter.teeth} teeth, {angle:.0f} degrees of engagement); "
+            "a cut this interrupted has period-doubling (flip) lobes and moved limits that the mean directional coefficients do not show"
+        )
+    if np.ptp(cutter.runout) > 0.0:
+        doubts.append("run-out is left out: the limit is that of equal teeth")
+    if critical is not None:
+        doubts += _band_doubts(receptance, critical)
+    return doubts
+
+
+def _band_doubts(receptance: Receptance, critical: float) -> list[str]:
+    omega = receptance.omega[receptance.omega > 0.0]
+    if not omega[0] < critical < omega[-1]:
+        band = f"{omega[0] / (2 * np.pi):.0f}-{omega[-1] / (2 * np.pi):.0f} Hz"
+        return [f"the absolute limit lies at the edge of the receptance's band ({band}): modes outside may be more critical"]
+    k = int(np.searchsorted(receptance.omega, critical))
+    around = receptance.values[max(k - 3, 0) : k + 3].reshape(-1, receptance.values.shape[1] * receptance.values.shape[2])
+    # the share by which the largest receptance changes from line to line at the critical mode
+    step = float(np.max(np.abs(np.diff(around, axis=0))) / np.max(np.abs(around)))
+    if step <= 0.35:
+        return []
+    spacing = (receptance.omega[k] - receptance.omega[k - 1]) / (2.0 * np.pi)
+    return [f"the receptance is coarse at the critical mode ({spacing:.3g} Hz between lines): the limit may be percents off"]

@@ -1,0 +1,118 @@
+"""The time loop of regenerative milling; arrays and scalars only."""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+
+
+@numba.njit(cache=True)
+def cut_force(step, position, tooth, delay, cut, slices, path, force):
+    """Write the force per slice sum at one instant into `force`, in feed and normal direction.
+
+    step: index of the instant; position: feed-axis position of the tool at the instant, shape (2,); tooth: angle, run-out
+    a row; delay: steps since tooth j + 1 + k stood where j is now, shape (teeth, passes); path: earlier positions.
+    cut: angle of tooth 1, entry, exit, smear, lag, force per slice: K_t b, K_r b, edge t b, edge r b.
+    """
+    theta, entry, leave, smear, lag = cut[0], cut[1], cut[2], cut[3], cut[4]
+    force[0] = 0.0
+    force[1] = 0.0
+    teeth, passes = delay.shape
+    turn = 2.0 * math.pi
+    for j in range(teeth):
+        for k in range(slices):
+            phi = theta + tooth[j, 0] - (k + 0.5) * lag
+            phi -= turn * math.floor(phi / turn)
+            # share of the slice and of the step that is inside the immersion
+            share = min(max((phi - entry) / smear + 0.5, 0.0), 1.0) - min(max((phi - leave) / smear + 0.5, 0.0), 1.0)
+            if phi > turn - smear:
+                share += min(max((phi - turn - entry) / smear + 0.5, 0.0), 1.0)
+            if share <= 0.0:
+                continue
+            s, c = math.sin(phi), math.cos(phi)
+            chip = 1e300
+            for m in range(passes):
+                other = (j + 1 + m) % teeth
+                back = step - delay[j, m]
+                if back < 0.0:
+                    # before the first instant the tool moved along its path without vibration
+                    x, y = cut[9] * back, 0.0
+                else:
+                    i = int(back)
+                    part = back - i
+                    x = path[i, 0] + part * (path[i + 1, 0] - path[i, 0])
+                    y = path[i, 1] + part * (path[i + 1, 1] - path[i, 1])
+                left = (position[0] - x) * s + (position[1] - y) * c + tooth[j, 1] - tooth[other, 1]
+                chip = min(chip, left)
+            if chip <= 0.0:
+                continue
+            tangential = share * (cut[5] * chip + cut[7])
+            radial = share * (cut[6] * chip + cut[8])
+            force[0] += -c * tangential - s * radial
+            force[1] += s * tangential - c * radial
+
+
+@numba.njit(cache=True)
+def mill(decay, gain, shape, state, tooth, delay, cut, slices, turn, force):
+    """March the spindle through a cut and return its outputs, shape (n, o).
+
+    decay: e^{pole dt}, shape (m,); gain: of the old and the new force, shape (2, m, 2); shape: outputs of the poles, shape
+    (o, m), the first two the tip's X and Y, doubled for the conjugate poles; state: of the poles at the start, shape (m,);
+    cut: as in `cut_force`, then feed per step, spindle angle per step; turn: feed axes in machine axes, shape (2, 2);
+    force: shape (n, 2), is filled, in machine axes. The force between two instants is linear, so the march is exact in it.
+    """
+    n = force.shape[0]
+    m = decay.size
+    outputs = shape.shape[0]
+    result = np.zeros((n, outputs))
+    path = np.zeros((n, 2))
+    now = cut.copy()
+    local = np.zeros(2)
+    position = np.zeros(2)
+    instant = np.zeros((2, 2))
+    for k in range(m):
+        for a in range(2):
+            for b in range(2):
+                instant[a, b] += (shape[a, k] * gain[1, k, b]).real
+    free = np.zeros(2)
+    for i in range(n):
+        if i > 0:
+            fx, fy = force[i - 1, 0], force[i - 1, 1]
+            for k in range(m):
+                state[k] = decay[k] * state[k] + gain[0, k, 0] * fx + gain[0, k, 1] * fy
+        free[0] = 0.0
+        free[1] = 0.0
+        for k in range(m):
+            free[0] += shape[0, k].real * state[k].real - shape[0, k].imag * state[k].imag
+            free[1] += shape[1, k].real * state[k].real - shape[1, k].imag * state[k].imag
+        gx, gy = 0.0, 0.0
+        if i > 0:
+            gx, gy = force[i - 1, 0], force[i - 1, 1]
+        now[0] = cut[0] + i * cut[10]
+        # the new force moves the tip within the step by a compliance that is small against the cut's
+        for _ in range(3 if i > 0 else 1):
+            x = free[0]
+            y = free[1]
+            if i > 0:
+                x += instant[0, 0] * gx + instant[0, 1] * gy
+                y += instant[1, 0] * gx + instant[1, 1] * gy
+            position[0] = turn[0, 0] * x + turn[1, 0] * y + cut[9] * i
+            position[1] = turn[0, 1] * x + turn[1, 1] * y
+            cut_force(i, position, tooth, delay, now, slices, path, local)
+            gx = turn[0, 0] * local[0] + turn[0, 1] * local[1]
+            gy = turn[1, 0] * local[0] + turn[1, 1] * local[1]
+        force[i, 0] = gx
+        force[i, 1] = gy
+        path[i, 0] = position[0]
+        path[i, 1] = position[1]
+        if i > 0:
+            for k in range(m):
+                state[k] += gain[1, k, 0] * gx + gain[1, k, 1] * gy
+        for a in range(outputs):
+            value = 0.0
+            for k in range(m):
+                value += shape[a, k].real * state[k].real - shape[a, k].imag * state[k].imag
+            result[i, a] = value
+    return result

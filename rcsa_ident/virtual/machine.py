@@ -1,0 +1,187 @@
+"""What a virtual machine is made of: shaft, bearings, housing, joint, and what its sensors add. Nouns only, no matrices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.tool_holder.geometry import BeamSegment
+
+#: A value for each of the machine's axes, X and Y.
+PerAxis = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Bearing:
+    """A radial spring and damper between shaft and housing.
+
+    Parameters
+    ----------
+    position : float [m]
+        From the spindle's flange face towards the rear.
+    stiffness : two floats, X and Y [N/m]
+        At standstill.
+    damping : two floats, X and Y [N s/m]
+    softening : float [s/rad], default 0
+        Share of the stiffness lost per spindle speed: k = k0 (1 - softening Omega).
+    """
+
+    position: float
+    stiffness: PerAxis
+    damping: PerAxis
+    softening: float = 0.0
+
+    def __post_init__(self) -> None:
+        non_negative("bearings.position", self.position, "m")
+        _pair("bearings.stiffness", self.stiffness, positive, "N/m")
+        _pair("bearings.damping", self.damping, non_negative, "N s/m")
+        if not np.isfinite(self.softening):
+            raise InputError("bearings.softening", self.softening, "a finite number")
+
+
+@dataclass(frozen=True, slots=True)
+class Housing:
+    """A rigid body in each bending plane, on springs and dampers to the ground.
+
+    Parameters
+    ----------
+    position : float [m]
+        Of its centre of mass and of its support, from the flange face towards the rear.
+    mass : float [kg]
+    inertia : float [kg m^2]
+    stiffness, damping : two floats, X and Y [N/m], [N s/m]
+    tilting_stiffness, tilting_damping : two floats, X and Y [N m/rad], [N m s/rad]
+    """
+
+    position: float
+    mass: float
+    inertia: float
+    stiffness: PerAxis
+    damping: PerAxis
+    tilting_stiffness: PerAxis
+    tilting_damping: PerAxis
+
+    def __post_init__(self) -> None:
+        positive("housing.mass", self.mass, "kg")
+        positive("housing.inertia", self.inertia, "kg m^2")
+        for name in ("stiffness", "tilting_stiffness"):
+            _pair(f"housing.{name}", getattr(self, name), positive)
+        for name in ("damping", "tilting_damping"):
+            _pair(f"housing.{name}", getattr(self, name), non_negative)
+
+
+@dataclass(frozen=True, slots=True)
+class FlangeJoint:
+    """The clamped face between spindle and holder, lumped.
+
+    Parameters
+    ----------
+    translational_stiffness : float [N/m]
+    translational_damping : float [N s/m]
+    rotational_stiffness : float [N m/rad]
+    rotational_damping : float [N m s/rad]
+    """
+
+    translational_stiffness: float
+    translational_damping: float
+    rotational_stiffness: float
+    rotational_damping: float
+
+    def __post_init__(self) -> None:
+        for name in ("translational_stiffness", "rotational_stiffness"):
+            positive(f"joint.{name}", getattr(self, name))
+        for name in ("translational_damping", "rotational_damping"):
+            non_negative(f"joint.{name}", getattr(self, name))
+
+
+@dataclass(frozen=True, slots=True)
+class VirtualSpindle:
+    """A spindle in its housing, as far as the flange face.
+
+    Parameters
+    ----------
+    shaft : tuple of BeamSegment
+        From the flange face to the rear end.
+    bearings : tuple of Bearing
+    housing : Housing
+    joint : FlangeJoint
+    gyroscopic : bool
+        Whether the spinning parts couple the two bending planes.
+    fixture_position : float [m]
+        Where on the housing the flange sensor is held, from the flange face towards the rear.
+    """
+
+    shaft: tuple[BeamSegment, ...]
+    bearings: tuple[Bearing, ...]
+    housing: Housing
+    joint: FlangeJoint
+    gyroscopic: bool = False
+    fixture_position: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.shaft:
+            raise InputError("shaft.segments", "none", "at least one segment")
+        if not self.bearings:
+            raise InputError("bearings", "none", "at least one bearing")
+        length = self.shaft_length
+        for bearing in self.bearings:
+            if bearing.position > length + 1e-9:
+                raise InputError("bearings.position_mm", bearing.position * 1e3, f"0 to the shaft's length, {length * 1e3:g} mm")
+
+    @property
+    def shaft_length(self) -> float:
+        """From the flange face to the rear end [m]."""
+        return sum(s.length for s in self.shaft)
+
+    @property
+    def speed_dependent(self) -> bool:
+        """True where the dynamics change with the spindle's speed."""
+        return self.gyroscopic or any(b.softening != 0.0 for b in self.bearings)
+
+
+def _pair(field: str, values: PerAxis, check, unit: str = "") -> None:  # type: ignore[no-untyped-def]
+    if len(values) != 2:
+        raise InputError(field, list(values), "two numbers, X and Y")
+    for value in values:
+        check(field, value, unit)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CutPlan:
+    """The cuts of a simulated campaign: every tooling at every speed.
+
+    Parameters
+    ----------
+    spindle_speeds : tuple of float [rad/s]
+        As programmed.
+    axial_depth, feed_per_tooth : float [m]
+    engagement : Engagement
+    feed_angle : float [rad]
+    duration : float [s]
+        Of each record.
+    settling : float [s]
+        Simulated before it and dropped.
+    """
+
+    spindle_speeds: tuple[float, ...]
+    axial_depth: float
+    feed_per_tooth: float
+    engagement: Engagement
+    feed_angle: float = 0.0
+    duration: float = 0.3
+    settling: float = 0.15
+
+    def __post_init__(self) -> None:
+        if not self.spindle_speeds:
+            raise InputError("cuts.spindle_speeds_rpm", "none", "at least one speed")
+        positive("cuts.duration_s", self.duration, "s")
+        non_negative("cuts.settling_s", self.settling, "s")
+        for speed in self.spindle_speeds:
+            self.conditions(speed)
+
+    def conditions(self, spindle_speed: float) -> CuttingConditions:
+        """Return the conditions of one cut at this speed."""
+        return CuttingConditions(spindle_speed, self.axial_depth, self.feed_per_tooth, self.engagement, self.feed_angle)

@@ -1,0 +1,166 @@
+"""Regenerative milling in the time domain on the finite-element rotor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import CuttingConditions
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.errors import InputError
+from rcsa_ident.virtual._kernels import mill
+from rcsa_ident.virtual.reduction import Poles
+
+#: Harmonics of the spindle from which the state at the start is built.
+_START_ORDERS = 512
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CutHistory:
+    """One simulated cut.
+
+    Parameters
+    ----------
+    step : float [s]
+    angle : array, shape (n,) [rad]
+        Immersion angle of tooth 1 at the tip, from the feed's normal, growing.
+    force : array, shape (n, 2) [N]
+        On the tool, machine axes X and Y.
+    tip, flange, fixture : arrays, shape (n, 2) [m]
+        Absolute displacements, X and Y.
+    acceleration : array, shape (n, 2) [m/s^2]
+        Of the fixture.
+    """
+
+    step: float
+    angle: FloatArray
+    force: FloatArray
+    tip: FloatArray
+    flange: FloatArray
+    fixture: FloatArray
+    acceleration: FloatArray
+
+    def after(self, count: int) -> CutHistory:
+        """Return the history without its first `count` instants."""
+        series = (self.angle, self.force, self.tip, self.flange, self.fixture, self.acceleration)
+        return CutHistory(self.step, *(values[count:] for values in series))
+
+
+def mill_cut(
+    dynamics: Poles,
+    cutter: Cutter,
+    conditions: CuttingConditions,
+    coefficients: CuttingCoefficients,
+    step: float,
+    count: int,
+    start_angle: float = 0.0,
+    slices: int = 8,
+) -> CutHistory:
+    """Simulate a cut of `count` instants, `step` apart, already in the material and near its steady state.
+
+    The chip of a tooth is what lies between its path and the surfaces that all teeth left in the last revolution; a tooth
+    whose path lies inside them cuts nothing. Run-out is the cutter's.
+
+    Parameters
+    ----------
+    dynamics : Poles
+        With inputs ``tip.x``, ``tip.y`` and outputs at ``tip``, ``flange``, ``fixture``.
+    conditions : CuttingConditions
+        With the true spindle speed.
+    step : float [s]
+        The force is linear between instants; displacements follow exactly.
+    start_angle : float [rad]
+        Immersion of tooth 1 at the first instant.
+    slices : int
+        Of the depth, for the helix.
+
+    Notes
+    -----
+    The first state answers the force of a tool that does not vibrate; what regeneration adds has to settle.
+    """
+    speed = conditions.spindle_speed
+    if dynamics.inputs.shape[1] != 2:
+        raise InputError("inputs", dynamics.inputs.shape[1], "two: tip.x and tip.y")
+    lines = rigid_force_lines(cutter, conditions, coefficients, slices)
+    order = np.arange(lines.shape[0])
+    iw = 1j * speed * order
+    rotated = lines * np.exp(1j * order * start_angle)[:, None]
+    # a real force has orders -m too: with half the line's conjugate, since lines are those of Re sum
+    positive = np.where(order[:, None] == 0, 1.0, 0.5) * rotated
+    state = (dynamics.inputs * ((1.0 / (iw[:, None] - dynamics.pole)).T @ positive)).sum(axis=1)
+    state += (dynamics.inputs * ((1.0 / (-iw[1:, None] - dynamics.pole)).T @ positive[1:].conj())).sum(axis=1)
+
+    x = dynamics.pole * step
+    first = np.expm1(x) / x
+    second = (first - 1.0) / x
+    gain = step * np.stack([first - second, second])[:, :, None] * dynamics.inputs
+    rows = [[str(c) for c in dynamics.coordinates].index(f"{point}.{axis}") for point in ("tip", "flange", "fixture") for axis in "xy"]
+    seen = dynamics.outputs[rows]
+    bend = dynamics.outputs[rows[4:]] * dynamics.pole**2
+    shape = 2.0 * np.concatenate([seen, bend])
+    # a force at the tip accelerates the housing at once only through what the basis leaves out
+    through = 2.0 * (dynamics.outputs[rows[4:]] * dynamics.pole) @ dynamics.inputs
+
+    force = np.zeros((count, 2))
+    setup = _cut_arrays(cutter, conditions, coefficients, step, slices, start_angle)
+    result = mill(np.exp(x), gain, np.ascontiguousarray(shape), state, *setup, force)
+    return CutHistory(
+        step=step,
+        angle=start_angle + speed * step * np.arange(count),
+        force=force,
+        tip=result[:, 0:2],
+        flange=result[:, 2:4],
+        fixture=result[:, 4:6],
+        acceleration=result[:, 6:8] + force @ through.real.T,
+    )
+
+
+def rigid_force_lines(
+    cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, slices: int = 8, samples: int = 4 * _START_ORDERS
+) -> np.ndarray:
+    """Return the force of a tool that does not vibrate as F = Re sum_m lines[m] e^{i m Omega t}, shape (orders, 2) [N].
+
+    Tooth 1 is at immersion 0 when t = 0; machine axes.
+    """
+    step = 2.0 * np.pi / conditions.spindle_speed / samples
+    setup = _cut_arrays(cutter, conditions, coefficients, step, slices, 0.0)
+    force = np.zeros((samples, 2))
+    none = np.zeros(1, dtype=complex)
+    mill(none, np.zeros((2, 1, 2), dtype=complex), np.zeros((2, 1), dtype=complex), none.copy(), *setup, force)
+    lines = np.fft.rfft(force, axis=0)[:_START_ORDERS] / samples
+    lines[1:] *= 2.0
+    return lines
+
+
+def _cut_arrays(cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, step: float, slices: int, angle: float):  # type: ignore[no-untyped-def]
+    """The kernel's view of a cut: teeth, delays in steps, numbers, slices, axes."""
+    speed = conditions.spindle_speed
+    tooth = np.stack([cutter.tooth_angle, cutter.runout], axis=1)
+    # angle from tooth j to the 1st, 2nd, ... one ahead of it, up to itself one turn earlier
+    ahead = np.array([np.cumsum(np.roll(cutter.pitch, -j)) for j in range(cutter.teeth)])
+    delay = ahead / (speed * step)
+    if delay.min() < 1.0:
+        raise InputError("step", f"{step:g} s", f"at most a tooth period, {delay.min() * step:g} s")
+    lag = 2.0 * conditions.axial_depth / slices * np.tan(cutter.helix) / cutter.diameter
+    width = conditions.axial_depth / slices
+    feed = conditions.feed_per_tooth * cutter.teeth * speed / (2.0 * np.pi)
+    c = coefficients
+    cut = np.array(
+        [
+            angle,
+            conditions.engagement.entry,
+            conditions.engagement.exit,
+            max(speed * step, lag),
+            lag,
+            c.tangential * width,
+            c.tangential * c.radial_ratio * width,
+            c.tangential_edge * width,
+            c.radial_edge * width,
+            feed * step,
+            speed * step,
+        ]
+    )
+    return tooth, delay, cut, slices, np.ascontiguousarray(conditions.machine_from_feed)

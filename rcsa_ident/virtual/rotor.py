@@ -1,0 +1,169 @@
+"""The finite-element rotor: tool, holder, joint, shaft, bearings and housing in one assembly, both bending planes.
+
+Own assembly and own solution; shared with the identification's model are only the element matrices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+import scipy.sparse.linalg
+
+from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+from rcsa_ident.errors import InputError
+from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.virtual.machine import VirtualSpindle
+from rcsa_ident.virtual.mesh import SHAFT, TOOL, Mesh, add_tooling, element_edges, nanometres
+
+_AXES = (Dof.X, Dof.Y)
+_SLOPES = (Dof.SLOPE_X, Dof.SLOPE_Y)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rotor:
+    """M q'' + (C + Omega G) q' + (K - Omega K_s + i S) q = f; X freedoms first, then Y.
+
+    Parameters
+    ----------
+    mass, damping, stiffness, loss, gyroscopic, softening : sparse matrices, shape (d, d)
+        `loss` is S, the materials' hysteretic part; `gyroscopic` G and `softening` K_s are per spindle speed.
+    ports : array, shape (p, d)
+        Motion at each coordinate as a combination of the freedoms; its transpose spreads a force.
+    coordinates : tuple of Coordinate, length p
+        ``tip`` (cutting end), ``flange`` (spindle side of the joint), ``fixture`` (sensor holder on the housing).
+    """
+
+    mass: scipy.sparse.csc_array
+    damping: scipy.sparse.csc_array
+    stiffness: scipy.sparse.csc_array
+    loss: scipy.sparse.csc_array
+    gyroscopic: scipy.sparse.csc_array
+    softening: scipy.sparse.csc_array
+    ports: FloatArray
+    coordinates: tuple[Coordinate, ...]
+
+    def port(self, *names: str) -> np.ndarray:
+        """Return the rows of `ports` with these names, as in ``tip.x``."""
+        known = [str(c) for c in self.coordinates]
+        for name in names:
+            if name not in known:
+                raise InputError("coordinate", name, "one of " + ", ".join(known))
+        return np.array([known.index(name) for name in names])
+
+
+def rotor(spindle: VirtualSpindle, tooling: ToolAssembly | None, refinement: int = 1) -> Rotor:
+    """Return the assembled rotor; without a tooling, the spindle alone with its flange free.
+
+    Parameters
+    ----------
+    refinement : int
+        Divides every element further: for convergence studies.
+    """
+    mesh = Mesh()
+    if tooling is not None:
+        add_tooling(mesh, tooling, refinement)
+    stops = [nanometres(b.position) for b in spindle.bearings]
+    mesh.body(SHAFT, 0.0, spindle.shaft, element_edges(0.0, spindle.shaft, stops, refinement))
+    nodes = {z: node for (body, z), node in mesh.nodes.items() if body == SHAFT}
+    housing = mesh.new_node()
+    planes = [_plane(mesh, spindle, tooling is not None, nodes, housing, axis) for axis in (0, 1)]
+    freedoms = 2 * mesh.count
+    names = ("mass", "damping", "stiffness", "loss", "softening")
+    blocks = {name: scipy.sparse.block_diag([p[name] for p in planes], format="csc") for name in names}
+    turning = mesh.sum(mesh.rotary, freedoms)
+    if not spindle.gyroscopic:
+        turning = scipy.sparse.csc_array((freedoms, freedoms))
+    # the cutter turns from +Y to +X, against z; a slope rate in one plane asks for a moment in the other
+    gyroscopic = scipy.sparse.csc_array(scipy.sparse.block_array([[None, -2.0 * turning], [2.0 * turning, None]], format="csc"))
+    ports, coordinates = [], []
+    arm = spindle.housing.position - spindle.fixture_position
+    points = {"flange": ((2 * nodes[0], 1.0),), "fixture": ((2 * housing, 1.0), (2 * housing + 1, -arm))}
+    if tooling is not None:
+        points = {"tip": ((2 * mesh.nodes[TOOL, 0], 1.0),), **points}
+    for point, terms in points.items():
+        for axis in (0, 1):
+            row = np.zeros(2 * freedoms)
+            for index, weight in terms:
+                row[axis * freedoms + index] = weight
+            ports.append(row)
+            coordinates.append(Coordinate(point, _AXES[axis]))
+    for axis in (0, 1):
+        row = np.zeros(2 * freedoms)
+        row[axis * freedoms + 2 * nodes[0] + 1] = 1.0
+        ports.append(row)
+        coordinates.append(Coordinate("flange", _SLOPES[axis]))
+    return Rotor(gyroscopic=gyroscopic, ports=frozen(ports), coordinates=tuple(coordinates), **blocks)
+
+
+def frequency_response(
+    model: Rotor,
+    omega: FloatArray,
+    speed: float = 0.0,
+    inputs: tuple[str, ...] = ("tip.x", "tip.y"),
+    outputs: tuple[str, ...] | None = None,
+) -> ComplexArray:
+    """Return the receptances from `inputs` to `outputs` by solving the full equations at every frequency.
+
+    Parameters
+    ----------
+    omega : array, shape (n,) [rad/s], above 0
+    speed : float [rad/s]
+        Of the spindle: gyroscopic moments and softening.
+    inputs, outputs : tuples of str
+        Coordinates such as ``tip.x``; outputs default to all.
+
+    Returns
+    -------
+    complex array, shape (n, outputs, inputs) [m/N]
+    """
+    rows = np.arange(len(model.coordinates)) if outputs is None else model.port(*outputs)
+    return model.ports[rows] @ frequency_motion(model, omega, inputs, speed)
+
+
+def frequency_motion(model: Rotor, omega: FloatArray, inputs: tuple[str, ...], speed: float = 0.0) -> ComplexArray:
+    """Return the motion of every freedom under unit forces at `inputs`, shape (n, d, inputs)."""
+    omega = np.asarray(omega, dtype=float)
+    force = np.ascontiguousarray(model.ports[model.port(*inputs)].T.astype(complex))
+    stiffness = model.stiffness - speed * model.softening + 1j * model.loss
+    damping = model.damping + speed * model.gyroscopic
+    values = np.empty((omega.size, *force.shape), dtype=complex)
+    for i, w in enumerate(omega):
+        dynamic = (stiffness + 1j * w * damping - w**2 * model.mass).tocsc()
+        values[i] = scipy.sparse.linalg.splu(dynamic).solve(force)
+    return values
+
+
+def _plane(mesh: Mesh, spindle: VirtualSpindle, loaded: bool, nodes: dict[int, int], housing: int, axis: int) -> dict:
+    """The matrices of one bending plane."""
+    freedoms = 2 * mesh.count
+    damping, stiffness, softening = list(mesh.damping), list(mesh.stiffness), []
+    w, r = 2 * housing, 2 * housing + 1
+    body = spindle.housing
+    index = np.array([w, r])
+    stiffness.append((index, np.diag([body.stiffness[axis], body.tilting_stiffness[axis]])))
+    damping.append((index, np.diag([body.damping[axis], body.tilting_damping[axis]])))
+    for bearing in spindle.bearings:
+        # shaft deflection minus the housing's at the bearing: w_h + (z - z_h) r_h
+        index = np.array([2 * nodes[nanometres(bearing.position)], w, r])
+        gap = np.array([1.0, -1.0, -(bearing.position - body.position)])
+        square = np.outer(gap, gap)
+        stiffness.append((index, bearing.stiffness[axis] * square))
+        softening.append((index, bearing.stiffness[axis] * bearing.softening * square))
+        damping.append((index, bearing.damping[axis] * square))
+    if loaded:
+        face = mesh.flange
+        difference = np.array([[1.0, -1.0], [-1.0, 1.0]])
+        joint = spindle.joint
+        for k, spring, damper in (
+            (0, joint.translational_stiffness, joint.translational_damping),
+            (1, joint.rotational_stiffness, joint.rotational_damping),
+        ):
+            index = np.array([2 * face + k, 2 * nodes[0] + k])
+            stiffness.append((index, spring * difference))
+            damping.append((index, damper * difference))
+    mass = [*mesh.mass, (np.array([w, r]), np.diag([body.mass, body.inertia]))]
+    parts = {"mass": mass, "damping": damping, "stiffness": stiffness, "loss": mesh.loss, "softening": softening}
+    return {name: mesh.sum(part, freedoms) for name, part in parts.items()}

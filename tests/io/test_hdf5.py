@@ -1,0 +1,277 @@
+"""HDF5 recordings that are broken, or that reach for something outside of themselves."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.recordings import read_recording, write_hdf5
+from rcsa_ident.signals.recording import Quantity, Sensor
+
+X = Sensor("x", Quantity.TRIGGER)
+Y = Sensor("y", Quantity.TRIGGER)
+DATA = np.arange(64, dtype=np.float32)
+
+
+def make(path: Path, rate: object = 51200.0, **channels: object) -> h5py.File:
+    file = h5py.File(path, "w")
+    if rate is not None:
+        file.attrs["sampling_rate_hz"] = rate
+    for name, values in channels.items():
+        file.create_dataset(name, data=values)
+    return file
+
+
+def external_link(path: Path) -> None:
+    make(path.with_name("other.h5"), x=DATA).close()
+    with make(path) as file:
+        file["x"] = h5py.ExternalLink("other.h5", "/x")
+
+
+def external_link_beside(path: Path) -> None:
+    with make(path, x=DATA) as file:
+        file["z"] = h5py.ExternalLink("/etc/passwd", "/x")
+
+
+def soft_link(path: Path) -> None:
+    with make(path, real=DATA) as file:
+        file["x"] = h5py.SoftLink("/real")
+
+
+def external_storage(path: Path) -> None:
+    path.with_name("raw.bin").write_bytes(DATA.tobytes())
+    with make(path) as file:
+        file.create_dataset("x", (64,), "f4", external=[(str(path.with_name("raw.bin")), 0, 256)])
+
+
+def virtual(path: Path) -> None:
+    make(path.with_name("other.h5"), x=DATA).close()
+    layout = h5py.VirtualLayout((64,), "f4")
+    layout[:] = h5py.VirtualSource(str(path.with_name("other.h5")), "x", shape=(64,))
+    with make(path) as file:
+        file.create_virtual_dataset("x", layout)
+
+
+def terabytes(path: Path) -> None:
+    with make(path) as file:
+        file.create_dataset("x", (10**12,), "f4", chunks=(1024,))
+
+
+def bomb(path: Path) -> None:
+    with make(path) as file:
+        file.create_dataset("x", data=np.zeros(10**6, "f4"), compression="gzip", compression_opts=9, chunks=(10**6,))
+
+
+def huge_chunks(path: Path) -> None:
+    with make(path) as file:
+        file.create_dataset("x", data=DATA, chunks=(2**26,), maxshape=(None,))
+
+
+def unwritten(path: Path) -> None:
+    with make(path) as file:
+        file.create_dataset("x", (64,), "f4", chunks=(16,))[:32] = 1.0
+
+
+def never_written(path: Path) -> None:
+    with make(path) as file:
+        file.create_dataset("x", (64,), "f4")
+
+
+def foreign_filter(path: Path) -> None:
+    with make(path) as file:
+        file.create_dataset("x", data=np.arange(64), scaleoffset=0)
+
+
+def twice_deflated(path: Path) -> None:
+    plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    plist.set_chunk((64,))
+    plist.set_deflate(9)
+    plist.set_deflate(9)
+    with make(path) as file:
+        space = h5py.h5s.create_simple((64,))
+        h5py.h5d.create(file.id, b"x", h5py.h5t.NATIVE_FLOAT, space, plist).write(h5py.h5s.ALL, h5py.h5s.ALL, DATA)
+
+
+def inflating_chunk(path: Path) -> None:
+    with make(path) as file:
+        file.create_dataset("x", (64,), "f4", chunks=(64,), compression="gzip")
+        file["x"].id.write_direct_chunk((0,), zlib.compress(bytes(10**6)))
+
+
+def long_chunk(path: Path) -> None:
+    with make(path) as file:
+        file.create_dataset("x", (64,), "f4", chunks=(64,), compression="gzip")
+        file["x"].id.write_direct_chunk((0,), bytes(10**4))
+
+
+def lzf_after_deflate(path: Path) -> None:
+    plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    plist.set_chunk((64,))
+    plist.set_deflate(9)
+    plist.set_filter(h5py.h5z.FILTER_LZF, h5py.h5z.FLAG_OPTIONAL)
+    with make(path) as file:
+        h5py.h5d.create(file.id, b"x", h5py.h5t.NATIVE_FLOAT, h5py.h5s.create_simple((64,)), plist)
+        file["x"][:] = DATA
+
+
+def many_chunks(path: Path) -> None:
+    with make(path, filler=np.ones(10**5)) as file:
+        file.create_dataset("x", (200_000,), "f4", chunks=(1,))
+
+
+def garbled_chunk(path: Path) -> None:
+    with make(path) as file:
+        file.create_dataset("x", (64,), "f4", chunks=(64,), compression="gzip")
+        file["x"].id.write_direct_chunk((0,), b"garbage")
+
+
+def truncated(path: Path) -> None:
+    make(path, x=np.arange(4096.0)).close()
+    path.write_bytes(path.read_bytes()[:9000])
+
+
+def damaged(path: Path) -> None:
+    with make(path) as file:
+        file.create_dataset("x", data=np.arange(4096.0), chunks=(4096,), fletcher32=True)
+        offset = file["x"].id.get_chunk_info(0).byte_offset
+    raw = bytearray(path.read_bytes())
+    raw[offset + 100] ^= 0xFF
+    path.write_bytes(raw)
+
+
+def group(path: Path) -> None:
+    with make(path) as file:
+        file.create_group("x")
+
+
+def own_rates(path: Path) -> None:
+    with make(path, x=DATA, y=DATA) as file:
+        file["y"].attrs["sampling_rate_hz"] = 25600.0
+
+
+def list_of_rates(path: Path) -> None:
+    with make(path, rate=None, x=DATA) as file:
+        file.attrs["sampling_rate_hz"] = np.array([51200.0, 51200.0])
+
+
+BROKEN: list[tuple[Callable[[Path], object], list[str]]] = [
+    (external_link, ["channel x", "a link to another file", "in the file itself"]),
+    (external_link_beside, ["channel z", "a link to another file"]),
+    (soft_link, ["channel x", "a soft link"]),
+    (external_storage, ["channel x", "samples in an external file"]),
+    (virtual, ["channel x", "a virtual dataset"]),
+    (terabytes, ["8e+06 MB of declared samples", "at most 512 MB"]),
+    (bomb, ["8000000 bytes declared", "200 times the file's size"]),
+    (huge_chunks, ["channel x", "chunks of 268 MB", "at most 8 MB"]),
+    (unwritten, ["channel x", "never written", "a complete channel"]),
+    (never_written, ["channel x", "never written"]),
+    (foreign_filter, ["channel x", "filter number 6", "deflate, shuffle, fletcher32, lzf"]),
+    (twice_deflated, ["channel x", "a filter applied twice"]),
+    (inflating_chunk, ["channel x", "inflates to more than declared", "256 bytes"]),
+    (long_chunk, ["channel x", "a chunk larger than declared"]),
+    (lzf_after_deflate, ["channel x", "a filter after deflate"]),
+    (many_chunks, ["channel x", "200000 chunks", "at most 100000"]),
+    (garbled_chunk, ["cannot be read", "a complete HDF5 file"]),
+    (truncated, ["cannot be read (truncated file", "a complete HDF5 file"]),
+    (damaged, ["cannot be read", "a complete HDF5 file"]),
+    (group, ["channel x", "a group", "a dataset"]),
+    (own_rates, ["sampling_rate_hz", "x: 51200, y: 25600", "one rate for all channels"]),
+    (list_of_rates, ["sampling_rate_hz of the file", "shape (2,)", "one number"]),
+    (lambda p: make(p, rate=None, x=DATA).close(), ["sampling_rate_hz", "found nothing", "the campaign's rate"]),
+    (lambda p: make(p, rate=-1.0, x=DATA).close(), ["sampling_rate_hz of the file", "found -1.0", "greater than 0"]),
+    (lambda p: make(p, rate="51200", x=DATA).close(), ["sampling_rate_hz of the file", "found a text", "one number"]),
+    (lambda p: make(p, x=DATA, y=DATA[:60]).close(), ["different lengths (x: 64, y: 60)", "one length"]),
+    (lambda p: make(p, x=DATA.reshape(8, 8)).close(), ["channel x", "shape (8, 8)", "1-D"]),
+    (lambda p: make(p, x=DATA[:0]).close(), ["channel x", "shape (0,)", "at least one sample"]),
+    (lambda p: make(p, x=np.array([b"a", b"b"])).close(), ["channel x", "values of type |S1", "real numbers"]),
+    (lambda p: make(p, x=DATA * 1j).close(), ["channel x", "values of type complex64", "real numbers"]),
+    (lambda p: make(p, flange_y=DATA).close(), ["channel x", "no such channel", "of the file: flange_y"]),
+    (lambda p: p.write_bytes(b"time,x\n0,1\n"), ["cannot be read (file signature not found)"]),
+    (lambda p: p.write_bytes(b""), ["an empty file"]),
+    (lambda p: p.mkdir(), ["a folder", "an existing file"]),
+    (lambda p: None, ["no such file", "an existing file"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("write", "words"), BROKEN, ids=[f"{i}-{w[0][:24]}" for i, (_, w) in enumerate(BROKEN)])
+def test_a_bad_file_is_answered_with_one_sentence(tmp_path, write, words):
+    path = tmp_path / "cut.h5"
+    write(path)
+    both = any("y: " in word for word in words)
+    with pytest.raises(InputError) as error:
+        read_recording(path, (X, Y) if both else (X,))
+    message = str(error.value)
+    assert str(path) in message
+    assert "\n" not in message
+    for word in words:
+        assert word in message
+
+
+def test_nothing_outside_the_file_is_opened(tmp_path):
+    """The link's target would be read if it were followed; a missing target would give another message."""
+    for write in (external_link, external_storage, virtual):
+        path = tmp_path / "cut.h5"
+        write(path)
+        path.with_name("other.h5").unlink(missing_ok=True)
+        path.with_name("raw.bin").unlink(missing_ok=True)
+        with pytest.raises(InputError, match="in the file itself"):
+            read_recording(path, (X,))
+
+
+def test_own_attribute_wins_and_campaign_is_last(tmp_path):
+    path = tmp_path / "cut.h5"
+    with make(path, rate=1000.0, x=DATA) as file:
+        file["x"].attrs["sampling_rate_hz"] = 2000
+    assert read_recording(path, (X,), 3000.0).rate == 2000.0
+    make(path, rate=1000.0, x=DATA).close()
+    assert read_recording(path, (X,), 3000.0).rate == 1000.0
+    make(path, rate=None, x=DATA).close()
+    assert read_recording(path, (X,), 3000.0).rate == 3000.0
+
+
+@pytest.mark.parametrize("options", [{"compression": "gzip", "shuffle": True}, {"compression": "lzf"}, {"fletcher32": True}])
+def test_usual_filters_are_read(tmp_path, options):
+    path = tmp_path / "cut.hdf5"
+    noise = np.random.default_rng(2).normal(size=5000).astype(np.float32)
+    with make(path) as file:
+        file.create_dataset("x", data=noise, chunks=(1000,), **options)
+    np.testing.assert_array_equal(read_recording(path, (X,)).samples[:, 0], noise)
+
+
+@pytest.mark.parametrize("kind", ["i2", "i4", "u1", ">f4", "f8", "f2", "?"])
+def test_any_real_type_is_read(tmp_path, kind):
+    path = tmp_path / "cut.h5"
+    values = np.array([0, 1, 1, 0, 1]).astype(kind)
+    make(path, x=values).close()
+    np.testing.assert_array_equal(read_recording(path, (X,)).samples[:, 0], values.astype(float))
+
+
+def test_same_recording_same_bytes(tmp_path):
+    for name in ("a.h5", "b.h5"):
+        write_hdf5(tmp_path / name, 51200.0, {"x": DATA, "y": DATA})
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert file["x"].dtype == np.float32
+        assert file["x"].chunks is None
+
+
+@pytest.mark.parametrize(
+    ("rate", "channels", "words"),
+    [
+        (0.0, {"x": DATA}, "sampling_rate_hz"),
+        (1.0, {}, "channels: found none"),
+        (1.0, {"x": DATA, "y": DATA[1:]}, "one length"),
+        (1.0, {"x": DATA.reshape(8, 8)}, "one length"),
+        (1.0, {"a/b": DATA}, "a name without '/'"),
+    ],
+)
+def test_what_cannot_be_read_is_not_written(tmp_path, rate, channels, words):
+    with pytest.raises(InputError, match=words):
+        write_hdf5(tmp_path / "a.h5", rate, channels)
+    assert list(tmp_path.iterdir()) == []

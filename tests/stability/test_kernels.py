@@ -1,0 +1,72 @@
+"""The lobe kernels against plain loops; these tests run again without the compiler."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rcsa_ident.stability import _kernels as kernels
+from tests.oracles import naive
+
+ALPHA = np.array([[-0.4, -1.1], [0.9, -0.5]])
+OMEGA = 2.0 * np.pi * np.arange(600.0, 1300.0, 4.0)
+STIFFNESS = 7e8
+
+
+def model(w):
+    def mode(frequency, zeta, mass):
+        wn = 2.0 * np.pi * frequency
+        return 1.0 / (mass * (wn**2 - w**2 + 2j * zeta * wn * w))
+
+    a, b, c = mode(800.0, 0.04, 0.05), mode(950.0, 0.04, 0.05), mode(1100.0, 0.03, 0.08)
+    return np.array([[a + 0.36 * c, 0.6 * c], [0.6 * c, b + c]])
+
+
+@pytest.fixture(scope="module")
+def characteristic():
+    loop = np.array([ALPHA @ model(w) for w in OMEGA])
+    return np.trace(loop, axis1=1, axis2=2).astype(complex), np.linalg.det(loop)
+
+
+def test_eigenvalues(characteristic):
+    trace, determinant = characteristic
+    root = kernels.roots_along(trace, determinant)
+    for k in range(0, OMEGA.size, 7):
+        expected = np.sort_complex(np.linalg.eigvals(ALPHA @ model(OMEGA[k])))
+        np.testing.assert_allclose(np.sort_complex([0.5 * trace[k] + root[k], 0.5 * trace[k] - root[k]]), expected, rtol=1e-10)
+    for sign in (1.0, -1.0):
+        middle = 0.5 * (OMEGA[40] + OMEGA[41])
+        found = kernels.eigenvalue_at(OMEGA, trace, determinant, root, sign, 40, middle)
+        assert np.min(np.abs(np.linalg.eigvals(ALPHA @ model(middle)) / found - 1.0)) < 1e-6
+
+
+def test_largest_real_part(characteristic):
+    fine = np.linspace(OMEGA[0], OMEGA[-1], 20001)
+    expected = max(np.linalg.eigvals(ALPHA @ model(w)).real.max() for w in fine)
+    value, place = kernels.largest_real_part(OMEGA, *characteristic)
+    assert value == pytest.approx(expected, rel=1e-5)
+    assert np.linalg.eigvals(ALPHA @ model(place)).real.max() == pytest.approx(expected, rel=1e-5)
+
+
+def test_envelopes(characteristic):
+    speeds = np.array([900.0, 1333.0, 2000.0])
+    equal = np.full(3, 2.0 * np.pi / 3.0)
+    uneven = np.array([1.9, 2.2, 2.0 * np.pi - 4.1])
+    for pitch in (equal, uneven):
+        if pitch is equal:
+            limit, chatter, lobe = kernels.envelope(OMEGA, *characteristic, STIFFNESS, 3, speeds)
+            np.testing.assert_array_equal(lobe, np.floor(chatter / (3 * speeds)).astype(int))
+        else:
+            limit, chatter, lobe = kernels.pitch_envelope(OMEGA, *characteristic, STIFFNESS, pitch, speeds)
+        for i, speed in enumerate(speeds):
+            depth, frequency = naive.zero_order_limit(model, ALPHA, STIFFNESS, pitch, speed, OMEGA)
+            assert limit[i] == pytest.approx(depth, rel=1e-5)
+            assert chatter[i] == pytest.approx(frequency, rel=1e-6)
+
+
+def test_no_limit_where_no_eigenvalue_has_a_positive_real_part():
+    trace = np.full(5, -2.0 + 0.1j)
+    limit, chatter, lobe = kernels.envelope(OMEGA[:5], trace, np.full(5, 1.0 + 0j), STIFFNESS, 2, np.array([900.0]))
+    assert np.isinf(limit[0])
+    assert np.isnan(chatter[0])
+    assert lobe[0] == -1
