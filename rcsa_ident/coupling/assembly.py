@@ -28,14 +28,15 @@ def assemble(tool_holder: Structure, spindle: Structure, joint: LumpedJoint) -> 
     loss = scipy.linalg.block_diag(tool_holder.structural_damping, spindle.structural_damping)
     springs = (joint.translational_stiffness, joint.rotational_stiffness)
     dampers = (joint.translational_damping, joint.rotational_damping)
-    for i, coordinate in enumerate(spindle.coordinates):
+    flange = [(i, c) for i, c in enumerate(spindle.coordinates) if c.point == "flange"]
+    for i, coordinate in flange:
         here = d + spindle.index[i]
         there = tool_holder.index[tool_holder.coordinates.index(coordinate)]
         pair = np.ix_([here, there], [here, there])
         tie = np.array([[1.0, -1.0], [-1.0, 1.0]])
-        stiffness[pair] += springs["'" in coordinate.dof] * tie
-        damping[pair] += dampers["'" in coordinate.dof] * tie
+        stiffness[pair] += springs[coordinate.dof.is_slope] * tie
+        damping[pair] += dampers[coordinate.dof.is_slope] * tie
     tips = [(i, c) for i, c in enumerate(tool_holder.coordinates) if c.point == "tip"]
-    coordinates = (*(c for _, c in tips), *(Coordinate(SPINDLE, c.dof) for c in spindle.coordinates))
-    index = np.concatenate([tool_holder.index[[i for i, _ in tips]], d + spindle.index])
+    coordinates = (*(c for _, c in tips), *(Coordinate(SPINDLE, c.dof) for _, c in flange))
+    index = np.concatenate([tool_holder.index[[i for i, _ in tips]], d + spindle.index[[i for i, _ in flange]]])
     return Structure(mass, damping, stiffness, loss, coordinates, index)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import non_negative, positive
 
 
@@ -33,13 +35,14 @@ class LumpedJoint:
         non_negative("joint translational_damping", self.translational_damping, "N s/m")
         non_negative("joint rotational_damping", self.rotational_damping, "N m s/rad")
 
-    def compliance(self, omega: FloatArray, planes: int = 1) -> ComplexArray:
-        """Return K(omega)^-1 over (translation, slope) of each bending plane, shape (n, 2 planes, 2 planes)."""
+    def compliance_along(self, omega: FloatArray, directions: Sequence[Dof]) -> ComplexArray:
+        """Return the diagonal of K(omega)^-1 over the given directions, shape (n, d)."""
         omega = np.asarray(omega, dtype=float)
         translation = 1.0 / (self.translational_stiffness + 1j * omega * self.translational_damping)
         slope = 1.0 / (self.rotational_stiffness + 1j * omega * self.rotational_damping)
-        values = np.zeros((omega.size, 2 * planes, 2 * planes), dtype=complex)
-        for k in range(planes):
-            values[:, 2 * k, 2 * k] = translation
-            values[:, 2 * k + 1, 2 * k + 1] = slope
-        return values
+        return np.stack([slope if dof.is_slope else translation for dof in directions], axis=1)
+
+    def compliance(self, omega: FloatArray, planes: int = 1) -> ComplexArray:
+        """Return K(omega)^-1 over (translation, slope) of each bending plane, shape (n, 2 planes, 2 planes)."""
+        diagonal = self.compliance_along(omega, (Dof.X, Dof.SLOPE_X) * planes)
+        return diagonal[:, :, None] * np.eye(2 * planes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 
@@ -22,7 +22,7 @@ def couple(tool_holder: Receptance, spindle: Receptance, joint: LumpedJoint) -> 
     tool_holder : Receptance
         Points ``tip`` and ``flange``; per point translation and slope of one bending plane, or of both (4 x 4 blocks).
     spindle : Receptance
-        Point ``flange`` with the same directions, at the same frequencies.
+        Point ``flange`` with the same directions in the same order, at the same frequencies.
 
     Returns
     -------
@@ -34,17 +34,25 @@ def couple(tool_holder: Receptance, spindle: Receptance, joint: LumpedJoint) -> 
     a11, a12 = tool_holder["tip", "tip"], tool_holder["tip", "flange"]
     a21, a22 = tool_holder["flange", "tip"], tool_holder["flange", "flange"]
     b33 = spindle["flange", "flange"]
-    if b33.shape != a22.shape:
-        raise InputError("spindle receptance", b33.shape, f"the shape of the tool-holder's flange block, {a22.shape}")
-    size = a22.shape[1]
-    interface = a22 + joint.compliance(tool_holder.omega, size // 2) + b33
+    directions = _directions(tool_holder.rows, "flange")
+    for name, found in (("columns", _directions(tool_holder.cols, "flange")), ("spindle", _directions(spindle.rows, "flange"))):
+        if found != directions:
+            raise InputError(f"directions at the flange ({name})", " ".join(found), f"the tool-holder's, {' '.join(directions)}, in that order")
+    interface = a22 + b33
+    i = np.arange(len(directions))
+    interface[:, i, i] += joint.compliance_along(tool_holder.omega, directions)
+    tips = a21.shape[2]
     carried = np.linalg.solve(interface, np.concatenate([a21, b33], axis=2))
-    from_tip, from_spindle = carried[:, :, :size], carried[:, :, size:]
+    from_tip, from_spindle = carried[:, :, :tips], carried[:, :, tips:]
     c11 = a11 - a12 @ from_tip
     c31 = b33 @ from_tip
     c13 = a12 @ from_spindle
     c33 = b33 - b33 @ from_spindle
     values = np.concatenate([np.concatenate([c11, c13], axis=2), np.concatenate([c31, c33], axis=2)], axis=1)
-    tips = tuple(c for c in tool_holder.rows if c.point == "tip")
-    coordinates = (*tips, *(Coordinate(SPINDLE, c.dof) for c in tips))
-    return Receptance(tool_holder.omega, values, coordinates, coordinates)
+    spindle_end = tuple(Coordinate(SPINDLE, dof) for dof in directions)
+    rows, cols = ((*(c for c in side if c.point == "tip"), *spindle_end) for side in (tool_holder.rows, tool_holder.cols))
+    return Receptance(tool_holder.omega, values, rows, cols)
+
+
+def _directions(coordinates: tuple[Coordinate, ...], point: str) -> tuple[Dof, ...]:
+    return tuple(c.dof for c in coordinates if c.point == point)

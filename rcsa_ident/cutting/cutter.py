@@ -29,8 +29,8 @@ class Cutter:
     teeth: int
     diameter: float
     helix: float = 0.0
-    pitch: FloatArray = field(default=None)  # type: ignore[assignment]
-    runout: FloatArray = field(default=None)  # type: ignore[assignment]
+    pitch: FloatArray = field(default=None)  # type: ignore[arg-type]
+    runout: FloatArray = field(default=None)  # type: ignore[arg-type]
 
     def __post_init__(self) -> None:
         if isinstance(self.teeth, bool) or int(self.teeth) != self.teeth or not 1 <= self.teeth <= 100:

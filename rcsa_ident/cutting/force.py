@@ -31,9 +31,7 @@ def tooth_force(phi: FloatArray, chip: FloatArray, coefficients: CuttingCoeffici
     return np.stack([-c * tangential - s * radial, s * tangential - c * radial, axial], axis=-1)
 
 
-def force_lines(
-    cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, orders: np.ndarray
-) -> ComplexArray:
+def force_lines(cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, orders: np.ndarray) -> ComplexArray:
     """Return the amplitudes of the milling force at multiples of the spindle frequency.
 
     The force is F(t) = Re sum_m lines[m] e^{i m Omega t} with tooth 1 (at the tip) at immersion 0 when t = 0. Exact

@@ -1,6 +1,8 @@
-"""Sums over poles; arrays and scalars only."""
+"""Sums over poles, and bases; arrays and scalars only."""
 
 from __future__ import annotations
+
+import math
 
 import numba
 import numpy as np
@@ -21,3 +23,51 @@ def pole_sum(omega, pole, residue):
             for j in range(q):
                 values[i, j] += residue[k, j] * factor
     return values
+
+
+@numba.njit(cache=True)
+def independent_columns(columns, tolerance):
+    """Return an orthonormal basis of the columns, shape (d, m) -> (d, k), largest remainder first.
+
+    Columns are taken at unit length; the basis ends where no remainder is longer than `tolerance`.
+    """
+    d, m = columns.shape
+    rest = np.empty((m, d))
+    size = np.empty(m)
+    for j in range(m):
+        rest[j] = columns[:, j]
+        length = math.sqrt(dot(rest[j], rest[j]))
+        if length > 0.0:
+            rest[j] /= length
+        size[j] = dot(rest[j], rest[j])
+    basis = np.empty((min(d, m), d))
+    for k in range(min(d, m)):
+        best = np.argmax(size)
+        if math.sqrt(size[best]) <= tolerance:
+            return basis[:k].T.copy()
+        basis[k] = rest[best] / math.sqrt(size[best])
+        # what the subtractions have lost to rounding is taken out again
+        for i in range(k):
+            take_out(basis[i], basis[k])
+        basis[k] /= math.sqrt(dot(basis[k], basis[k]))
+        for j in range(m):
+            take_out(basis[k], rest[j])
+            size[j] = dot(rest[j], rest[j])
+    return basis.T.copy()
+
+
+@numba.njit(cache=True)
+def dot(a, b):
+    """Return the inner product of two real vectors."""
+    total = 0.0
+    for i in range(a.size):
+        total += a[i] * b[i]
+    return total
+
+
+@numba.njit(cache=True)
+def take_out(direction, vector):
+    """Subtract from `vector`, in place, its part along the unit vector `direction`."""
+    share = dot(direction, vector)
+    for i in range(vector.size):
+        vector[i] -= share * direction[i]

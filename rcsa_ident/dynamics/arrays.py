@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+# names for the reader; numpy's stubs lose the dtype in too many functions for a checker to hold them
+FloatArray = NDArray[Any]
+ComplexArray = NDArray[Any]
 
 
 def frozen(values: Any, dtype: Any = np.float64) -> NDArray[Any]:

@@ -21,6 +21,11 @@ class Dof(StrEnum):
     SLOPE_X = "x'"
     SLOPE_Y = "y'"
 
+    @property
+    def is_slope(self) -> bool:
+        """True for a rotation."""
+        return self in (Dof.SLOPE_X, Dof.SLOPE_Y)
+
 
 @dataclass(frozen=True, slots=True)
 class Coordinate:

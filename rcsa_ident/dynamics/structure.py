@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from rcsa_ident.dynamics._kernels import independent_columns
 from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.modal import PoleModel
@@ -55,24 +56,51 @@ class Structure:
         return Receptance(omega, values.reshape(omega.size, *2 * (self.index.size,)), self.coordinates, self.coordinates)
 
 
+@dataclass(frozen=True, slots=True)
+class _Bands:
+    """The matrices by diagonals: entry (i, j) stands at [half + i - j, j]."""
+
+    half: int
+    stiffness: ComplexArray
+    damping: ComplexArray
+    mass: ComplexArray
+
+    @classmethod
+    def of(cls, structure: Structure) -> _Bands:
+        stiffness = structure.stiffness + 1j * structure.structural_damping
+        rows, cols = np.nonzero((structure.mass != 0.0) | (structure.damping != 0.0) | (stiffness != 0.0))
+        half = int(np.max(np.abs(rows - cols)))
+        bands = []
+        for matrix in (stiffness, structure.damping, structure.mass):
+            band = np.zeros((2 * half + 1, matrix.shape[0]), dtype=complex)
+            band[half + rows - cols, cols] = matrix[rows, cols]
+            bands.append(band)
+        return cls(half, *bands)
+
+    def times(self, band: ComplexArray, x: np.ndarray) -> np.ndarray:
+        """Return the product of one of the matrices with x, shape (d, k)."""
+        d = x.shape[0]
+        total = np.zeros(x.shape, dtype=np.result_type(band, x))
+        for offset in range(-self.half, self.half + 1):
+            i, j = max(offset, 0), max(-offset, 0)
+            total[i : d - j] += band[self.half + offset, j : d - i, None] * x[j : d - i]
+        return total
+
+
 def unit_responses(structure: Structure, omega: FloatArray) -> Iterator[ComplexArray]:
     """Yield, per frequency, the motion of every freedom under a unit force at each coordinate, shape (d, p).
 
     The dynamic stiffness is solved as a band: cost about 2 d b^2 complex flops with half-bandwidth b.
     """
-    d, p = structure.mass.shape[0], structure.index.size
-    force = np.zeros((d, p), dtype=complex)
-    force[structure.index, np.arange(p)] = 1.0
-    stiffness = structure.stiffness + 1j * structure.structural_damping
-    rows, cols = np.nonzero((structure.mass != 0.0) | (structure.damping != 0.0) | (stiffness != 0.0))
-    half = int(np.max(np.abs(rows - cols)))
-    bands = []
-    for matrix in (stiffness, structure.damping, structure.mass):
-        band = np.zeros((2 * half + 1, d), dtype=complex)
-        band[half + rows - cols, cols] = matrix[rows, cols]
-        bands.append(band)
+    return _unit_responses(structure, _Bands.of(structure), omega)
+
+
+def _unit_responses(structure: Structure, bands: _Bands, omega: FloatArray) -> Iterator[ComplexArray]:
+    force = np.zeros((structure.mass.shape[0], structure.index.size), dtype=complex)
+    force[structure.index, np.arange(structure.index.size)] = 1.0
     for w in omega:
-        yield scipy.linalg.solve_banded((half, half), bands[0] + 1j * w * bands[1] - w**2 * bands[2], force)
+        dynamic = bands.stiffness + 1j * w * bands.damping - w**2 * bands.mass
+        yield scipy.linalg.solve_banded((bands.half, bands.half), dynamic, force, overwrite_ab=True, check_finite=False)
 
 
 def natural_frequencies(structure: Structure) -> FloatArray:
@@ -89,22 +117,28 @@ def rigid_body_modes(structure: Structure, max_omega: float) -> FloatArray:
     max_omega : float [rad/s]
         A frequency of the elastic motion; a thousandth of it shifts the inverse iteration.
     """
-    mass, stiffness = structure.mass, structure.stiffness
-    d = mass.shape[0]
-    factor = scipy.linalg.cho_factor(stiffness + (1e-3 * max_omega) ** 2 * mass)
+    return _rigid_body_modes(_Bands.of(structure), max_omega)
+
+
+def _rigid_body_modes(bands: _Bands, max_omega: float) -> FloatArray:
+    stiffness, mass, half = bands.stiffness.real, bands.mass.real, bands.half
+    d = mass.shape[1]
+    shifted = (stiffness + (1e-3 * max_omega) ** 2 * mass)[half:]
+    factor = (scipy.linalg.cholesky_banded(shifted, lower=True), True)
     motions = np.random.default_rng(0).normal(size=(d, min(6, d)))
     for _ in range(4):
-        motions = np.linalg.qr(scipy.linalg.cho_solve(factor, mass @ motions))[0]
-    _, mix = scipy.linalg.eigh(motions.T @ stiffness @ motions, motions.T @ mass @ motions)
+        motions = np.linalg.qr(scipy.linalg.cho_solve_banded(factor, bands.times(mass, motions)))[0]
+    _, mix = scipy.linalg.eigh(motions.T @ bands.times(stiffness, motions), motions.T @ bands.times(mass, motions))
     motions = motions @ mix
     free = np.ones(motions.shape[1], dtype=bool)
-    for matrix in (stiffness, structure.damping, structure.structural_damping):
+    for band in (stiffness, bands.damping.real, bands.stiffness.imag):
         # a force that is nothing but the rounding of the sums that make it
-        free &= np.max(np.abs(matrix @ motions), axis=0) <= 1e-13 * np.max(np.abs(matrix) @ np.abs(motions), axis=0)
+        force, sums = bands.times(band, motions), bands.times(np.abs(band), np.abs(motions))
+        free &= np.max(np.abs(force), axis=0) <= 1e-13 * np.max(sums, axis=0)
     return motions[:, free]
 
 
-def poles(structure: Structure, max_omega: float, snapshots: int = 6, tolerance: float = 1e-7) -> PoleModel:
+def poles(structure: Structure, max_omega: float, snapshots: int = 6, tolerance: float = 3e-7) -> PoleModel:
     """Return the receptance as poles and residues, good up to `max_omega`.
 
     The equations are projected on their own exact solutions at a few frequencies of the band (a rational Krylov
@@ -118,15 +152,15 @@ def poles(structure: Structure, max_omega: float, snapshots: int = 6, tolerance:
     snapshots : int
         Frequencies at which the full equations are solved, Chebyshev points of the band.
     tolerance : float
-        Directions whose share of the solutions' mass norm is smaller are dropped.
+        Directions whose share of the solutions is smaller are dropped.
     """
+    bands = _Bands.of(structure)
     points = 0.5 * max_omega * (1.0 - np.cos(np.pi * (np.arange(snapshots) + 0.5) / snapshots))
-    solutions = np.hstack(list(unit_responses(structure, points)))
-    rigid = rigid_body_modes(structure, max_omega)
-    basis = _orthonormal(np.hstack([solutions.real, solutions.imag]), structure.mass, rigid, tolerance)
-    stiffness = basis.T @ (structure.stiffness + 1j * structure.structural_damping) @ basis
-    damping = basis.T @ structure.damping @ basis
-    elastic = _diagonalise(basis.T @ structure.mass @ basis, damping, stiffness, basis[structure.index], structure.coordinates)
+    solutions = np.hstack(list(_unit_responses(structure, bands, points)))
+    rigid = _rigid_body_modes(bands, max_omega)
+    basis = _elastic_basis(np.hstack([solutions.real, solutions.imag]), bands, rigid, tolerance)
+    mass, damping, stiffness = (basis.T @ bands.times(band, basis) for band in (bands.mass.real, bands.damping.real, bands.stiffness))
+    elastic = _diagonalise(mass, damping, stiffness, basis[structure.index], structure.coordinates)
     small, at_ports = 1e-7j * max_omega, rigid[structure.index]
     pair = np.concatenate([np.full(rigid.shape[1], small), np.full(rigid.shape[1], -small)])
     return PoleModel(
@@ -137,22 +171,19 @@ def poles(structure: Structure, max_omega: float, snapshots: int = 6, tolerance:
     )
 
 
-def _orthonormal(columns: FloatArray, mass: FloatArray, rigid: FloatArray, tolerance: float) -> FloatArray:
-    """Mass-orthonormalise the columns against `rigid` and each other; directions that add nothing are dropped."""
-    momentum = mass @ rigid
+def _elastic_basis(columns: FloatArray, bands: _Bands, rigid: FloatArray, tolerance: float) -> FloatArray:
+    """Independent directions of the columns, free of rigid-body motion."""
+    momentum = bands.times(bands.mass.real, rigid)
     for _ in range(2):
         columns = columns - rigid @ (momentum.T @ columns)
-    norms = np.sqrt(np.einsum("ij,ij->j", columns, mass @ columns))
-    scaled = columns[:, norms > 0.0] / norms[norms > 0.0]
-    factor = np.linalg.cholesky(mass)
-    left, size, _ = np.linalg.svd(factor.T @ scaled, full_matrices=False)
-    kept = left[:, size > tolerance * np.max(size, initial=0.0)]
-    basis = scipy.linalg.solve_triangular(factor.T, kept, lower=False)
+    # slopes and deflections, long and short elements on one scale
+    scale = np.sqrt(bands.mass.real[bands.half])[:, None]
+    basis = independent_columns(np.asfortranarray(scale * columns), tolerance) / scale
     return basis - rigid @ (momentum.T @ basis)
 
 
 def _diagonalise(mass, damping, stiffness, ports, coordinates):  # type: ignore[no-untyped-def]
-    """Poles and residues of ports (K + i w C - w^2 M)^-1 ports^T for w > 0, M the identity up to rounding."""
+    """Poles and residues of ports (K + i w C - w^2 M)^-1 ports^T for w > 0."""
     m = mass.shape[0]
     inverse = np.linalg.inv(mass)
     state = np.zeros((2 * m, 2 * m), dtype=complex)

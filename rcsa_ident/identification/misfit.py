@@ -49,15 +49,15 @@ class Misfit:
     ----------
     data : IdentificationData
     priors : Priors
-    model_error : float [-]
-        Standard deviation of what the force model leaves out, as a share of each line.
+    model_error : tuple of float [-]
+        Of each axis: standard deviation of what the force model leaves out, as a share of each line.
     """
 
-    def __init__(self, data: IdentificationData, priors: Priors, model_error: float) -> None:
+    def __init__(self, data: IdentificationData, priors: Priors, model_error: tuple[float, ...]) -> None:
         self.data = data
         self.priors = priors
         self.model_error = model_error
-        self.weight = tuple(_weight(a, model_error) for a in data.axes)
+        self.weight = tuple(_weight(a, f) for a, f in zip(data.axes, model_error, strict=True))
         # lines of all axes, cut by cut: a cut's delay and angle are the same for both
         cut = np.concatenate([a.cut for a in data.axes])
         self._order = np.argsort(cut, kind="stable")
@@ -99,7 +99,7 @@ class Misfit:
         nuisance = nuisance.copy()
         prior = self.data.cut_prior
         fit_cuts(self._lines, self._weights, np.concatenate(models)[self._order], self._start, prior, nuisance, grid)
-        rest = [self._rest(a, model, w, nuisance) for a, model, w in zip(self.data.axes, models, self.weight, strict=True)]
+        rest = [self._rest(i, model, nuisance) for i, model in enumerate(models)]
         chi2 = tuple(float(np.sum(np.abs(r) ** 2)) for r in rest)
         own, own_jacobian = prior_rows(theta, orders, self.priors)
         cuts = prior[:, 1] * (nuisance[:, 0] - prior[:, 0]) ** 2 + prior[:, 2] * nuisance[:, 1] ** 2
@@ -117,8 +117,16 @@ class Misfit:
             cost, chi2, nuisance, tuple(models), slope + own_jacobian.T @ own, hessian + own_jacobian.T @ own_jacobian
         )
 
-    def _rest(self, axis: AxisData, model: ComplexArray, weight: FloatArray, nuisance: FloatArray) -> ComplexArray:
-        return (self._turned(axis, nuisance)[0] - model) * np.sqrt(weight)
+    def residuals(self, evaluation: Evaluation) -> list[ComplexArray]:
+        """Return each axis' residuals in standard deviations."""
+        return [self._rest(i, model, evaluation.nuisance) for i, model in enumerate(evaluation.models)]
+
+    def without_delay(self, axis: AxisData, nuisance: FloatArray) -> ComplexArray:
+        """Return the measured lines of an axis as they would be with tooth 1 at immersion 0 at the start [m/N]."""
+        return self._turned(axis, nuisance)[0]
+
+    def _rest(self, i: int, model: ComplexArray, nuisance: FloatArray) -> ComplexArray:
+        return (self._turned(self.data.axes[i], nuisance)[0] - model) * np.sqrt(self.weight[i])
 
     @staticmethod
     def _turned(axis: AxisData, nuisance: FloatArray) -> tuple[ComplexArray, ComplexArray]:

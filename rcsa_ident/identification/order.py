@@ -10,7 +10,7 @@ from rcsa_ident.dynamics.arrays import FloatArray
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import pack, split, unpack, without_mode
 from rcsa_ident.identification.polish import Solution, polish
-from rcsa_ident.identification.priors import log_volume
+from rcsa_ident.identification.priors import log_volume, prior_rows
 
 #: The walk stops where the evidence lies this far behind the best seen: nothing below comes back from there.
 GIVE_UP = 60.0
@@ -65,8 +65,8 @@ def drop_modes(solution: Solution, misfit: Misfit, report: Callable[[str, float]
     return best
 
 
-def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> float:
-    """Return the share of each line that the residuals show to be unexplained, beyond the records' noise.
+def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> tuple[float, ...]:
+    """Return, per axis, the share of each line that the residuals show to be unexplained beyond the records' noise.
 
     The share f solves sum |rest|^2 / (variance + f^2 |h|^2 / 2) = degrees of freedom, the data's less those that parameters
     and cuts have used.
@@ -77,11 +77,20 @@ def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> f
         Floor: no simulated force is better than that.
     """
     assert solution.evaluation.hessian is not None
-    prior = np.exp(log_volume(solution.orders, misfit.priors) / solution.theta.size)
-    spectrum = np.linalg.eigvalsh(solution.evaluation.hessian / prior)
-    used = float(np.sum(1.0 - 1.0 / np.maximum(spectrum, 1.0))) + 2.0 * len(misfit.data.cut_ids)
-    freedom = max(misfit.points - used, 0.1 * misfit.points)
-    squares, noise, size = _squares(solution, misfit)
+    jacobian = prior_rows(solution.theta, solution.orders, misfit.priors)[1]
+    # parameters that the data have moved away from their priors
+    used = solution.theta.size - float(np.trace(np.linalg.solve(solution.evaluation.hessian, jacobian.T @ jacobian)))
+    used += 2.0 * len(misfit.data.cut_ids)
+    free = max(1.0 - used / misfit.points, 0.1)
+    shares = []
+    for axis, rest, weight in zip(misfit.data.axes, misfit.residuals(solution.evaluation), misfit.weight, strict=True):
+        squares, size = np.abs(rest) ** 2 / weight, np.abs(axis.measured) ** 2
+        shares.append(_share(squares, axis.variance, size, 2.0 * axis.omega.size * free, smallest))
+    return tuple(shares)
+
+
+def _share(squares: FloatArray, noise: FloatArray, size: FloatArray, freedom: float, smallest: float) -> float:
+    """Solve for the share by bisection of its logarithm: the sum falls with it."""
     low, high = smallest, 1.0
     if np.sum(squares / (noise + 0.5 * low**2 * size)) <= freedom:
         return smallest
@@ -92,13 +101,3 @@ def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> f
         else:
             high = middle
     return high
-
-
-def _squares(solution: Solution, misfit: Misfit) -> tuple[FloatArray, FloatArray, FloatArray]:
-    squares, noise, size = [], [], []
-    for axis, model, weight in zip(misfit.data.axes, solution.evaluation.models, misfit.weight, strict=True):
-        rest = misfit._rest(axis, model, weight, solution.evaluation.nuisance)
-        squares.append(np.abs(rest) ** 2 / weight)
-        noise.append(axis.variance)
-        size.append(np.abs(axis.measured) ** 2)
-    return np.concatenate(squares), np.concatenate(noise), np.concatenate(size)

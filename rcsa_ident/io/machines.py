@@ -69,6 +69,7 @@ def read_machine(path: str | Path) -> MachineFile:
     sensors = top.table("sensors", _SENSORS, {})
     cuts = top.table("cuts", _CUTS)
     with top.naming({}):
+        plan = _plan(cuts)
         spindle = VirtualSpindle(
             shaft=beam_segments(top.table("shaft", ("segments",)), material_library(top)),
             bearings=tuple(_bearing(table) for table in top.tables("bearings", _BEARING)),
@@ -77,12 +78,17 @@ def read_machine(path: str | Path) -> MachineFile:
             gyroscopic=_flag(head, "gyroscopic"),
             fixture_position=sensors.number("fixture_position_mm", "mm", 0.0, least=-1000.0, most=5000.0) * 1e-3,
         )
+        fastest = max(plan.spindle_speeds)
+        for i, bearing in enumerate(spindle.bearings):
+            if bearing.softening * fastest >= 1.0:
+                allowed = f"below {1.0 / (fastest / _RPM):.3g} at {fastest / _RPM:g} rev/min, so that some stiffness is left"
+                top.refuse(f"bearings[{i}].softening_per_rpm", f"{bearing.softening * _RPM:g}", allowed)
         return MachineFile(
             name=head.text("name", path.stem),
             spindle=spindle,
             sensors=_sensors(sensors),
             workpiece=_workpiece(top.table("workpiece", _WORKPIECE)),
-            plan=_plan(cuts),
+            plan=plan,
             toolings=_paths(cuts, "toolings", path.parent, required=True),
             truth_toolings=_paths(cuts, "truth_toolings", path.parent, required=False),
         )

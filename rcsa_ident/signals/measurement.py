@@ -144,7 +144,7 @@ def measure_cut(
     if harmonic.size == 0:
         return Reading(Verdict((f"no tooth-passing line below {max_frequency:.0f} Hz",)))
     forced = np.abs(difference[harmonic]).max(axis=0)
-    reasons = [chatter(lines, forced, (0.5 * cutter.teeth * speed / (2 * np.pi), max_frequency))]
+    reasons = [chatter(lines, _displacement_indices(cut, axes), forced, (0.5 * cutter.teeth * speed / (2 * np.pi), max_frequency))]
     if air is not None and cutter.equally_spaced:
         reasons.append(tooth_count_fault(np.sum(np.abs(difference) ** 2, axis=1), cutter.teeth))
     if any(reasons):
@@ -171,14 +171,13 @@ def measure_cut(
     return Reading(Verdict((), tuple(notes)), measurement)
 
 
-def _displacement_columns(recording: Recording, axes: list[Dof]) -> np.ndarray:
-    columns = []
-    for axis in axes:
-        found = recording.channel(Quantity.DISPLACEMENT, axis)
-        if found is None:
-            raise InputError(f"displacement channel {axis}", "none", "the same channels as in the cut")
-        columns.append(found[1])
-    return np.column_stack(columns)
+def _displacement_indices(recording: Recording, axes: list[Dof]) -> list[int]:
+    kinds = [(sensor.quantity, sensor.axis) for sensor in recording.sensors]
+    return [kinds.index((Quantity.DISPLACEMENT, axis)) for axis in axes]
+
+
+def _displacement_columns(recording: Recording, axes: list[Dof]) -> FloatArray:
+    return recording.samples[:, _displacement_indices(recording, axes)]
 
 
 def _lines(

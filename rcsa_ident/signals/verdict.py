@@ -93,21 +93,22 @@ def speed_faults(samples: FloatArray, rate: float, speed: float, programmed: flo
     return tuple(found)
 
 
-def chatter(lines: LineSpectrum, forced: FloatArray, band: tuple[float, float]) -> str | None:
+def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: tuple[float, float]) -> str | None:
     """Return a sentence if a vibration off the spindle's orders stands out, else None.
 
     Parameters
     ----------
     lines : LineSpectrum
-        Of the displacements.
-    forced : array, shape (c,) [m]
-        Largest tooth-passing amplitude of each channel.
+    channels : list of int
+        The displacements among its channels.
+    forced : array, one entry per displacement [m]
+        Largest tooth-passing amplitude.
     band : (float, float) [Hz]
         Where to look.
     """
     n = lines.rest.shape[0]
     window = get_window("hann", n)
-    amplitude = 2.0 * np.abs(np.fft.rfft(lines.rest * window[:, None], axis=0)) / window.sum()
+    amplitude = 2.0 * np.abs(np.fft.rfft(lines.rest[:, channels] * window[:, None], axis=0)) / window.sum()
     frequency = np.fft.rfftfreq(n, 1.0 / lines.rate)
     order = frequency * 2.0 * np.pi / lines.spindle_speed
     # a Hann line reaches two bins to each side of the spindle's orders

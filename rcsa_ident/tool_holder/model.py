@@ -16,9 +16,9 @@ from rcsa_ident.tool_holder.timoshenko import (
     Section,
     ShearCoefficient,
     cowper,
-    section,
     refined_beam_matrices,
     refined_layer_matrices,
+    section,
     stacked,
     together,
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -142,7 +143,7 @@ class VirtualSpindle:
         return self.gyroscopic or any(b.softening != 0.0 for b in self.bearings)
 
 
-def _pair(field: str, values: PerAxis, check, unit: str = "") -> None:  # type: ignore[no-untyped-def]
+def _pair(field: str, values: PerAxis, check: Callable[[str, float, str], float], unit: str = "") -> None:
     if len(values) != 2:
         raise InputError(field, list(values), "two numbers, X and Y")
     for value in values:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -105,11 +106,11 @@ def mill_cut(
     through = 2.0 * (dynamics.outputs[rows[4:]] * dynamics.pole) @ dynamics.inputs
 
     force = np.zeros((count, 2))
-    setup = _cut_arrays(cutter, conditions, coefficients, step, slices, start_angle)
-    result = mill(np.exp(x), gain, np.ascontiguousarray(shape), state, *setup, force)
+    tooth, delay, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices, start_angle)
+    result = mill(np.exp(x), gain, np.ascontiguousarray(shape), state, tooth, delay, cut, slices, turn, force)
     return CutHistory(
         step=step,
-        angle=start_angle + speed * step * np.arange(count),
+        angle=np.asarray(start_angle + speed * step * np.arange(count), dtype=np.float64),
         force=force,
         tip=result[:, 0:2],
         flange=result[:, 2:4],
@@ -126,16 +127,18 @@ def rigid_force_lines(
     Tooth 1 is at immersion 0 when t = 0; machine axes.
     """
     step = 2.0 * np.pi / conditions.spindle_speed / samples
-    setup = _cut_arrays(cutter, conditions, coefficients, step, slices, 0.0)
+    tooth, delay, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices, 0.0)
     force = np.zeros((samples, 2))
-    none = np.zeros(1, dtype=complex)
-    mill(none, np.zeros((2, 1, 2), dtype=complex), np.zeros((2, 1), dtype=complex), none.copy(), *setup, force)
+    none = np.zeros((2, 1), dtype=complex)
+    mill(none[0], none[:, :, None] * np.ones(2), none, none[1].copy(), tooth, delay, cut, slices, turn, force)
     lines = np.fft.rfft(force, axis=0)[:_START_ORDERS] / samples
     lines[1:] *= 2.0
     return lines
 
 
-def _cut_arrays(cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, step: float, slices: int, angle: float):  # type: ignore[no-untyped-def]
+def _cut_arrays(
+    cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, step: float, slices: int, angle: float
+) -> tuple[Any, ...]:
     """The kernel's view of a cut: teeth, delays in steps, numbers, slices, axes."""
     speed = conditions.spindle_speed
     tooth = np.stack([cutter.tooth_angle, cutter.runout], axis=1)
@@ -163,4 +166,27 @@ def _cut_arrays(cutter: Cutter, conditions: CuttingConditions, coefficients: Cut
             speed * step,
         ]
     )
-    return tooth, delay, cut, slices, np.ascontiguousarray(conditions.machine_from_feed)
+    return tooth, delay, cut, np.ascontiguousarray(conditions.machine_from_feed)
+
+
+def synchronous_lines(angle: FloatArray, values: FloatArray, orders: int) -> np.ndarray:
+    """Return the amplitudes at spindle orders 0 to `orders` - 1 of the mean revolution, shape (orders, c).
+
+    values = Re sum_m lines[m] e^{i m angle}; over the last whole revolutions.
+
+    Parameters
+    ----------
+    angle : array, shape (n,) [rad]
+        Growing evenly.
+    values : array, shape (n, c)
+    """
+    turn = 2.0 * np.pi
+    first, last = np.ceil(angle[0] / turn), np.floor(angle[-1] / turn)
+    if last <= first:
+        raise InputError("angle", f"{(angle[-1] - angle[0]) / turn:.2f} revolutions", "at least one whole revolution from angle 0")
+    points = 8 * orders
+    places = turn * (first + np.arange(int(last - first) * points) / points)
+    columns = [np.interp(places, angle, column).reshape(-1, points).mean(axis=0) for column in values.T]
+    lines = np.fft.rfft(np.stack(columns, axis=-1), axis=0)[:orders] / points
+    lines[1:] *= 2.0
+    return lines

@@ -74,8 +74,15 @@ def reduced(
     def project(matrix: scipy.sparse.csc_array) -> FloatArray:
         return basis.T @ (matrix @ basis)
 
-    matrices = [project(m) for m in (model.damping, model.stiffness, model.loss, model.gyroscopic, model.softening)]
-    return ReducedRotor(*matrices, model.ports @ basis, model.coordinates)
+    return ReducedRotor(
+        damping=project(model.damping),
+        stiffness=project(model.stiffness),
+        loss=project(model.loss),
+        gyroscopic=project(model.gyroscopic),
+        softening=project(model.softening),
+        ports=model.ports @ basis,
+        coordinates=model.coordinates,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

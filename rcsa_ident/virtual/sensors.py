@@ -220,7 +220,8 @@ def record(
     history : CutHistory or None
         With `padding` on both sides; None is an air cut.
     """
-    gap = out_of_round(suite, clamping, angle - feed_angle + speed * np.arange(count) / suite.rate, speed, factor)
+    turned = np.asarray(angle + speed * np.arange(count) / suite.rate, dtype=np.float64)
+    gap = out_of_round(suite, clamping, turned - feed_angle, speed, factor)
     acceleration = np.zeros((count, 2))
     if history is not None:
         step = 1.0 / (suite.rate * factor)
@@ -239,5 +240,5 @@ def record(
         seen = acceleration[:, i] + suite.acceleration_noise * rng.normal(size=count)
         channels[f"fixture_{axis}"] = suite.acceleration_sensitivity * seen
     if suite.trigger:
-        channels["trigger"] = trigger_pulse(angle + speed * np.arange(count) / suite.rate, suite.tooth_angle)
+        channels["trigger"] = trigger_pulse(turned, suite.tooth_angle)
     return channels

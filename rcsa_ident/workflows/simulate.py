@@ -18,7 +18,7 @@ from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.io.machines import MachineFile, read_machine
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machining_setup import Tooling
-from rcsa_ident.virtual.milling import CutHistory, mill_cut
+from rcsa_ident.virtual.milling import CutHistory, mill_cut, synchronous_lines
 from rcsa_ident.virtual.reduction import Poles, poles, reduced
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from rcsa_ident.virtual.sensors import Clamping, clamp, padding, record
@@ -39,7 +39,8 @@ class SimulatedCampaign:
     ----------
     folder : Path
     truth : Path
-        Receptances, true speeds and tooth angles; no reader of the folder sees it.
+        ``tip/``, ``cross/``, ``spindle.csv``: receptances; ``records.csv``: true speeds and tooth angles at the first sample;
+        ``forces/``: lines of the true force, F = Re sum_m lines[m] e^{i m angle of tooth 1}. No reader of the folder sees it.
     cuts : int
     """
 
@@ -90,14 +91,17 @@ def simulate(
     extra = [read_tooling(path) for path in setup.truth_toolings]
     if len({t.name for t in (*toolings, *extra)}) != len(toolings) + len(extra):
         raise InputError("cuts.toolings", ", ".join(t.name for t in (*toolings, *extra)), "toolings with different names")
-    for folder in (out / "recordings", out / "toolings", truth / "tip", truth / "cross"):
+    for folder in (out / "recordings", out / "toolings", truth / "tip", truth / "cross", truth / "forces"):
         folder.mkdir(parents=True, exist_ok=True)
     for path, tooling in zip(setup.toolings, toolings, strict=True):
         shutil.copyfile(path, out / "toolings" / f"{tooling.name}.toml")
     write_text(out / "campaign.toml", _campaign_text(setup, toolings))
     jobs = list(_jobs(setup, toolings, np.random.default_rng(seed)))
     rows = ["record,spindle_speed_rpm,tooth_angle_deg"]
-    for done, (job, records) in enumerate(zip(jobs, mapper(_Worker(setup), jobs), strict=True), start=1):
+    for done, (job, (records, lines)) in enumerate(zip(jobs, mapper(_Worker(setup), jobs), strict=True), start=1):
+        order = np.arange(lines.shape[0])
+        table = np.column_stack([order, lines[:, 0].real, lines[:, 0].imag, lines[:, 1].real, lines[:, 1].imag])
+        _write_table(truth / "forces" / f"{job.id}.csv", "order,X_re,X_im,Y_re,Y_im", table)
         for kind, (speed, angle, channels) in records.items():
             write_hdf5(out / "recordings" / f"{job.id}_{kind}.h5", setup.sensors.rate, channels)
             rows.append(f"{job.id}_{kind},{speed * 30.0 / np.pi:.9g},{np.degrees(angle):.9g}")
@@ -109,19 +113,34 @@ def simulate(
 
 
 def write_truth(setup: MachineFile, toolings: list[Tooling], folder: Path) -> None:
-    """Write the true receptances tip-tip into ``tip/`` and flange-tip into ``cross/``, from the full equations at mid speed."""
+    """Write the true receptances, from the full equations at the mean of the programmed speeds.
+
+    ``tip/`` and ``cross/`` hold tip-tip and flange-tip of each tooling, ``spindle.csv`` the flange without a tooling.
+    """
     first, last, step = TRUTH_FREQUENCIES
     frequency = np.arange(first, last + 0.5 * step, step)
+    omega = 2.0 * np.pi * frequency
     speed = float(np.mean(setup.plan.spindle_speeds))
     for tooling in toolings:
         outputs = ("tip.x", "tip.y", "flange.x", "flange.y")
-        model = rotor(setup.spindle, tooling.assembly)
-        values = frequency_response(model, 2.0 * np.pi * frequency, speed, outputs=outputs)
+        values = frequency_response(rotor(setup.spindle, tooling.assembly), omega, speed, outputs=outputs)
         for name, start in (("tip", 0), ("cross", 2)):
             x, y = values[:, start, 0], values[:, start + 1, 1]
             table = np.column_stack([frequency, x.real, x.imag, y.real, y.imag])
-            lines = [",".join(f"{v:.9g}" for v in row) for row in table]
-            write_text(folder / name / f"{tooling.name}.csv", "\n".join(["frequency_hz,X_re,X_im,Y_re,Y_im", *lines]) + "\n")
+            _write_table(folder / name / f"{tooling.name}.csv", "frequency_hz,X_re,X_im,Y_re,Y_im", table)
+    columns, header = [frequency], ["frequency_hz"]
+    for axis in "xy":
+        plane = (f"flange.{axis}", f"flange.{axis}'")
+        values = frequency_response(rotor(setup.spindle, None), omega, speed, inputs=plane, outputs=plane)
+        for (i, j), entry in (((0, 0), "tF"), ((0, 1), "tM"), ((1, 0), "rF"), ((1, 1), "rM")):
+            columns += [values[:, i, j].real, values[:, i, j].imag]
+            header += [f"{axis.upper()}_{entry}_re", f"{axis.upper()}_{entry}_im"]
+    _write_table(folder / "spindle.csv", ",".join(header), np.column_stack(columns))
+
+
+def _write_table(path: Path, header: str, table: FloatArray) -> None:
+    lines = [",".join(f"{value:.9g}" for value in row) for row in table]
+    write_text(path, "\n".join([header, *lines]) + "\n")
 
 
 def _jobs(setup: MachineFile, toolings: list[Tooling], rng: np.random.Generator) -> Iterable[_Job]:
@@ -142,8 +161,9 @@ class _Worker:
 
     setup: MachineFile
 
-    def __call__(self, job: _Job) -> dict[str, tuple[float, float, dict[str, FloatArray]]]:
+    def __call__(self, job: _Job) -> tuple[dict[str, tuple[float, float, dict[str, FloatArray]]], np.ndarray]:
         suite, plan = self.setup.sensors, self.setup.plan
+        lines = np.zeros((0, 2), dtype=complex)
         count = round(plan.duration * suite.rate)
         records = {}
         for kind in ("cut", "air"):
@@ -154,9 +174,11 @@ class _Worker:
                 conditions = replace(job.conditions, spindle_speed=speed)
                 cutter = replace(job.tooling.cutter, runout=job.clamping.runout)
                 history = _history(self.setup, job.dynamics, cutter, conditions, angle, count)
+                highest = int(2.0 * np.pi * TRUTH_FREQUENCIES[1] / speed)
+                lines = synchronous_lines(history.angle, history.force, highest + 1)
             channels = record(suite, job.clamping, speed, angle, job.conditions.feed_angle, count, OVERSAMPLING, history, job.rng)
             records[kind] = (speed, angle, channels)
-        return records
+        return records, lines
 
 
 def _history(setup: MachineFile, dynamics: Poles, cutter: Cutter, conditions: CuttingConditions, angle: float, count: int) -> CutHistory:

@@ -1,0 +1,95 @@
+"""From a campaign to modes and joint: read and judge every recording, then identify."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol
+
+from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.data import IdentificationData, prepare
+from rcsa_ident.identification.result import Identification
+from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.signals.measurement import Reading, measure_cut
+from rcsa_ident.signals.recording import Recording
+from rcsa_ident.signals.verdict import Verdict
+from rcsa_ident.tool_holder.model import tool_holder_receptance
+
+Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
+#: Reads the recordings of a cut: the cut itself, and its air cut where there is one.
+ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
+
+
+class Method(Protocol):
+    """An identification method: an object that carries its settings."""
+
+    def run(self, data: IdentificationData, seed: int, map: Map) -> Identification:
+        """Return modes and joint."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedCut:
+    """A cut with its verdict and, where it is usable, its measurement."""
+
+    cut: Cut
+    reading: Reading
+
+
+def judge(campaign: Campaign, read: ReadCut, map: Map = map, progress: Callable[[int, int], None] | None = None) -> list[JudgedCut]:
+    """Return the verdict on every cut of a campaign, in its order.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    read : callable
+        Given a cut, returns its recordings; a bad file is a reason to leave the cut out, not to stop.
+    map : callable
+        Cuts are independent of each other.
+    progress : callable of (done, total)
+    """
+    judged = []
+    readings = map(partial(judge_cut, campaign, read), campaign.cuts)
+    for done, (cut, reading) in enumerate(zip(campaign.cuts, readings, strict=True), start=1):
+        judged.append(JudgedCut(cut, reading))
+        if progress is not None:
+            progress(done, len(campaign.cuts))
+    return judged
+
+
+def judge_cut(campaign: Campaign, read: ReadCut, cut: Cut) -> Reading:
+    """Return verdict and measurement of one cut."""
+    try:
+        recording, air = read(cut)
+        cutter = campaign.toolings[cut.tooling].cutter
+        return measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, campaign.workpiece.coefficients)
+    except InputError as error:
+        return Reading(Verdict((f"unreadable: {error}",)))
+
+
+def identify(campaign: Campaign, judged: Sequence[JudgedCut], method: Method, seed: int, map: Map = map) -> Identification:
+    """Return modes and joint from the usable cuts.
+
+    Raises
+    ------
+    InputError
+        If no cut is usable.
+    """
+    return method.run(data_of(campaign, judged), seed, map)
+
+
+def data_of(campaign: Campaign, judged: Sequence[JudgedCut]) -> IdentificationData:
+    """Return the usable cuts' lines beside their tool-holders' receptances."""
+    measurements = [j.reading.measurement for j in judged if j.reading.measurement is not None]
+    if not measurements:
+        reasons = "; ".join(dict.fromkeys(r for j in judged for r in j.reading.verdict.reasons))
+        raise InputError("cuts", f"none of {len(judged)} usable ({reasons})", "at least one usable cut")
+    receptances = {name: partial(_receptance, campaign, name) for name in campaign.toolings}
+    return prepare(measurements, receptances, {name: t.cutter.teeth for name, t in campaign.toolings.items()})
+
+
+def _receptance(campaign: Campaign, name: str, omega: FloatArray) -> Receptance:
+    return tool_holder_receptance(campaign.toolings[name].assembly, omega)
