@@ -37,7 +37,9 @@ def couple(tool_holder: Receptance, spindle: Receptance, joint: LumpedJoint) -> 
     directions = _directions(tool_holder.rows, "flange")
     for name, found in (("columns", _directions(tool_holder.cols, "flange")), ("spindle", _directions(spindle.rows, "flange"))):
         if found != directions:
-            raise InputError(f"directions at the flange ({name})", " ".join(found), f"the tool-holder's, {' '.join(directions)}, in that order")
+            raise InputError(
+                f"directions at the flange ({name})", " ".join(found), f"the tool-holder's, {' '.join(directions)}, in that order"
+            )
     interface = a22 + b33
     i = np.arange(len(directions))
     interface[:, i, i] += joint.compliance_along(tool_holder.omega, directions)

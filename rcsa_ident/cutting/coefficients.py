@@ -29,7 +29,8 @@ class CuttingCoefficients:
 
     def __post_init__(self) -> None:
         positive("tangential coefficient", self.tangential, "N/m^2")
-        if not -1.0 <= self.radial_ratio <= 5.0:
-            raise InputError("radial_ratio", self.radial_ratio, "a ratio from -1 to 5")
+        for name in ("radial_ratio", "axial_ratio"):
+            if not -1.0 <= getattr(self, name) <= 5.0:
+                raise InputError(name, getattr(self, name), "a ratio from -1 to 5")
         for name in ("tangential_edge", "radial_edge", "axial_edge"):
             non_negative(name, getattr(self, name), "N/m")

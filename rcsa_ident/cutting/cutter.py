@@ -41,10 +41,10 @@ class Cutter:
         equal = np.full(self.teeth, 2.0 * np.pi / self.teeth)
         pitch = frozen(equal if self.pitch is None else self.pitch)
         runout = frozen(np.zeros(self.teeth) if self.runout is None else self.runout)
-        if pitch.shape != (self.teeth,) or np.any(pitch <= 0.0) or abs(pitch.sum() - 2.0 * np.pi) > 1e-6:
+        if pitch.shape != (self.teeth,) or not np.all(pitch > 0.0) or not abs(pitch.sum() - 2.0 * np.pi) <= 1e-6:
             raise InputError("pitch", pitch.tolist(), f"{self.teeth} positive angles that add up to a full turn")
-        if runout.shape != (self.teeth,):
-            raise InputError("runout", runout.tolist(), f"{self.teeth} radial offsets [m]")
+        if runout.shape != (self.teeth,) or not np.all(np.isfinite(runout)):
+            raise InputError("runout", runout.tolist(), f"{self.teeth} finite radial offsets [m]")
         object.__setattr__(self, "pitch", pitch)
         object.__setattr__(self, "runout", runout)
 

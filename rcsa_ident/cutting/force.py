@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
@@ -63,6 +65,11 @@ def force_lines(cutter: Cutter, conditions: CuttingConditions, coefficients: Cut
     q = np.arange(-2, 3)
     window = _exponential_integral(q[None, :] - orders[:, None], entry, exit_) / (2.0 * np.pi)
     lines = (phases @ feed)[:, None] * (window @ chip_lines) + phases.sum(axis=1)[:, None] * (window @ edge_lines)
+    return _over_depth(lines, cutter, conditions, orders)
+
+
+def _over_depth(lines: ComplexArray, cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray) -> ComplexArray:
+    """Integrate two-sided lines per depth over the depth, turn them to machine axes and make them one-sided."""
     lag = orders * np.tan(cutter.helix) / cutter.diameter * conditions.axial_depth
     lines = lines * (conditions.axial_depth * np.exp(-1j * lag) * np.sinc(lag / np.pi))[:, None]
     lines = np.where(orders[:, None] == 0, 1.0, 2.0) * lines
@@ -72,15 +79,18 @@ def force_lines(cutter: Cutter, conditions: CuttingConditions, coefficients: Cut
 def _trigonometric_form(coefficients: CuttingCoefficients) -> tuple[ComplexArray, ComplexArray]:
     """Coefficients of e^{i q phi}, q = -2..2, of the (feed, normal) force per depth: per unit feed, and of the edge."""
     k, kr = coefficients.tangential, coefficients.tangential * coefficients.radial_ratio
-    te, re = coefficients.tangential_edge, coefficients.radial_edge
-    # rows q = -2..2 of sin cos, sin^2, cos, sin
+    # rows q = -2..2 of sin cos, sin^2
     sin_cos = np.array([0.25j, 0, 0, 0, -0.25j])
     sin_sin = np.array([-0.25, 0, 0.5, 0, -0.25])
+    chip = np.stack([-k * sin_cos - kr * sin_sin, k * sin_sin - kr * sin_cos], axis=1)
+    return chip, _constant_form(coefficients.tangential_edge, coefficients.radial_edge)
+
+
+def _constant_form(tangential: float, radial: float) -> ComplexArray:
+    """The same of a force per depth that does not depend on phi along the edge."""
     cos = np.array([0, 0.5, 0, 0.5, 0])
     sin = np.array([0, 0.5j, 0, -0.5j, 0])
-    chip = np.stack([-k * sin_cos - kr * sin_sin, k * sin_sin - kr * sin_cos], axis=1)
-    edge = np.stack([-te * cos - re * sin, te * sin - re * cos], axis=1)
-    return chip, edge
+    return np.stack([-tangential * cos - radial * sin, tangential * sin - radial * cos], axis=1)
 
 
 def _exponential_integral(n: np.ndarray, start: float, end: float) -> ComplexArray:
@@ -131,27 +141,63 @@ def force_history(
 
 def _kinematic_chip(j: int, sine: FloatArray, feed: FloatArray, runout: FloatArray) -> FloatArray:
     """Chip of tooth j: the smallest distance to the surfaces left by the teeth ahead, over one revolution of them."""
-    teeth = feed.size
-    moved = 0.0
-    chip = np.full(sine.shape, np.inf)
-    for back in range(1, teeth + 1):
-        moved += feed[(j + back - 1) % teeth]
-        chip = np.minimum(chip, moved * sine + runout[j] - runout[(j + back) % teeth])
-    return chip
+    moved, offset = _chip_bounds(j, feed, runout)
+    return np.min(moved * sine[..., None] + offset, axis=-1)
 
 
 def runout_force_lines(
-    cutter: Cutter,
-    conditions: CuttingConditions,
-    coefficients: CuttingCoefficients,
-    orders: np.ndarray,
-    samples: int = 4096,
+    cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, orders: np.ndarray
 ) -> ComplexArray:
-    """Return the lines as `force_lines` does, from a sampled revolution: for run-out, where teeth may miss.
+    """Return the lines as `force_lines` does, with run-out: teeth may cut deeper, late or not at all. Exact.
 
-    The error falls as 1/samples^2 except for the jumps at entry and exit, where it is 1/samples.
+    Parameters
+    ----------
+    orders : array of int, shape (m,)
+
+    Returns
+    -------
+    complex array, shape (m, 2) [N]
+
+    Notes
+    -----
+    A tooth's chip is the smallest of as many a sin(phi) + b as there are teeth, where positive: between the angles at
+    which two of them, or one and zero, meet, each line is the integral that `force_lines` takes.
     """
-    angle = 2.0 * np.pi * np.arange(samples) / samples
-    history = force_history(cutter, conditions, coefficients, angle, slices=64)[:, :2]
-    lines = np.exp(-1j * np.outer(orders, angle)) @ history / samples
-    return np.where(np.asarray(orders)[:, None] == 0, 1.0, 2.0) * lines
+    orders = np.asarray(orders)
+    per_feed, edge = _trigonometric_form(coefficients)
+    per_depth = _constant_form(coefficients.tangential, coefficients.tangential * coefficients.radial_ratio)
+    feed = conditions.feed_per_tooth * cutter.pitch * cutter.teeth / (2.0 * np.pi)
+    q = np.arange(-2, 3)
+    lines = np.zeros((orders.size, 2), dtype=complex)
+    for j in range(cutter.teeth):
+        moved, offset = _chip_bounds(j, feed, cutter.runout)
+        tooth = np.zeros((orders.size, 2), dtype=complex)
+        for start, end, a, b in _chip_pieces(moved, offset, conditions.engagement.entry, conditions.engagement.exit):
+            window = _exponential_integral(q[None, :] - orders[:, None], start, end) / (2.0 * np.pi)
+            tooth += window @ (a * per_feed + b * per_depth + edge)
+        lines += np.exp(1j * orders * cutter.tooth_angle[j])[:, None] * tooth
+    return _over_depth(lines, cutter, conditions, orders)
+
+
+def _chip_bounds(j: int, feed: FloatArray, runout: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Distances a sin(phi) + b of tooth j to the surfaces of the teeth ahead, over one revolution of them: a and b, shape (teeth,)."""
+    ahead = (j + np.arange(feed.size)) % feed.size
+    return np.cumsum(feed[ahead]), runout[j] - runout[(ahead + 1) % feed.size]
+
+
+def _chip_pieces(moved: FloatArray, offset: FloatArray, entry: float, exit_: float) -> list[tuple[float, float, float, float]]:
+    """Angles between which the chip is one a sin(phi) + b, with a and b; only where it is positive."""
+    meet = [-b / a for a, b in zip(moved, offset, strict=True) if a > 0.0]
+    for i in range(moved.size):
+        steeper = moved[:i] != moved[i]
+        meet += ((offset[:i] - offset[i])[steeper] / (moved[i] - moved[:i])[steeper]).tolist()
+    angles = np.arcsin([s for s in meet if 0.0 < s < 1.0])
+    angles = np.concatenate([[entry, exit_], angles, np.pi - angles])
+    angles = np.unique(angles[(angles >= entry) & (angles <= exit_)])
+    pieces = []
+    for start, end in pairwise(angles.tolist()):
+        chips = moved * np.sin(0.5 * (start + end)) + offset
+        k = int(np.argmin(chips))
+        if chips[k] > 0.0:
+            pieces.append((start, end, float(moved[k]), float(offset[k])))
+    return pieces

@@ -81,7 +81,9 @@ class ModalModel:
             raise InputError("phi", self.phi.shape, f"shape {(m, d)}: modes, coordinates")
         if self.residual.shape != (d, d):
             raise InputError("residual", self.residual.shape, f"shape {(d, d)}")
-        if self.zeta.shape != (m,) or np.any(self.zeta <= 0.0) or np.any(self.zeta > 1.0):
+        if not np.all(np.isfinite(self.omega_n) & (self.omega_n > 0.0)):
+            raise InputError("omega_n", self.omega_n.tolist(), "finite natural frequencies above 0 [rad/s]")
+        if self.zeta.shape != (m,) or not np.all((self.zeta > 0.0) & (self.zeta <= 1.0)):
             raise InputError("zeta", self.zeta.tolist(), f"{m} damping ratios above 0 and not above 1")
 
     @property

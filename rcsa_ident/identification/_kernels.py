@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _factor_solve(matrix, right):
     """Solve a complex symmetric system in place: L D L^T, lower triangle read, `right` (m, 2) overwritten."""
     m = right.shape[0]
@@ -33,7 +33,7 @@ def _factor_solve(matrix, right):
         right[j, 1] = second / matrix[j, j]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def cross_frf(stiffness, psi, factor, residual, joint, omega, flange, tip, values, gradient):
     """Fill `values` (n,) with the flange motion per tip force and, if it has rows, `gradient` (n, p).
 
@@ -114,7 +114,7 @@ def cross_frf(stiffness, psi, factor, residual, joint, omega, flange, tip, value
         row[k + 6] = complex(0.0, w) * row[k + 4]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def fit_cuts(lines, weights, model, start, prior, nuisance, grid):
     """Fit each cut's delay and the angle to its air cut to the model, in place.
 
@@ -184,7 +184,7 @@ def fit_cuts(lines, weights, model, start, prior, nuisance, grid):
         nuisance[cut, 1] = angle
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _cut_misfit(lines, weights, model, first, last, delay, angle):
     total = 0.0
     for j in range(first, last):
@@ -196,7 +196,7 @@ def _cut_misfit(lines, weights, model, first, last, delay, angle):
     return total
 
 
-@numba.njit(cache=True, fastmath={"contract", "reassoc", "arcp", "nsz"})
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
 def modal_cross_frf(modes, joint, omega, flange, tip, out):
     """Fill `out` (2, n) with real and imaginary part of the cross FRF of complex modes: the search's cheap candidate.
 
@@ -249,7 +249,7 @@ def modal_cross_frf(modes, joint, omega, flange, tip, out):
         out[1, f] = (ni * det_r - nr * det_i) * scale
 
 
-@numba.njit(cache=True, fastmath={"contract", "reassoc", "arcp", "nsz"})
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
 def best_grid_misfit(model, measured, weight, table, start, group, totals):
     """Add to `totals` the misfit of each cut at its best delay on a grid, by group (tooling).
 
@@ -262,15 +262,22 @@ def best_grid_misfit(model, measured, weight, table, start, group, totals):
     start : (k + 1,); group : (k,)
     """
     delays = table.shape[0]
+    overlap = np.empty(delays)
     for cut in range(start.size - 1):
         first, last = start[cut], start[cut + 1]
-        best = -1e300
+        best = 0
         for d in range(delays):
-            overlap = 0.0
+            total = 0.0
             for f in range(first, last):
-                overlap += weight[f] * (model[0, f] * table[d, 0, f] + model[1, f] * table[d, 1, f])
-            best = max(best, overlap)
+                total += weight[f] * (model[0, f] * table[d, 0, f] + model[1, f] * table[d, 1, f])
+            overlap[d] = total
+            if total > overlap[best]:
+                best = d
+        # the grid is fine enough for a parabola through the best delay and its neighbours; the period closes it
+        before, after = overlap[best - 1], overlap[(best + 1) % delays]
+        bend = 2.0 * overlap[best] - before - after
+        top = overlap[best] + (after - before) ** 2 / (8.0 * bend) if bend > 0.0 else overlap[best]
         size = 0.0
         for f in range(first, last):
             size += weight[f] * (measured[f] + model[0, f] ** 2 + model[1, f] ** 2)
-        totals[group[cut]] += max(size - 2.0 * best, 0.0)
+        totals[group[cut]] += max(size - 2.0 * top, 0.0)

@@ -124,13 +124,12 @@ def _finish(method: DefaultMethod, data: IdentificationData, searched: list[_Axi
     solution = polish(Misfit(data, method.priors, tuple(max(f, 0.02) for f in shares)), theta, orders, nuisance, 40, grid=32)
     for _ in range(3):
         misfit = Misfit(data, method.priors, shares)
-        solution = polish(misfit, solution.theta, orders, solution.evaluation.nuisance, 150, tolerance=1e-6)
+        solution = polish(misfit, solution.theta, orders, solution.evaluation.nuisance, 300, tolerance=1e-5)
         trace.append(("both", "polish", solution.cost))
         learned = model_error(solution, misfit)
         if all(abs(a / b - 1.0) < 0.05 for a, b in zip(learned, shares, strict=True)):
             break
         shares = learned
-    assert solution.evaluation.hessian is not None
     covariance = np.linalg.inv(solution.evaluation.hessian)
     delay_std = misfit.delay_std(solution.evaluation.nuisance)
     axes = {}

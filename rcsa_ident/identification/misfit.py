@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,8 +28,8 @@ class Evaluation:
         Of each axis' lines.
     nuisance : array, shape (k, 2)
         Delay [s] and angle [rad] of each cut at the optimum for this vector.
-    gradient, hessian : arrays, shapes (p,), (p, p), or None
-        Of half the cost, Gauss-Newton, delays and angles eliminated.
+    linear : Linearisation or None
+        Gradient and Gauss-Newton matrix of half the cost, where asked for.
     models : tuple of complex arrays [m/N]
         The model's cross FRF on the lines of each axis.
     """
@@ -38,8 +38,86 @@ class Evaluation:
     chi2: tuple[float, ...]
     nuisance: FloatArray
     models: tuple[ComplexArray, ...]
-    gradient: FloatArray | None = None
-    hessian: FloatArray | None = None
+    linear: Linearisation | None = None
+
+    @property
+    def hessian(self) -> FloatArray:
+        """Gauss-Newton matrix of half the cost, shape (p, p)."""
+        assert self.linear is not None
+        return self.linear.hessian
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Residual:
+    """Everything whose squares add up to the cost: lines, parameters' priors, cuts' priors; all in standard deviations."""
+
+    lines: tuple[ComplexArray, ...]
+    own: FloatArray
+    cuts: FloatArray
+
+    def minus(self, other: Residual, factor: float = 1.0) -> Residual:
+        """Return self - factor other."""
+        lines = tuple(a - factor * b for a, b in zip(self.lines, other.lines, strict=True))
+        return Residual(lines, self.own - factor * other.own, self.cuts - factor * other.cuts)
+
+    def times(self, factor: float) -> Residual:
+        """Return factor self."""
+        return Residual(tuple(factor * a for a in self.lines), factor * self.own, factor * self.cuts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Linearisation:
+    """Residual to first order in the parameters and in each cut's delay and angle; the latter two are eliminated.
+
+    Parameters
+    ----------
+    blocks : tuple of (slice, complex array (n, q + 4))
+        Per axis: which parameters, and the lines' change with them and the joint's four.
+    columns : tuple of complex arrays, shape (n, 2)
+        The lines' change with their cut's delay (in `DELAY_UNIT`) and angle.
+    cut : tuple of int arrays, shape (n,)
+    own : array, shape (p, p)
+        The priors' change.
+    cut_prior : array, shape (k, 2)
+        Square roots of the weights of the cuts' priors.
+    gradient, hessian : arrays, shapes (p,), (p, p)
+    inner : array, shape (k, 2, 2)
+    mixed : array, shape (k, 2, p)
+    """
+
+    blocks: tuple[tuple[slice, ComplexArray], ...]
+    columns: tuple[ComplexArray, ...]
+    cut: tuple[np.ndarray, ...]
+    own: FloatArray
+    cut_prior: FloatArray
+    gradient: FloatArray
+    hessian: FloatArray
+    inner: FloatArray
+    mixed: FloatArray
+
+    def follow(self, step: FloatArray) -> FloatArray:
+        """Return how delay and angle of each cut follow a step of the parameters, shape (k, 2)."""
+        return -np.linalg.solve(self.inner, (self.mixed @ step)[:, :, None])[:, :, 0]
+
+    def push(self, step: FloatArray, cuts: FloatArray) -> Residual:
+        """Return the residual's change with a step of the parameters and of the cuts' unknowns."""
+        lines = tuple(
+            jacobian @ np.concatenate([step[block], step[-4:]]) + np.einsum("ni,ni->n", columns, cuts[cut])
+            for (block, jacobian), columns, cut in zip(self.blocks, self.columns, self.cut, strict=True)
+        )
+        return Residual(lines, self.own @ step, self.cut_prior * cuts)
+
+    def pull(self, residual: Residual) -> FloatArray:
+        """Return the gradient that a residual would have, the cuts' unknowns eliminated, shape (p,)."""
+        slope = self.own.T @ residual.own
+        right = self.cut_prior * residual.cuts
+        for (block, jacobian), columns, cut, r in zip(self.blocks, self.columns, self.cut, residual.lines, strict=True):
+            down = (jacobian.conj().T @ r).real
+            slope[block] += down[:-4]
+            slope[-4:] += down[-4:]
+            for i in range(2):
+                right[:, i] += np.bincount(cut, (columns[:, i].conj() * r).real, minlength=right.shape[0])
+        return slope - np.einsum("kip,ki->p", self.mixed, np.linalg.solve(self.inner, right[:, :, None])[:, :, 0])
 
 
 class Misfit:
@@ -85,6 +163,30 @@ class Misfit:
         grid : int
             Delays tried over a tooth-passing period; 0 stays near `nuisance`.
         """
+        models, gradients, axes, scaled = self._models(theta, orders, normal)
+        nuisance = nuisance.copy()
+        fit_cuts(self._lines, self._weights, np.concatenate(models)[self._order], self._start, self.data.cut_prior, nuisance, grid)
+        residual, own_jacobian = self._residual(theta, orders, models, nuisance)
+        chi2 = tuple(float(np.sum(np.abs(r) ** 2)) for r in residual.lines)
+        cost = sum(chi2) + float(np.sum(residual.own**2)) + float(np.sum(residual.cuts**2))
+        linear = None
+        if normal:
+            blocks = []
+            first = 0
+            for axis, gradient, w, m in zip(axes, gradients, self.weight, orders, strict=True):
+                scale = np.concatenate([chain(axis), scaled])
+                blocks.append((slice(first, first + axis_size(m)), -gradient * scale * np.sqrt(w)[:, None]))
+                first += axis_size(m)
+            linear = self._linearise(residual, own_jacobian, tuple(blocks), nuisance)
+        return Evaluation(cost, chi2, nuisance, tuple(models), linear)
+
+    def residual_at(self, theta: FloatArray, orders: tuple[int, ...], nuisance: FloatArray) -> Residual:
+        """Return the residual with the cuts' delays and angles as they are given."""
+        models = self._models(theta, orders, False)[0]
+        return self._residual(theta, orders, models, nuisance)[0]
+
+    def _models(self, theta: FloatArray, orders: tuple[int, ...], normal: bool):  # type: ignore[no-untyped-def]
+        """Cross FRF on each axis' lines, its gradient in kernel units, and the axes' physics."""
         parts, joint = split(theta, orders)
         scaled = scaled_joint(joint)
         models, gradients, axes = [], [], []
@@ -96,26 +198,16 @@ class Misfit:
             axes.append(axis)
             models.append(values)
             gradients.append(gradient)
-        nuisance = nuisance.copy()
-        prior = self.data.cut_prior
-        fit_cuts(self._lines, self._weights, np.concatenate(models)[self._order], self._start, prior, nuisance, grid)
-        rest = [self._rest(i, model, nuisance) for i, model in enumerate(models)]
-        chi2 = tuple(float(np.sum(np.abs(r) ** 2)) for r in rest)
+        return models, gradients, axes, scaled
+
+    def _residual(
+        self, theta: FloatArray, orders: tuple[int, ...], models: list[ComplexArray], nuisance: FloatArray
+    ) -> tuple[Residual, FloatArray]:
+        lines = tuple(self._rest(i, model, nuisance) for i, model in enumerate(models))
         own, own_jacobian = prior_rows(theta, orders, self.priors)
-        cuts = prior[:, 1] * (nuisance[:, 0] - prior[:, 0]) ** 2 + prior[:, 2] * nuisance[:, 1] ** 2
-        cost = sum(chi2) + float(own @ own) + float(cuts.sum())
-        if not normal:
-            return Evaluation(cost, chi2, nuisance, tuple(models))
-        jacobians = []
-        first = 0
-        for axis, gradient, w, m in zip(axes, gradients, self.weight, orders, strict=True):
-            scale = np.concatenate([chain(axis), scaled])
-            jacobians.append((slice(first, first + axis_size(m)), -gradient * scale * np.sqrt(w)[:, None]))
-            first += axis_size(m)
-        hessian, slope = self._normal_equations(rest, jacobians, nuisance, theta.size)
-        return Evaluation(
-            cost, chi2, nuisance, tuple(models), slope + own_jacobian.T @ own, hessian + own_jacobian.T @ own_jacobian
-        )
+        prior = self.data.cut_prior
+        cuts = np.sqrt(prior[:, 1:3]) * (nuisance - np.stack([prior[:, 0], np.zeros(len(prior))], axis=1))
+        return Residual(lines, own, cuts), own_jacobian
 
     def residuals(self, evaluation: Evaluation) -> list[ComplexArray]:
         """Return each axis' residuals in standard deviations."""
@@ -136,44 +228,53 @@ class Misfit:
         air = axis.lines[:, 1] * np.exp(1j * axis.order * angle) * back
         return axis.lines[:, 0] * back - air, air
 
-    def _normal_equations(self, rest, jacobians, nuisance, size):  # type: ignore[no-untyped-def]
+    def _linearise(self, residual, own_jacobian, blocks, nuisance):  # type: ignore[no-untyped-def]
         """Gauss-Newton matrices of the parameters after eliminating two unknowns per cut (Schur complement)."""
-        hessian = np.zeros((size, size))
-        slope = np.zeros(size)
+        size = own_jacobian.shape[0]
         prior = self.data.cut_prior
         cuts = len(self.data.cut_ids)
+        cut_prior = np.sqrt(prior[:, 1:3]) * np.array([DELAY_UNIT, 1.0])
+        hessian = own_jacobian.T @ own_jacobian
         mixed = np.zeros((cuts, 2, size))
         inner = np.zeros((cuts, 2, 2))
-        inner[:, 0, 0] = prior[:, 1] * DELAY_UNIT**2
-        inner[:, 1, 1] = prior[:, 2]
-        inner_slope = np.stack([prior[:, 1] * (nuisance[:, 0] - prior[:, 0]) * DELAY_UNIT, prior[:, 2] * nuisance[:, 1]], axis=1)
+        inner[:, [0, 1], [0, 1]] = cut_prior**2
         tail = slice(size - 4, size)
-        for axis, r, weight, (block, jacobian) in zip(self.data.axes, rest, self.weight, jacobians, strict=True):
+        all_columns = []
+        for axis, weight, (block, jacobian) in zip(self.data.axes, self.weight, blocks, strict=True):
             stacked = np.concatenate([jacobian.real, jacobian.imag])
             square = stacked.T @ stacked
-            down = stacked.T @ np.concatenate([r.real, r.imag])
             hessian[block, block] += square[:-4, :-4]
             hessian[block, tail] += square[:-4, -4:]
             hessian[tail, block] += square[-4:, :-4]
             hessian[tail, tail] += square[-4:, -4:]
-            slope[block] += down[:-4]
-            slope[tail] += down[-4:]
-            measured, air = self._turned(axis, nuisance)
-            columns = np.stack([1j * axis.omega * DELAY_UNIT * measured, -1j * axis.order * air], axis=1) * np.sqrt(weight)[:, None]
+            columns = self._columns(axis, weight, nuisance)
+            all_columns.append(columns)
             first = np.flatnonzero(np.diff(axis.cut, prepend=-1))
             present = axis.cut[first]
             for i in range(2):
                 products = np.add.reduceat((columns[:, i].conj()[:, None] * jacobian).real, first, axis=0)
                 mixed[present, i, block] += products[:, :-4]
                 mixed[present, i, tail] += products[:, -4:]
-                inner_slope[present, i] += np.add.reduceat((columns[:, i].conj() * r).real, first)
-                for j in range(2):
-                    inner[present, i, j] += np.add.reduceat((columns[:, i].conj() * columns[:, j]).real, first)
-        solved = np.linalg.solve(inner, np.concatenate([mixed, inner_slope[:, :, None]], axis=2))
+            self._add_inner(inner, axis, columns)
         flat = mixed.reshape(2 * cuts, size)
-        hessian -= flat.T @ solved[:, :, :-1].reshape(2 * cuts, size)
-        slope -= flat.T @ solved[:, :, -1].reshape(2 * cuts)
-        return hessian, slope
+        hessian -= flat.T @ np.linalg.solve(inner, mixed).reshape(2 * cuts, size)
+        index = tuple(axis.cut for axis in self.data.axes)
+        linear = Linearisation(
+            blocks, tuple(all_columns), index, own_jacobian, cut_prior, np.empty(0), hessian, inner, mixed
+        )
+        return replace(linear, gradient=linear.pull(residual))
+
+    def _columns(self, axis: AxisData, weight: FloatArray, nuisance: FloatArray) -> ComplexArray:
+        """The lines' change with delay and angle of their cut."""
+        measured, air = self._turned(axis, nuisance)
+        return np.stack([1j * axis.omega * DELAY_UNIT * measured, -1j * axis.order * air], axis=1) * np.sqrt(weight)[:, None]
+
+    @staticmethod
+    def _add_inner(inner: FloatArray, axis: AxisData, columns: ComplexArray) -> None:
+        for i in range(2):
+            for j in range(2):
+                products = (columns[:, i].conj() * columns[:, j]).real
+                inner[:, i, j] += np.bincount(axis.cut, products, minlength=inner.shape[0])
 
     def delay_std(self, nuisance: FloatArray) -> FloatArray:
         """Return each cut's standard deviation of the delay for a given model, shape (k,) [s]."""
@@ -181,11 +282,7 @@ class Misfit:
         inner = np.zeros((len(prior), 2, 2))
         inner[:, 0, 0], inner[:, 1, 1] = prior[:, 1] * DELAY_UNIT**2, prior[:, 2]
         for axis, weight in zip(self.data.axes, self.weight, strict=True):
-            measured, air = self._turned(axis, nuisance)
-            columns = np.stack([1j * axis.omega * DELAY_UNIT * measured, -1j * axis.order * air], axis=1)
-            for i in range(2):
-                for j in range(2):
-                    np.add.at(inner[:, i, j], axis.cut, weight * (columns[:, i].conj() * columns[:, j]).real)
+            self._add_inner(inner, axis, self._columns(axis, weight, nuisance))
         return np.sqrt(np.linalg.inv(inner)[:, 0, 0]) * DELAY_UNIT
 
 

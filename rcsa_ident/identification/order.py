@@ -22,7 +22,6 @@ def evidence(solution: Solution, misfit: Misfit) -> float:
     cost + log det(posterior information) - log det(prior information); a mode that the data do not need costs the second
     term, one that they need costs the first.
     """
-    assert solution.evaluation.hessian is not None
     sign, volume = np.linalg.slogdet(solution.evaluation.hessian)
     if sign <= 0.0:
         return np.inf
@@ -76,7 +75,6 @@ def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> t
     smallest : float
         Floor: no simulated force is better than that.
     """
-    assert solution.evaluation.hessian is not None
     jacobian = prior_rows(solution.theta, solution.orders, misfit.priors)[1]
     # parameters that the data have moved away from their priors
     used = solution.theta.size - float(np.trace(np.linalg.solve(solution.evaluation.hessian, jacobian.T @ jacobian)))

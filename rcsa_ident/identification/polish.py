@@ -8,10 +8,13 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.dynamics.arrays import FloatArray
-from rcsa_ident.identification.misfit import Evaluation, Misfit
+from rcsa_ident.identification.misfit import DELAY_UNIT, Evaluation, Misfit
 
 #: No parameter (all are logarithms or of order one) moves further in one step.
 LARGEST_STEP = 1.0
+#: Share of a step at which the residual's bend is probed, and the largest acceleration over velocity that is believed.
+PROBE = 0.1
+LARGEST_BEND = 0.75
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,44 +65,56 @@ def polish(
     grid : int
         Delays tried over a tooth-passing period at every step: needed far from the minimum.
     tolerance : float
-        Stop where a step lowers the cost by less than this share.
+        Stop where two steps in a row lower the cost by less than this share.
     """
     here = misfit.evaluate(theta, orders, nuisance, grid, normal=True)
     damping = 1e-2
+    quiet = 0
     for step_number in range(max_steps):
-        accepted = None
-        for _ in range(7):
-            step = _step(here, damping)
+        trial = None
+        for _ in range(8):
+            step = _step(misfit, theta, orders, here, damping)
             if step is not None:
-                trial = misfit.evaluate(theta + step, orders, here.nuisance, grid)
-                if trial.cost < here.cost:
-                    accepted = step
+                candidate = misfit.evaluate(theta + step, orders, here.nuisance, grid)
+                if candidate.cost < here.cost:
+                    trial = candidate
                     break
-            damping *= 5.0
-        if accepted is None:
+            damping *= 4.0
+        if trial is None or step is None:
             # no descent at any damping: rounding is reached, or the model is stuck on a ridge
             return Solution(theta, orders, here, True, step_number)
         gained = here.cost - trial.cost
-        theta = theta + accepted
-        damping = max(0.25 * damping, 1e-7)
+        theta = theta + step
+        damping = max(0.2 * damping, 1e-8)
         here = misfit.evaluate(theta, orders, trial.nuisance, grid, normal=True)
-        if gained < tolerance * here.cost:
+        quiet = quiet + 1 if gained < tolerance * here.cost else 0
+        if quiet == 2:
             return Solution(theta, orders, here, True, step_number + 1)
     return Solution(theta, orders, here, False, max_steps)
 
 
-def _step(here: Evaluation, damping: float) -> FloatArray | None:
-    assert here.hessian is not None
-    assert here.gradient is not None
-    scale = np.sqrt(np.maximum(np.diag(here.hessian), 1e-12))
-    matrix = here.hessian / np.outer(scale, scale)
+def _step(misfit: Misfit, theta: FloatArray, orders: tuple[int, ...], here: Evaluation, damping: float) -> FloatArray | None:
+    """Damped step with geodesic acceleration (Transtrum & Sethna, 2012): it bends along the valley, not into its wall."""
+    linear = here.linear
+    assert linear is not None
+    scale = np.sqrt(np.maximum(np.diag(linear.hessian), 1e-12))
+    matrix = linear.hessian / np.outer(scale, scale)
     matrix[np.diag_indices_from(matrix)] += damping
     try:
         factor = scipy.linalg.cho_factor(matrix, check_finite=False)
     except scipy.linalg.LinAlgError:
         return None
-    step = -scipy.linalg.cho_solve(factor, here.gradient / scale, check_finite=False) / scale
-    largest = float(np.max(np.abs(step)))
+    velocity = -scipy.linalg.cho_solve(factor, linear.gradient / scale, check_finite=False) / scale
+    largest = float(np.max(np.abs(velocity)))
     if not np.isfinite(largest):
         return None
-    return step if largest <= LARGEST_STEP else step * (LARGEST_STEP / largest)
+    if largest > LARGEST_STEP:
+        return velocity * (LARGEST_STEP / largest)
+    cuts = linear.follow(velocity)
+    ahead = here.nuisance + PROBE * cuts * np.array([DELAY_UNIT, 1.0])
+    change = misfit.residual_at(theta + PROBE * velocity, orders, ahead).minus(misfit.residual_at(theta, orders, here.nuisance))
+    bend = change.times(1.0 / PROBE).minus(linear.push(velocity, cuts)).times(2.0 / PROBE)
+    acceleration = -0.5 * scipy.linalg.cho_solve(factor, linear.pull(bend) / scale, check_finite=False) / scale
+    # where the bend is as large as the step, the expansion says nothing
+    ratio = np.linalg.norm(acceleration * scale) / np.linalg.norm(velocity * scale)
+    return velocity + acceleration if 2.0 * ratio < LARGEST_BEND else velocity

@@ -11,9 +11,10 @@ from rcsa_ident.dynamics.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io import delimited, hdf5
 from rcsa_ident.io.hdf5 import write_hdf5
+from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 
-__all__ = ["READERS", "read_recording", "write_hdf5"]
+__all__ = ["READERS", "read_cut", "read_recording", "write_hdf5"]
 
 Reader = Callable[[Path, Sequence[str], float | None], tuple[float, list[FloatArray]]]
 
@@ -54,3 +55,9 @@ def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: 
     samples[np.isinf(samples)] = np.nan
     samples.setflags(write=False)
     return Recording(rate, samples, sensors)
+
+
+def read_cut(sensors: tuple[Sensor, ...], default_rate: float | None, cut: Cut) -> tuple[Recording, Recording | None]:
+    """Return the recordings of a cut: the cut itself, and its air cut where there is one."""
+    recording = read_recording(cut.recording, sensors, default_rate)
+    return recording, None if cut.air is None else read_recording(cut.air, sensors, default_rate)

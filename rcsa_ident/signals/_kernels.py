@@ -31,3 +31,20 @@ def order_sums(samples, step, highest, moments):
                 weight = weight * u
             factor = factor * rotation
     return sums
+
+
+@numba.njit(cache=True)
+def order_signal(amplitude, step, n):
+    """Return Re sum_m amplitude[m] e^{i m step t'} with t' from the middle of n samples, shape (m + 1, c) -> (n, c)."""
+    orders, channels = amplitude.shape
+    values = np.zeros((n, channels))
+    middle = 0.5 * (n - 1)
+    for t in range(n):
+        shifted = t - middle
+        rotation = complex(math.cos(step * shifted), math.sin(step * shifted))
+        factor = complex(1.0, 0.0)
+        for m in range(orders):
+            for c in range(channels):
+                values[t, c] += amplitude[m, c].real * factor.real - amplitude[m, c].imag * factor.imag
+            factor = factor * rotation
+    return values

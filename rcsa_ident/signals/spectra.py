@@ -9,7 +9,7 @@ from scipy.signal import get_window
 
 from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.signals._kernels import order_sums
+from rcsa_ident.signals._kernels import order_signal, order_sums
 
 #: Share of the programmed speed within which the true one is looked for.
 SPEED_SEARCH = 0.01
@@ -60,7 +60,8 @@ def refine_speed(samples: FloatArray, rate: float, nominal: float, orders: int =
     nominal_hz = nominal / (2.0 * np.pi)
     highest = int(min(orders, 0.45 * rate / nominal_hz))
     if n < 4.0 * rate / nominal_hz or highest < 1:
-        raise InputError("recording length", f"{n / rate:.4g} s", f"at least four revolutions, {4.0 / nominal_hz:.4g} s, sampled twice per turn")
+        wanted = f"at least four revolutions, {4.0 / nominal_hz:.4g} s, sampled twice per turn"
+        raise InputError("recording length", f"{n / rate:.4g} s", wanted)
     centred = samples - samples.mean(axis=0)
     length = 1 << int(np.ceil(np.log2(4 * n)))
     power = np.sum(np.abs(np.fft.rfft(centred * get_window("hann", n)[:, None], length, axis=0)) ** 2, axis=1)
@@ -69,13 +70,19 @@ def refine_speed(samples: FloatArray, rate: float, nominal: float, orders: int =
     bins = np.outer(trial, np.arange(1, highest + 1)) * length / rate
     low = np.floor(bins).astype(int)
     score = np.sum((1.0 - (bins - low)) * power[low] + (bins - low) * power[low + 1], axis=1)
-    speed = 2.0 * np.pi * trial[int(np.argmax(score))] / rate
+    return follow_speed(centred, rate, float(2.0 * np.pi * trial[int(np.argmax(score))]), highest)
+
+
+def follow_speed(samples: FloatArray, rate: float, near: float, orders: int = 16) -> float:
+    """Return the spindle speed that fits best close to a good guess (within a tenth of a turn over the record) [rad/s]."""
+    step = near / rate
+    highest = int(min(orders, 0.9 * np.pi / step))
     for _ in range(6):
-        change = _speed_correction(centred, speed, highest)
-        speed += change
-        if abs(change) * n * highest < 1e-7:
+        change = _speed_correction(samples, step, highest)
+        step += change
+        if abs(change) * samples.shape[0] * highest < 1e-3:
             break
-    return float(speed * rate)
+    return float(step * rate)
 
 
 def _speed_correction(samples: FloatArray, step: float, highest: int) -> float:
@@ -148,13 +155,8 @@ def _fit(samples: FloatArray, step: float, highest: int) -> tuple[ComplexArray, 
 
 
 def _synthesis(amplitude: ComplexArray, drift: FloatArray, n: int, step: float) -> FloatArray:
-    shifted = np.arange(n) - 0.5 * (n - 1)
-    rotation = np.exp(1j * step * shifted)
-    total = np.zeros((n, amplitude.shape[1]), dtype=complex)
-    for line in amplitude[::-1]:  # Horner's scheme over the orders
-        total = total * rotation[:, None] + line
-    u = 2.0 * shifted / n
-    return total.real + np.outer(u, drift[0]) + np.outer(u**2, drift[1])
+    u = 2.0 * (np.arange(n) - 0.5 * (n - 1)) / n
+    return order_signal(amplitude, step, n) + np.column_stack([u, u**2]) @ drift
 
 
 def _floor(rest: FloatArray, step: float, highest: int) -> FloatArray:

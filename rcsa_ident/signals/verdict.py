@@ -9,7 +9,7 @@ from scipy.signal import get_window
 
 from rcsa_ident.dynamics.arrays import FloatArray
 from rcsa_ident.signals.recording import Quantity, Recording
-from rcsa_ident.signals.spectra import LineSpectrum, refine_speed
+from rcsa_ident.signals.spectra import LineSpectrum, follow_speed
 
 #: Equal samples in a row that a live analogue channel does not produce.
 FROZEN_SAMPLES = 12
@@ -81,8 +81,8 @@ def speed_faults(samples: FloatArray, rate: float, speed: float, programmed: flo
         return tuple(found)
     half = samples.shape[0] // 2
     if half > 4.0 * rate * 2.0 * np.pi / speed:
-        first = refine_speed(samples[:half], rate, speed)
-        second = refine_speed(samples[half:], rate, speed)
+        first = follow_speed(samples[:half], rate, speed)
+        second = follow_speed(samples[half:], rate, speed)
         # a speed that changes linearly bends the phase of order m by m * change * T / 8 at the middle
         phase = highest_order * abs(second - first) * samples.shape[0] / rate / 4.0
         if phase > DRIFT_PHASE:

@@ -44,10 +44,12 @@ class Mesh:
         self.damping: list = []
 
     def new_node(self) -> int:
+        """Return the number of one more node."""
         self.count += 1
         return self.count - 1
 
     def node(self, body: int, z: int) -> int:
+        """Return the number of a body's node at `z` [nm], new or known."""
         key = (body, z)
         if key not in self.nodes:
             self.nodes[key] = self.new_node()
@@ -70,6 +72,7 @@ class Mesh:
 
     @staticmethod
     def sum(parts: list, freedoms: int) -> scipy.sparse.csc_array:
+        """Add up matrices given with the freedoms that they belong to."""
         if not parts:
             return scipy.sparse.csc_array((freedoms, freedoms))
         rows = np.concatenate([np.repeat(i, i.size) for i, _ in parts])
@@ -107,8 +110,8 @@ def add_tooling(mesh: Mesh, tooling: ToolAssembly, refinement: int) -> None:
     """Tool and holder: two parallel beams over the insertion, tied by the distributed contact or sharing their nodes."""
     face, depth = nanometres(tooling.stickout), nanometres(tooling.tool_length)
     if not tooling.holder:
-        mesh.body(0, 0.0, tooling.tool, element_edges(0.0, tooling.tool, [], refinement))
-        mesh.flange = mesh.nodes[0, depth]
+        mesh.body(TOOL, 0.0, tooling.tool, element_edges(0.0, tooling.tool, [], refinement))
+        mesh.flange = mesh.nodes[TOOL, depth]
         return
     # inside the bore both bodies get the nodes of the thinner tool, which has one at every step of either
     steps = np.cumsum([0.0, *(s.length for s in tooling.holder)]) + tooling.stickout
@@ -116,19 +119,19 @@ def add_tooling(mesh: Mesh, tooling: ToolAssembly, refinement: int) -> None:
     shared = [z for z in inner if face <= z <= depth]
     outer = element_edges(tooling.stickout, tooling.holder, [depth], refinement)
     outer = [*shared, *(z for z in outer if z > depth)]
-    mesh.body(0, 0.0, tooling.tool, inner)
+    mesh.body(TOOL, 0.0, tooling.tool, inner)
     contact = tooling.contact
     tied = contact is None or depth == face
     if tied:
         for z in shared:
-            mesh.nodes[1, z] = mesh.nodes[0, z]
-    mesh.body(1, tooling.stickout, tooling.holder, outer)
-    mesh.flange = mesh.nodes[1, nanometres(tooling.stickout + tooling.holder_length)]
+            mesh.nodes[HOLDER, z] = mesh.nodes[TOOL, z]
+    mesh.body(HOLDER, tooling.stickout, tooling.holder, outer)
+    mesh.flange = mesh.nodes[HOLDER, nanometres(tooling.stickout + tooling.holder_length)]
     if contact is None or tied:
         return
     for z in shared[:-1]:
-        tool, length, first = mesh.beams[0, z]
-        holder, _, last = mesh.beams[1, z]
+        tool, length, first = mesh.beams[TOOL, z]
+        holder, _, last = mesh.beams[HOLDER, z]
         gap, turn = layer_matrices(tool, holder, length)
         index = np.concatenate([first, last])
         mesh.stiffness.append((index, contact.translational_stiffness * gap + contact.rotational_stiffness * turn))

@@ -184,7 +184,8 @@ def synchronous_lines(angle: FloatArray, values: FloatArray, orders: int) -> np.
     first, last = np.ceil(angle[0] / turn), np.floor(angle[-1] / turn)
     if last <= first:
         raise InputError("angle", f"{(angle[-1] - angle[0]) / turn:.2f} revolutions", "at least one whole revolution from angle 0")
-    points = 8 * orders
+    # a force that jumps has lines far above: as fine as the series itself, so that they do not fold down
+    points = max(int(np.ceil(2.0 * turn / (angle[1] - angle[0]))), 2 * orders)
     places = turn * (first + np.arange(int(last - first) * points) / points)
     columns = [np.interp(places, angle, column).reshape(-1, points).mean(axis=0) for column in values.T]
     lines = np.fft.rfft(np.stack(columns, axis=-1), axis=0)[:orders] / points

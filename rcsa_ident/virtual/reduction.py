@@ -15,6 +15,8 @@ from rcsa_ident.virtual.rotor import Rotor, frequency_motion
 
 #: Frequencies [Hz] at which the reduced rotor is exact.
 EXACT_AT = (300.0, 1000.0, 2000.0, 3000.0, 4200.0, 6000.0)
+#: A pole whose imaginary part is a smaller share of it belongs to an overdamped mode: the loss factors leave no more.
+_OVERDAMPED = 0.03
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,7 +94,7 @@ class Poles:
     Parameters
     ----------
     pole : complex array, shape (m,) [rad/s]
-        Those with positive imaginary part.
+        Those with positive imaginary part; real ones of overdamped modes, with half their residue.
     inputs : complex array, shape (m, i)
     outputs : complex array, shape (p, m)
     coordinates : tuple of Coordinate, length p
@@ -117,7 +119,7 @@ def poles(model: ReducedRotor, speed: float = 0.0, inputs: tuple[str, ...] = ("t
     Hysteretic damping exists only for steady vibration: its equations hold for positive frequencies, and their poles
     with negative imaginary part are unstable. The poles of positive frequency together with their conjugates make a
     real, causal system; it differs from the hysteretic one by a share of the loss factor far from resonance
-    (`tests/virtual/test_rotor.py` holds it below 0.2 %).
+    (`tests/virtual/test_reduction.py` holds it below 0.2 %).
     """
     m = model.stiffness.shape[0]
     state = np.zeros((2 * m, 2 * m), dtype=complex)
@@ -128,10 +130,15 @@ def poles(model: ReducedRotor, speed: float = 0.0, inputs: tuple[str, ...] = ("t
     force = np.zeros((2 * m, len(inputs)), dtype=complex)
     force[m:] = model.ports[_rows(model.coordinates, inputs)].T
     left = np.linalg.solve(right, force)
-    keep = value.imag > 0.0
-    if keep.sum() != m or np.any(value[keep].real >= 0.0):
-        raise InputError("damping", f"{keep.sum()} of {m} oscillating modes", "dampers that leave every mode oscillating and stable")
-    return Poles(value[keep], left[keep], model.ports @ right[:m, keep], model.coordinates)
+    shape = model.ports @ right[:m]
+    # an overdamped mode has two poles that decay without oscillating; each stands for itself, its conjugate included
+    decaying = np.abs(value.imag) < _OVERDAMPED * np.abs(value)
+    value = np.where(decaying, value.real, value)
+    shape = np.where(decaying, 0.5 * shape, shape)
+    keep = (value.imag > 0.0) | decaying
+    if np.any(value[keep].real >= 0.0):
+        raise InputError("spindle", "a mode that grows by itself", "bearings and dampers that leave every mode stable")
+    return Poles(value[keep], left[keep], shape[:, keep], model.coordinates)
 
 
 def _rows(coordinates: tuple[Coordinate, ...], names: tuple[str, ...]) -> np.ndarray:

@@ -14,8 +14,8 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
-from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.io.machines import MachineFile, read_machine
+from rcsa_ident.io.recordings import write_hdf5
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.virtual.milling import CutHistory, mill_cut, synchronous_lines
@@ -129,12 +129,13 @@ def write_truth(setup: MachineFile, toolings: list[Tooling], folder: Path) -> No
             table = np.column_stack([frequency, x.real, x.imag, y.real, y.imag])
             _write_table(folder / name / f"{tooling.name}.csv", "frequency_hz,X_re,X_im,Y_re,Y_im", table)
     columns, header = [frequency], ["frequency_hz"]
-    for axis in "xy":
-        plane = (f"flange.{axis}", f"flange.{axis}'")
-        values = frequency_response(rotor(setup.spindle, None), omega, speed, inputs=plane, outputs=plane)
-        for (i, j), entry in (((0, 0), "tF"), ((0, 1), "tM"), ((1, 0), "rF"), ((1, 1), "rM")):
-            columns += [values[:, i, j].real, values[:, i, j].imag]
-            header += [f"{axis.upper()}_{entry}_re", f"{axis.upper()}_{entry}_im"]
+    planes = ("flange.x", "flange.x'", "flange.y", "flange.y'")
+    values = frequency_response(rotor(setup.spindle, None), omega, speed, inputs=planes, outputs=planes)
+    for axis, first_row in (("X", 0), ("Y", 2)):
+        for row, col, entry in ((0, 0, "tF"), (0, 1, "tM"), (1, 0, "rF"), (1, 1, "rM")):
+            column = values[:, first_row + row, first_row + col]
+            columns += [column.real, column.imag]
+            header += [f"{axis}_{entry}_re", f"{axis}_{entry}_im"]
     _write_table(folder / "spindle.csv", ",".join(header), np.column_stack(columns))
 
 

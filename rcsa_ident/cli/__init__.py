@@ -1,0 +1,49 @@
+"""The command line: the one place where workflows, files and reports are put together."""
+
+import os
+
+# one thread per process: the linear algebra here is small, its sums stay the same on any number of cores
+for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+import typer  # noqa: E402
+
+from rcsa_ident.cli import demo, identify, lobes, machine  # noqa: E402
+
+app = typer.Typer(
+    name="rcsa-ident",
+    help="Spindle dynamics from ordinary stable cuts: tooltip FRFs and stability lobes of any tool. "
+    "Exit codes: 0 done, 1 failed, 2 bad input, 3 not converged (the result is still written).",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+app.command("demo")(demo.demo)
+app.command("check")(identify.check)
+app.command("identify")(identify.identify)
+app.command("tooltip")(lobes.tooltip)
+app.command("lobes")(lobes.lobes)
+app.command("simulate")(machine.simulate)
+app.command("warm")(machine.warm)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from rcsa_ident import __version__
+
+        typer.echo(f"rcsa-ident {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def root(version: bool = typer.Option(False, "--version", callback=_version, is_eager=True, help="Print the version.")) -> None:
+    """Take the options in front of a command."""
+
+
+root.__doc__ = app.info.help
+
+
+def main() -> None:
+    """Run the command line."""
+    app()

@@ -1,0 +1,185 @@
+"""What all commands share: exit codes, errors in one sentence, worker processes, progress, output."""
+
+from __future__ import annotations
+
+import functools
+import json
+import multiprocessing
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import typer
+
+from rcsa_ident.errors import InputError, RcsaIdentError
+
+FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
+#: Reading and searching do not get faster beyond it.
+MOST_PROCESSES = 8
+
+Processes = Annotated[
+    int | None, typer.Option(min=1, max=64, help="Worker processes; by default one a core, at most 8.", show_default=False)
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of tables.")]
+Seed = Annotated[int, typer.Option(min=0, help="Same seed, same answer, on any number of processes.")]
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def answers(command: Command) -> Command:
+    """Turn what a command raises into one sentence on stderr and an exit code."""
+
+    @functools.wraps(command)
+    def wrapped(*args: Any, **kwargs: Any) -> Any:
+        try:
+            return command(*args, **kwargs)
+        except InputError as error:
+            _refuse(str(error), BAD_INPUT, kwargs.get("json_"), {"field": error.field, "where": error.where})
+        except RcsaIdentError as error:
+            _refuse(str(error), FAILED, kwargs.get("json_"), {})
+        except BrokenProcessPool:
+            _refuse(
+                "a worker process was ended from outside (out of memory?); fewer --processes need less", FAILED, kwargs.get("json_"), {}
+            )
+        except KeyboardInterrupt:
+            _refuse("interrupted: nothing was written", INTERRUPTED, kwargs.get("json_"), {})
+
+    return wrapped  # type: ignore[return-value]
+
+
+def _refuse(sentence: str, code: int, as_json: bool | None, details: dict[str, Any]) -> None:
+    if as_json:
+        typer.echo(json.dumps({"error": sentence, "exit_code": code, **details}, ensure_ascii=False))
+    typer.secho(sentence, fg=typer.colors.RED, err=True)
+    raise typer.Exit(code)
+
+
+def _die_on_interrupt() -> None:
+    # a worker has nothing to tidy up, and the main process says what happened
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@dataclass(frozen=True, slots=True)
+class Workers:
+    """A `map` that may run in several processes; results come in the order of the tasks."""
+
+    pool: ProcessPoolExecutor | None
+
+    def map(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterable[Any]:
+        """Few long tasks."""
+        return map(function, tasks) if self.pool is None else self.pool.map(function, tasks)
+
+    def map_many(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterable[Any]:
+        """Many short tasks, sent four at a time."""
+        return map(function, tasks) if self.pool is None else self.pool.map(function, tasks, chunksize=4)
+
+
+@contextmanager
+def workers(processes: int | None) -> Iterator[Workers]:
+    """Yield worker processes; on the way out they are gone, at once if something went wrong."""
+    count = processes or min(_cores(), MOST_PROCESSES)
+    if count == 1:
+        yield Workers(None)
+        return
+    pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), initializer=_die_on_interrupt)
+    try:
+        yield Workers(pool)
+    except BaseException:
+        for child in multiprocessing.active_children():
+            child.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _cores() -> int:
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on every system
+        return os.cpu_count() or 1
+
+
+@dataclass(slots=True)
+class Stages:
+    """Progress on stderr and the seconds that each stage took.
+
+    Parameters
+    ----------
+    quiet : bool
+        Nothing is shown, as with ``--json``.
+    """
+
+    quiet: bool = False
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, title: str) -> Iterator[Callable[[int, int], None]]:
+        """Show a stage while it runs; yield what takes (done, total)."""
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+        start = time.perf_counter()
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+        with Progress(*columns, console=Console(stderr=True), transient=True, disable=self.quiet or not sys.stderr.isatty()) as progress:
+            task = progress.add_task(title, total=None)
+            yield lambda done, total: progress.update(task, completed=done, total=total)
+        self.seconds[title] = time.perf_counter() - start
+
+
+def emit(data: Any) -> None:
+    """Print one JSON object; what is not finite becomes null."""
+    typer.echo(json.dumps(_finite(data), ensure_ascii=False))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(v) for v in value]
+    return None if isinstance(value, float) and value - value != 0.0 else value
+
+
+def say(text: str) -> None:
+    """Print a line with rich markup."""
+    from rich.console import Console
+
+    Console(highlight=False, soft_wrap=True).print(text)
+
+
+def warn(text: str) -> None:
+    """Print a warning on stderr."""
+    typer.secho(f"warning: {text}", fg=typer.colors.YELLOW, err=True)
+
+
+def writable(path: Path, option: str = "--out") -> Path:
+    """Return `path` if a file can be written there, before the long work and not after it."""
+    if path.is_dir():
+        raise InputError(option, "a folder", "the name of a file", str(path))
+    if not path.parent.is_dir():
+        raise InputError(option, f"no folder {path.parent}", "a file in an existing folder", str(path))
+    if not os.access(path.parent, os.W_OK):
+        raise InputError(option, "a folder without permission to write", "a file that can be written", str(path))
+    return path
+
+
+def inclusive(first: float, last: float, step: float, names: tuple[str, str, str], unit: str) -> Any:
+    """Return first, first + step, ... up to last, which is one of them if the steps meet it."""
+    import numpy as np
+
+    for name, value in zip(names, (first, last, step), strict=True):
+        if not (value > 0.0 and value - value == 0.0):
+            raise InputError(name, value, f"a finite number above 0 [{unit}]")
+    if last < first:
+        raise InputError(names[1], last, f"{names[0]} ({first:g}) or more [{unit}]")
+    count = int(np.floor((last - first) / step * (1.0 + 1e-12) + 1e-9)) + 1
+    if count > 1_000_000:
+        raise InputError(names[2], step, f"a step that gives at most 1000000 values [{unit}]")
+    return first + step * np.arange(count)

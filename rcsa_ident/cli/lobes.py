@@ -1,0 +1,333 @@
+"""tooltip and lobes: what a result is for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rcsa_ident.cli.common import Json, Stages, answers, emit, inclusive, say, warn, writable
+from rcsa_ident.errors import InputError
+
+if TYPE_CHECKING:
+    from rcsa_ident.cutting.coefficients import CuttingCoefficients
+    from rcsa_ident.cutting.conditions import Engagement
+    from rcsa_ident.dynamics.arrays import FloatArray
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.dynamics.receptance import Receptance
+    from rcsa_ident.identification.posterior import MachineAxis
+    from rcsa_ident.stability.result import StabilityLobes
+    from rcsa_ident.workflows.lobes import LobeConditions
+    from rcsa_ident.workflows.tip import TooltipResponse
+
+#: Lower end of the receptances that lobes are computed from, and their step [Hz].
+LOWEST, STEP = 100.0, 1.0
+
+ResultFile = Annotated[Path, typer.Argument(help="RESULT.json of an identification.", show_default=False)]
+ToolingFile = Annotated[Path, typer.Argument(help="TOOLING.toml; it need not have been cut with.", show_default=False)]
+Bands = Annotated[bool, typer.Option(help="Add what the records leave open: 2 standard deviations, 95 % of the machines.")]
+
+
+class LobeMethod(StrEnum):
+    """Stability methods by name."""
+
+    zero_order = "zero-order"
+
+
+class Strategy(StrEnum):
+    """Which way the teeth enter."""
+
+    up = "up"
+    down = "down"
+
+
+@answers
+def tooltip(
+    result: ResultFile,
+    tooling: ToolingFile,
+    out: Annotated[Path, typer.Option(help="FRF.csv to write, m/N.", show_default=False)],
+    from_: Annotated[float, typer.Option("--from", help="Lowest frequency, Hz.")] = 100.0,
+    to: Annotated[
+        float | None, typer.Option("--to", help="Highest frequency, Hz; default: end of the identified band.", show_default=False)
+    ] = None,
+    step: Annotated[float, typer.Option(help="Frequency step, Hz.")] = 1.0,
+    bands: Bands = True,
+    json_: Json = False,
+) -> None:
+    """Predict the tooltip FRF of any tooling on the identified machine."""
+    from rcsa_ident.io.setups import read_tooling
+
+    writable(out)
+    machine, data = read_machine(result)
+    assembly = read_tooling(tooling).assembly
+    last = data["band_hz"][1] if to is None else to
+    frequency = inclusive(from_, last, step, ("--from", "--to", "--step"), "Hz")
+    if to is not None and to > 1.001 * data["band_hz"][1]:
+        warn(f"the machine was identified up to {data['band_hz'][1]:.0f} Hz; above that the FRF is extrapolated")
+    stages = Stages(quiet=json_)
+    with stages.stage("tooltip"):
+        response = tip_response(machine, assembly, frequency, bands)
+    write_response(out, frequency, response)
+    peaks = peaks_of(frequency, response)
+    if json_:
+        emit(
+            {
+                "frequencies": len(frequency),
+                "peaks": {a.upper(): asdict(p) for a, (p, _) in peaks.items()},
+                "seconds": stages.seconds,
+                "out": str(out),
+            }
+        )
+        return
+    from rcsa_ident.cli.tables import show_peaks
+
+    show_peaks({a: (p.frequency_hz, p.magnitude, p.lowest_real_part, band) for a, (p, band) in peaks.items()})
+    say(f"written: {out} ({len(frequency)} frequencies, {stages.seconds['tooltip']:.2f} s)")
+
+
+@answers
+def lobes(
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="[RESULT.json] TOOLING.toml", help="With --modes or --frf the tooling alone.", show_default=False),
+    ],
+    out: Annotated[Path, typer.Option(help="LOBES.csv to write.", show_default=False)],
+    modes: Annotated[
+        Path | None, typer.Option(help="MODES.toml: a modal model of the tip instead of a result.", show_default=False)
+    ] = None,
+    frf: Annotated[
+        list[str] | None, typer.Option(metavar="[X=]FRF.csv", help="Tap-test FRF instead of a result; once an axis.", show_default=False)
+    ] = None,
+    immersion: Annotated[float, typer.Option(help="Radial depth over diameter, up to 1 (a slot).")] = 0.5,
+    strategy: Annotated[Strategy, typer.Option(help="Up or down milling.")] = Strategy.down,
+    entry_deg: Annotated[
+        float | None, typer.Option(help="Entry angle from the normal direction, instead of --immersion.", show_default=False)
+    ] = None,
+    exit_deg: Annotated[float | None, typer.Option(help="Exit angle.", show_default=False)] = None,
+    feed_direction: Annotated[str, typer.Option(help="+X -X +Y -Y, or degrees from +X.")] = "+X",
+    speed_from: Annotated[float, typer.Option(help="Lowest spindle speed, rev/min.")] = 4000.0,
+    speed_to: Annotated[float, typer.Option(help="Highest spindle speed, rev/min.")] = 20000.0,
+    speed_step: Annotated[float, typer.Option(help="Speed step, rev/min.")] = 50.0,
+    max_depth_mm: Annotated[float, typer.Option(help="Depths beyond it are not of interest, mm.")] = 10.0,
+    ktc_mpa: Annotated[
+        float | None, typer.Option(help="Tangential coefficient, MPa; default: the result's workpiece.", show_default=False)
+    ] = None,
+    krc: Annotated[float | None, typer.Option(help="Radial ratio; default: the result's workpiece.", show_default=False)] = None,
+    method: Annotated[LobeMethod, typer.Option(help="How the limit is found.")] = LobeMethod.zero_order,
+    bands: Bands = True,
+    json_: Json = False,
+) -> None:
+    """Compute stability lobes of a tooling: on an identified machine, from a modal model or from tap tests."""
+    import numpy as np
+
+    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.workflows.lobes import LobeConditions, best_speeds
+
+    writable(out)
+    own_tip = modes is not None or bool(frf)
+    if modes is not None and frf:
+        raise InputError("--modes and --frf", "both", "one of them")
+    if len(files) != (1 if own_tip else 2):
+        wanted = (
+            "TOOLING.toml alone with --modes or --frf" if own_tip else "RESULT.json TOOLING.toml (or --modes or --frf and TOOLING.toml)"
+        )
+        raise InputError("files", f"{len(files)} files", wanted)
+    tooling = read_tooling(files[-1])
+    result = None if own_tip else read_machine(files[0])
+    conditions = LobeConditions(
+        tooling.cutter,
+        coefficients(ktc_mpa, krc, None if result is None else (result[1], str(files[0]))),
+        engagement(immersion, strategy, entry_deg, exit_deg),
+        feed_angle(feed_direction),
+        inclusive(speed_from, speed_to, speed_step, ("--speed-from", "--speed-to", "--speed-step"), "rev/min") * (np.pi / 30.0),
+        max_depth_mm * 1e-3,
+    )
+    stages = Stages(quiet=json_)
+    with stages.stage("lobes"):
+        if result is None:
+            found, spread, doubts = conditions.lobes(tip_of(modes, frf or [])), None, list[str]()
+        else:
+            found, spread, doubts = machine_lobes(*result, tooling.assembly, conditions, bands)
+    write_lobes(out, found, spread)
+    best = best_speeds(found)
+    if json_:
+        emit(lobes_summary(found, best) | {"warnings": [*found.warnings, *doubts], "seconds": stages.seconds, "out": str(out)})
+        return
+    from rcsa_ident.cli.tables import show_lobes
+
+    show_lobes(found, best, conditions.max_depth)
+    for doubt in (*found.warnings, *doubts):
+        warn(doubt)
+    say(f"written: {out} ({found.spindle_speed.size} speeds, {stages.seconds['lobes']:.2f} s)")
+
+
+def read_machine(path: Path) -> tuple[dict[Dof, MachineAxis], dict[str, Any]]:
+    """Return the machine of a result file beside the file's content."""
+    from rcsa_ident.io.identifications import machine_from_json
+    from rcsa_ident.io.results import read_result
+
+    data = read_result(path)
+    machine = machine_from_json(data, str(path))
+    if data["status"] != "converged":
+        warn(f"{path} is {data['status']}: {'; '.join(data['reasons'])}")
+    return machine, data
+
+
+def tip_response(machine: dict[Dof, MachineAxis], assembly: Any, frequency: FloatArray, bands: bool) -> TooltipResponse:
+    """Return the tip's response at frequencies in Hz."""
+    import numpy as np
+
+    from rcsa_ident.workflows.tip import tooltip as run
+
+    return run(machine, assembly, 2.0 * np.pi * frequency, bands)
+
+
+def write_response(path: Path, frequency: FloatArray, response: TooltipResponse) -> None:
+    """Write FRF.csv with standard deviations in further columns."""
+    from rcsa_ident.io.curves import write_frf_csv
+
+    columns: dict[str, FloatArray] = {}
+    for axis, (real, imaginary) in response.deviation.items():
+        columns |= {f"{axis.upper()}_re_std": real, f"{axis.upper()}_im_std": imaginary}
+    write_frf_csv(path, frequency, {axis.upper(): response.tip(axis) for axis in response.coupled}, columns)
+
+
+def peaks_of(frequency: FloatArray, response: TooltipResponse) -> dict[Dof, Any]:
+    """Return, per axis, the peak and two standard deviations of the magnitude there (NaN without bands)."""
+    import numpy as np
+
+    from rcsa_ident.report.rows import peak_row
+
+    peaks = {}
+    for axis in response.coupled:
+        values = response.tip(axis)
+        k = int(np.argmax(np.abs(values)))
+        band = math.nan
+        if axis in response.deviation:
+            real, imaginary = (part[k] for part in response.deviation[axis])
+            unit = values[k] / abs(values[k])
+            band = 2.0 * math.hypot(real * unit.real, imaginary * unit.imag)
+        peaks[axis] = (peak_row(frequency, values), band)
+    return peaks
+
+
+def coefficients(ktc_mpa: float | None, krc: float | None, result: tuple[dict[str, Any], str] | None) -> CuttingCoefficients:
+    """Return the cutting coefficients asked for, those of the result where nothing is said."""
+    from dataclasses import replace
+
+    from rcsa_ident.cutting.coefficients import CuttingCoefficients
+    from rcsa_ident.errors import positive
+    from rcsa_ident.io.identifications import workpiece_from_json
+
+    given = {} if ktc_mpa is None else {"tangential": positive("--ktc-mpa", ktc_mpa, "MPa") * 1e6}
+    given |= {} if krc is None else {"radial_ratio": krc}
+    if result is not None:
+        return replace(workpiece_from_json(*result).coefficients, **given)
+    if len(given) < 2:
+        missing = "--ktc-mpa" if ktc_mpa is None else "--krc"
+        raise InputError(missing, "nothing", "--ktc-mpa [MPa] and --krc [-]: without a result no workpiece is known")
+    return CuttingCoefficients(**given)
+
+
+def engagement(immersion: float, strategy: Strategy, entry_deg: float | None, exit_deg: float | None) -> Engagement:
+    """Return the engagement from both angles, or from immersion and strategy."""
+    from rcsa_ident.cutting.conditions import Engagement
+
+    if (entry_deg is None) != (exit_deg is None):
+        raise InputError("--entry-deg and --exit-deg", "one of them", "both, or neither")
+    if entry_deg is None or exit_deg is None:
+        return Engagement.from_immersion(immersion, str(strategy))
+    return Engagement(math.radians(entry_deg), math.radians(exit_deg))
+
+
+def feed_angle(text: str) -> float:
+    """Return the feed direction [rad] of +X, -X, +Y, -Y or degrees."""
+    from rcsa_ident.io.setups import FEED_DIRECTIONS
+
+    if text.upper() in FEED_DIRECTIONS:
+        return FEED_DIRECTIONS[text.upper()]
+    try:
+        degrees = float(text)
+    except ValueError:
+        degrees = math.nan
+    if not abs(degrees) <= 360.0:
+        raise InputError("--feed-direction", text, f"one of {', '.join(FEED_DIRECTIONS)}, or an angle from -360 to 360 [deg]")
+    return math.radians(degrees)
+
+
+def tip_of(modes: Path | None, frf: list[str]) -> Receptance:
+    """Return the tip's receptance from a modal model or from tap tests."""
+    from rcsa_ident.io.modes import read_modes
+    from rcsa_ident.workflows.lobes import measured_tip, modal_tip
+
+    return modal_tip(read_modes(modes)) if modes is not None else measured_tip(_tap_tests(frf))
+
+
+def _tap_tests(texts: list[str]) -> dict[Dof, Any]:
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.io.curves import read_frf_csv
+
+    found: dict[Dof, Any] = {}
+    for text in texts:
+        axis, sign, name = text.partition("=")
+        path = Path(name if sign and axis.upper() in ("X", "Y") else text)
+        if path.suffix.lower() != ".csv":
+            raise InputError(
+                "--frf",
+                f"suffix '{path.suffix}'",
+                "an FRF.csv (frequency_hz, X_re, X_im, Y_re, Y_im); other formats are not read yet",
+                str(path),
+            )
+        curves = read_frf_csv(path)
+        wanted = [axis.upper()] if path.name != text and str(path) != text else list(curves.values)
+        for each in wanted:
+            if each not in curves.values:
+                raise InputError(f"column {each}_re", "nothing", f"an FRF of axis {each}", str(path))
+            if Dof(each.lower()) in found:
+                raise InputError("--frf", f"axis {each} twice", "each axis once", str(path))
+            found[Dof(each.lower())] = (curves.frequency, curves.values[each])
+    return found
+
+
+def machine_lobes(
+    machine: dict[Dof, MachineAxis], data: dict[str, Any], assembly: Any, conditions: LobeConditions, bands: bool
+) -> tuple[StabilityLobes, tuple[FloatArray, FloatArray] | None, list[str]]:
+    """Return the lobes on an identified machine, their band and what speaks against them."""
+    import numpy as np
+
+    from rcsa_ident.workflows.lobes import band_warning, lobe_bands, tooling_lobes
+
+    low, high = data["band_hz"]
+    frequency = np.arange(min(LOWEST, low), high + 0.5 * STEP, STEP)
+    response = tip_response(machine, assembly, frequency, bands)
+    found = tooling_lobes(response, conditions)
+    spread = lobe_bands(response, conditions) if bands else None
+    doubt = band_warning(found, (low, high))
+    return found, spread, [doubt] if doubt else []
+
+
+def write_lobes(path: Path, found: StabilityLobes, spread: tuple[FloatArray, FloatArray] | None) -> None:
+    """Write LOBES.csv; the band's columns are empty where even its edge is beyond the largest depth."""
+    import numpy as np
+
+    from rcsa_ident.io.curves import write_lobes_csv
+
+    extra = {} if spread is None else {"limit_depth_low_mm": spread[0] * 1e3, "limit_depth_high_mm": spread[1] * 1e3}
+    lobe = np.where(found.lobe < 0, np.nan, found.lobe.astype(float))
+    chatter = found.chatter_frequency / (2.0 * np.pi)
+    write_lobes_csv(path, found.spindle_speed * (30.0 / np.pi), found.limit_depth * 1e3, chatter, lobe, extra)
+
+
+def lobes_summary(found: StabilityLobes, best: list[tuple[float, float]]) -> dict[str, Any]:
+    """Return what a machine wants to know of lobes without reading the curve."""
+    rpm = 30.0 / math.pi
+    return {
+        "method": found.method,
+        "absolute_limit_mm": found.absolute_limit * 1e3,
+        "absolute_frequency_hz": found.absolute_frequency / (2.0 * math.pi),
+        "best_speeds": [{"spindle_speed_rpm": s * rpm, "limit_depth_mm": d * 1e3} for s, d in best],
+    }

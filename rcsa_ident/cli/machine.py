@@ -1,0 +1,48 @@
+"""simulate and warm."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rcsa_ident.cli.common import Json, Processes, Seed, Stages, answers, emit, say, workers
+
+
+@answers
+def simulate(
+    machine: Annotated[Path, typer.Argument(help="MACHINE.toml.", show_default=False)],
+    out: Annotated[Path, typer.Option(help="Campaign folder to write; the truth goes beside it, into OUT.truth.", show_default=False)],
+    seed: Seed = 1,
+    processes: Processes = None,
+    json_: Json = False,
+) -> None:
+    """Record a campaign on the virtual machine."""
+    from rcsa_ident.workflows.simulate import simulate as run
+
+    stages = Stages(quiet=json_)
+    with stages.stage("cuts") as progress, workers(processes) as pool:
+        done = run(machine, out, seed, progress, pool.map)
+    seconds = stages.seconds["cuts"]
+    if json_:
+        emit({"folder": str(done.folder), "truth": str(done.truth), "cuts": done.cuts, "seconds": seconds})
+    else:
+        say(f"{done.cuts} cuts in {seconds:.1f} s: {done.folder}, truth in {done.truth}")
+
+
+@answers
+def warm(json_: Json = False) -> None:
+    """Compile the numerical kernels once and cache them; the first command is then as fast as any other."""
+    from rcsa_ident.workflows.warm import STEPS
+
+    stages = Stages(quiet=json_)
+    for name, step in STEPS.items():
+        with stages.stage(name):
+            step()
+    if json_:
+        emit({"seconds": stages.seconds})
+    else:
+        for name, seconds in stages.seconds.items():
+            say(f"{name:<16} {seconds:6.1f} s")
+        say(f"{'together':<16} {sum(stages.seconds.values()):6.1f} s")

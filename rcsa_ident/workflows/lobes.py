@@ -1,0 +1,166 @@
+"""From what the tip answers to stability lobes, with bands and the speeds that allow most."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.errors import InputError
+from rcsa_ident.stability.lobes import StabilityMethod, stability_lobes, uncoupled_planes
+from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.zero_order import ZeroOrder
+from rcsa_ident.workflows.tip import TooltipResponse
+
+#: Lines per half-power bandwidth of the least damped mode, and the most there may be.
+LINES_PER_BANDWIDTH = 10.0
+MOST_LINES = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class LobeConditions:
+    """What a stability limit is asked for.
+
+    Parameters
+    ----------
+    cutter : Cutter
+    coefficients : CuttingCoefficients
+    engagement : Engagement
+    feed_angle : float [rad]
+    speeds : array, shape (n,) [rad/s]
+    max_depth : float [m]
+    method : StabilityMethod
+    """
+
+    cutter: Cutter
+    coefficients: CuttingCoefficients
+    engagement: Engagement
+    feed_angle: float
+    speeds: FloatArray
+    max_depth: float
+    method: StabilityMethod = field(default_factory=ZeroOrder)
+
+    def lobes(self, tip: Receptance) -> StabilityLobes:
+        """Return the lobes for the tip's 2 x 2 receptance."""
+        return stability_lobes(
+            tip, self.cutter, self.coefficients, self.engagement, self.feed_angle, self.speeds, self.max_depth, self.method
+        )
+
+
+def tooling_lobes(response: TooltipResponse, conditions: LobeConditions) -> StabilityLobes:
+    """Return the lobes of a tooling on an identified machine, whose planes do not feel each other."""
+    return conditions.lobes(uncoupled_planes(response.coupled.get(Dof.X), response.coupled.get(Dof.Y)))
+
+
+def lobe_bands(
+    response: TooltipResponse, conditions: LobeConditions, draws: int = 60, seed: int = 1
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return the limit depths between which 95 % of the machines lie that the records allow, or None without a posterior.
+
+    Parameters
+    ----------
+    response : TooltipResponse
+        With its spread.
+    draws : int
+        Receptances drawn from it, the axes independently of each other.
+    seed : int
+
+    Returns
+    -------
+    (array, array), shape (n,) each [m]
+        Infinite where the cut is stable up to the depth that was asked for.
+    """
+    if draws < 2 or any(axis not in response.spread for axis in response.coupled):
+        return None
+    rng = np.random.default_rng(seed)
+    limits = np.empty((draws, conditions.speeds.size))
+    for i in range(draws):
+        curves = {}
+        for axis, receptance in response.coupled.items():
+            change = response.spread[axis]
+            drawn = response.tip(axis) + rng.standard_normal(change.shape[0]) @ change
+            curves[axis] = (receptance.omega / (2.0 * np.pi), drawn)
+        limits[i] = conditions.lobes(measured_tip(curves)).limit_depth
+    # an infinite limit has its rank like any other, but can't be interpolated
+    low, high = np.quantile(limits, (0.025, 0.975), axis=0, method="nearest")
+    return low, high
+
+
+def best_speeds(lobes: StabilityLobes, count: int = 3) -> list[tuple[float, float]]:
+    """Return the speeds that allow the largest depths, at most `count`, the best first.
+
+    Parameters
+    ----------
+    lobes : StabilityLobes
+
+    Returns
+    -------
+    list of (float, float) [rad/s, m]
+        Peaks of the limit; the middle of a range that is stable up to the depth that was asked for, with an infinite limit.
+    """
+    order = np.argsort(lobes.spindle_speed)
+    speed, limit = lobes.spindle_speed[order], lobes.limit_depth[order]
+    edges = np.flatnonzero(np.concatenate([[True], limit[1:] != limit[:-1]]))
+    ends = np.concatenate([edges[1:], [limit.size]]) - 1
+    level = limit[edges]
+    outside = np.concatenate([[-np.inf], level, [-np.inf]])
+    peaks = [k for k in range(level.size) if level[k] > outside[k] and level[k] > outside[k + 2]]
+    width = speed[ends] - speed[edges]
+    peaks.sort(key=lambda k: (-level[k], -width[k]))
+    return [(float(0.5 * (speed[edges[k]] + speed[ends[k]])), float(level[k])) for k in peaks[:count]]
+
+
+def modal_tip(models: Mapping[Dof, ModalModel]) -> Receptance:
+    """Return the tip's 2 x 2 receptance of a modal model, at frequencies that resolve its sharpest mode.
+
+    Parameters
+    ----------
+    models : mapping of Dof to ModalModel
+        With ``tip.x``, ``tip.y``; a direction that is missing is rigid.
+    """
+    frequency = np.concatenate([m.omega_n for m in models.values()])
+    step = min(float(np.min(2.0 * m.zeta * m.omega_n)) for m in models.values()) / LINES_PER_BANDWIDTH
+    low, high = 0.1 * float(frequency.min()), 2.0 * float(frequency.max())
+    count = (high - low) / step
+    if count > MOST_LINES:
+        sharpest = min(float(m.zeta.min()) for m in models.values())
+        raise InputError("damping_ratio", sharpest, f"modes that {MOST_LINES} frequencies resolve")
+    omega = np.linspace(low, high, int(count) + 2)
+    planes = {axis: model.receptance(omega) for axis, model in models.items()}
+    return uncoupled_planes(planes.get(Dof.X), planes.get(Dof.Y))
+
+
+def measured_tip(curves: Mapping[Dof, tuple[FloatArray, ComplexArray]]) -> Receptance:
+    """Return the tip's 2 x 2 receptance of measured FRFs.
+
+    Parameters
+    ----------
+    curves : mapping of Dof to (frequency [Hz], values [m/N])
+        A direction that is missing is rigid.
+    """
+    planes = {}
+    for axis, (frequency, values) in curves.items():
+        tip = (Coordinate("tip", axis),)
+        planes[axis] = Receptance(2.0 * np.pi * frequency, np.asarray(values)[:, None, None], tip, tip)
+    return uncoupled_planes(planes.get(Dof.X), planes.get(Dof.Y))
+
+
+def band_warning(lobes: StabilityLobes, band_hz: tuple[float, float]) -> str | None:
+    """Return a sentence where the limiting vibration lies outside the identified band, else None."""
+    frequency = lobes.chatter_frequency[np.isfinite(lobes.chatter_frequency)] / (2.0 * np.pi)
+    outside = (frequency < band_hz[0]) | (frequency > band_hz[1])
+    if not outside.any():
+        return None
+    worst = float(frequency[outside][np.argmax(np.abs(frequency[outside] - np.mean(band_hz)))])
+    return (
+        f"at {int(outside.sum())} of {lobes.spindle_speed.size} speeds chatter is expected outside the identified band "
+        f"{band_hz[0]:.0f}-{band_hz[1]:.0f} Hz (as far as {worst:.0f} Hz): the machine is extrapolated there"
+    )

@@ -1,0 +1,164 @@
+import csv
+import dataclasses
+import hashlib
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from rcsa_ident.cutting.force import force_lines
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.machines import read_machine
+from rcsa_ident.io.recordings import read_recording
+from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.workflows.simulate import simulate
+
+
+@pytest.fixture(scope="module")
+def small(hpm):
+    plan = dataclasses.replace(hpm.plan, spindle_speeds=(8200.0 * np.pi / 30.0, 15500.0 * np.pi / 30.0))
+    return dataclasses.replace(hpm, plan=plan, toolings=hpm.toolings[:1], truth_toolings=())
+
+
+@pytest.fixture(scope="module")
+def written(small, tmp_path_factory):
+    return simulate(small, tmp_path_factory.mktemp("run") / "campaign", seed=7)
+
+
+@pytest.fixture
+def quick_truth(monkeypatch):
+    """The truth at few frequencies, where a test does not look at it."""
+    monkeypatch.setattr("rcsa_ident.workflows.simulate.TRUTH_FREQUENCIES", (100.0, 4500.0, 100.0))
+
+
+def digest(folder):
+    files = sorted(p for p in folder.rglob("*") if p.is_file())
+    return {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
+
+
+def true_records(result):
+    with (result.truth / "records.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    return {r["record"]: (float(r["spindle_speed_rpm"]) * np.pi / 30.0, np.radians(float(r["tooth_angle_deg"]))) for r in rows}
+
+
+def receptance(path, axis, omega):
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    column = 1 if axis is Dof.X else 3
+    frequency = omega / (2.0 * np.pi)
+    return np.interp(frequency, table[:, 0], table[:, column]) + 1j * np.interp(frequency, table[:, 0], table[:, column + 1])
+
+
+def lines(values, angle, orders):
+    basis = np.exp(1j * np.outer(angle, orders))
+    slow = np.linspace(-1.0, 1.0, angle.size)[:, None] ** np.arange(4)
+    found = np.linalg.lstsq(np.hstack([basis.real, -basis.imag, slow]), values, rcond=None)[0]
+    return found[: orders.size] + 1j * found[orders.size : 2 * orders.size]
+
+
+def test_recordings_hold_the_true_cross_receptance(written):
+    # what a reader of the folder, told speed and tooth angle, finds: cut minus air, over the analytic force
+    campaign, truth = read_campaign(written.folder), true_records(written)
+    tooling = campaign.toolings["S1-ER32"]
+    for cut in campaign.cuts:
+        for axis in (Dof.X, Dof.Y):
+            seen = []
+            for kind, path in (("cut", cut.recording), ("air", cut.air)):
+                speed, start = truth[f"{cut.id}_{kind}"]
+                recording = read_recording(path, campaign.sensors)
+                orders = np.arange(1, int(2.0 * np.pi * 4300.0 / speed))
+                angle = start + speed * recording.time
+                gap = lines(recording.channel(Quantity.DISPLACEMENT, axis)[1], angle, orders)
+                bend = lines(recording.channel(Quantity.ACCELERATION, axis)[1], angle, orders) / (orders * speed) ** 2
+                seen.append(gap - bend)
+            speed, _ = truth[f"{cut.id}_cut"]
+            count = min(s.size for s in seen)
+            orders = np.arange(1, count + 1)
+            teeth = orders % 4 == 0
+            found = (seen[0][:count] - seen[1][:count])[teeth]
+            conditions = dataclasses.replace(cut.conditions, spindle_speed=speed)
+            force = force_lines(tooling.cutter, conditions, campaign.workpiece.coefficients, orders[teeth])[:, 0 if axis is Dof.X else 1]
+            expected = receptance(written.truth / "cross" / "S1-ER32.csv", axis, orders[teeth] * speed) * force
+            assert np.linalg.norm(found - expected) < 1e-2 * np.linalg.norm(expected)
+
+
+def test_true_forces_are_those_of_the_cut(written):
+    campaign, truth = read_campaign(written.folder), true_records(written)
+    cut = campaign.cuts[0]
+    table = np.loadtxt(written.truth / "forces" / f"{cut.id}.csv", delimiter=",", skiprows=1)
+    orders = table[:, 0].astype(int)
+    conditions = dataclasses.replace(cut.conditions, spindle_speed=truth[f"{cut.id}_cut"][0])
+    expected = force_lines(campaign.toolings[cut.tooling].cutter, conditions, campaign.workpiece.coefficients, orders)
+    teeth = (orders % 4 == 0) & (orders > 0)
+    found = table[:, [1, 3]] + 1j * table[:, [2, 4]]
+    assert np.abs(found - expected)[teeth].max() < 5e-3 * np.abs(expected).max()
+
+
+def test_the_truth_lies_outside(written):
+    assert written.cuts == 2
+    assert written.truth.parent == written.folder.parent
+    assert sorted(p.name for p in written.folder.iterdir()) == ["campaign.toml", "recordings", "toolings"]
+    assert sorted(p.name for p in written.truth.iterdir()) == ["cross", "forces", "records.csv", "spindle.csv", "tip"]
+    tip = np.loadtxt(written.truth / "tip" / "S1-ER32.csv", delimiter=",", skiprows=1)
+    assert tip.shape == (900, 5)
+    assert (tip[0, 0], tip[-1, 0]) == (5.0, 4500.0)
+
+
+def test_speeds_differ_from_the_programmed_and_from_each_other(written):
+    truth = true_records(written)
+    programmed = {cut.id: cut.conditions.spindle_speed for cut in read_campaign(written.folder).cuts}
+    off = np.array([speed / programmed[record.rsplit("_", 1)[0]] - 1.0 for record, (speed, _) in truth.items()])
+    assert np.unique(off).size == 4
+    assert 1e-5 < np.abs(off).max() < 5e-3
+    assert np.unique([angle for _, angle in truth.values()]).size == 4
+
+
+def test_same_seed_same_files_in_any_order(small, written, tmp_path):
+    done = []
+    with ThreadPoolExecutor(2) as pool:
+        again = simulate(small, tmp_path / "a", seed=7, progress=lambda *step: done.append(step), mapper=pool.map)
+    assert digest(again.folder) == digest(written.folder)
+    assert digest(again.truth) == digest(written.truth)
+    assert done == [(1, 2), (2, 2)]
+
+
+def test_another_seed_other_records(small, written, tmp_path, quick_truth):
+    other, one = digest(simulate(small, tmp_path / "b", seed=8).folder), digest(written.folder)
+    assert other.keys() == one.keys()
+    assert {name for name in one if one[name] != other[name]} == {name for name in one if name.startswith("recordings/")}
+
+
+def test_one_more_speed_leaves_the_other_records(small, written, tmp_path, quick_truth):
+    plan = dataclasses.replace(small.plan, spindle_speeds=(*small.plan.spindle_speeds, 1900.0))
+    more = simulate(dataclasses.replace(small, plan=plan), tmp_path / "more", seed=7)
+    assert digest(written.folder / "recordings").items() <= digest(more.folder / "recordings").items()
+
+
+def test_a_folder_with_content_is_left_alone(small, tmp_path):
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine.txt").write_text("mine")
+    with pytest.raises(InputError, match="empty"):
+        simulate(small, tmp_path / "full")
+    assert [p.name for p in tmp_path.iterdir()] == ["full"]
+
+
+def test_machine_with_everything(machines_folder, tmp_path, quick_truth):
+    # trigger, lagging sensors, gyroscopic moments, edge forces, feed along Y: the campaign says so and can be read
+    machine = read_machine(machines_folder / "stiff.toml")
+    plan = dataclasses.replace(machine.plan, spindle_speeds=(1000.0,), duration=0.05, settling=0.02)
+    result = simulate(dataclasses.replace(machine, plan=plan, toolings=machine.toolings[:1], truth_toolings=()), tmp_path / "out")
+    campaign = read_campaign(result.folder)
+    sensors = {sensor.name: sensor for sensor in campaign.sensors}
+    assert sensors["trigger"].tooth_angle == pytest.approx(np.radians(35.0))
+    assert sensors["flange_x"].bandwidth == 20000.0
+    assert sensors["fixture_y"].delay == 1.5e-5
+    assert campaign.cuts[0].conditions.feed_angle == pytest.approx(0.5 * np.pi)
+    assert campaign.workpiece.coefficients.radial_edge == pytest.approx(6e3)
+    recording = read_recording(campaign.cuts[0].recording, campaign.sensors)
+    speed, start = true_records(result)["S1-ER32-00_cut"]
+    rising = np.flatnonzero(np.diff(recording.channel(Quantity.TRIGGER)[1]) > 0.5) + 1
+    late = np.mod(start + speed * rising / recording.rate - np.radians(35.0), 2.0 * np.pi)
+    assert rising.size >= 7
+    assert np.all(late <= speed / recording.rate * (1.0 + 1e-6))
