@@ -30,6 +30,10 @@ class InputError(RcsaIdentError, ValueError):
         place = f"{where}: " if where else ""
         super().__init__(f"{place}{field}: found {_short(found)}, allowed is {allowed}")
 
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, object, str, str]]:
+        """Pickle with all arguments, so that the error crosses processes."""
+        return type(self), (self.field, self.found, self.allowed, self.where)
+
     def at(self, where: str) -> InputError:
         """Return the same error with the file named in which it stood."""
         return InputError(self.field, self.found, self.allowed, where)

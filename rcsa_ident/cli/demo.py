@@ -1,6 +1,209 @@
-"""demo (in progress)."""
+"""demo: the whole chain, from recordings to a report."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rcsa_ident.cli.common import Json, Processes, Seed, Stages, answers, emit, say, warn, workers
+from rcsa_ident.cli.identify import Method, leave, read_and_judge, result_of, search, warn_left_out
+from rcsa_ident.cli.lobes import lobes_summary, tip_response, write_lobes, write_response
+from rcsa_ident.errors import InputError
+
+if TYPE_CHECKING:
+    from rcsa_ident.identification.result import Identification
+    from rcsa_ident.machining_setup import Campaign, Tooling
+    from rcsa_ident.report.html import ToolingPage
+
+#: Where predicted and true tooltip FRFs are compared [Hz].
+COMPARED = (600.0, 4000.0, 5.0)
+SPEEDS = (4000.0, 20000.0, 50.0)
+MAX_DEPTH = 0.01
 
 
-def demo() -> None:
-    """The whole chain on the sample runs."""
-    raise SystemExit(1)
+@answers
+def demo(
+    data: Annotated[Path, typer.Option(help="Campaign folder.")] = Path("data/sample_runs"),
+    out: Annotated[Path, typer.Option(help="Folder for the results; it is made if need be.")] = Path("report"),
+    tooling: Annotated[
+        list[Path] | None, typer.Option(help="Further TOOLING.toml; default: those in DATA/../machines/toolings.", show_default=False)
+    ] = None,
+    seed: Seed = 1,
+    processes: Processes = None,
+    json_: Json = False,
+) -> None:
+    """Run the whole chain on a campaign: verdicts, identification, tooltip FRFs, lobes, report.
+
+    Where the virtual machine has left its truth beside the campaign (DATA.truth), predictions are compared with it
+    afterwards; the identification never reads it.
+    """
+    from rcsa_ident.io.files import write_text
+    from rcsa_ident.io.results import write_result
+    from rcsa_ident.report.html import report_html
+
+    stages = Stages(quiet=json_)
+    _folder(out)
+    with workers(processes) as pool:
+        campaign, judged = read_and_judge(data, pool, stages)
+        extra = _further_toolings(campaign, data, tooling)
+        found = search(campaign, judged, Method.default, seed, pool, stages)
+        result = result_of(found, campaign, judged)
+        write_result(out / "RESULT.json", result)
+        pages: list[ToolingPage] = []
+        if found.axes:
+            task = partial(_page, found, campaign, (result["band_hz"][0], result["band_hz"][1]), _truth_of(data), out)
+            wanted = [*campaign.toolings.items(), *extra.items()]
+            with stages.stage("tooltips and lobes") as progress:
+                for page in pool.map(task, wanted):
+                    pages.append(page)
+                    progress(len(pages), len(wanted))
+    with stages.stage("report"):
+        text = report_html(found, campaign, [(j.cut, j.reading) for j in judged], pages, stages.seconds)
+        write_text(out / "report.html", text)
+    if json_:
+        emit(_summary(found, pages, stages, out))
+    else:
+        _show(pages, found)
+        warn_left_out(result)
+        say(
+            ", ".join(f"{name} {seconds:.1f} s" for name, seconds in stages.seconds.items())
+            + f"; together {sum(stages.seconds.values()):.1f} s"
+        )
+        say(f"written: {out / 'report.html'}, RESULT.json, {len(pages)} FRFs, {len(pages)} lobes")
+    leave(found)
+
+
+def _folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError("--out", error.strerror or "an error", "a folder that can be made", str(out)) from None
+
+
+def _further_toolings(campaign: Campaign, data: Path, given: list[Path] | None) -> dict[str, Tooling]:
+    """Toolings that the campaign has not cut with."""
+    from rcsa_ident.io.setups import read_tooling
+
+    paths = given if given else sorted((data.resolve().parent / "machines" / "toolings").glob("*.toml"))
+    read = [read_tooling(path) for path in paths]
+    return {each.name: each for each in read if each.name not in campaign.toolings}
+
+
+def _truth_of(data: Path) -> Path:
+    """Where the virtual machine leaves the truth of a campaign."""
+    return data.with_name(data.resolve().name + ".truth")
+
+
+def _page(
+    found: Identification, campaign: Campaign, band_hz: tuple[float, float], truth: Path, out: Path, named: tuple[str, Tooling]
+) -> ToolingPage:
+    """Compute, write and collect what there is to say of one tooling."""
+    import numpy as np
+
+    from rcsa_ident.cutting.conditions import Engagement
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.identification.posterior import MachineAxis, Posterior
+    from rcsa_ident.machine.spindle import Spindle
+    from rcsa_ident.report.html import ToolingPage
+    from rcsa_ident.workflows.lobes import LobeConditions, band_warning, best_speeds, lobe_bands, measured_tip, tooling_lobes
+
+    name, tooling = named
+    machine = {}
+    for axis, part in found.axes.items():
+        posterior = None if part.theta is None or part.covariance is None else Posterior(part.theta, part.covariance)
+        machine[axis] = MachineAxis(Spindle(part.modes), part.joint, posterior)
+    frequency = np.arange(100.0, band_hz[1] + 0.5, 1.0)
+    response = tip_response(machine, tooling.assembly, frequency, bands=True)
+    speeds = np.arange(SPEEDS[0], SPEEDS[1] + 0.5 * SPEEDS[2], SPEEDS[2]) * (np.pi / 30.0)
+    coefficients = campaign.workpiece.coefficients
+    conditions = LobeConditions(tooling.cutter, coefficients, Engagement.from_immersion(0.5, "down"), 0.0, speeds, MAX_DEPTH)
+    lobes = tooling_lobes(response, conditions)
+    spread = lobe_bands(response, conditions)
+    safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
+    write_response(out / f"FRF_{safe}.csv", frequency, response)
+    write_lobes(out / f"LOBES_{safe}.csv", lobes, spread)
+    tip = {axis.upper(): response.tip(axis) for axis in response.coupled}
+    true, error = _truth(truth / "tip" / f"{name}.csv", frequency, tip)
+    limit = None
+    if true is not None and len(true) == len(tip):
+        limit = conditions.lobes(measured_tip({Dof(axis.lower()): (frequency, value) for axis, value in true.items()})).limit_depth
+    doubt = band_warning(lobes, band_hz)
+    # a page needs no more than what an eye resolves
+    shown = slice(None, None, 4)
+    return ToolingPage(
+        name,
+        name in {cut.tooling for cut in campaign.cuts},
+        frequency[shown],
+        {axis: value[shown] for axis, value in tip.items()},
+        {axis.upper(): (real[shown], imaginary[shown]) for axis, (real, imaginary) in response.deviation.items()},
+        None if true is None else {axis: value[shown] for axis, value in true.items()},
+        error,
+        lobes,
+        MAX_DEPTH,
+        spread,
+        best_speeds(lobes),
+        limit,
+        band_hz,
+        f"half-immersion down-milling, feed +X, {tooling.cutter.teeth} teeth, {campaign.workpiece.name}, {lobes.method} method",
+        [*lobes.warnings, *([doubt] if doubt else [])],
+    )
+
+
+def _truth(path: Path, frequency: Any, tip: dict[str, Any]) -> tuple[dict[str, Any] | None, dict[str, float]]:
+    """The true FRF at the same frequencies and the relative difference, where the truth is known."""
+    import numpy as np
+
+    from rcsa_ident.io.curves import read_frf_csv
+
+    if not path.is_file():
+        return None, {}
+    curves = read_frf_csv(path)
+    compared = np.arange(COMPARED[0], COMPARED[1] + 0.5 * COMPARED[2], COMPARED[2])
+    true, error = {}, {}
+    for axis, value in tip.items():
+        if axis in curves.values:
+            true[axis] = np.interp(frequency, curves.frequency, curves.values[axis])
+            there = np.interp(compared, curves.frequency, curves.values[axis])
+            error[axis] = float(np.linalg.norm(np.interp(compared, frequency, value) - there) / np.linalg.norm(there))
+    return true, error
+
+
+def _show(pages: list[ToolingPage], found: Identification) -> None:
+    from rich.table import Table
+
+    from rcsa_ident.cli.tables import console, show_identification
+
+    show_identification(found)
+    known = any(page.error for page in pages)
+    headers = ["tooling", "recorded", *(["error X\n%", "error Y\n%"] if known else []), "stable\nanywhere\nmm", "best speeds\nrev/min (mm)"]
+    table = Table(*headers, title="tooltip and stability, half-immersion down-milling", title_justify="left")
+    for page in pages:
+        errors = [f"{100 * page.error[axis]:.1f}" if axis in page.error else "" for axis in ("X", "Y")] if known else []
+        assert page.lobes is not None
+        best = "\n".join(f"{s * 30 / math.pi:.0f} ({1e3 * d:.2f})" for s, d in page.best)
+        table.add_row(page.name, "yes" if page.recorded else "no", *errors, f"{1e3 * page.lobes.absolute_limit:.2f}", best)
+    console().print(table)
+    for page in pages:
+        for doubt in page.warnings:
+            warn(f"{page.name}: {doubt}")
+
+
+def _summary(found: Identification, pages: list[ToolingPage], stages: Stages, out: Path) -> dict[str, Any]:
+    toolings = {
+        page.name: {"recorded": page.recorded, "error": dict(page.error), "warnings": list(page.warnings)}
+        | (lobes_summary(page.lobes, list(page.best)) if page.lobes is not None else {})
+        for page in pages
+    }
+    return {
+        "status": str(found.status),
+        "reasons": list(found.reasons),
+        "seed": found.seed,
+        "cuts_used": len(found.cut_ids),
+        "toolings": toolings,
+        "seconds": stages.seconds,
+        "out": str(out),
+    }

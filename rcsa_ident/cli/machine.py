@@ -19,7 +19,7 @@ def simulate(
     json_: Json = False,
 ) -> None:
     """Record a campaign on the virtual machine."""
-    from rcsa_ident.workflows.simulate import simulate as run
+    from rcsa_ident.cli.simulation import simulate_campaign as run
 
     stages = Stages(quiet=json_)
     with stages.stage("cuts") as progress, workers(processes) as pool:

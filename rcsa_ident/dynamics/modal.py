@@ -115,6 +115,8 @@ def normal_modes(
         Mass-normalised shapes.
     """
     omega_n, zeta, psi = (np.asarray(a, dtype=float) for a in (omega_n, zeta, psi))
+    if not np.all((zeta > 0.0) & (zeta < 1.0)):
+        raise InputError("zeta", zeta.tolist(), "damping ratios above 0 and below 1")
     omega_d = omega_n * np.sqrt(1.0 - zeta**2)
     phi = psi * ((1.0 - 1.0j) / (2.0 * np.sqrt(omega_d)))[:, None]
     d = len(coordinates)
@@ -138,16 +140,14 @@ def damped_modes(
         Mass-normalised shapes.
     residual : array, shape (d, d)
     """
-    m = omega_n.size
-    state = np.zeros((2 * m, 2 * m))
-    state[:m, m:] = np.eye(m)
-    state[m:, :m] = -np.diag(omega_n**2)
-    state[m:, m:] = -damping
-    values, right = np.linalg.eig(state)
-    # left vectors of this companion form follow from the right ones: q^T [s + D, 1], with q^T (2 s + D) q as norm
-    q = right[:m]
-    norm = np.einsum("ik,ik->k", q, 2.0 * values * q + damping @ q)
-    shapes = (psi.T @ q) / np.sqrt(norm.astype(complex))
+    values, q, norm = _free_motions(omega_n, damping)
+    # where a pair of poles is about to become real it has no two shapes: a few millionths more damping tell it apart
+    for _ in range(3):
+        if np.all(np.abs(norm) > 1e-3 * np.abs(values) * np.einsum("ik,ik->k", q, q.conj()).real):
+            break
+        damping = damping * (1.0 + 4e-6)
+        values, q, norm = _free_motions(omega_n, damping)
+    shapes = (psi.T @ q) / np.sqrt(norm)
     tolerance = 1e-9 * np.abs(values)
     pairs = values.imag > tolerance
     real = np.abs(values.imag) <= tolerance
@@ -157,3 +157,17 @@ def damped_modes(
     order = np.argsort(frequency, kind="stable")
     zeta = np.clip(-lam.real / frequency, 1e-9, 1.0)
     return ModalModel(frequency[order], zeta[order], phi[order], residual, coordinates)
+
+
+def _free_motions(omega_n: FloatArray, damping: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Poles s and shapes q of (s^2 + s D + diag(omega_n^2)) q = 0, with q^T (2 s + D) q."""
+    m = omega_n.size
+    state = np.zeros((2 * m, 2 * m))
+    state[:m, m:] = np.eye(m)
+    state[m:, :m] = -np.diag(omega_n**2)
+    state[m:, m:] = -damping
+    values, right = np.linalg.eig(state)
+    # left vectors of this companion form follow from the right ones: q^T [s + D, 1], with q^T (2 s + D) q as norm
+    q = right[:m]
+    norm = np.einsum("ik,ik->k", q, 2.0 * values * q + damping @ q)
+    return values.astype(complex), q.astype(complex), norm.astype(complex)

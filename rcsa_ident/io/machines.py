@@ -9,7 +9,7 @@ import numpy as np
 
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.io.keys import Table, as_number, describe
-from rcsa_ident.io.setups import _RPM, _WORKPIECE, _feed_angle, _workpiece, beam_segments, material_library, read_toml
+from rcsa_ident.io.setups import RPM, WORKPIECE_KEYS, beam_segments, feed_angle_of, material_library, read_toml, workpiece_of
 from rcsa_ident.machining_setup import Workpiece
 from rcsa_ident.virtual.machine import Bearing, CutPlan, FlangeJoint, Housing, PerAxis, VirtualSpindle
 from rcsa_ident.virtual.sensors import SensorSuite
@@ -81,13 +81,13 @@ def read_machine(path: str | Path) -> MachineFile:
         fastest = max(plan.spindle_speeds)
         for i, bearing in enumerate(spindle.bearings):
             if bearing.softening * fastest >= 1.0:
-                allowed = f"below {1.0 / (fastest / _RPM):.3g} at {fastest / _RPM:g} rev/min, so that some stiffness is left"
-                top.refuse(f"bearings[{i}].softening_per_rpm", f"{bearing.softening * _RPM:g}", allowed)
+                allowed = f"below {1.0 / (fastest / RPM):.3g} at {fastest / RPM:g} rev/min, so that some stiffness is left"
+                top.refuse(f"bearings[{i}].softening_per_rpm", f"{bearing.softening * RPM:g}", allowed)
         return MachineFile(
             name=head.text("name", path.stem),
             spindle=spindle,
             sensors=_sensors(sensors),
-            workpiece=_workpiece(top.table("workpiece", _WORKPIECE)),
+            workpiece=workpiece_of(top.table("workpiece", WORKPIECE_KEYS)),
             plan=plan,
             toolings=_paths(cuts, "toolings", path.parent, required=True),
             truth_toolings=_paths(cuts, "truth_toolings", path.parent, required=False),
@@ -99,7 +99,7 @@ def _bearing(table: Table) -> Bearing:
         table.number("position_mm", "mm", least=0.0, most=5000.0) * 1e-3,
         _pair(table, "stiffness", "N/m"),
         _pair(table, "damping", "N s/m"),
-        table.number("softening_per_rpm", "1/(rev/min)", 0.0, least=-1e-3, most=1e-3) / _RPM,
+        table.number("softening_per_rpm", "1/(rev/min)", 0.0, least=-1e-3, most=1e-3) / RPM,
     )
 
 
@@ -148,11 +148,11 @@ def _plan(table: Table) -> CutPlan:
     if exit_ <= entry:
         table.refuse("exit_angle_deg", f"{exit_:g}", f"above entry_angle_deg, {entry:g}, and at most 180 [deg]")
     return CutPlan(
-        spindle_speeds=tuple(float(speed) * _RPM for speed in _speeds(table)),
+        spindle_speeds=tuple(float(speed) * RPM for speed in _speeds(table)),
         axial_depth=table.number("axial_depth_mm", "mm", above=0.0, most=500.0) * 1e-3,
         feed_per_tooth=table.number("feed_per_tooth_mm", "mm", above=0.0, most=10.0) * 1e-3,
         engagement=Engagement(float(np.radians(entry)), float(np.radians(exit_))),
-        feed_angle=_feed_angle(table),
+        feed_angle=feed_angle_of(table),
         duration=table.number("duration_s", "s", 0.3, above=0.0, most=60.0),
         settling=table.number("settling_s", "s", 0.15, least=0.0, most=60.0),
     )

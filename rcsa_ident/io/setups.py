@@ -24,7 +24,7 @@ from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Mat
 CAMPAIGN_FILE = "campaign.toml"
 LARGEST_SETUP = 4 * MEGABYTE
 FEED_DIRECTIONS = {"+X": 0.0, "-X": np.pi, "+Y": 0.5 * np.pi, "-Y": -0.5 * np.pi}
-_RPM = np.pi / 30.0
+RPM = np.pi / 30.0
 
 _TOOLING = ("name", "cutter", "tool", "holder", "contact", "materials")
 _CUTTER = ("teeth", "diameter_mm", "helix_deg", "pitch_deg")
@@ -36,7 +36,7 @@ _MATERIAL = ("youngs_modulus_gpa", "density", "poisson", "loss_factor")
 _CAMPAIGN = ("campaign", "sensors", "workpiece", "toolings", "cuts")
 _SENSOR = ("quantity", "axis", "sensitivity", "delay_s", "bandwidth_hz")
 _TRIGGER = ("quantity", "sensitivity", "delay_s", "bandwidth_hz", "pulses_per_revolution", "tooth_angle_deg")
-_WORKPIECE = (
+WORKPIECE_KEYS = (
     "name", "tangential_coefficient_mpa", "radial_ratio", "axial_ratio",
     "tangential_edge_n_per_mm", "radial_edge_n_per_mm", "axial_edge_n_per_mm",
 )  # fmt: skip
@@ -178,7 +178,7 @@ def read_campaign(folder: str | Path) -> Campaign:
     sensors = tuple(_sensor(key, channels.data[key], str(path)) for key in channels)
     if not sensors:
         top.refuse("sensors", "an empty table", "at least one table [sensors.<channel>]")
-    workpiece = _workpiece(top.table("workpiece", _WORKPIECE))
+    workpiece = workpiece_of(top.table("workpiece", WORKPIECE_KEYS))
     paths = top.table("toolings")
     toolings = {key: read_tooling(_inside(folder, paths, key)) for key in paths}
     cuts = tuple(_cut(table, folder, toolings) for table in top.tables("cuts", _CUT))
@@ -212,7 +212,7 @@ def _sensor(name: str, data: Any, where: str) -> Sensor:
     )
 
 
-def _workpiece(table: Table) -> Workpiece:
+def workpiece_of(table: Table) -> Workpiece:
     edges = [table.number(f"{way}_edge_n_per_mm", "N/mm", 0.0, least=0.0, most=1000.0) * 1e3 for way in ("tangential", "radial", "axial")]
     coefficients = CuttingCoefficients(
         table.number("tangential_coefficient_mpa", "MPa", above=0.0, most=50000.0) * 1e6,
@@ -229,18 +229,18 @@ def _cut(table: Table, folder: Path, toolings: Mapping[str, Tooling]) -> Cut:
     if exit_ <= entry:
         table.refuse("exit_angle_deg", f"{exit_:g}", f"above entry_angle_deg, {entry:g}, and at most 180 [deg]")
     conditions = CuttingConditions(
-        table.number("spindle_speed_rpm", "rev/min", above=0.0, most=500000.0) * _RPM,
+        table.number("spindle_speed_rpm", "rev/min", above=0.0, most=500000.0) * RPM,
         table.number("axial_depth_mm", "mm", above=0.0, most=500.0) * 1e-3,
         table.number("feed_per_tooth_mm", "mm", above=0.0, most=10.0) * 1e-3,
         Engagement(float(np.radians(entry)), float(np.radians(exit_))),
-        _feed_angle(table),
+        feed_angle_of(table),
     )
     name = table.text("id")
     tooling = table.text("tooling", choices=tuple(toolings))
     return Cut(name, tooling, conditions, _inside(folder, table, "cut"), _inside(folder, table, "air") if "air" in table else None)
 
 
-def _feed_angle(table: Table) -> float:
+def feed_angle_of(table: Table) -> float:
     allowed = f"one of {', '.join(FEED_DIRECTIONS)}, or an angle from +X from -360 to 360 [deg]"
     value = table.value("feed_direction", allowed)
     if isinstance(value, str) and value in FEED_DIRECTIONS:

@@ -20,6 +20,8 @@ from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.tip import TooltipResponse
 
+#: Two peaks are one pocket unless the limit between them falls below this share of the lower one.
+POCKET = 0.85
 #: Lines per half-power bandwidth of the least damped mode, and the most there may be.
 LINES_PER_BANDWIDTH = 10.0
 MOST_LINES = 200_000
@@ -95,11 +97,13 @@ def lobe_bands(
 
 
 def best_speeds(lobes: StabilityLobes, count: int = 3) -> list[tuple[float, float]]:
-    """Return the speeds that allow the largest depths, at most `count`, the best first.
+    """Return the speeds that allow the largest depths, one for each pocket of the lobes, the best first.
 
     Parameters
     ----------
     lobes : StabilityLobes
+    count : int
+        At most so many.
 
     Returns
     -------
@@ -115,7 +119,12 @@ def best_speeds(lobes: StabilityLobes, count: int = 3) -> list[tuple[float, floa
     peaks = [k for k in range(level.size) if level[k] > outside[k] and level[k] > outside[k + 2]]
     width = speed[ends] - speed[edges]
     peaks.sort(key=lambda k: (-level[k], -width[k]))
-    return [(float(0.5 * (speed[edges[k]] + speed[ends[k]])), float(level[k])) for k in peaks[:count]]
+    chosen: list[int] = []
+    for k in peaks:
+        # an infinite limit and its neighbour are pockets of their own: something finite lies between them
+        if all(np.min(level[min(k, c) : max(k, c) + 1]) < POCKET * level[k] for c in chosen):
+            chosen.append(k)
+    return [(float(0.5 * (speed[edges[k]] + speed[ends[k]])), float(level[k])) for k in chosen[:count]]
 
 
 def modal_tip(models: Mapping[Dof, ModalModel]) -> Receptance:

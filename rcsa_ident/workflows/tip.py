@@ -42,9 +42,7 @@ class TooltipResponse:
     @property
     def deviation(self) -> dict[Dof, tuple[FloatArray, FloatArray]]:
         """Standard deviations of the tip-tip receptance's real and imaginary part, shape (n,) each [m/N]."""
-        return {
-            axis: (np.sqrt(np.sum(each.real**2, axis=0)), np.sqrt(np.sum(each.imag**2, axis=0))) for axis, each in self.spread.items()
-        }
+        return {axis: (np.sqrt(np.sum(each.real**2, axis=0)), np.sqrt(np.sum(each.imag**2, axis=0))) for axis, each in self.spread.items()}
 
 
 def tooltip(machine: Mapping[Dof, MachineAxis], assembly: ToolAssembly, omega: FloatArray, bands: bool = True) -> TooltipResponse:

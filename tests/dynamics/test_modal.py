@@ -60,6 +60,15 @@ def test_damped_modes(damping):
     assert np.min(dissipation(W, model.receptance(W).values)) > -1e-9
 
 
+@pytest.mark.parametrize("excess", [0.0, 1e-14, -1e-14, 1e-9, -1e-9, -1e-6, 1e-3])
+def test_critical_damping(excess):
+    """A pair of poles that becomes two real ones has a single shape there."""
+    omega_n, psi = np.array([5000.0, 9000.0]), np.array([[0.3, 4.0], [-0.2, 3.0]])
+    d = np.diag([2.0 * (1.0 + excess) * 5000.0, 900.0])
+    model = damped_modes(omega_n, d, psi, np.zeros((2, 2)), FLANGE)
+    np.testing.assert_allclose(model.receptance(W).values, direct(omega_n, d, psi), rtol=2e-5)
+
+
 def test_damped_modes_of_proportional_damping_are_the_normal_ones():
     omega_n, zeta = np.array([4000.0, 9000.0]), np.array([0.05, 0.2])
     psi = np.array([[0.3, 4.0], [-0.2, 3.0]])

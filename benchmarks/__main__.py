@@ -1,0 +1,37 @@
+"""``python -m benchmarks [--json] [claim ...]``: run the claims and print {claim, ours, peer, ratio, unit, accuracy}."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+#: Each is a module with ``run() -> list of rows``.
+CLAIMS = ("candidate", "lobes", "tooltip_error", "published_modes")
+#: Minutes rather than seconds: only where asked for.
+LONG = ("tooltip_error",)
+
+
+def main() -> None:
+    """Run the named claims, by default all that take seconds."""
+    parser = argparse.ArgumentParser(prog="benchmarks", description=__doc__)
+    parser.add_argument("claims", nargs="*", choices=[*CLAIMS, []], metavar="claim", help=f"some of {', '.join(CLAIMS)}")
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    rows = []
+    for name in arguments.claims or [c for c in CLAIMS if c not in LONG]:
+        rows += importlib.import_module(f"benchmarks.{name}").run()
+    if arguments.json:
+        print(json.dumps(rows, indent=1))
+        return
+    for row in rows:
+        peer = "-" if row["peer"] is None else f"{row['peer']:.4g}"
+        ratio = f"{row['ratio']:.3g}" if row["ratio"] is not None else "-"
+        print(f"{row['claim']:<72} ours {row['ours']:<10.4g} peer {peer:<10} ratio {ratio:<8} {row['unit']:<10} {row['accuracy']}")
+
+
+if __name__ == "__main__":
+    main()

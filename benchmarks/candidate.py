@@ -1,0 +1,89 @@
+"""Cost of one candidate: the search's kernel against the same algebra in vectorised NumPy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from benchmarks.timing import best_of, row
+from rcsa_ident.identification._kernels import cross_frf, modal_cross_frf
+from rcsa_ident.identification.paper import modal_fractions
+
+LINES, TOOLINGS, MODES = 164, 2, 10
+
+
+def run() -> list[dict[str, Any]]:
+    """2 toolings x 164 frequencies of their own x 10 modes."""
+    rng = np.random.default_rng(1)
+    n = LINES * TOOLINGS
+    omega = 2.0 * np.pi * rng.uniform(500.0, 4300.0, n)
+    omega_n = 2.0 * np.pi * np.sort(rng.uniform(600.0, 3500.0, MODES))
+    zeta = rng.uniform(0.01, 0.2, MODES)
+    phi = (rng.standard_normal((MODES, 2)) + 1j * rng.standard_normal((MODES, 2))) * 1e-3
+    flange = (rng.standard_normal((n, 3)) + 1j * rng.standard_normal((n, 3))) * 1e-8
+    tip = (rng.standard_normal((n, 2)) + 1j * rng.standard_normal((n, 2))) * 1e-8
+    joint = np.array([3e9, 6e8, 2e3, 1e3])
+    fractions = modal_fractions(omega_n, zeta, phi[:, 0], phi[:, 1])
+    flange_rows = np.ascontiguousarray(np.concatenate([[c.real, c.imag] for c in flange.T]))
+    tip_rows = np.ascontiguousarray(np.concatenate([[c.real, c.imag] for c in tip.T]))
+    out = np.empty((2, n))
+
+    def kernel() -> None:
+        modal_cross_frf(fractions, joint, omega, flange_rows, tip_rows, out)
+
+    def vectorised() -> np.ndarray:
+        pole = -zeta * omega_n + 1j * omega_n * np.sqrt(1.0 - zeta**2)
+        one = 1.0 / (1j * omega[:, None] - pole)
+        two = 1.0 / (1j * omega[:, None] - pole.conj())
+        residues = np.stack([phi[:, 0] ** 2, phi[:, 0] * phi[:, 1], phi[:, 1] ** 2], axis=1)
+        b = one @ residues + two @ residues.conj()
+        e_tt = flange[:, 0] + 1.0 / (joint[0] + 1j * omega * joint[2]) + b[:, 0]
+        e_rr = flange[:, 2] + 1.0 / (joint[1] + 1j * omega * joint[3]) + b[:, 2]
+        e_tr = flange[:, 1] + b[:, 1]
+        determinant = e_tt * e_rr - e_tr**2
+        x0 = (e_rr * tip[:, 0] - e_tr * tip[:, 1]) / determinant
+        x1 = (e_tt * tip[:, 1] - e_tr * tip[:, 0]) / determinant
+        return b[:, 0] * x0 + b[:, 1] * x1
+
+    kernel()
+    reference = vectorised()
+    error = float(np.max(np.abs(out[0] + 1j * out[1] - reference)) / np.max(np.abs(reference)))
+    rows = [
+        row("candidate, complex modes (2 x 164 lines x 10 modes)", best_of(kernel) * 1e6, best_of(vectorised) * 1e6, "us", f"{error:.0e}")
+    ]
+
+    psi = rng.standard_normal((MODES, 2)) * 0.2
+    factor = np.tril(rng.standard_normal((MODES, MODES))) * 3.0 + np.diag(np.full(MODES, 20.0))
+    residual = np.array([[3e-5, 0.0], [1e-5, 2e-5]])
+    values, gradient = np.empty(n, dtype=complex), np.empty((n, 3 * MODES + MODES * (MODES + 1) // 2 + 7), dtype=complex)
+
+    def passive_kernel() -> None:
+        cross_frf(omega_n**2, psi, factor, residual, joint, omega, flange, tip, values, gradient)
+
+    def passive_vectorised() -> np.ndarray:
+        dynamic = np.zeros((n, MODES, MODES), dtype=complex)
+        dynamic += 1j * omega[:, None, None] * (factor @ factor.T)
+        dynamic[:, np.arange(MODES), np.arange(MODES)] += omega_n**2 - omega[:, None] ** 2
+        u = np.linalg.solve(dynamic, np.broadcast_to(psi.astype(complex), (n, MODES, 2)))
+        block = psi.T @ u + residual @ residual.T
+        e = np.zeros((n, 2, 2), dtype=complex)
+        e[:, 0, 0], e[:, 0, 1], e[:, 1, 0], e[:, 1, 1] = flange[:, 0], flange[:, 1], flange[:, 1], flange[:, 2]
+        e[:, 0, 0] += 1.0 / (joint[0] + 1j * omega * joint[2])
+        e[:, 1, 1] += 1.0 / (joint[1] + 1j * omega * joint[3])
+        x = np.linalg.solve(e + block, tip[:, :, None])
+        return (block @ x)[:, 0, 0]
+
+    passive_kernel()
+    reference = passive_vectorised()
+    error = float(np.max(np.abs(values - reference)) / np.max(np.abs(reference)))
+    rows.append(
+        row(
+            "candidate, passive form, with all 92 derivatives (NumPy: value only)",
+            best_of(passive_kernel) * 1e6,
+            best_of(passive_vectorised) * 1e6,
+            "us",
+            f"{error:.0e}",
+        )
+    )
+    return rows

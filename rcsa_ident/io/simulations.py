@@ -1,0 +1,163 @@
+"""A virtual machine's campaign on disk: the folder as a machine shop would send it, and the truth outside it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.files import write_text
+from rcsa_ident.io.machines import MachineFile
+from rcsa_ident.io.recordings import write_hdf5
+from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.virtual.campaign import SimulatedCut, TrueFlange, TrueReceptances
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedCampaign:
+    """Where a simulated campaign was written.
+
+    Parameters
+    ----------
+    folder : Path
+    truth : Path
+        ``tip/``, ``cross/``, ``spindle.csv``: receptances; ``records.csv``: true speeds and tooth angles at the first sample;
+        ``forces/``: lines of the true force. No reader of the folder sees it.
+    cuts : int
+    """
+
+    folder: Path
+    truth: Path
+    cuts: int
+
+
+def write_simulation(
+    out: str | Path,
+    setup: MachineFile,
+    toolings: Sequence[Tooling],
+    cuts: Iterable[SimulatedCut],
+    receptances: Iterable[TrueReceptances],
+    flange: TrueFlange,
+    progress: Progress | None = None,
+) -> SimulatedCampaign:
+    """Write the campaign into `out` and the truth into ``<out>.truth``; recordings are written as they come.
+
+    Parameters
+    ----------
+    out : path
+        A folder that does not exist yet, or an empty one.
+    toolings : sequence of Tooling
+        Those of the cuts, in the order of ``setup.toolings``.
+    cuts : iterable of SimulatedCut
+    receptances : iterable of TrueReceptances
+    progress : callable of (done, total), optional
+    """
+    out = Path(out)
+    truth = out.with_name(out.name + ".truth")
+    for folder in (out, truth):
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise InputError("out", str(folder), "a folder that does not exist or is empty")
+    for folder in (out / "recordings", out / "toolings", truth / "tip", truth / "cross", truth / "forces"):
+        folder.mkdir(parents=True, exist_ok=True)
+    for path, tooling in zip(setup.toolings, toolings, strict=True):
+        shutil.copyfile(path, out / "toolings" / f"{tooling.name}.toml")
+    write_text(out / "campaign.toml", _campaign_text(setup, toolings))
+    total = len(toolings) * len(setup.plan.spindle_speeds)
+    rows = ["record,spindle_speed_rpm,tooth_angle_deg"]
+    for done, cut in enumerate(cuts, start=1):
+        _write_columns(truth / "forces" / f"{cut.id}.csv", ("order",), np.arange(cut.force_lines.shape[0]), cut.force_lines)
+        for kind, record in cut.records.items():
+            write_hdf5(out / "recordings" / f"{cut.id}_{kind}.h5", setup.sensors.rate, record.channels)
+            rows.append(f"{cut.id}_{kind},{record.spindle_speed * 30.0 / np.pi:.9g},{np.degrees(record.tooth_angle):.9g}")
+        if progress is not None:
+            progress(done, total)
+    write_text(truth / "records.csv", "\n".join(rows) + "\n")
+    for true in receptances:
+        _write_columns(truth / "tip" / f"{true.tooling}.csv", ("frequency_hz",), true.frequency_hz, true.tip)
+        _write_columns(truth / "cross" / f"{true.tooling}.csv", ("frequency_hz",), true.frequency_hz, true.cross)
+    names = [f"{axis}_{entry}" for axis in "XY" for entry in ("tF", "tM", "rF", "rM")]
+    _write_columns(truth / "spindle.csv", ("frequency_hz",), flange.frequency_hz, flange.values.reshape(-1, 8), names)
+    return SimulatedCampaign(out, truth, total)
+
+
+def _write_columns(path: Path, first: tuple[str], abscissa: FloatArray, values: np.ndarray, names: Sequence[str] = ("X", "Y")) -> None:
+    """Complex columns as real and imaginary parts, the way of FRF.csv."""
+    parts = np.stack([values.real, values.imag], axis=2).reshape(values.shape[0], -1)
+    header = [*first, *(f"{name}_{part}" for name in names for part in ("re", "im"))]
+    lines = [",".join(f"{value:.9g}" for value in row) for row in np.column_stack([abscissa, parts])]
+    write_text(path, "\n".join([",".join(header), *lines]) + "\n")
+
+
+def _campaign_text(setup: MachineFile, toolings: Sequence[Tooling]) -> str:
+    """The campaign file, as a machinist would write it."""
+    suite, plan = setup.sensors, setup.plan
+    lines = ["[campaign]", f"name = {_quoted(setup.name)}", f"sampling_rate_hz = {suite.rate!r}"]
+    for axis in "XY":
+        lines += _sensor("flange", "displacement", axis, suite.gap_sensitivity, suite.gap_delay, suite.gap_bandwidth)
+    for axis in "XY":
+        lines += _sensor(
+            "fixture", "acceleration", axis, suite.acceleration_sensitivity, suite.acceleration_delay, suite.acceleration_bandwidth
+        )
+    if suite.trigger:
+        lines += [
+            "[sensors.trigger]",
+            'quantity = "trigger"',
+            "pulses_per_revolution = 1",
+            f"tooth_angle_deg = {np.degrees(suite.tooth_angle):.9g}",
+        ]
+    c = setup.workpiece.coefficients
+    lines += ["[workpiece]", f"name = {_quoted(setup.workpiece.name)}", f"tangential_coefficient_mpa = {c.tangential * 1e-6:.9g}"]
+    lines += [f"radial_ratio = {c.radial_ratio:.9g}"]
+    optional = (
+        ("axial_ratio", c.axial_ratio, 1.0),
+        ("tangential_edge_n_per_mm", c.tangential_edge, 1e-3),
+        ("radial_edge_n_per_mm", c.radial_edge, 1e-3),
+        ("axial_edge_n_per_mm", c.axial_edge, 1e-3),
+    )
+    lines += [f"{key} = {value * scale:.9g}" for key, value, scale in optional if value != 0.0]
+    lines += ["[toolings]", *(f"{_quoted(t.name)} = {_quoted(f'toolings/{t.name}.toml')}" for t in toolings)]
+    for tooling in toolings:
+        for i, speed in enumerate(plan.spindle_speeds):
+            cut = f"{tooling.name}-{i:02d}"
+            lines += [
+                "[[cuts]]",
+                f"id = {_quoted(cut)}",
+                f"tooling = {_quoted(tooling.name)}",
+                f"spindle_speed_rpm = {speed * 30.0 / np.pi:.9g}",
+                f"axial_depth_mm = {plan.axial_depth * 1e3:.9g}",
+                f"feed_per_tooth_mm = {plan.feed_per_tooth * 1e3:.9g}",
+                f"entry_angle_deg = {np.degrees(plan.engagement.entry):.9g}",
+                f"exit_angle_deg = {np.degrees(plan.engagement.exit):.9g}",
+                f"feed_direction = {_feed(plan.feed_angle)}",
+                f"cut = {_quoted(f'recordings/{cut}_cut.h5')}",
+                f"air = {_quoted(f'recordings/{cut}_air.h5')}",
+            ]
+    return "\n".join(lines) + "\n"
+
+
+def _sensor(place: str, quantity: str, axis: str, sensitivity: float, delay: float, bandwidth: float | None) -> list[str]:
+    lines = [f"[sensors.{place}_{axis.lower()}]", f'quantity = "{quantity}"', f'axis = "{axis}"', f"sensitivity = {sensitivity!r}"]
+    if delay != 0.0:
+        lines.append(f"delay_s = {delay!r}")
+    if bandwidth is not None:
+        lines.append(f"bandwidth_hz = {bandwidth!r}")
+    return lines
+
+
+def _feed(angle: float) -> str:
+    for name, known in (("+X", 0.0), ("+Y", 0.5 * np.pi), ("-X", np.pi), ("-Y", -0.5 * np.pi)):
+        if abs(angle - known) < 1e-12:
+            return f'"{name}"'
+    return f"{np.degrees(angle):.9g}"
+
+
+def _quoted(text: str) -> str:
+    """A TOML string."""
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -1,0 +1,300 @@
+"""Figures of an identification, without a window: each function returns a figure, `svg` makes text of it."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.stability.result import StabilityLobes
+
+#: Distinct for colour-blind readers, too (Okabe & Ito), and dark enough on white.
+COLOURS = {"X": "#0072B2", "Y": "#C8501A"}
+STAGES = {
+    "search": ("genetic search", "#9aa5b1"),
+    "refine": ("refined candidates", "#0072B2"),
+    "learn noise": ("noise learned from the data", "#009E73"),
+    "polish": ("both axes polished", "#C8501A"),
+    "generation": ("best of each generation", "#0072B2"),
+}
+_TRUTH = "#1f2933"
+_RPM = 30.0 / np.pi
+_STYLE: dict[Any, Any] = {
+    "svg.fonttype": "none",
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Arial", "Helvetica"],
+    "font.size": 10.0,
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#52606d",
+    "axes.labelcolor": "#1f2933",
+    "grid.color": "#e4e7eb",
+    "xtick.color": "#52606d",
+    "ytick.color": "#52606d",
+    "legend.frameon": False,
+    "legend.fontsize": 9.0,
+    "lines.linewidth": 1.5,
+    "path.simplify_threshold": 0.3,
+}
+
+
+def svg(figure: Figure, name: str) -> str:
+    """Return the figure as an SVG element for a page.
+
+    Parameters
+    ----------
+    name : str
+        Prefix of its ids, which a page with several figures needs to be different; the same figure gives the same text.
+    """
+    text = io.StringIO()
+    with mpl.rc_context({**_STYLE, "svg.hashsalt": name}):
+        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    content = text.getvalue()
+    content = content[content.index("<svg") :]
+    content = re.sub(r'\bid="', f'id="{name}-', content)
+    content = re.sub(r'(url\(#|href="#)', rf"\g<1>{name}-", content)
+    # the page sets the width, the view box keeps the shape
+    content = re.sub(r'<svg ([^>]*?)width="[^"]*"', r"<svg \1", content, count=1)
+    content = re.sub(r'<svg ([^>]*?)height="[^"]*"', r"<svg \1", content, count=1)
+    # a hundredth of a point is below what an eye resolves
+    content = re.sub(r"(\d\.\d\d)\d+", r"\1", content)
+    return re.sub(r"<metadata>.*?</metadata>\s*", "", content, flags=re.DOTALL)
+
+
+def _grid(
+    rows: int, cols: int, height: float, ratios: Sequence[float] | None = None, sharey: bool | str = "row"
+) -> tuple[Figure, np.ndarray]:
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(9.6, height), layout="constrained")
+        axes = figure.subplots(rows, cols, sharex=True, sharey=sharey, squeeze=False, height_ratios=ratios)  # type: ignore[call-overload]
+    return figure, axes
+
+
+def cross_frf(axis: AxisResult, tooling: Sequence[str], name: str) -> Figure:
+    """Measured points and the fitted cross FRF C31, magnitude and phase, a column for each tooling.
+
+    Parameters
+    ----------
+    axis : AxisResult
+    tooling : sequence of str, length k
+        Of each cut.
+    name : str
+        X or Y.
+    """
+    omega, cut = axis.measured["omega"], np.asarray(axis.measured["cut"], dtype=int)
+    value, model = (np.asarray(axis.measured[key], dtype=complex) for key in ("value", "model"))
+    of = np.array(tooling)[cut]
+    names = list(dict.fromkeys(of.tolist()))
+    figure, grid = _grid(2, len(names), 4.6, (1.6, 1.0))
+    with mpl.rc_context(_STYLE):
+        for column, each in enumerate(names):
+            order = np.flatnonzero(of == each)
+            order = order[np.argsort(omega[order])]
+            frequency = omega[order] / (2.0 * np.pi)
+            top, bottom = grid[:, column]
+            for ax, curve in ((top, lambda h: 1e6 * np.abs(h)), (bottom, lambda h: np.degrees(np.angle(h)))):
+                ax.plot(frequency, curve(value[order]), "o", ms=3.4, mfc="none", mec=COLOURS[name], mew=1.0, zorder=3, label="measured")
+                if ax is bottom:
+                    ax.plot(frequency, _without_jumps(curve(model[order])), color=_TRUTH, lw=1.0, zorder=2, label="fitted")
+                else:
+                    ax.plot(frequency, curve(model[order]), color=_TRUTH, lw=1.0, zorder=2, label="fitted")
+            top.set_yscale("log")
+            top.set_title(f"{name}: {each}")
+            bottom.set_ylim(-190.0, 190.0)
+            bottom.set_yticks([-180, -90, 0, 90, 180])
+            bottom.set_xlabel("frequency [Hz]")
+        grid[0, 0].set_ylabel("|C31|  [µm/N]")
+        grid[1, 0].set_ylabel("phase [°]")
+        grid[0, -1].legend(loc="upper right")
+    return figure
+
+
+def _without_jumps(degrees: FloatArray) -> FloatArray:
+    """Break the line where the phase wraps."""
+    broken = degrees.copy()
+    broken[1:][np.abs(np.diff(degrees)) > 180.0] = np.nan
+    return broken
+
+
+def convergence(found: Identification) -> Figure:
+    """Cost over the search's evaluations, and what the data pay for another mode, a row for each axis."""
+    names = [str(axis) for axis in found.axes]
+    counted = any(stage.endswith(" modes") for _, stage, _ in found.trace)
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(9.6, 2.5 * len(names) + 0.4), layout="constrained")
+        grid = figure.subplots(len(names), 2 if counted else 1, squeeze=False, width_ratios=(1.9, 1.0) if counted else (1.0,))
+        for row, name in zip(grid, names, strict=True):
+            own = [(stage, cost) for axis, stage, cost in found.trace if axis in (name, "both")]
+            _costs(row[0], [(stage, cost) for stage, cost in own if not stage.endswith(" modes")], name.upper())
+            if counted:
+                _evidence(row[1], [(int(stage.split()[0]), cost) for stage, cost in own if stage.endswith(" modes")], name.upper())
+        grid[-1, 0].set_xlabel("evaluation")
+        handles: dict[str, object] = {}
+        for row in grid:
+            handles |= {str(line.get_label()): line for line in row[0].get_lines() if not str(line.get_label()).startswith("_")}
+        figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=5)  # type: ignore[arg-type]
+    return figure
+
+
+def _costs(ax: Axes, trace: Sequence[tuple[str, float]], name: str) -> None:
+    cost = np.array([c for _, c in trace])
+    number = np.arange(1, cost.size + 1)
+    for stage, (label, colour) in STAGES.items():
+        # thousands of generations look the same as hundreds of them
+        chosen = [i for i, (s, _) in enumerate(trace) if s == stage and np.isfinite(cost[i])]
+        chosen = chosen[:: max(1, len(chosen) // 400)]
+        if chosen:
+            ax.plot(number[chosen], cost[chosen], "o", ms=3.5, color=colour, label=label)
+    searched = [i for i, (s, _) in enumerate(trace) if s == "search"]
+    if searched:
+        ax.plot(number[searched], np.minimum.accumulate(cost[searched]), color="#52606d", lw=1.2, label="best so far")
+    if cost.size and np.nanmin(cost) > 0.0:
+        ax.set_yscale("log")
+    ax.set_title(f"{name}: search")
+    ax.set_ylabel("cost [–]")
+
+
+def _evidence(ax: Axes, trace: Sequence[tuple[int, float]], name: str) -> None:
+    best: dict[int, float] = {}
+    for count, value in trace:
+        best[count] = min(value, best.get(count, np.inf))
+    counts = sorted(best)
+    lowest = min(best.values(), default=0.0)
+    ax.plot(counts, [best[c] - lowest for c in counts], "o-", color=COLOURS.get(name, _TRUTH), ms=4.0)
+    ax.set_yscale("symlog", linthresh=10.0)
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.set_title(f"{name}: number of modes")
+    ax.set_ylabel("–2 ln evidence, above best")
+    ax.set_xlabel("modes")
+
+
+def tooltip_frf(
+    frequency: FloatArray,
+    tip: Mapping[str, ComplexArray],
+    deviation: Mapping[str, tuple[FloatArray, FloatArray]],
+    truth: Mapping[str, ComplexArray] | None = None,
+    band_hz: tuple[float, float] | None = None,
+) -> Figure:
+    """Tooltip receptance C11, magnitude and real part, a column for each axis, with 2 standard deviations.
+
+    Parameters
+    ----------
+    frequency : array, shape (n,) [Hz]
+    tip : mapping of X or Y to complex array, shape (n,) [m/N]
+    deviation : mapping of X or Y to (real, imaginary) standard deviations [m/N]
+    truth : mapping of X or Y to complex array, shape (n,) [m/N]
+        Where it is known.
+    band_hz : (low, high) [Hz]
+        That was identified; what lies outside is shaded.
+    """
+    figure, grid = _grid(2, len(tip), 4.8, (1.3, 1.0))
+    with mpl.rc_context(_STYLE):
+        for column, (axis, value) in enumerate(tip.items()):
+            top, bottom = grid[:, column]
+            size, real = 1e6 * np.abs(value), 1e6 * value.real
+            if axis in deviation:
+                std_real, std_imaginary = (1e6 * d for d in deviation[axis])
+                unit = value / np.abs(value)
+                std_size = np.hypot(std_real * unit.real, std_imaginary * unit.imag)
+                low = np.maximum(size - 2.0 * std_size, 1e-3 * size)
+                top.fill_between(frequency, low, size + 2.0 * std_size, color=COLOURS[axis], alpha=0.3, lw=0, label="± 2 σ")
+                bottom.fill_between(frequency, real - 2.0 * std_real, real + 2.0 * std_real, color=COLOURS[axis], alpha=0.3, lw=0)
+            top.plot(frequency, size, color=COLOURS[axis], label="predicted")
+            bottom.plot(frequency, real, color=COLOURS[axis])
+            if truth is not None and axis in truth:
+                top.plot(frequency, 1e6 * np.abs(truth[axis]), "--", color=_TRUTH, lw=1.1, label="true")
+                bottom.plot(frequency, 1e6 * truth[axis].real, "--", color=_TRUTH, lw=1.1)
+            top.set_yscale("log")
+            for ax in (top, bottom):
+                _shade_outside(ax, frequency, band_hz)
+            top.set_title(f"{axis}: tooltip")
+            top.legend(loc="lower left")
+            bottom.set_xlabel("frequency [Hz]")
+            bottom.set_xlim(frequency[0], frequency[-1])
+        # the curves set the scale, not what is unknown outside the band
+        all_sizes = 1e6 * np.abs(np.concatenate(list(tip.values())))
+        all_real = 1e6 * np.concatenate(list(tip.values())).real
+        reach = 0.08 * float(np.ptp(all_real))
+        grid[0, 0].set_ylim(0.5 * float(all_sizes.min()), 2.0 * float(all_sizes.max()))
+        grid[1, 0].set_ylim(float(all_real.min()) - reach, float(all_real.max()) + reach)
+        grid[0, 0].set_ylabel("|C11|  [µm/N]")
+        grid[1, 0].set_ylabel("real part [µm/N]")
+    return figure
+
+
+def _shade_outside(ax: Axes, frequency: FloatArray, band_hz: tuple[float, float] | None) -> None:
+    for start, end in () if band_hz is None else ((frequency[0], band_hz[0]), (band_hz[1], frequency[-1])):
+        if start < end:
+            ax.axvspan(start, end, color="#52606d", alpha=0.10, lw=0, label="outside the identified band")
+
+
+def stability_figure(
+    lobes: StabilityLobes,
+    max_depth: float,
+    band: tuple[FloatArray, FloatArray] | None = None,
+    best: Sequence[tuple[float, float]] = (),
+    true_limit: FloatArray | None = None,
+) -> Figure:
+    """Limit depth over spindle speed, the chatter frequency below, the best speeds marked.
+
+    Parameters
+    ----------
+    lobes : StabilityLobes
+    max_depth : float [m]
+        That was asked for; the cut is stable up to it where the limit is infinite.
+    band : (low, high) [m]
+    best : sequence of (speed [rad/s], depth [m])
+    true_limit : array, shape (n,) [m]
+        Where it is known.
+    """
+    figure, grid = _grid(2, 1, 4.6, (2.2, 1.0), sharey=False)
+    top, bottom = grid[:, 0]
+    speed = lobes.spindle_speed * _RPM
+    limit = 1e3 * np.minimum(lobes.limit_depth, max_depth)
+    finite = limit[np.isfinite(lobes.limit_depth)]
+    ceiling = 1e3 * max_depth if finite.size < limit.size else min(1e3 * max_depth, 1.25 * float(limit.max()))
+    with mpl.rc_context(_STYLE):
+        top.fill_between(speed, 0.0, limit, color="#009E73", alpha=0.13, lw=0)
+        top.fill_between(speed, limit, ceiling, color="#C8501A", alpha=0.10, lw=0)
+        if band is not None:
+            low, high = (1e3 * np.minimum(edge, max_depth) for edge in band)
+            top.fill_between(speed, low, high, color=COLOURS["X"], alpha=0.35, lw=0, label="95 % band")
+        top.plot(speed, limit, color=COLOURS["X"], label="stability limit")
+        if true_limit is not None:
+            top.plot(speed, 1e3 * np.minimum(true_limit, max_depth), "--", color=_TRUTH, lw=1.1, label="from the true FRF")
+        if np.isfinite(lobes.absolute_limit) and lobes.absolute_limit < max_depth:
+            label = f"stable at any speed: {1e3 * lobes.absolute_limit:.2f} mm"
+            top.axhline(1e3 * lobes.absolute_limit, color="#52606d", ls=":", lw=1.2, label=label)
+        for i, (best_speed, depth) in enumerate(best):
+            x, y = best_speed * _RPM, 1e3 * min(depth, max_depth)
+            top.plot(x, y, "v", color="#00704f", ms=8.0, label="best speeds" if i == 0 else None)
+            text = f"{x:.0f} rev/min\n{y:.2f} mm" if depth <= max_depth else f"{x:.0f} rev/min"
+            top.annotate(text, (x, y), xytext=(0, 7), textcoords="offset points", ha="center", fontsize=8.5, color="#00704f")
+        top.text(0.008, 0.97, "chatter", transform=top.transAxes, va="top", color="#a33f12", fontsize=9.5, style="italic")
+        top.text(0.008, 0.03, "stable", transform=top.transAxes, va="bottom", color="#00704f", fontsize=9.5, style="italic")
+        top.set_ylim(0.0, ceiling)
+        top.set_ylabel("axial depth [mm]")
+        figure.legend(*top.get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=9.0, frameon=False)
+        order = np.argsort(speed)
+        chatter = lobes.chatter_frequency[order] / (2.0 * np.pi)
+        jumps = np.abs(np.diff(lobes.lobe[order], prepend=lobes.lobe[order][0])) > 0
+        chatter[jumps] = np.nan
+        bottom.plot(speed[order], chatter, color="#52606d")
+        bottom.set_ylabel("chatter [Hz]")
+        bottom.set_xlabel("spindle speed [rev/min]")
+        bottom.set_xlim(speed.min(), speed.max())
+    return figure

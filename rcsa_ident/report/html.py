@@ -1,0 +1,161 @@
+"""One HTML page without scripts: what was recorded, what was found, what it is good for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from rcsa_ident import __version__
+from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.report import figures
+from rcsa_ident.report.rows import mode_rows, peak_row, recording_rows
+from rcsa_ident.signals.measurement import Reading
+from rcsa_ident.stability.result import StabilityLobes
+
+_RPM = 30.0 / np.pi
+#: A logarithm that the data leave open by more than this is not told by them.
+UNTOLD = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ToolingPage:
+    """What is shown of one tooling.
+
+    Parameters
+    ----------
+    name : str
+    recorded : bool
+        Whether the campaign has cuts with it.
+    frequency : array, shape (n,) [Hz]
+    tip : mapping of X or Y to complex array, shape (n,) [m/N]
+    deviation : mapping of X or Y to (real, imaginary) standard deviations [m/N]
+    truth : mapping of X or Y to complex array, shape (n,) [m/N], or None
+    error : mapping of X or Y to float [-]
+        Relative difference to the truth, where it is known.
+    lobes : StabilityLobes or None
+    max_depth : float [m]
+    band : (array, array) or None [m]
+    best : sequence of (speed [rad/s], depth [m])
+    true_limit : array, shape (n,) [m], or None
+    band_hz : (low, high) [Hz], or None
+        That was identified.
+    conditions : str
+        Of the lobes, in words.
+    warnings : sequence of str
+    """
+
+    name: str
+    recorded: bool
+    frequency: FloatArray
+    tip: Mapping[str, ComplexArray]
+    deviation: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+    truth: Mapping[str, ComplexArray] | None = None
+    error: Mapping[str, float] = field(default_factory=dict)
+    lobes: StabilityLobes | None = None
+    max_depth: float = 0.01
+    band: tuple[FloatArray, FloatArray] | None = None
+    best: Sequence[tuple[float, float]] = ()
+    true_limit: FloatArray | None = None
+    band_hz: tuple[float, float] | None = None
+    conditions: str = ""
+    warnings: Sequence[str] = ()
+
+
+def report_html(
+    found: Identification,
+    campaign: Campaign,
+    readings: Iterable[tuple[Cut, Reading]],
+    toolings: Sequence[ToolingPage] = (),
+    seconds: Mapping[str, float] | None = None,
+) -> str:
+    """Return the page.
+
+    Parameters
+    ----------
+    found : Identification
+    campaign : Campaign
+    readings : iterable of (Cut, Reading)
+        The verdict on every recording.
+    toolings : sequence of ToolingPage
+    seconds : mapping of stage to float
+        How long each took.
+    """
+    from jinja2 import Environment, StrictUndefined
+
+    rows = recording_rows(readings)
+    tooling_of = {cut.id: cut.tooling for cut in campaign.cuts}
+    template = files("rcsa_ident.report").joinpath("template.html").read_text(encoding="utf-8")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    return environment.from_string(template).render(
+        version=__version__,
+        campaign=campaign,
+        found=found,
+        status=str(found.status),
+        recordings=rows,
+        left_out=[row for row in rows if not row.usable],
+        noted=sum(bool(row.notes) for row in rows),
+        coefficients=campaign.workpiece.coefficients,
+        axes=[_axis(axis.upper(), part, [tooling_of[c] for c in found.cut_ids]) for axis, part in found.axes.items()],
+        joint=_joint(next(iter(found.axes.values()))) if found.axes else [],
+        untold=UNTOLD,
+        convergence=figures.svg(figures.convergence(found), "search") if found.axes and found.trace else "",
+        evaluations=len(found.trace),
+        toolings=[_tooling(i, page) for i, page in enumerate(toolings)],
+        known=any(page.error for page in toolings),
+        seconds=dict(seconds or {}),
+    )
+
+
+def _axis(name: str, part: AxisResult, tooling: Sequence[str]) -> dict[str, Any]:
+    omega = part.measured.get("omega", np.zeros(0))
+    return {
+        "name": name,
+        "part": part,
+        "modes": mode_rows(part.modes),
+        "residual": part.modes.residual.tolist(),
+        "band": (float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))) if omega.size else None,
+        "points": omega.size,
+        "figure": figures.svg(figures.cross_frf(part, tooling, name), f"cross{name}") if omega.size else "",
+    }
+
+
+def _joint(part: AxisResult) -> list[dict[str, Any]]:
+    """The joint's values with the range of 95 %, from the logarithms at the end of the covariance."""
+    joint = part.joint
+    values = (
+        ("translational stiffness k_t", joint.translational_stiffness, "N/m"),
+        ("rotational stiffness k_r", joint.rotational_stiffness, "N m/rad"),
+        ("translational damping c_t", joint.translational_damping, "N s/m"),
+        ("rotational damping c_r", joint.rotational_damping, "N m s/rad"),
+    )
+    deviation = [None] * 4 if part.covariance is None else np.sqrt(np.maximum(np.diag(part.covariance)[-4:], 0.0)).tolist()
+    return [
+        {"name": name, "value": value, "unit": unit, "std": std, "range": None if std is None else _range(value, std)}
+        for (name, value, unit), std in zip(values, deviation, strict=True)
+    ]
+
+
+def _range(value: float, std: float) -> tuple[float, float]:
+    factor = float(np.exp(min(2.0 * std, 50.0)))
+    return value / factor, value * factor
+
+
+def _tooling(number: int, page: ToolingPage) -> dict[str, Any]:
+    lobes = page.lobes
+    return {
+        "page": page,
+        "peaks": {axis: peak_row(page.frequency, value) for axis, value in page.tip.items()},
+        "tip": figures.svg(figures.tooltip_frf(page.frequency, page.tip, page.deviation, page.truth, page.band_hz), f"tip{number}"),
+        "lobes": ""
+        if lobes is None
+        else figures.svg(figures.stability_figure(lobes, page.max_depth, page.band, page.best, page.true_limit), f"lobes{number}"),
+        "best": [{"rpm": s * _RPM, "mm": d * 1e3 if np.isfinite(d) else None} for s, d in page.best],
+        "anywhere": None if lobes is None or not np.isfinite(lobes.absolute_limit) else lobes.absolute_limit * 1e3,
+        "critical": None if lobes is None or not np.isfinite(lobes.absolute_frequency) else lobes.absolute_frequency / (2.0 * np.pi),
+    }

@@ -1,0 +1,91 @@
+"""Small jobs that call every kernel in the signatures that the commands use, so that all are compiled and cached."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
+from rcsa_ident.dynamics.modal import normal_modes
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.identification.data import IdentificationData, prepare
+from rcsa_ident.identification.default import DefaultMethod
+from rcsa_ident.identification.paper import PaperGeneticAlgorithm
+from rcsa_ident.identification.search import SearchSettings
+from rcsa_ident.signals.measurement import AxisLines, CutMeasurement, measure_cut
+from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly
+from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.virtual.milling import mill_cut
+from rcsa_ident.virtual.reduction import Poles
+from rcsa_ident.workflows.lobes import LobeConditions, modal_tip
+
+_CUTTER = Cutter(2, 0.012)
+_COEFFICIENTS = CuttingCoefficients(9e8, 0.3)
+_SPEED = 200.0 * np.pi
+_CONDITIONS = CuttingConditions(_SPEED, 1e-4, 1e-4, Engagement.from_immersion(0.5, "down"))
+
+
+def _assembly() -> ToolAssembly:
+    steel = MATERIALS["steel"]
+    return ToolAssembly((BeamSegment(0.08, 0.012, steel),), (BeamSegment(0.05, 0.05, steel, 0.012),), 0.03, Contact(2e10, 6e5, 6e4, 9.0))
+
+
+def _tool_holder() -> None:
+    tool_holder_receptance(_assembly(), 2.0 * np.pi * np.linspace(100.0, 2000.0, 20))
+
+
+def _recordings() -> None:
+    rng = np.random.default_rng(1)
+    rate, time = 20000.0, np.arange(4000) / 20000.0
+    cut, air = (1e-6 * np.sum([np.cos(m * _SPEED * time) for m in range(1, 9)], axis=0) for _ in range(2))
+    sensors = (Sensor("x", Quantity.DISPLACEMENT, Dof.X),)
+    records = [Recording(rate, (each + 1e-9 * rng.standard_normal(each.size))[:, None], sensors) for each in (cut, 0.1 * air)]
+    measure_cut("warm", "warm", *records, _CUTTER, _CONDITIONS, _COEFFICIENTS)
+
+
+def _lines() -> IdentificationData:
+    rng = np.random.default_rng(1)
+    measurements = []
+    for k in range(4):
+        speed = _SPEED * (1.0 + 0.1 * k)
+        order = 2 * np.arange(1, 6)
+        value = 1e-8 * (rng.standard_normal(5) + 1j * rng.standard_normal(5))
+        lines = AxisLines(order, order * speed, value, 0.1 * value, np.full(5, 1e-20), np.ones(5), np.ones(5, dtype=complex))
+        measurements.append(CutMeasurement(f"{k}", "warm", speed, {Dof.X: lines}, 0.01))
+    assembly = _assembly()
+
+    def receptance(omega: FloatArray) -> Receptance:
+        return tool_holder_receptance(assembly, omega)
+
+    return prepare(measurements, {"warm": receptance}, {"warm": 2})
+
+
+def _default_method() -> None:
+    DefaultMethod(search=SearchSettings(modes=3, population=4, generations=1, steps=1), candidates=1).run(_lines(), 1)
+
+
+def _paper_method() -> None:
+    PaperGeneticAlgorithm(population=4, generations=1).run(_lines(), 1)
+
+
+def _lobes() -> None:
+    tip = modal_tip({Dof.X: normal_modes(np.array([5000.0]), np.array([0.05]), np.ones((1, 1)), (Coordinate("tip", Dof.X),))})
+    speeds = np.linspace(800.0, 1000.0, 3)
+    for cutter in (_CUTTER, Cutter(2, 0.012, 0.0, np.array([3.0, 2.0 * np.pi - 3.0]))):
+        LobeConditions(cutter, _COEFFICIENTS, _CONDITIONS.engagement, 0.0, speeds, 0.01).lobes(tip)
+
+
+#: Name and job, in the order of the chain.
+STEPS: dict[str, Callable[[], None]] = {
+    "tool-holder": _tool_holder,
+    "recordings": _recordings,
+    "default method": _default_method,
+    "paper's method": _paper_method,
+    "lobes": _lobes,
+}
