@@ -15,6 +15,7 @@ from rcsa_ident.cli.lobes import lobes_summary, tip_response, write_lobes, write
 from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
+    from rcsa_ident.dynamics.arrays import FloatArray
     from rcsa_ident.identification.result import Identification
     from rcsa_ident.machining_setup import Campaign, Tooling
     from rcsa_ident.report.html import ToolingPage
@@ -127,7 +128,8 @@ def _page(
     write_response(out / f"FRF_{safe}.csv", frequency, response)
     write_lobes(out / f"LOBES_{safe}.csv", lobes, spread)
     tip = {axis.upper(): response.tip(axis) for axis in response.coupled}
-    true, error = _truth(truth / "tip" / f"{name}.csv", frequency, tip)
+    deviation = {axis.upper(): each for axis, each in response.deviation.items()}
+    true, error, coverage = _truth(truth / "tip" / f"{name}.csv", frequency, tip, deviation)
     limit = None
     if true is not None and len(true) == len(tip):
         limit = conditions.lobes(measured_tip({Dof(axis.lower()): (frequency, value) for axis, value in true.items()})).limit_depth
@@ -139,9 +141,10 @@ def _page(
         name in {cut.tooling for cut in campaign.cuts},
         frequency[shown],
         {axis: value[shown] for axis, value in tip.items()},
-        {axis.upper(): (real[shown], imaginary[shown]) for axis, (real, imaginary) in response.deviation.items()},
+        {axis: (real[shown], imaginary[shown]) for axis, (real, imaginary) in deviation.items()},
         None if true is None else {axis: value[shown] for axis, value in true.items()},
         error,
+        coverage,
         lobes,
         MAX_DEPTH,
         spread,
@@ -153,23 +156,31 @@ def _page(
     )
 
 
-def _truth(path: Path, frequency: Any, tip: dict[str, Any]) -> tuple[dict[str, Any] | None, dict[str, float]]:
-    """The true FRF at the same frequencies and the relative difference, where the truth is known."""
+def _truth(
+    path: Path, frequency: FloatArray, tip: dict[str, Any], deviation: dict[str, tuple[FloatArray, FloatArray]]
+) -> tuple[dict[str, Any] | None, dict[str, float], dict[str, float]]:
+    """The true FRF at the same frequencies, the relative difference and the band's coverage, where the truth is known."""
     import numpy as np
 
     from rcsa_ident.io.curves import read_frf_csv
 
     if not path.is_file():
-        return None, {}
+        return None, {}, {}
     curves = read_frf_csv(path)
     compared = np.arange(COMPARED[0], COMPARED[1] + 0.5 * COMPARED[2], COMPARED[2])
-    true, error = {}, {}
+    true, error, coverage = {}, {}, {}
     for axis, value in tip.items():
-        if axis in curves.values:
-            true[axis] = np.interp(frequency, curves.frequency, curves.values[axis])
-            there = np.interp(compared, curves.frequency, curves.values[axis])
-            error[axis] = float(np.linalg.norm(np.interp(compared, frequency, value) - there) / np.linalg.norm(there))
-    return true, error
+        if axis not in curves.values:
+            continue
+        true[axis] = np.interp(frequency, curves.frequency, curves.values[axis])
+        there = np.interp(compared, curves.frequency, curves.values[axis])
+        difference = np.interp(compared, frequency, value) - there
+        error[axis] = float(np.linalg.norm(difference) / np.linalg.norm(there))
+        if axis in deviation:
+            real, imaginary = (np.interp(compared, frequency, std) for std in deviation[axis])
+            inside = np.concatenate([np.abs(difference.real) <= 2.0 * real, np.abs(difference.imag) <= 2.0 * imaginary])
+            coverage[axis] = float(inside.mean())
+    return true, error, coverage
 
 
 def _show(pages: list[ToolingPage], found: Identification) -> None:
@@ -194,7 +205,7 @@ def _show(pages: list[ToolingPage], found: Identification) -> None:
 
 def _summary(found: Identification, pages: list[ToolingPage], stages: Stages, out: Path) -> dict[str, Any]:
     toolings = {
-        page.name: {"recorded": page.recorded, "error": dict(page.error), "warnings": list(page.warnings)}
+        page.name: {"recorded": page.recorded, "error": dict(page.error), "coverage": dict(page.coverage), "warnings": list(page.warnings)}
         | (lobes_summary(page.lobes, list(page.best)) if page.lobes is not None else {})
         for page in pages
     }

@@ -256,6 +256,7 @@ class Misfit:
                 mixed[present, i, block] += products[:, :-4]
                 mixed[present, i, tail] += products[:, -4:]
             self._add_inner(inner, axis, columns)
+        _without_information(inner)
         flat = mixed.reshape(2 * cuts, size)
         hessian -= flat.T @ np.linalg.solve(inner, mixed).reshape(2 * cuts, size)
         index = tuple(axis.cut for axis in self.data.axes)
@@ -283,8 +284,20 @@ class Misfit:
         inner[:, 0, 0], inner[:, 1, 1] = prior[:, 1] * DELAY_UNIT**2, prior[:, 2]
         for axis, weight in zip(self.data.axes, self.weight, strict=True):
             self._add_inner(inner, axis, self._columns(axis, weight, nuisance))
-        return np.sqrt(np.linalg.inv(inner)[:, 0, 0]) * DELAY_UNIT
+        unknown = _without_information(inner)
+        # at worst it lies anywhere in a tooth-passing period
+        return np.where(unknown, prior[:, 3] / np.sqrt(12.0), np.sqrt(np.linalg.inv(inner)[:, 0, 0]) * DELAY_UNIT)
+
+
+def _without_information(inner: FloatArray) -> np.ndarray:
+    """Find the cuts whose delay nothing tells, no line and no trigger, shape (k,); any information keeps theirs solvable."""
+    unknown = ~(inner[:, 0, 0] > 0.0)
+    inner[unknown, 0, 0] = 1.0
+    return unknown
 
 
 def _weight(axis: AxisData, model_error: float) -> FloatArray:
-    return 1.0 / (axis.variance + 0.5 * model_error**2 * np.abs(axis.measured) ** 2)
+    size = np.abs(axis.measured) ** 2
+    # a line of nothing in a record without noise is not infinitely sure
+    floor = 1e-12 * float(np.mean(size)) if np.any(size) else 1e-30
+    return 1.0 / np.maximum(axis.variance + 0.5 * model_error**2 * size, floor)

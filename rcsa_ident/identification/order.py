@@ -23,9 +23,8 @@ def evidence(solution: Solution, misfit: Misfit) -> float:
     term, one that they need costs the first.
     """
     sign, volume = np.linalg.slogdet(solution.evaluation.hessian)
-    if sign <= 0.0:
-        return np.inf
-    return float(solution.cost + volume - log_volume(solution.orders, misfit.priors))
+    value = float(solution.cost + volume - log_volume(solution.orders, misfit.priors))
+    return value if sign > 0.0 and np.isfinite(value) else np.inf
 
 
 def drop_modes(solution: Solution, misfit: Misfit, report: Callable[[str, float], None] | None = None, smallest: int = 2) -> Solution:

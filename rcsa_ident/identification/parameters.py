@@ -90,11 +90,24 @@ def chain(axis: AxisParameters) -> FloatArray:
     return np.concatenate([2.0 * axis.stiffness, np.ones(2 * m), factor, np.full(3, RESIDUAL_UNIT)])
 
 
+def selected(axis: AxisParameters, modes: np.ndarray) -> AxisParameters:
+    """Return the axis with some of its modes, in the given order, their damping as it was.
+
+    The damping's factor is that of L's rows, L_s L_s^T = R^T R from L_s^T = Q R: unlike a Cholesky factor of the product it
+    exists for any damping, however light.
+    """
+    rows = axis.factor[modes]
+    factor = np.linalg.qr(rows.T, mode="r").T
+    factor = factor * np.where(np.diag(factor) < 0.0, -1.0, 1.0)
+    # a mode that hangs on another one's damper alone has a zero there, and no logarithm
+    own = np.maximum(np.diag(factor), 1e-9 * np.linalg.norm(rows, axis=1) + 1e-150)
+    np.fill_diagonal(factor, own)
+    return AxisParameters(axis.stiffness[modes], axis.psi[modes], factor, axis.residual)
+
+
 def without_mode(axis: AxisParameters, mode: int) -> AxisParameters:
     """Return the axis with one mode taken out, the others' damping as it was."""
-    kept = np.arange(axis.order) != mode
-    damping = (axis.factor @ axis.factor.T)[np.ix_(kept, kept)]
-    return AxisParameters(axis.stiffness[kept], axis.psi[kept], np.linalg.cholesky(damping), axis.residual)
+    return selected(axis, np.flatnonzero(np.arange(axis.order) != mode))
 
 
 def scaled_joint(logs: FloatArray) -> FloatArray:

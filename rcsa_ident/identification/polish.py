@@ -81,8 +81,8 @@ def polish(
                     break
             damping *= 4.0
         if trial is None or step is None:
-            # no descent at any damping: rounding is reached, or the model is stuck on a ridge
-            return Solution(theta, orders, here, True, step_number)
+            # no descent at any damping: rounding is reached, or the model is stuck on a ridge; without a step nothing is reached
+            return Solution(theta, orders, here, step is not None, step_number)
         gained = here.cost - trial.cost
         theta = theta + step
         damping = max(0.2 * damping, 1e-8)

@@ -9,7 +9,7 @@ import numpy as np
 
 from rcsa_ident.dynamics.arrays import FloatArray
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import DAMPING_UNIT, axis_size, split
+from rcsa_ident.identification.parameters import DAMPING_UNIT, axis_size, pack, selected, split, unpack
 from rcsa_ident.identification.polish import Solution, polish
 
 
@@ -84,6 +84,8 @@ def explore(
     reached: dict[bytes, Solution] = {}
     while algorithm.has_next():
         offspring = algorithm.ask()
+        if offspring is None:  # the population has collapsed: all children were duplicates
+            break
         improved = []
         for individual in offspring:
             theta = _by_frequency(np.asarray(individual.X, dtype=float), settings.modes)
@@ -107,8 +109,4 @@ def _by_frequency(theta: FloatArray, modes: int) -> FloatArray:
     order = np.argsort(part[:modes], kind="stable")
     if np.array_equal(order, np.arange(modes)):
         return theta
-    from rcsa_ident.identification.parameters import AxisParameters, pack, unpack
-
-    axis = unpack(part, modes)
-    damping = (axis.factor @ axis.factor.T)[np.ix_(order, order)]
-    return np.concatenate([pack(AxisParameters(axis.stiffness[order], axis.psi[order], np.linalg.cholesky(damping), axis.residual)), joint])
+    return np.concatenate([pack(selected(unpack(part, modes), order)), joint])

@@ -5,10 +5,11 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -76,11 +77,11 @@ def svg(figure: Figure, name: str) -> str:
 
 
 def _grid(
-    rows: int, cols: int, height: float, ratios: Sequence[float] | None = None, sharey: bool | str = "row"
+    rows: int, cols: int, height: float, ratios: Sequence[float] | None = None, sharey: Literal["row", "none"] = "row"
 ) -> tuple[Figure, np.ndarray]:
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(9.6, height), layout="constrained")
-        axes = figure.subplots(rows, cols, sharex=True, sharey=sharey, squeeze=False, height_ratios=ratios)  # type: ignore[call-overload]
+        axes = figure.subplots(rows, cols, sharex=True, sharey=sharey, squeeze=False, height_ratios=ratios)
     return figure, axes
 
 
@@ -113,7 +114,7 @@ def cross_frf(axis: AxisResult, tooling: Sequence[str], name: str) -> Figure:
                 else:
                     ax.plot(frequency, curve(model[order]), color=_TRUTH, lw=1.0, zorder=2, label="fitted")
             top.set_yscale("log")
-            top.set_title(f"{name}: {each}")
+            top.set_title(f"{name}: {each}", parse_math=False)
             bottom.set_ylim(-190.0, 190.0)
             bottom.set_yticks([-180, -90, 0, 90, 180])
             bottom.set_xlabel("frequency [Hz]")
@@ -143,10 +144,10 @@ def convergence(found: Identification) -> Figure:
             if counted:
                 _evidence(row[1], [(int(stage.split()[0]), cost) for stage, cost in own if stage.endswith(" modes")], name.upper())
         grid[-1, 0].set_xlabel("evaluation")
-        handles: dict[str, object] = {}
+        handles: dict[str, Artist] = {}
         for row in grid:
             handles |= {str(line.get_label()): line for line in row[0].get_lines() if not str(line.get_label()).startswith("_")}
-        figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=5)  # type: ignore[arg-type]
+        figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=5)
     return figure
 
 
@@ -222,7 +223,7 @@ def tooltip_frf(
             for ax in (top, bottom):
                 _shade_outside(ax, frequency, band_hz)
             top.set_title(f"{axis}: tooltip")
-            top.legend(loc="lower left")
+            top.legend(loc="upper right")
             bottom.set_xlabel("frequency [Hz]")
             bottom.set_xlim(frequency[0], frequency[-1])
         # the curves set the scale, not what is unknown outside the band
@@ -261,7 +262,7 @@ def stability_figure(
     true_limit : array, shape (n,) [m]
         Where it is known.
     """
-    figure, grid = _grid(2, 1, 4.6, (2.2, 1.0), sharey=False)
+    figure, grid = _grid(2, 1, 4.6, (2.2, 1.0), sharey="none")
     top, bottom = grid[:, 0]
     speed = lobes.spindle_speed * _RPM
     limit = 1e3 * np.minimum(lobes.limit_depth, max_depth)
@@ -272,7 +273,7 @@ def stability_figure(
         top.fill_between(speed, limit, ceiling, color="#C8501A", alpha=0.10, lw=0)
         if band is not None:
             low, high = (1e3 * np.minimum(edge, max_depth) for edge in band)
-            top.fill_between(speed, low, high, color=COLOURS["X"], alpha=0.35, lw=0, label="95 % band")
+            top.fill_between(speed, low, high, color=COLOURS["X"], alpha=0.35, lw=0, label="95 % (records' noise)")
         top.plot(speed, limit, color=COLOURS["X"], label="stability limit")
         if true_limit is not None:
             top.plot(speed, 1e3 * np.minimum(true_limit, max_depth), "--", color=_TRUTH, lw=1.1, label="from the true FRF")
@@ -291,7 +292,8 @@ def stability_figure(
         figure.legend(*top.get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=9.0, frameon=False)
         order = np.argsort(speed)
         chatter = lobes.chatter_frequency[order] / (2.0 * np.pi)
-        jumps = np.abs(np.diff(lobes.lobe[order], prepend=lobes.lobe[order][0])) > 0
+        # another lobe or another mode: no line between them
+        jumps = np.abs(np.diff(chatter, prepend=chatter[0])) > 0.03 * chatter
         chatter[jumps] = np.nan
         bottom.plot(speed[order], chatter, color="#52606d")
         bottom.set_ylabel("chatter [Hz]")

@@ -38,6 +38,8 @@ class ToolingPage:
     truth : mapping of X or Y to complex array, shape (n,) [m/N], or None
     error : mapping of X or Y to float [-]
         Relative difference to the truth, where it is known.
+    coverage : mapping of X or Y to float [-]
+        Share of the true values (real and imaginary parts) within 2 standard deviations.
     lobes : StabilityLobes or None
     max_depth : float [m]
     band : (array, array) or None [m]
@@ -57,6 +59,7 @@ class ToolingPage:
     deviation: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
     truth: Mapping[str, ComplexArray] | None = None
     error: Mapping[str, float] = field(default_factory=dict)
+    coverage: Mapping[str, float] = field(default_factory=dict)
     lobes: StabilityLobes | None = None
     max_depth: float = 0.01
     band: tuple[FloatArray, FloatArray] | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import next_fast_len
 from scipy.signal import get_window
 
 from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
@@ -13,6 +14,8 @@ from rcsa_ident.signals._kernels import order_signal, order_sums
 
 #: Share of the programmed speed within which the true one is looked for.
 SPEED_SEARCH = 0.01
+#: Degree of the polynomial that is fitted beside the lines.
+DRIFT_DEGREE = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,11 +46,10 @@ class LineSpectrum:
     rate: float
 
 
-def refine_speed(samples: FloatArray, rate: float, nominal: float, orders: int = 16) -> float:
+def refine_speed(samples: FloatArray, rate: float, nominal: float, orders: int = 16, search: float = SPEED_SEARCH) -> float:
     """Return the spindle speed whose multiples fit the record best [rad/s].
 
-    A zero-padded spectrum is scanned within `SPEED_SEARCH` of the nominal speed; Gauss-Newton steps on the
-    least-squares fit of all lines follow.
+    A zero-padded spectrum is scanned near the nominal speed; `follow_speed` takes over from there.
 
     Parameters
     ----------
@@ -55,6 +57,10 @@ def refine_speed(samples: FloatArray, rate: float, nominal: float, orders: int =
         Displacements, without lost samples.
     rate : float [Hz]
     nominal : float [rad/s]
+    orders : int
+        Highest multiple that is looked at.
+    search : float
+        Share of the nominal speed within which the true one is looked for.
     """
     n = samples.shape[0]
     nominal_hz = nominal / (2.0 * np.pi)
@@ -63,49 +69,79 @@ def refine_speed(samples: FloatArray, rate: float, nominal: float, orders: int =
         wanted = f"at least four revolutions, {4.0 / nominal_hz:.4g} s, sampled twice per turn"
         raise InputError("recording length", f"{n / rate:.4g} s", wanted)
     centred = samples - samples.mean(axis=0)
-    length = 1 << int(np.ceil(np.log2(4 * n)))
+    length = next_fast_len(4 * n, real=True)
     power = np.sum(np.abs(np.fft.rfft(centred * get_window("hann", n)[:, None], length, axis=0)) ** 2, axis=1)
     step = 0.2 * rate / n / highest
-    trial = nominal_hz + np.arange(-np.ceil(SPEED_SEARCH * nominal_hz / step), np.ceil(SPEED_SEARCH * nominal_hz / step) + 1) * step
+    reach = np.ceil(search * nominal_hz / step)
+    trial = nominal_hz + np.arange(-reach, reach + 1) * step
     bins = np.outer(trial, np.arange(1, highest + 1)) * length / rate
-    low = np.floor(bins).astype(int)
+    low = np.minimum(np.floor(bins).astype(int), power.size - 2)
     score = np.sum((1.0 - (bins - low)) * power[low] + (bins - low) * power[low + 1], axis=1)
     return follow_speed(centred, rate, float(2.0 * np.pi * trial[int(np.argmax(score))]), highest)
 
 
 def follow_speed(samples: FloatArray, rate: float, near: float, orders: int = 16) -> float:
-    """Return the spindle speed that fits best close to a good guess (within a tenth of a turn over the record) [rad/s]."""
+    """Return the spindle speed that fits best close to a good guess (within a tenth of a turn over the record) [rad/s].
+
+    In each of up to eight blocks the lines are fitted; the speed is the one at which all blocks tell the same amplitudes
+    and phases. Blocks hold whole revolutions, so that orders above `orders` do not leak in.
+    """
     step = near / rate
     highest = int(min(orders, 0.9 * np.pi / step))
-    for _ in range(6):
-        change = _speed_correction(samples, step, highest)
+    for _ in range(4):
+        middles, lines = _block_lines(samples, step, highest, *_blocks(samples.shape[0], 2.0 * np.pi / step))
+        change = _common_rotation(lines, middles)
         step += change
-        if abs(change) * samples.shape[0] * highest < 1e-3:
+        if abs(change) * samples.shape[0] * highest < 1e-2:
             break
     return float(step * rate)
 
 
-def _speed_correction(samples: FloatArray, step: float, highest: int) -> float:
-    """Gauss-Newton step of the speed: the rest of the fit against the fit's own change with speed.
+def _blocks(n: int, period: float) -> tuple[np.ndarray, int]:
+    """First samples and length of blocks, two at least, that leave little of the record out.
 
-    The change is freed of what the amplitudes can follow themselves, so that leakage between lines leaves no bias.
+    Blocks hold whole revolutions and lie whole revolutions apart: what is not fitted leaks into all of them alike.
     """
-    n = samples.shape[0]
-    amplitude, drift = _fit(samples, step, highest)
-    shifted = np.arange(n) - 0.5 * (n - 1)
-    no_drift = np.zeros_like(drift)
-    rest = samples - _synthesis(amplitude, drift, n, step)
-    change = shifted[:, None] * _synthesis(1j * np.arange(highest + 1)[:, None] * amplitude, no_drift, n, step)
-    change -= _synthesis(*_fit(change, step, highest), n, step)
-    size = np.sum(change**2)
-    return float(np.sum(change * rest) / size) if size > 0.0 else 0.0
+    turns = int(n / period)
+    # k blocks tell 1 - 1 / k^2 of what the samples in them know of the speed
+    told = {k: (turns // k) * k * (1.0 - 1.0 / k**2) for k in range(2, 11) if turns // k >= 2}
+    blocks = max(told, key=lambda k: told[k]) if told else 2
+    length = min(max(round(turns // blocks * period), 1), n // blocks)
+    starts = np.round(np.arange(blocks) * max(turns // blocks, 1) * period).astype(int)
+    return np.minimum(starts, n - length) + max(n - length - starts[-1], 0) // 2, length
+
+
+def _block_lines(samples: FloatArray, step: float, highest: int, starts: np.ndarray, length: int) -> tuple[FloatArray, ComplexArray]:
+    """Blocks' middles from the record's, and their amplitudes with phases from there, shapes (blocks,) and (blocks, m + 1, c)."""
+    n, channels = samples.shape
+    side_by_side = np.concatenate([samples[s : s + length] for s in starts], axis=1)
+    amplitude = _fit(side_by_side, step, highest, degree=2)[0].reshape(highest + 1, starts.size, channels).transpose(1, 0, 2)
+    middles = starts + 0.5 * (length - 1) - 0.5 * (n - 1)
+    return middles, amplitude * np.exp(-1j * np.outer(middles, np.arange(highest + 1)) * step)[:, :, None]
+
+
+def _common_rotation(lines: ComplexArray, middles: FloatArray) -> float:
+    """Change of the step at which the blocks' amplitudes agree best, by Gauss-Newton steps."""
+    order = np.arange(lines.shape[1])
+    slope = np.outer(middles - middles.mean(), order)[:, :, None]
+    change = 0.0
+    for _ in range(20):
+        turned = lines * np.exp(-1j * change * slope)
+        mean = turned.mean(axis=0)
+        size = np.sum(slope**2 * np.abs(mean) ** 2)
+        if size == 0.0:
+            break
+        more = np.sum(slope * (mean.conj() * turned).imag) / size
+        change += more
+        if abs(more * slope[-1, -1, 0]) < 1e-6:
+            break
+    return float(change)
 
 
 def line_spectrum(samples: FloatArray, rate: float, spindle_speed: float, max_frequency: float) -> LineSpectrum:
     """Return the amplitudes at all multiples of the spindle's frequency up to `max_frequency`, by least squares.
 
-    Lines and a parabola (drift) are fitted together. The sums are closed forms or one pass over the samples, so the cost is
-    n times the orders, and the small normal equations.
+    Lines and a slow drift (a polynomial) are fitted together.
 
     Parameters
     ----------
@@ -117,55 +153,55 @@ def line_spectrum(samples: FloatArray, rate: float, spindle_speed: float, max_fr
     n = samples.shape[0]
     step = spindle_speed / rate
     highest = int(min(max_frequency, 0.45 * rate) * 2.0 * np.pi / spindle_speed)
-    amplitude, drift = _fit(samples, step, highest)
-    rest = samples - _synthesis(amplitude, drift, n, step)
-    quarter = n // 4
-    parts = np.array([_fit(samples[k * quarter : (k + 1) * quarter], step, highest)[0] for k in range(4)])
-    # each part counts its phase from its own middle
-    middles = np.array([(k + 0.5) * quarter - 0.5 for k in range(4)])
-    parts = parts * np.exp(-1j * np.outer(middles - 0.5 * (n - 1), np.arange(highest + 1)) * step)[:, :, None]
+    amplitude, drift = _fit(samples, step, highest, DRIFT_DEGREE)
+    rest = samples - order_signal(amplitude, step, n) - _drift_basis(n, DRIFT_DEGREE) @ drift
+    parts = _block_lines(samples, step, highest, np.arange(4) * (n // 4), n // 4)[1]
     scatter = np.sum(np.abs(parts - parts.mean(axis=0)) ** 2, axis=0) / (2.0 * 3.0 * 4.0)
-    variance = _floor(rest, step, highest)
     from_start = amplitude * np.exp(-1j * np.arange(highest + 1) * step * 0.5 * (n - 1))[:, None]
-    return LineSpectrum(spindle_speed, from_start, variance, scatter, rest, rate)
+    return LineSpectrum(spindle_speed, from_start, _floor(rest, step, highest), scatter, rest, rate)
 
 
-def _fit(samples: FloatArray, step: float, highest: int) -> tuple[ComplexArray, FloatArray]:
-    """Least-squares amplitudes (phases from the middle), and the drift's coefficients on u and u^2."""
+def _fit(samples: FloatArray, step: float, highest: int, degree: int) -> tuple[ComplexArray, FloatArray]:
+    """Least-squares amplitudes (phases from the middle), and the drift's coefficients on `_drift_basis`."""
     n, channels = samples.shape
     offset = samples.mean(axis=0)
-    u = 2.0 * (np.arange(n) - 0.5 * (n - 1)) / n
-    data = np.column_stack([samples - offset, u, u**2])
-    sums = order_sums(data, step, highest, 1)[0]
-    # unknowns: complex exponentials -highest..highest, then u, u^2
+    basis = _drift_basis(n, degree)
+    data = np.concatenate([samples - offset, basis], axis=1)
+    sums = order_sums(data, step, highest)
+    # unknowns: complex exponentials -highest..highest, then the drift
     both = np.concatenate([sums[:0:-1].conj(), sums])
-    exponentials, powers = both[:, :channels], both[:, channels:]
-    order = np.arange(-highest, highest + 1)
-    half = 0.5 * (order[None, :] - order[:, None]) * step
-    gram = np.full(half.shape, float(n))
-    off = np.abs(np.sin(half)) > 1e-15
-    gram[off] = np.sin(n * half[off]) / np.sin(half[off])
-    drift_basis = np.column_stack([u, u**2])
-    matrix = np.block([[gram.astype(complex), powers], [powers.conj().T, (drift_basis.T @ drift_basis).astype(complex)]])
-    right = np.vstack([exponentials, drift_basis.T @ data[:, :channels]])
+    half = 0.5 * np.arange(-2 * highest, 2 * highest + 1) * step
+    on_line = np.abs(np.sin(half)) < 1e-15
+    kernel = np.where(on_line, float(n), np.sin(n * half) / np.where(on_line, 1.0, np.sin(half)))
+    order = np.arange(2 * highest + 1)
+    size = order.size
+    matrix = np.empty((size + degree, size + degree), dtype=complex)
+    matrix[:size, :size] = kernel[order[None, :] - order[:, None] + 2 * highest]
+    matrix[:size, size:] = both[:, channels:]
+    matrix[size:, :size] = both[:, channels:].conj().T
+    matrix[size:, size:] = basis.T @ basis
+    right = np.concatenate([both[:, :channels], basis.T @ data[:, :channels]])
     solution = np.linalg.solve(matrix, right)
-    amplitude = 2.0 * solution[highest : 2 * highest + 1]
+    amplitude = 2.0 * solution[highest:size]
     amplitude[0] = 0.5 * amplitude[0] + offset
-    return amplitude, solution[2 * highest + 1 :].real
+    return amplitude, solution[size:].real
 
 
-def _synthesis(amplitude: ComplexArray, drift: FloatArray, n: int, step: float) -> FloatArray:
+def _drift_basis(n: int, degree: int) -> FloatArray:
+    """Legendre polynomials of degree 1 to `degree` over the samples, shape (n, degree)."""
     u = 2.0 * (np.arange(n) - 0.5 * (n - 1)) / n
-    return order_signal(amplitude, step, n) + np.column_stack([u, u**2]) @ drift
+    return np.polynomial.legendre.legvander(u, degree)[:, 1:]
 
 
 def _floor(rest: FloatArray, step: float, highest: int) -> FloatArray:
     """Variance of a line's real part from the mean power in the bins around it, half an order to each side."""
     n = rest.shape[0]
     power = np.abs(np.fft.rfft(rest, axis=0)) ** 2 / n
-    cumulative = np.vstack([np.zeros(rest.shape[1]), np.cumsum(power, axis=0)])
+    cumulative = np.concatenate([np.zeros((1, rest.shape[1])), np.cumsum(power, axis=0)])
     centre = np.arange(highest + 1) * step * n / (2.0 * np.pi)
     reach = max(0.45 * step * n / (2.0 * np.pi), 2.0)
     low = np.clip(np.floor(centre - reach), 1, power.shape[0] - 2).astype(int)
     high = np.clip(np.ceil(centre + reach) + 1, low + 1, power.shape[0]).astype(int)
-    return 2.0 / n * (cumulative[high] - cumulative[low]) / (high - low)[:, None]
+    # the line itself took one bin's noise with it
+    bins = np.maximum(high - low - 1, 1)
+    return 2.0 / n * (cumulative[high] - cumulative[low]) / bins[:, None]

@@ -33,7 +33,7 @@ def steady_part(samples: FloatArray, rate: float, spindle_speed: float, teeth: i
     for b in range(blocks):
         part = samples[b * length : (b + 1) * length]
         highest = int(min(3 * teeth, 0.45 * period))
-        sums = order_sums(part - part.mean(axis=0), spindle_speed / rate, highest, 1)[0]
+        sums = order_sums(part - part.mean(axis=0), spindle_speed / rate, highest)
         amplitude[b] = np.sqrt(np.sum(np.abs(sums[teeth::teeth]) ** 2))
     middle = np.median(amplitude)
     steady = np.abs(amplitude - middle) <= STEADY_SHARE * middle

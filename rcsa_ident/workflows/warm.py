@@ -10,7 +10,7 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.arrays import FloatArray
-from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.identification.data import IdentificationData, prepare
@@ -44,9 +44,13 @@ def _recordings() -> None:
     rng = np.random.default_rng(1)
     rate, time = 20000.0, np.arange(4000) / 20000.0
     cut, air = (1e-6 * np.sum([np.cos(m * _SPEED * time) for m in range(1, 9)], axis=0) for _ in range(2))
-    sensors = (Sensor("x", Quantity.DISPLACEMENT, Dof.X),)
-    records = [Recording(rate, (each + 1e-9 * rng.standard_normal(each.size))[:, None], sensors) for each in (cut, 0.1 * air)]
-    measure_cut("warm", "warm", *records, _CUTTER, _CONDITIONS, _COEFFICIENTS)
+    both = (Sensor("x", Quantity.DISPLACEMENT, Dof.X), Sensor("y", Quantity.DISPLACEMENT, Dof.Y))
+    # one channel and several lie differently in memory
+    for sensors in (both[:1], both):
+        records = []
+        for each in (cut, 0.1 * air):
+            records.append(Recording(rate, each[:, None] + 1e-9 * rng.standard_normal((each.size, len(sensors))), sensors))
+        measure_cut("warm", "warm", records[0], records[1], _CUTTER, _CONDITIONS, _COEFFICIENTS)
 
 
 def _lines() -> IdentificationData:
@@ -81,6 +85,15 @@ def _lobes() -> None:
         LobeConditions(cutter, _COEFFICIENTS, _CONDITIONS.engagement, 0.0, speeds, 0.01).lobes(tip)
 
 
+def _virtual_machine() -> None:
+    places = [f"{place}.{axis}" for place in ("tip", "flange", "fixture") for axis in "xy"]
+    pole = np.array([-100.0 + 5000.0j, -100.0 + 6000.0j])
+    shape = np.array([[0.01 - 0.01j, 0.0], [0.0, 0.01 - 0.01j]])
+    outputs = np.concatenate([shape, 0.1 * shape, 0.01 * shape])
+    dynamics = Poles(pole, shape, outputs, tuple(Coordinate.parse(place) for place in places))
+    mill_cut(dynamics, _CUTTER, _CONDITIONS, _COEFFICIENTS, 5e-6, 200)
+
+
 #: Name and job, in the order of the chain.
 STEPS: dict[str, Callable[[], None]] = {
     "tool-holder": _tool_holder,
@@ -88,4 +101,5 @@ STEPS: dict[str, Callable[[], None]] = {
     "default method": _default_method,
     "paper's method": _paper_method,
     "lobes": _lobes,
+    "virtual machine": _virtual_machine,
 }

@@ -1,0 +1,1 @@
+"""The web service's package, beside the physics that it will serve."""

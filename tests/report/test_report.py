@@ -1,0 +1,171 @@
+"""The page: one file, no scripts, everything said, nothing injected."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.dynamics.coordinates import Dof, plane
+from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.identification.result import AxisResult, Identification, Status
+from rcsa_ident.machining_setup import Campaign, Cut, Tooling, Workpiece
+from rcsa_ident.report.figures import svg, tooltip_frf
+from rcsa_ident.report.html import ToolingPage, report_html
+from rcsa_ident.report.rows import recording_rows
+from rcsa_ident.signals.measurement import AxisLines, CutMeasurement, Reading
+from rcsa_ident.signals.verdict import Verdict
+from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
+
+STEEL = MATERIALS["steel"]
+# neither HTML nor a formula
+NAME = "<b>T1</b> & $co_"
+
+
+@pytest.fixture
+def campaign(tmp_path):
+    assembly = ToolAssembly((BeamSegment(0.08, 0.012, STEEL),), (BeamSegment(0.05, 0.05, STEEL, 0.012),), 0.03, None)
+    conditions = CuttingConditions(1000.0, 4e-4, 1e-4, Engagement(0.5 * np.pi, np.pi))
+    cuts = tuple(Cut(f"cut-{i}", NAME, conditions, tmp_path / "none.h5") for i in range(3))
+    workpiece = Workpiece("EN AW-6082", CuttingCoefficients(902e6, 0.26))
+    return Campaign("<script>alert(1)</script>", None, (), workpiece, {NAME: Tooling(NAME, Cutter(4, 0.012), assembly)}, cuts)
+
+
+@pytest.fixture
+def readings(campaign):
+    value = np.array([1e-8 + 1e-8j, 2e-8])
+    lines = AxisLines(np.array([4, 8]), np.array([4e3, 8e3]), value, 0.0 * value, np.full(2, 1e-20), np.ones(2), value)
+    good = Reading(Verdict((), ("no air cut",)), CutMeasurement("cut-0", NAME, 1001.0, {Dof.X: lines}, 0.0))
+    return [(campaign.cuts[0], good), (campaign.cuts[1], good), (campaign.cuts[2], Reading(Verdict(("chatter: 3 µm at 1500 Hz",))))]
+
+
+@pytest.fixture
+def found():
+    modes = ModalModel(
+        np.array([5e3, 1e4]), np.array([0.05, 0.04]), np.full((2, 2), 1e-3 - 1e-3j), np.zeros((2, 2)), plane("flange", Dof.X)
+    )
+    omega = np.linspace(4e3, 2e4, 12)
+    value = 1e-4 / omega * np.exp(-1j * omega / 3e3)
+    measured = {"omega": omega, "value": value, "model": value, "cut": np.arange(12) % 2, "coherence": np.ones(12)}
+    joint = LumpedJoint(2e9, 5e6, 1e4, 10.0)
+    covariance = np.diag([1.0, 1e-4, 1.0, 1e-4, 1e-4])
+    part = AxisResult(modes, joint, 1.23, {NAME: 1.23}, 0.004, ("a", "b", "c", "d", "e"), covariance, np.zeros(5), measured)
+    trace = (("x", "search", 30.0), ("x", "search", 20.0), ("x", "3 modes", -5.0), ("x", "2 modes", -9.0), ("both", "polish", 4.0))
+    cuts = ("cut-0", "cut-1")
+    return Identification(Status.SUSPECT, ("few cuts: 2",), 1, "default", {Dof.X: part}, cuts, np.zeros(2), np.ones(2), np.ones(2), trace)
+
+
+def page_of(name=NAME, **more):
+    frequency = np.linspace(200.0, 3000.0, 50)
+    tip = {"X": 1e-6 / (1.0 - (frequency / 900.0) ** 2 + 0.1j)}
+    speed = np.linspace(400.0, 2000.0, 30)
+    limit = np.where(speed > 1800.0, np.inf, 1e-3 * (1.2 + np.sin(speed / 100.0)))
+    stable = np.isinf(limit)
+    lobes = StabilityLobes(speed, limit, np.where(stable, np.nan, 5e3), np.where(stable, -1, 2), 2e-4, 5e3, "zero-order")
+    deviation = {"X": (np.full(50, 1e-8), np.full(50, 1e-8))}
+    return ToolingPage(name, True, frequency, tip, deviation, lobes=lobes, best=[(1900.0, np.inf), (500.0, 2e-3)], **more)
+
+
+class Tags(HTMLParser):
+    """Every tag is closed by its own name; names and ids are collected."""
+
+    VOID = ("meta", "br", "link", "img")
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.names, self.ids, self.text = [], set(), [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.names.add(tag)
+        self.ids += [value for key, value in attrs if key == "id"]
+        assert not any(key.startswith("on") for key, _ in attrs)
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.names.add(tag)
+        self.ids += [value for key, value in attrs if key == "id"]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+def parsed(text):
+    tags = Tags()
+    tags.feed(text)
+    assert tags.open == []
+    return tags
+
+
+def test_the_page_is_whole_and_self_contained(found, campaign, readings):
+    text = report_html(found, campaign, readings, [page_of(), page_of("T2")], {"recordings": 1.5})
+    tags = parsed(text)
+    assert "script" not in tags.names
+    assert len(tags.ids) == len(set(tags.ids))
+    assert not re.search(r"(src|href)=\"(https?:)?//", text)
+    assert len(text) < 1_000_000
+    words = " ".join(tags.text)
+    for said in (
+        "<script>alert(1)</script>",
+        NAME,
+        "suspect",
+        "few cuts: 2",
+        "chatter: 3 µm at 1500 Hz",
+        "no air cut",
+        "1.23",
+        "2 of 3 cuts",
+    ):
+        assert said in words
+    for unit in ("[Hz]", "[µm/N]", "[mm]", "[rev/min]", "N m/rad"):
+        assert unit in words
+
+
+def test_what_the_records_do_not_tell_is_marked(found, campaign, readings):
+    text = report_html(found, campaign, readings)
+    rows = {
+        row.split("</td>")[0]: "hardly tell" in row
+        for row in re.findall(r"<tr><td>((?:translational|rotational).*?)</tr>", text, re.DOTALL)
+    }
+    assert rows == {
+        "translational stiffness k_t": False,
+        "rotational stiffness k_r": True,
+        "translational damping c_t": False,
+        "rotational damping c_r": False,
+    }
+
+
+def test_the_truth_appears_only_where_it_is_known(found, campaign, readings):
+    without = report_html(found, campaign, readings, [page_of()])
+    truth = page_of().tip
+    known = report_html(found, campaign, readings, [page_of(truth=truth, error={"X": 0.0123})])
+    assert "true FRF" not in without
+    assert "1.2 %" in known
+
+
+def test_the_same_figure_gives_the_same_text():
+    page = page_of()
+    one, two = (svg(tooltip_frf(page.frequency, page.tip, page.deviation), "a") for _ in range(2))
+    assert one == two
+    assert one.startswith("<svg")
+    assert "<metadata" not in one
+
+
+def test_rows_say_what_a_recording_is_worth(readings):
+    rows = recording_rows(readings)
+    assert [row.usable for row in rows] == [True, True, False]
+    assert rows[0].lines == 2
+    assert rows[0].found_rpm == pytest.approx(1001.0 * 30.0 / np.pi)
+    # |h|^2 / (2 var) is 1e4 and 2e4, their median 1.5e4
+    assert rows[0].signal_to_noise_db == {"X": pytest.approx(10.0 * np.log10(1.5e4))}
+    assert rows[2].found_rpm is None
+    assert rows[2].signal_to_noise_db == {}
