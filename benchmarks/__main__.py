@@ -10,7 +10,7 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 #: Each is a module with ``run() -> list of rows``.
-CLAIMS = ("candidate", "lobes", "tooltip_error", "published_modes")
+CLAIMS = ("candidate", "lobes", "published_modes", "bad_input", "tooltip_error")
 #: Minutes rather than seconds: only where asked for.
 LONG = ("tooltip_error",)
 

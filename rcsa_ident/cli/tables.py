@@ -28,14 +28,22 @@ def show_recordings(rows: Sequence[RecordingRow]) -> None:
     for column in table.columns[2:7]:
         column.justify = "right"
     for row in rows:
-        verdict = "[green]usable[/]" if row.usable else "[red]left out:[/] " + escape("; ".join(row.reasons))
+        verdict = "[green]usable[/]" if row.usable else "[red]left out[/]"
         if row.notes:
-            verdict += " [yellow](" + escape("; ".join(row.notes)) + ")[/]"
+            verdict += " [yellow]*[/]"
         found = "" if row.found_rpm is None else f"{row.found_rpm:.1f}"
         ratios = [f"{row.signal_to_noise_db[axis]:.0f}" if axis in row.signal_to_noise_db else "" for axis in ("X", "Y")]
         lines = str(row.lines) if row.lines else ""
         table.add_row(escape(row.id), escape(row.tooling), f"{row.programmed_rpm:.0f}", found, lines, *ratios, verdict)
-    console().print(table)
+    out = console()
+    out.print(table)
+    # sentences stand below: a column would break them into words
+    for row in rows:
+        for reason in row.reasons:
+            out.print(f"[red]{escape(row.id)}[/] left out: {escape(reason)}")
+    for note in dict.fromkeys(note for row in rows for note in row.notes):
+        count = sum(note in row.notes for row in rows)
+        out.print(f"[yellow]*[/] {count} recordings: {escape(note)}")
 
 
 def show_identification(found: Identification) -> None:

@@ -223,7 +223,7 @@ def tooltip_frf(
             for ax in (top, bottom):
                 _shade_outside(ax, frequency, band_hz)
             top.set_title(f"{axis}: tooltip")
-            top.legend(loc="upper right")
+            top.legend(loc="lower left")  # receptances fall with frequency: that corner is free
             bottom.set_xlabel("frequency [Hz]")
             bottom.set_xlim(frequency[0], frequency[-1])
         # the curves set the scale, not what is unknown outside the band

@@ -2,36 +2,110 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Protocol
+
 import numpy as np
-from scipy.signal import get_window
 
 from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+from rcsa_ident.signals.steady import SteadyRecord
 
 
-def segment_lines(samples: FloatArray, rate: float, omega: FloatArray, segments: int = 8) -> ComplexArray:
-    """Return amplitudes at given frequencies in half-overlapping Hann segments, phases from the record's start.
+@dataclass(frozen=True, slots=True, eq=False)
+class HarmonicPoints:
+    """Absolute flange displacement over the force at the tooth-passing harmonics of a cut, every axis on its own force.
 
     Parameters
     ----------
-    samples : array, shape (n, c)
-    rate : float [Hz]
-    omega : array, shape (m,) [rad/s]
-
-    Returns
-    -------
-    complex array, shape (segments, m, c)
+    cut, air : complex arrays, shape (n, axes) [m/N]
+        The receptance is cut - air; the air cut's line is turned by the angle between both records.
+    variance : array, shape (n, axes) [m^2/N^2]
+        Of the real and of the imaginary part of cut - air each.
+    coherence : array, shape (n, axes) [-]
     """
-    n = samples.shape[0]
-    length = 2 * n // (segments + 1)
-    window = get_window("hann", length)
-    window = 2.0 * window / window.sum()
-    starts = [s * (n - length) // max(segments - 1, 1) for s in range(segments)]
-    parts = []
-    for start in starts:
-        t = (start + np.arange(length)) / rate
-        part = samples[start : start + length]
-        parts.append(np.exp(-1j * np.outer(omega, t)) @ ((part - part.mean(axis=0)) * window[:, None]))
-    return np.array(parts)
+
+    cut: ComplexArray
+    air: ComplexArray
+    variance: FloatArray
+    coherence: FloatArray
+
+
+class Estimator(Protocol):
+    """How points of the cross FRF come out of a cut and its air cut: an object that carries its settings."""
+
+    def points(self, cut: SteadyRecord, air: SteadyRecord | None, angle: float, order: np.ndarray, force: ComplexArray) -> HarmonicPoints:
+        """Return the points at the given orders.
+
+        Parameters
+        ----------
+        angle : float [rad]
+            By which the air cut must be turned to lie under the cut.
+        order : array of int, shape (n,)
+        force : complex array, shape (n, axes) [N]
+            Without zeros.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class LineEstimator:
+    """Least-squares lines over the whole record, the air cut's subtracted as complex numbers."""
+
+    def points(self, cut: SteadyRecord, air: SteadyRecord | None, angle: float, order: np.ndarray, force: ComplexArray) -> HarmonicPoints:
+        """Return the points; the variance is that of both lines, from the noise beside them and their scatter."""
+        amplitude, noise = cut.flange[order], cut.variance[order]
+        still = np.zeros_like(amplitude)
+        if air is not None:
+            still, still_noise = turned_air(air, angle, int(order[-1]))
+            still, noise = still[order], noise + still_noise[order]
+        variance = noise / np.abs(force) ** 2
+        power = np.abs((amplitude - still) / force) ** 2
+        # the noise is in the power, too
+        coherence = np.clip(1.0 - 2.0 * variance / np.maximum(power, 1e-300), 0.0, 1.0)
+        return HarmonicPoints(amplitude / force, still / force, variance, coherence)
+
+
+@dataclass(frozen=True, slots=True)
+class AirCorrectedSpectra:
+    """The paper's estimator: spectra averaged over segments, those of the air cut subtracted (eqs. 8 and 16).
+
+    What cut and air cut share at an order goes only as far as it is uncorrelated with what the force does there; at the
+    few harmonics where the flange's roundness reaches them this leaves a bias that `LineEstimator` does not have.
+
+    Parameters
+    ----------
+    segments : int
+        Half-overlapping Hann segments of each record.
+    """
+
+    segments: int = 8
+
+    def points(self, cut: SteadyRecord, air: SteadyRecord | None, angle: float, order: np.ndarray, force: ComplexArray) -> HarmonicPoints:
+        """Return the points, nothing left to subtract; the variance is the jackknife's over the segments."""
+        displacement = cut.segments(order, self.segments)
+        still = np.zeros_like(displacement)
+        if air is not None:
+            still = air.segments(order, self.segments) * np.exp(1j * order * angle)[:, None]
+        same = np.broadcast_to(force, displacement.shape)
+        values = air_corrected(displacement, same, still)
+        left = np.array([air_corrected(*(np.delete(x, s, axis=0) for x in (displacement, same, still))) for s in range(self.segments)])
+        spread = (self.segments - 1) / self.segments * np.sum(np.abs(left - left.mean(axis=0)) ** 2, axis=0)
+        variance = 0.5 * spread * _overlap_factor(self.segments)
+        return HarmonicPoints(values, np.zeros_like(values), variance, coherence(displacement - still.mean(axis=0), same))
+
+
+def turned_air(air: SteadyRecord, angle: float, highest: int) -> tuple[ComplexArray, FloatArray]:
+    """Return an air cut's lines turned by an angle and their variance, orders 0..highest; 0 where the record has no such order."""
+    missing = max(highest - air.highest_order, 0)
+    amplitude = np.pad(air.flange, ((0, missing), (0, 0)))[: highest + 1]
+    variance = np.pad(air.variance, ((0, missing), (0, 0)), mode="edge")[: highest + 1]
+    return amplitude * np.exp(1j * np.arange(highest + 1) * angle)[:, None], variance
+
+
+def _overlap_factor(segments: int) -> float:
+    """Variance of a mean over half-overlapping Hann segments over what their scatter suggests; neighbours correlate by 1/6."""
+    shared = (segments - 1) / segments / 6.0
+    return (1.0 + 2.0 * shared) / (1.0 - 2.0 * shared / (segments - 1))
 
 
 def h1(displacement: ComplexArray, force: ComplexArray) -> ComplexArray:

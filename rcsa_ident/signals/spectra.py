@@ -161,6 +161,32 @@ def line_spectrum(samples: FloatArray, rate: float, spindle_speed: float, max_fr
     return LineSpectrum(spindle_speed, from_start, _floor(rest, step, highest), scatter, rest, rate)
 
 
+def segment_lines(samples: FloatArray, rate: float, omega: FloatArray, segments: int = 8) -> ComplexArray:
+    """Return amplitudes at given frequencies in half-overlapping Hann segments, phases from the record's start.
+
+    Parameters
+    ----------
+    samples : array, shape (n, c)
+    rate : float [Hz]
+    omega : array, shape (m,) [rad/s]
+
+    Returns
+    -------
+    complex array, shape (segments, m, c)
+    """
+    n = samples.shape[0]
+    length = 2 * n // (segments + 1)
+    window = get_window("hann", length)
+    window = 2.0 * window / window.sum()
+    starts = [s * (n - length) // max(segments - 1, 1) for s in range(segments)]
+    parts = []
+    for start in starts:
+        t = (start + np.arange(length)) / rate
+        part = samples[start : start + length]
+        parts.append(np.exp(-1j * np.outer(omega, t)) @ ((part - part.mean(axis=0)) * window[:, None]))
+    return np.array(parts)
+
+
 def _fit(samples: FloatArray, step: float, highest: int, degree: int) -> tuple[ComplexArray, FloatArray]:
     """Least-squares amplitudes (phases from the middle), and the drift's coefficients on `_drift_basis`."""
     n, channels = samples.shape

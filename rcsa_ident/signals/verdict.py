@@ -9,12 +9,22 @@ from scipy.signal import get_window
 
 from rcsa_ident.dynamics.arrays import FloatArray
 from rcsa_ident.signals.recording import Quantity, Recording
-from rcsa_ident.signals.spectra import LineSpectrum, follow_speed
+from rcsa_ident.signals.spectra import LineSpectrum, follow_speed, line_spectrum, refine_speed
 
 #: Equal samples in a row that a live analogue channel does not produce.
 FROZEN_SAMPLES = 12
 #: A peak off the spindle's orders is chatter above this share of the largest tooth-passing line.
 CHATTER_SHARE = 0.3
+#: A signal with fewer levels is too coarsely resolved to tell a limit from a peak.
+LEAST_LEVELS = 12
+#: An extreme value is a limit if it is this many times more frequent than the level next to it.
+PILED_UP = 5.0
+#: Share of the programmed speed within which a wrong one is looked for.
+WIDE_SEARCH = 0.12
+#: Share of its power by which a tooth-passing line stands above what run-out does at other orders.
+ALONE = 20.0
+#: Squared amplitude over variance above which a line is one.
+VISIBLE = 40.0
 #: Phase [rad] that a drifting speed may add to the highest line over the record.
 DRIFT_PHASE = 0.5
 
@@ -47,21 +57,21 @@ def raw_faults(recording: Recording) -> tuple[str, ...]:
         if sensor.quantity in (Quantity.TRIGGER, Quantity.FORCE):
             continue
         x = recording.samples[:, i]
-        lost = int(np.isnan(x).sum())
-        if lost:
-            first = float(np.argmax(np.isnan(x))) / recording.rate
-            found.append(f"drop-outs: {lost} samples of {sensor.name} are missing, the first at {first:.4g} s")
+        lost = ~np.isfinite(x)
+        if lost.any():
+            first = float(np.argmax(lost)) / recording.rate
+            found.append(f"drop-outs: {lost.sum()} samples of {sensor.name} are missing, the first at {first:.4g} s")
             continue
         if np.ptp(x) == 0.0:
             found.append(f"no signal: {sensor.name} has the constant value {x[0]:.4g}")
             continue
         start, length = _runs(x)
-        extreme = (x[start] == x.max()) | (x[start] == x.min())
-        if np.sum(extreme & (length >= 3)) >= 2:
-            clipped = int(length[extreme & (length >= 3)].sum())
+        clipped = _clipped(x, x[start], length)
+        if clipped:
             found.append(f"saturation: {clipped} samples of {sensor.name} stand at its limits {x.min():.4g} and {x.max():.4g}")
-        elif length.max() >= FROZEN_SAMPLES:
-            k = int(np.argmax(length))
+            continue
+        k = _frozen(x[start], length)
+        if k is not None:
             found.append(f"drop-outs: {sensor.name} is frozen for {length[k]} samples at {start[k] / recording.rate:.4g} s")
     return tuple(found)
 
@@ -72,25 +82,97 @@ def _runs(x: FloatArray) -> tuple[np.ndarray, np.ndarray]:
     return start, np.diff(np.concatenate([start, [x.size]]))
 
 
-def speed_faults(samples: FloatArray, rate: float, speed: float, programmed: float, highest_order: int) -> tuple[str, ...]:
-    """Return what is wrong with the speed: far from the programmed one, or drifting within the record."""
-    found: list[str] = []
-    rpm = 30.0 / np.pi
+def _frozen(value: FloatArray, length: np.ndarray) -> int | None:
+    """The longest run that a live channel does not produce: longer than the others, and the signal has moved on after it.
+
+    A slow signal of coarse resolution also rests at its peaks, but goes on by one level.
+    """
+    jump = np.abs(np.diff(value))
+    ends = np.flatnonzero(length[:-1] >= max(FROZEN_SAMPLES, 4.0 * np.quantile(length, 0.97)))
+    ends = ends[jump[ends] > 1.5 * jump.min()]
+    if length[-1] >= 4.0 * FROZEN_SAMPLES and length[-1] >= 4.0 * length[:-1].max(initial=0):
+        return length.size - 1
+    return int(ends[np.argmax(length[ends])]) if ends.size else None
+
+
+def _clipped(x: FloatArray, value: FloatArray, length: np.ndarray) -> int:
+    """Samples that stand at a limit: several runs at an extreme that is far more frequent than the level next to it.
+
+    A coarsely resolved signal also repeats its extreme value, but the level beside it about as often.
+    """
+    limits = (x.min(), x.max())
+    runs = [length[(value == limit) & (length >= 3)] for limit in limits]
+    if max(run.size for run in runs) < 2:
+        return 0
+    level, count = np.unique(x, return_counts=True)
+    if level.size < LEAST_LEVELS:
+        return 0
+    piled = count[0] > PILED_UP * count[1], count[-1] > PILED_UP * count[-2]
+    return sum(int(run.sum()) for run, full in zip(runs, piled, strict=True) if full and run.size >= 2)
+
+
+def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) -> tuple[str, ...]:
+    """Return what is wrong with the speed: far from the programmed one, or drifting within the record.
+
+    Parameters
+    ----------
+    samples : array, shape (n, c)
+        Displacements.
+    lines : LineSpectrum
+        Of these, in its first channels; others may follow.
+    programmed : float [rad/s]
+    """
+    speed, rate, rpm = lines.spindle_speed, lines.rate, 30.0 / np.pi
+    order = np.arange(1, lines.amplitude.shape[0])[:, None]
+    power = np.abs(lines.amplitude[1:, : samples.shape[1]]) ** 2
+    information = power / np.maximum(lines.variance[1:, : samples.shape[1]], 1e-300)
+    visible = information.max() > VISIBLE
+    if _explained(lines, samples.shape[1]) < 0.5:
+        other = refine_speed(samples, rate, programmed, search=WIDE_SEARCH)
+        if _explained(line_spectrum(samples, rate, other, order.size * speed / (2.0 * np.pi)), samples.shape[1]) > 0.5:
+            speed, visible = other, True
+    if not visible:
+        # an air cut of a round flange tells no speed
+        return ()
     if abs(speed / programmed - 1.0) > 0.0095:
-        found.append(f"speed: no spindle speed near the programmed {programmed * rpm:.0f} rev/min (best within 1 %: {speed * rpm:.1f})")
-        return tuple(found)
+        return (f"speed: the record repeats at {speed * rpm:.1f} rev/min, the programmed speed is {programmed * rpm:.0f} rev/min",)
+    duration = samples.shape[0] / rate
     half = samples.shape[0] // 2
-    if half > 4.0 * rate * 2.0 * np.pi / speed:
-        first = follow_speed(samples[:half], rate, speed)
-        second = follow_speed(samples[half:], rate, speed)
-        # a speed that changes linearly bends the phase of order m by m * change * T / 8 at the middle
-        phase = highest_order * abs(second - first) * samples.shape[0] / rate / 4.0
-        if phase > DRIFT_PHASE:
-            found.append(
-                f"speed drifts from {first * rpm:.1f} to {second * rpm:.1f} rev/min: "
-                f"the highest line's phase bends by {phase:.2g} rad (at most {DRIFT_PHASE})"
-            )
-    return tuple(found)
+    if half < 4.0 * rate * 2.0 * np.pi / speed:
+        return ()
+    first = follow_speed(samples[:half], rate, speed)
+    second = follow_speed(samples[half:], rate, speed)
+    # a speed that changes linearly bends the phase of order m by m * change * T / 8 between the middle and the ends
+    phase = order.size * abs(second - first) * duration / 4.0
+    # halves have an eighth of the record's information on the speed each
+    std = 4.0 / np.sqrt(np.sum(order**2 * information) * duration**2 / 12.0)
+    if phase > DRIFT_PHASE and abs(second - first) > 5.0 * std:
+        return (
+            f"speed drifts from {first * rpm:.1f} to {second * rpm:.1f} rev/min: "
+            f"the highest line's phase bends by {phase:.2g} rad (at most {DRIFT_PHASE})",
+        )
+    return ()
+
+
+def _explained(lines: LineSpectrum, channels: int) -> float:
+    """Share of the displacements' power that lies in the lines."""
+    power = 0.5 * np.sum(np.abs(lines.amplitude[1:, :channels]) ** 2)
+    return float(power / (power + np.sum(np.mean(lines.rest[:, :channels] ** 2, axis=0))))
+
+
+def silence(power: FloatArray, variance: FloatArray) -> str | None:
+    """Return a sentence if no cutting force shows in the tooth-passing lines, else None.
+
+    Parameters
+    ----------
+    power, variance : arrays, shape (n, axes) [m^2]
+        Squared amplitudes, and variance of their real part.
+    """
+    ratio = power / np.maximum(2.0 * variance, 1e-300)
+    # pure noise has a mean of 1, and its largest of n is rarely above log(n) + 7
+    if ratio.max() > np.log(ratio.size) + 7.0:
+        return None
+    return f"no cutting: the largest tooth-passing line is {np.sqrt(power.max()) * 1e9:.3g} nm, which is noise"
 
 
 def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: tuple[float, float]) -> str | None:
@@ -138,15 +220,22 @@ def tooth_count_fault(power: FloatArray, teeth: int) -> str | None:
     """
     order = np.arange(power.size)
     shared = (order % teeth == 0) & (order > 0)
-    # run-out of the cutter lies on the other orders, below the teeth's own lines
     others = ~shared & (order > 0) & (order <= 3 * teeth)
     first = shared & (order <= 3 * teeth)
-    if teeth > 1 and power[others].sum() > power[first].sum():
-        strongest = int(order[1:][np.argmax(power[1:])])
-        return f"wrong tooth count: the strongest line of the cut is order {strongest}, not a multiple of {teeth} teeth"
+    for count in range(2, min(2 * teeth, power.size)):
+        # run-out spreads over all orders that the teeth do not share, another number of teeth stands on its own multiples alone
+        own, rest = others & (order % count == 0), others & (order % count != 0)
+        if teeth > 1 and own.any() and power[own].max() > ALONE * power[rest].max(initial=0.0):
+            missed = power[first & (order % count != 0)].max(initial=0.0)
+            if power[own].max() > (0.03 * power[first].max() if teeth % count == 0 else missed):
+                strongest = int(order[own][np.argmax(power[own])])
+                return f"wrong tooth count (or chatter): order {strongest} of the cut fits {count} teeth, not {teeth}"
+    if teeth > 1 and power[others].max() > ALONE * power[first].max():
+        strongest = int(order[others][np.argmax(power[others])])
+        return f"wrong tooth count (or chatter): the strongest line of the cut is order {strongest}, not a multiple of {teeth} teeth"
     odd = shared & (order % (2 * teeth) != 0) & (order <= 4 * teeth)
     even = (order % (2 * teeth) == 0) & (order > 0) & (order <= 4 * teeth)
     background = power[others].mean() if others.any() else 0.0
-    if odd.any() and even.any() and power[odd].max() < 1e-3 * power[even].max() and power[odd].max() < 4.0 * background:
+    if odd.any() and even.any() and power[odd].max() < 1e-2 * power[even].max() and power[odd].max() < 4.0 * background:
         return f"wrong tooth count: of the multiples of {teeth} teeth only every second is there, as with {2 * teeth}"
     return None

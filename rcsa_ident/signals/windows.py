@@ -15,7 +15,9 @@ def steady_part(samples: FloatArray, rate: float, spindle_speed: float, teeth: i
     """Return the longest stretch in which the tooth-passing lines keep their amplitude.
 
     The record is cut into blocks of two revolutions; a block belongs to the steady part if the amplitude of its first
-    three tooth-passing lines is within `STEADY_SHARE` of the median.
+    three tooth-passing lines is within `STEADY_SHARE` of the median, or no farther off than such blocks scatter anyway.
+    The median is that of the blocks' energy, so that a cut is found in a record that is mostly air. A stretch that
+    begins or ends within the record loses a block there, where entry or exit may reach into it.
 
     Parameters
     ----------
@@ -25,20 +27,31 @@ def steady_part(samples: FloatArray, rate: float, spindle_speed: float, teeth: i
     """
     n = samples.shape[0]
     period = 2.0 * np.pi / spindle_speed * rate
-    length = int(round(2.0 * period))
+    length = round(2.0 * period)
     blocks = n // length
     if blocks < 4:
         return slice(0, n)
-    amplitude = np.empty(blocks)
-    for b in range(blocks):
-        part = samples[b * length : (b + 1) * length]
-        highest = int(min(3 * teeth, 0.45 * period))
-        sums = order_sums(part - part.mean(axis=0), spindle_speed / rate, highest)
-        amplitude[b] = np.sqrt(np.sum(np.abs(sums[teeth::teeth]) ** 2))
-    middle = np.median(amplitude)
-    steady = np.abs(amplitude - middle) <= STEADY_SHARE * middle
+    amplitude = _block_amplitudes(samples[: blocks * length], blocks, spindle_speed / rate, teeth, int(min(3 * teeth, 0.45 * period)))
+    order = np.argsort(amplitude)
+    energy = np.cumsum(amplitude[order] ** 2)
+    middle = amplitude[order[np.searchsorted(energy, 0.5 * energy[-1])]]
+    usual = np.median(np.abs(np.diff(amplitude[amplitude > 0.5 * middle]))) if np.sum(amplitude > 0.5 * middle) > 4 else 0.0
+    steady = np.abs(amplitude - middle) <= max(STEADY_SHARE * middle, 6.0 * usual)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], steady, [False]]).astype(int)))
     starts, stops = edges[::2], edges[1::2]
     longest = int(np.argmax(stops - starts))
     first, last = int(starts[longest]), int(stops[longest])
-    return slice(first * length, n if last == blocks else last * length)
+    begin = (first + 1) * length if first > 0 else 0
+    return slice(begin, n if last == blocks else max((last - 1) * length, begin))
+
+
+def _block_amplitudes(samples: FloatArray, blocks: int, step: float, teeth: int, highest: int) -> FloatArray:
+    """Root of the power in the lines at multiples of `teeth` in each block."""
+    length, channels = samples.shape[0] // blocks, samples.shape[1]
+    parts = samples.reshape(blocks, length, channels)
+    # a Hann window keeps drift and the lines between out
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(length) + 0.5) / length)
+    parts = (parts - parts.mean(axis=1, keepdims=True)) * window[:, None]
+    side_by_side = np.ascontiguousarray(parts.transpose(1, 0, 2)).reshape(length, blocks * channels)
+    power = np.abs(order_sums(side_by_side, step, highest)[teeth::teeth]) ** 2
+    return np.sqrt(power.reshape(-1, blocks, channels).sum(axis=(0, 2)))

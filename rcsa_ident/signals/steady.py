@@ -1,0 +1,156 @@
+"""A recording's steady part: its speed, its lines, and the absolute displacement of the flange in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError
+from rcsa_ident.signals.recording import Quantity, Recording
+from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum, refine_speed, segment_lines
+from rcsa_ident.signals.windows import steady_part
+
+#: Least number of revolutions of a steady part.
+LEAST_REVOLUTIONS = 8.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SteadyRecord:
+    """The steady part of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+    axes : tuple of Dof
+        With a displacement sensor.
+    columns : tuple of int
+        Channels of the recording that matter: the axes' displacements, then the fixture's accelerations.
+    part : slice
+    teeth : int
+        1 for an air cut.
+    lines : LineSpectrum
+        Of these channels; phases from the recording's first sample.
+    flange : complex array, shape (orders, axes) [m]
+        Absolute displacement at each order.
+    variance : array, shape (orders, axes) [m^2]
+        Of its real and of its imaginary part each.
+    """
+
+    recording: Recording
+    axes: tuple[Dof, ...]
+    columns: tuple[int, ...]
+    part: slice
+    teeth: int
+    lines: LineSpectrum
+    flange: ComplexArray
+    variance: FloatArray
+
+    @property
+    def spindle_speed(self) -> float:
+        """From the record itself [rad/s]."""
+        return self.lines.spindle_speed
+
+    @property
+    def highest_order(self) -> int:
+        """Of the lines."""
+        return self.lines.amplitude.shape[0] - 1
+
+    @property
+    def displacement(self) -> FloatArray:
+        """Displacement channels in the steady part, shape (n, axes) [m]."""
+        return self.recording.samples[self.part][:, self.columns[: len(self.axes)]]
+
+    def segments(self, order: np.ndarray, count: int) -> ComplexArray:
+        """Return the absolute displacement in half-overlapping Hann segments, shape (count, orders, axes) [m]."""
+        samples = self.recording.samples[self.part][:, self.columns]
+        omega = order * self.spindle_speed
+        lines = segment_lines(samples, self.recording.rate, omega, count)
+        lines = lines * np.exp(-1j * omega * self.part.start / self.recording.rate)[:, None]
+        return np.einsum("smc,mca->sma", lines, _weights(self.recording, self.axes, self.columns, omega))
+
+
+def measured_axes(recording: Recording) -> tuple[Dof, ...]:
+    """Return the axes with a displacement sensor."""
+    return tuple(axis for axis in (Dof.X, Dof.Y) if recording.channel(Quantity.DISPLACEMENT, axis) is not None)
+
+
+def steady_record(recording: Recording, axes: Sequence[Dof], programmed: float, max_frequency: float, teeth: int) -> SteadyRecord | str:
+    """Return the steady part of a recording with its speed and lines, or why there is none.
+
+    Parameters
+    ----------
+    axes : sequence of Dof
+        Each with a displacement sensor in the recording.
+    programmed : float [rad/s]
+    max_frequency : float [Hz]
+    teeth : int
+        1 for an air cut.
+
+    Raises
+    ------
+    InputError
+        If the displacement of an axis is missing.
+    """
+    rate, n = recording.rate, recording.samples.shape[0]
+    least = LEAST_REVOLUTIONS * 2.0 * np.pi / programmed * rate
+    if n < least:
+        return f"too short: {n / rate:.3g} s hold fewer than {LEAST_REVOLUTIONS:.0f} revolutions"
+    columns = _columns(recording, axes)
+    displacement = recording.samples[:, columns[: len(axes)]]
+    rough = refine_speed(displacement, rate, programmed)
+    part = steady_part(displacement, rate, rough, teeth)
+    if part.stop - part.start < least:
+        return f"no steady part of at least {LEAST_REVOLUTIONS:.0f} revolutions"
+    whole = part == slice(0, n)
+    speed = rough if whole else refine_speed(displacement[part], rate, rough)
+    lines = line_spectrum(recording.samples[part][:, columns], rate, speed, max_frequency)
+    if part.start:
+        shift = np.exp(-1j * np.arange(lines.amplitude.shape[0]) * speed * part.start / rate)
+        lines = LineSpectrum(speed, lines.amplitude * shift[:, None], lines.variance, lines.scatter, lines.rest, lines.rate)
+    weight = _weights(recording, axes, columns, np.arange(lines.amplitude.shape[0]) * speed)
+    noise = np.stack([_line_variance(lines, c, teeth) for c in range(len(columns))], axis=1)
+    flange = np.einsum("mc,mca->ma", lines.amplitude, weight)
+    variance = np.einsum("mc,mca->ma", noise, np.abs(weight) ** 2)
+    return SteadyRecord(recording, tuple(axes), columns, part, teeth, lines, flange, variance)
+
+
+def _columns(recording: Recording, axes: Sequence[Dof]) -> tuple[int, ...]:
+    kinds = [(sensor.quantity, sensor.axis) for sensor in recording.sensors]
+    for axis in axes:
+        if (Quantity.DISPLACEMENT, axis) not in kinds:
+            raise InputError("sensors", f"no displacement {axis.upper()}", "the same sensors for a cut and its air cut")
+    wanted = [(quantity, axis) for quantity in (Quantity.DISPLACEMENT, Quantity.ACCELERATION) for axis in axes]
+    return tuple(kinds.index(kind) for kind in wanted if kind in kinds)
+
+
+def _weights(recording: Recording, axes: Sequence[Dof], columns: Sequence[int], omega: FloatArray) -> ComplexArray:
+    """Share of each channel in each axis: the gap plus the fixture's motion -a / omega^2, sensors undone; (orders, channels, axes)."""
+    twice = np.where(omega == 0.0, 0.0, -1.0 / np.where(omega == 0.0, 1.0, omega) ** 2)
+    weights = np.zeros((omega.size, len(columns), len(axes)), dtype=complex)
+    for c, column in enumerate(columns):
+        sensor = recording.sensors[column]
+        factor = 1.0 if sensor.quantity is Quantity.DISPLACEMENT else twice
+        weights[:, c, [axis is sensor.axis for axis in axes].index(True)] = factor / sensor.response(omega)
+    return weights
+
+
+def _line_variance(lines: LineSpectrum, channel: int, teeth: int) -> FloatArray:
+    """Noise floor beside each line, raised where the record's quarters scatter more than it explains.
+
+    What scatters in proportion to the lines (a force that is not quite steady, for those of the teeth) is found from all of
+    a kind together, since one line's scatter is itself known to a factor only.
+    """
+    floor, scatter = np.maximum(lines.variance[:, channel], 1e-300), lines.scatter[:, channel]
+    power = np.abs(lines.amplitude[:, channel]) ** 2
+    floor = floor * max(1.0, float(np.median(scatter[1:] / floor[1:])))
+    order = np.arange(power.size)
+    share = np.zeros(power.size)
+    for kind in ((order > 0) & (order % teeth == 0), order % teeth != 0):
+        scale = (power / floor)[kind]
+        excess = np.sum((scatter / floor - 1.0)[kind] * scale) / max(np.sum(scale**2), 1e-300)
+        share[kind] = max(excess, 0.0)
+    return floor + share * power

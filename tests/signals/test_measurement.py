@@ -1,0 +1,201 @@
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.machines import read_machine
+from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.signals.measurement import measure_cut
+from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+from rcsa_ident.virtual.rotor import frequency_response, rotor
+from rcsa_ident.workflows.simulate import simulate
+from tests.signals.synthetic import COEFFICIENTS, RPM, conditions, pair
+
+AXES = (Dof.X, Dof.Y)
+
+
+def errors(made, **changes):
+    """Errors over their standard deviation, real and imaginary."""
+    z = []
+    for axis, lines in made.measure(**changes).measurement.axes.items():
+        rest = (lines.receptance - made.expected(lines, axis)) / np.sqrt(lines.variance)
+        z += [*rest.real, *rest.imag]
+    return np.array(z)
+
+
+@pytest.mark.parametrize("rpm", [8000.0, 11500.0, 18300.0])
+@pytest.mark.parametrize("noise", [2e-9, 5e-8])
+def test_known_receptances_come_back_within_their_noise(rpm, noise):
+    # without run-out of the cutter the angle to the air cut is as good as known
+    z = np.concatenate([errors(pair(seed, rpm, noise=noise)) for seed in range(8)])
+    assert np.sqrt(np.mean(z**2)) == pytest.approx(1.0, abs=0.2)
+    assert np.abs(z).max() < 5.0
+
+
+def test_the_angle_to_the_air_cut_explains_the_rest():
+    # with run-out, lines that the roundness reaches are as good as that angle
+    z = []
+    for seed in range(12):
+        made = pair(seed, 12000.0, runout=5e-8)
+        measured = made.measure().measurement
+        for axis, lines in measured.axes.items():
+            rest = lines.receptance - made.expected(lines, axis)
+            total = 2.0 * lines.variance + (lines.order * np.abs(lines.air) * measured.alignment_std) ** 2
+            z += [*(np.abs(rest) / np.sqrt(total))]
+    assert np.sqrt(np.mean(np.square(z))) == pytest.approx(1.0, abs=0.25)
+
+
+def test_variance_is_in_proportion():
+    few, many = (pair(7, 12000.0, noise=n, accelerometers=False).measure().measurement for n in (4e-9, 4e-8))
+    short = pair(7, 12000.0, noise=4e-9, accelerometers=False, duration=0.14).measure().measurement
+    for axis in AXES:
+        assert np.median(many.axes[axis].variance / few.axes[axis].variance) == pytest.approx(100.0, rel=0.3)
+        assert np.median(short.axes[axis].variance[:5] / few.axes[axis].variance[:5]) == pytest.approx(2.0, rel=0.4)
+        # cut and air cut, white noise: 2 times 2 sigma^2 / n over the force's square
+        lines = few.axes[axis]
+        expected = 2.0 * 2.0 * 4e-9**2 / 7168 / np.abs(lines.force) ** 2
+        assert np.median(lines.variance / expected) == pytest.approx(1.0, abs=0.25)
+
+
+def test_coherence():
+    clear, noisy = pair(8).measure().measurement, pair(8, noise=2e-6).measure().measurement
+    for axis in AXES:
+        assert np.median(clear.axes[axis].coherence) > 0.99
+        if axis in noisy.axes:
+            assert np.all((noisy.axes[axis].coherence >= 0.0) & (noisy.axes[axis].coherence <= 1.0))
+            assert np.median(noisy.axes[axis].coherence) < 0.9
+
+
+def test_a_force_that_scatters_widens_the_variance():
+    z = np.concatenate([errors(pair(seed, 12000.0, scatter=0.03)) for seed in range(10)])
+    steady = pair(0, 12000.0).measure().measurement.axes[Dof.X]
+    unsteady = pair(0, 12000.0, scatter=0.03).measure().measurement.axes[Dof.X]
+    strong = np.argmax(np.abs(steady.receptance * steady.force))
+    assert unsteady.variance[strong] > 100.0 * steady.variance[strong]
+    assert 0.4 < np.sqrt(np.mean(z**2)) < 2.0
+
+
+def test_delay_and_bandwidth_of_the_sensors_are_undone():
+    plain = errors(pair(9, 12000.0, accelerometers=False))
+    lagging = pair(9, 12000.0, accelerometers=False, delay=7e-5, bandwidth=5000.0)
+    z = errors(lagging)
+    assert np.sqrt(np.mean(z**2)) < 1.3 * max(np.sqrt(np.mean(plain**2)), 0.8)
+    forgotten = Recording(
+        lagging.cut.rate, lagging.cut.samples, tuple(dataclasses.replace(s, delay=0.0, bandwidth=None) for s in lagging.cut.sensors)
+    )
+    assert np.abs(errors(lagging, cut=forgotten)).max() > 100.0
+
+
+def test_the_fixtures_motion_is_added_with_its_sign():
+    assert np.sqrt(np.mean(errors(pair(10, 12000.0)) ** 2)) < 1.4
+    # an accelerometer that is mounted backwards, or none: a fifth, a tenth is missing
+    for sensor, missing in ((-1.0, 0.2), (0.0, 0.1)):
+        made = pair(10, 12000.0, bad_compensation=sensor)
+        lines = made.measure().measurement.axes[Dof.X]
+        expected = made.expected(lines, Dof.X)
+        strong = np.abs(lines.air) < 0.05 * np.abs(lines.cut)
+        assert np.median(np.abs(lines.receptance - expected)[strong] / np.abs(expected)[strong]) == pytest.approx(missing, rel=0.1)
+
+
+def test_one_axis_alone():
+    made = pair(11, accelerometers=False)
+    keep = [1]
+    cut, air = (Recording(r.rate, r.samples[:, keep], tuple(r.sensors[i] for i in keep)) for r in (made.cut, made.air))
+    measured = made.measure(cut=cut, air=air).measurement
+    assert set(measured.axes) == {Dof.Y}
+    lines = measured.axes[Dof.Y]
+    both = made.measure().measurement.axes[Dof.Y]
+    np.testing.assert_allclose(np.abs(lines.receptance), np.abs(both.receptance), rtol=0.02, atol=1e-10)
+
+
+def test_missing_displacements_are_told():
+    made = pair(12)
+    blind = Recording(made.cut.rate, made.cut.samples[:, 2:], made.cut.sensors[2:])
+    with pytest.raises(InputError, match="no displacement"):
+        made.measure(cut=blind)
+    with pytest.raises(InputError, match="no displacement X"):
+        made.measure(air=blind)
+
+
+def test_other_channels_are_left_alone():
+    made = pair(13)
+    sensors = (Sensor("force", Quantity.FORCE, Dof.X), *made.cut.sensors)
+    with_force = Recording(made.cut.rate, np.column_stack([np.full(7168, np.nan), made.cut.samples]), sensors)
+    for axis, lines in made.measure(cut=with_force).measurement.axes.items():
+        np.testing.assert_array_equal(lines.cut, made.measure().measurement.axes[axis].cut)
+
+
+def test_entry_and_exit_do_not_matter():
+    made = pair(14, 12000.0, duration=0.5, roundness=0.0, noise=1e-9)
+    count = made.cut.samples.shape[0]
+    level = np.interp(np.arange(count), [2500, 3400, 10500, 11400], [0.0, 1.0, 1.0, 0.0])[:, None]
+    cut = Recording(made.cut.rate, made.cut.samples * level + (1.0 - level) * made.air.samples, made.cut.sensors)
+    for axis, lines in made.measure(cut=cut).measurement.axes.items():
+        error = np.abs((lines.receptance - made.expected(lines, axis)) * lines.force)
+        assert error.max() < 1e-2 * np.abs(lines.receptance * lines.force).max()
+
+
+@pytest.mark.parametrize("tooth_angle", [0.0, 1.9])
+def test_a_trigger_gives_the_delay(tooth_angle):
+    for seed in range(5):
+        made = pair(seed, 12000.0, trigger={"tooth_angle": tooth_angle})
+        measured = made.measure().measurement
+        turns = (measured.delay + made.angle / made.speed) * made.speed / (2.0 * np.pi)
+        assert (turns - round(turns)) * 2.0 * np.pi / made.speed == pytest.approx(0.0, abs=4.0 * measured.delay_std)
+        assert measured.delay_std * made.cut.rate < 0.3
+
+
+def test_a_limit_below_the_first_harmonic():
+    made = pair(15, 12000.0)
+    found = measure_cut("c", "t", made.cut, made.air, made.cutter, conditions(12000.0), COEFFICIENTS, max_frequency=700.0)
+    assert found.verdict.reasons == ("no tooth-passing line below 700 Hz",)
+
+
+@pytest.fixture(scope="module")
+def virtual():
+    machine = read_machine(Path(__file__).parents[2] / "data" / "machines" / "hpm.toml")
+    speeds = tuple(rpm * RPM for rpm in (8600.0, 16100.0))
+    machine = dataclasses.replace(machine, plan=dataclasses.replace(machine.plan, spindle_speeds=speeds))
+    tooling = read_tooling(machine.toolings[0])
+    return machine, tooling, list(simulate(machine, [tooling], seed=3))
+
+
+def recording(machine, record):
+    suite = machine.sensors
+    sensors, columns = [], []
+    for axis in AXES:
+        for name, quantity, scale in (
+            (f"flange_{axis}", Quantity.DISPLACEMENT, suite.gap_sensitivity),
+            (f"fixture_{axis}", Quantity.ACCELERATION, suite.acceleration_sensitivity),
+        ):
+            sensors.append(Sensor(name, quantity, axis))
+            columns.append(record.channels[name] / scale)
+    return Recording(suite.rate, np.column_stack(columns), tuple(sensors))
+
+
+def test_the_virtual_machines_cross_frf(virtual):
+    machine, tooling, cuts = virtual
+    assert len(cuts) == 2
+    for i, cut in enumerate(cuts):
+        records = {kind: recording(machine, record) for kind, record in cut.records.items()}
+        found = measure_cut(
+            cut.id,
+            cut.tooling,
+            records["cut"],
+            records["air"],
+            tooling.cutter,
+            machine.plan.conditions(machine.plan.spindle_speeds[i]),
+            machine.workpiece.coefficients,
+        )
+        assert found.verdict.usable
+        truth = cut.records["cut"]
+        assert found.measurement.spindle_speed == pytest.approx(truth.spindle_speed, rel=3e-7)
+        model = rotor(machine.spindle, tooling.assembly)
+        for column, lines in enumerate(found.measurement.axes.values()):
+            outputs = ("flange.x", "flange.y")
+            response = frequency_response(model, lines.omega, truth.spindle_speed, outputs=outputs)[:, column, column]
+            expected = response * np.exp(1j * lines.order * truth.tooth_angle) * lines.force
+            assert np.linalg.norm(lines.receptance * lines.force - expected) < 1e-2 * np.linalg.norm(expected)

@@ -1,0 +1,204 @@
+"""Every reason to leave a record out, with a record that deserves it and a neighbour that does not."""
+
+import numpy as np
+import pytest
+
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+from rcsa_ident.signals.verdict import raw_faults, tooth_count_fault
+from tests.signals.synthetic import RATE, RPM, changed, conditions, drift, pair, profile, wave
+
+
+@pytest.fixture(scope="module")
+def good():
+    return pair(seed=1, rpm=9000.0, runout=3e-8)
+
+
+def reasons(made, **changes):
+    return " | ".join(made.measure(**changes).verdict.reasons)
+
+
+def test_a_good_cut(good):
+    reading = good.measure()
+    assert reading.verdict.usable
+    assert reading.verdict.notes == ()
+    assert set(reading.measurement.axes) == {Dof.X, Dof.Y}
+
+
+def test_no_air_cut_is_a_note(good):
+    reading = good.measure(air=None)
+    assert reading.verdict.usable
+    assert "no air cut" in reading.verdict.notes[0]
+    assert reading.measurement.alignment_std == 0.0
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_lost_samples(good, value):
+    def lose(x):
+        x[400:404, 1] = value
+
+    assert "drop-outs: 4 samples of flange_y are missing, the first at 0.01562 s" in reasons(good, cut=changed(good.cut, lose))
+    assert reasons(good, air=changed(good.air, lose)).startswith("air cut: drop-outs")
+
+
+def test_a_frozen_channel(good):
+    def freeze(x):
+        x[3000:3030, 0] = x[3000, 0]
+
+    def to_the_end(x):
+        x[-60:, 1] = x[-60, 1]
+
+    def briefly(x):
+        x[3000:3003, 0] = x[3000, 0]
+
+    assert "flange_x is frozen for 30 samples" in reasons(good, cut=changed(good.cut, freeze))
+    assert "flange_y is frozen for 60 samples" in reasons(good, cut=changed(good.cut, to_the_end))
+    assert reasons(good, cut=changed(good.cut, briefly)) == ""
+
+
+def test_a_dead_channel(good):
+    def kill(x):
+        x[:, 2] = 0.3
+
+    assert "no signal: fixture_x has the constant value 0.3" in reasons(good, cut=changed(good.cut, kill))
+
+
+@pytest.mark.parametrize("sides", ["both", "upper"])
+def test_saturation(good, sides):
+    def clip(x):
+        top, bottom = np.quantile(x[:, 0], [0.97, 0.03])
+        x[:, 0] = np.clip(x[:, 0], bottom if sides == "both" else -np.inf, top)
+
+    assert "saturation" in reasons(good, cut=changed(good.cut, clip))
+
+
+@pytest.mark.parametrize("resolution", [1e-9, 30e-9, 100e-9])
+def test_a_coarse_resolution_is_no_saturation(resolution):
+    # a smooth peak repeats its highest level, too
+    made = pair(seed=2, rpm=8000.0, noise=1e-9)
+
+    def round_off(x):
+        x[:, :2] = np.round(x[:, :2] / resolution) * resolution
+
+    assert reasons(made, cut=changed(made.cut, round_off), air=changed(made.air, round_off)) == ""
+
+
+@pytest.mark.parametrize("resolution", [30e-9, 300e-9])
+def test_a_slow_coarse_signal_is_not_frozen(resolution):
+    t = np.arange(7168) / RATE
+    x = np.round((1e-6 * np.sin(800.0 * t) + 1e-7 * np.sin(2300.0 * t)) / resolution) * resolution
+    sensor = Sensor("g", Quantity.DISPLACEMENT, Dof.X)
+    assert raw_faults(Recording(RATE, x[:, None], (sensor,))) == ()
+
+
+def test_a_trigger_may_stand_still(good):
+    sensors = (*good.cut.sensors, Sensor("t", Quantity.TRIGGER))
+    still = Recording(RATE, np.column_stack([good.cut.samples, np.zeros(7168)]), sensors)
+    assert raw_faults(still) == ()
+
+
+@pytest.mark.parametrize("off", [-0.05, 0.02, 0.1])
+def test_a_wrong_programmed_speed(good, off):
+    found = reasons(good, conditions=conditions(9000.0 * (1.0 + off)))
+    assert "speed: the record repeats at" in found
+    assert f"the programmed speed is {9000.0 * (1.0 + off):.0f} rev/min" in found
+
+
+def test_a_programmed_speed_that_is_nearly_right(good):
+    for off in (-0.008, 0.008):
+        reading = good.measure(conditions=conditions(9000.0 * (1.0 + off)))
+        assert reading.verdict.usable
+        assert reading.measurement.spindle_speed == pytest.approx(good.speed, rel=1e-6)
+
+
+def ramped(made, change):
+    """The cut with a speed that grows by this share from its first to its last sample."""
+    n = made.cut.samples.shape[0]
+    t = np.arange(n) / RATE
+    bent = t + change * (0.5 * t**2 / t[-1] - 0.5 * t)
+
+    def warp(x):
+        for c in range(4):
+            x[:, c] = np.interp(bent, t, x[:, c])
+
+    return changed(made.cut, warp)
+
+
+def test_a_drifting_speed(good):
+    assert "speed drifts from" in reasons(good, cut=ramped(good, 0.005))
+    assert reasons(good, cut=ramped(good, 2e-5)) == ""
+
+
+@pytest.mark.parametrize("hertz", [860.0, 1300.0, 2210.0])
+def test_chatter(good, hertz):
+    t = np.arange(7168) / RATE
+    largest = max(np.abs(a.receptance * a.force).max() for a in good.measure().measurement.axes.values())
+
+    def shake(share):
+        def edit(x):
+            x[:, :2] += share * largest * np.sin(2.0 * np.pi * hertz * t)[:, None]
+
+        return changed(good.cut, edit)
+
+    found = reasons(good, cut=shake(0.7))
+    assert found.startswith("chatter: ")
+    # to half a bin of the spectrum
+    assert float(found.split(" at ")[1].split(" Hz")[0]) == pytest.approx(hertz, abs=0.5 * RATE / 7168 + 0.5)
+    assert reasons(good, cut=shake(0.02)) == ""
+
+
+def test_no_cutting(good):
+    idle = pair(seed=3, force=0.0)
+    assert "no cutting" in reasons(idle)
+    assert reasons(pair(seed=3, force=0.02)) == ""
+
+
+def test_too_short():
+    assert "too short: 0.045 s hold fewer than 8 revolutions" in reasons(pair(seed=4, rpm=9000.0, duration=0.045))
+    assert reasons(pair(seed=4, rpm=9000.0, duration=0.06)) == ""
+
+
+def test_nothing_steady():
+    made = pair(seed=4, duration=0.28)
+    rng = np.random.default_rng(0)
+    level = np.repeat(rng.permutation(np.geomspace(0.05, 1.0, 28)), 256)[:, None]
+    found = changed(made.cut, lambda x: x.__setitem__((slice(None), slice(0, 2)), x[:, :2] * level))
+    assert not made.measure(cut=found).verdict.usable
+
+
+@pytest.mark.parametrize(
+    ("true", "declared"),
+    [(4, 2), (2, 4), (4, 3), (3, 4), (6, 3), (3, 6), (5, 4), (2, 3)],
+)
+@pytest.mark.parametrize("rpm", [8300.0, 14000.0])
+def test_wrong_tooth_count(true, declared, rpm):
+    made = pair(seed=true, rpm=rpm, teeth=true, runout=2e-8)
+    assert "wrong tooth count" in reasons(made, cutter=Cutter(declared, 16e-3, np.radians(30.0)))
+
+
+@pytest.mark.parametrize("teeth", [2, 3, 4, 6])
+@pytest.mark.parametrize("runout", [0.0, 3e-8, 1e-7])
+def test_the_right_tooth_count(teeth, runout):
+    for seed, rpm in enumerate((8000.0, 11000.0, 15000.0, 19500.0)):
+        assert reasons(pair(seed=seed, rpm=rpm, teeth=teeth, runout=runout)) == ""
+
+
+def test_one_tooth_is_never_wrong():
+    assert tooth_count_fault(np.array([0.0, 1.0, 0.5, 0.2, 0.1]), 1) is None
+
+
+@pytest.mark.parametrize("noise", [2e-9, 2e-8])
+def test_an_air_cut_of_noise_alone_is_used(noise):
+    for seed in range(12):
+        reading = pair(seed=seed, rpm=14000.0, roundness=0.0, noise=noise, accelerometers=False, duration=0.2).measure()
+        assert reading.verdict.usable
+        # the angle between both cannot be told, and nobody needs it
+        assert reading.measurement.alignment_std > 1.0
+
+
+def test_an_air_cut_that_holds_another_speed(good):
+    rng = np.random.default_rng(0)
+    x = wave(profile(rng), 9500.0 * RPM, 7168) + drift(rng, 7168)[:, None] + 2e-9 * rng.normal(size=(7168, 2))
+    samples = np.column_stack([x, 0.05 * rng.normal(size=(7168, 2))])
+    assert reasons(good, air=Recording(RATE, samples, good.cut.sensors)).startswith("air cut: speed")
