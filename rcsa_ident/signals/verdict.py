@@ -210,6 +210,16 @@ def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: 
     return None
 
 
+def _stands_out(own: FloatArray, rest: FloatArray, claimed: FloatArray) -> bool:
+    """True where several lines of another comb are strong, and those that the teeth should have are no more than background.
+
+    A poorly aligned air cut (the wrong comb spoils it, too) leaves run-out on all other orders, so the background is high.
+    """
+    if own.size < 2 or rest.size == 0 or claimed.max() > 2.0 * rest.max():
+        return False
+    return bool(np.sort(own)[-2] > 4.0 * max(rest.max(), claimed.max()))
+
+
 def tooth_count_fault(power: FloatArray, teeth: int) -> str | None:
     """Return a sentence if the cut's own lines do not stand where `teeth` teeth would put them, else None.
 
@@ -222,9 +232,12 @@ def tooth_count_fault(power: FloatArray, teeth: int) -> str | None:
     shared = (order % teeth == 0) & (order > 0)
     others = ~shared & (order > 0) & (order <= 3 * teeth)
     first = shared & (order <= 3 * teeth)
-    for count in range(2, min(2 * teeth, power.size)):
+    for count in range(min(2 * teeth, power.size) - 1, 1, -1):
         # run-out spreads over all orders that the teeth do not share, another number of teeth stands on its own multiples alone
         own, rest = others & (order % count == 0), others & (order % count != 0)
+        claimed = first & (order % count != 0)
+        if teeth > 1 and claimed.any() and _stands_out(power[own], power[rest], power[claimed]):
+            return f"wrong tooth count (or chatter): the lines of the cut stand at multiples of {count}, not of {teeth}"
         if teeth > 1 and own.any() and power[own].max() > ALONE * power[rest].max(initial=0.0):
             missed = power[first & (order % count != 0)].max(initial=0.0)
             if power[own].max() > (0.03 * power[first].max() if teeth % count == 0 else missed):
