@@ -15,7 +15,7 @@ from rcsa_ident.cli.lobes import lobes_summary, tip_response, write_lobes, write
 from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
-    from rcsa_ident.dynamics.arrays import FloatArray
+    from rcsa_ident.arrays import FloatArray
     from rcsa_ident.identification.result import Identification
     from rcsa_ident.machining_setup import Campaign, Tooling
     from rcsa_ident.report.html import ToolingPage

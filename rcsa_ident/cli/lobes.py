@@ -15,7 +15,7 @@ from rcsa_ident.cli.conditions import Strategy, coefficients, engagement, feed_a
 from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
-    from rcsa_ident.dynamics.arrays import FloatArray
+    from rcsa_ident.arrays import FloatArray
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.posterior import MachineAxis
     from rcsa_ident.stability.result import StabilityLobes

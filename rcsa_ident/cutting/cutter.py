@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rcsa_ident.dynamics.arrays import FloatArray, frozen
+from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.errors import InputError, non_negative, positive
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.dynamics.arrays import FloatArray
 
 
 def mean_directional_matrix(teeth: int, engagement: Engagement, coefficients: CuttingCoefficients, feed_angle: float = 0.0) -> FloatArray:

@@ -6,10 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
 
 
 def tooth_force(phi: FloatArray, chip: FloatArray, coefficients: CuttingCoefficients) -> FloatArray:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics._kernels import pole_sum
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError

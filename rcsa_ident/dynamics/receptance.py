@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.errors import InputError
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics._kernels import independent_columns
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.modal import PoleModel
 from rcsa_ident.dynamics.receptance import Receptance

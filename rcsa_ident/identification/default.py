@@ -8,15 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.order import drop_modes, evidence, model_error
 from rcsa_ident.identification.parameters import joint_of, modes_of, split, unpack
 from rcsa_ident.identification.polish import Solution, polish
+from rcsa_ident.identification.posterior import Posterior, spread
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.result import AxisResult, Identification, Status
-from rcsa_ident.identification.search import SearchSettings, explore
+from rcsa_ident.identification.search import SearchSettings, explore, with_mode_below
 
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 
@@ -25,6 +28,8 @@ WORST_MODEL_ERROR = 0.05
 #: Solutions whose evidence lies closer than this are told apart by chance only.
 EVIDENCE_TIE = 6.0
 FEWEST_CUTS = 8
+#: Half of the lines must carry at least this many times their noise (its amplitude's root mean square).
+LEAST_SIGNAL = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +96,10 @@ def _search_axis(job: tuple[DefaultMethod, IdentificationData, np.random.SeedSeq
     misfit = Misfit(data, method.priors, (fine,))
     refined = []
     for member in population[: method.candidates]:
-        refined.append(polish(misfit, member.theta, member.orders, member.evaluation.nuisance, 60, grid=32))
+        found = polish(misfit, member.theta, member.orders, member.evaluation.nuisance, 60, grid=32)
+        theta = with_mode_below(found.theta, found.orders[0], band[0])
+        moved = polish(misfit, theta, found.orders, found.evaluation.nuisance, 60, grid=32)
+        refined.append(min(found, moved, key=lambda s: s.cost))
         report("refine", refined[-1].cost)
     refined.sort(key=lambda s: s.cost)
     share = fine
@@ -176,7 +184,7 @@ def _axis_result(i: int, data: IdentificationData, misfit: Misfit, solution: Sol
             "model": solution.evaluation.models[i],
             "tooling": tooling,
             "cut": axis.cut,
-            "coherence": response / (response + 2.0 * axis.variance),
+            "coherence": response / np.maximum(response + 2.0 * axis.variance, 1e-300),
         },
     )
 
@@ -197,6 +205,11 @@ def _doubts(data: IdentificationData, searched: list[_AxisSearch], solution: Sol
     reasons = []
     if not solution.converged:
         reasons.append(f"not converged: the polish still gained after {solution.steps} steps")
+    for axis in data.axes:
+        noise = np.sqrt(2.0 * axis.variance)
+        signal = float(np.median(np.abs(axis.measured) / np.where(noise > 0.0, noise, 1e-300)))
+        if signal < LEAST_SIGNAL:
+            reasons.append(f"{str(axis.axis).upper()}: half of the lines are below {signal:.2g} times their noise")
     for axis, share in zip(data.axes, misfit.model_error, strict=True):
         if share > WORST_MODEL_ERROR:
             reasons.append(
@@ -205,10 +218,11 @@ def _doubts(data: IdentificationData, searched: list[_AxisSearch], solution: Sol
             )
     for axis, found in zip(data.axes, searched, strict=True):
         if len(found.solutions) > 1 and found.evidences[1] - found.evidences[0] < EVIDENCE_TIE:
-            difference = _difference(misfit.data.only(axis.axis), *found.solutions[:2])
-            if difference > 0.1:
+            difference, band = _difference(misfit.data.only(axis.axis), *found.solutions[:2])
+            if difference > max(0.1, 3.0 * band):
                 reasons.append(
-                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.0f} % at the flange"
+                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.0f} % at the flange, "
+                    f"more than their deviation of {100 * band:.0f} %"
                 )
     if len(data.toolings) < 2:
         reasons.append("one tooling only: flange translation and slope can't be told apart; cut with a second, different holder")
@@ -219,12 +233,15 @@ def _doubts(data: IdentificationData, searched: list[_AxisSearch], solution: Sol
     return reasons
 
 
-def _difference(data: IdentificationData, one: Solution, two: Solution) -> float:
-    """Relative difference of the flange receptance of two solutions of an axis over the band."""
-    axis = data.axes[0]
-    omega = np.linspace(axis.omega.min(), axis.omega.max(), 200)
-    values = []
-    for solution in (one, two):
-        (part,), _ = split(solution.theta, solution.orders)
-        values.append(modes_of(unpack(part, solution.orders[0]), axis.axis).receptance(omega).values[:, 0, 0])
-    return float(np.linalg.norm(values[0] - values[1]) / np.linalg.norm(values[0]))
+def _difference(data: IdentificationData, one: Solution, two: Solution) -> tuple[float, float]:
+    """Relative difference of the flange receptance of two solutions of an axis over the band, and the first one's deviation."""
+    axis = data.axes[0].axis
+    omega = np.linspace(data.axes[0].omega.min(), data.axes[0].omega.max(), 200)
+
+    def flange(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
+        return modes.receptance(omega).values[:, 0, 0]
+
+    first, second = (Posterior(s.theta, np.linalg.inv(s.evaluation.hessian)) for s in (one, two))
+    value, other = flange(*first.machine(axis)), flange(*second.machine(axis))
+    size = np.linalg.norm(value)
+    return float(np.linalg.norm(value - other) / size), float(np.linalg.norm(spread(first, axis, flange)) / size)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification._kernels import cross_frf, fit_cuts
 from rcsa_ident.identification.data import AxisData, IdentificationData
 from rcsa_ident.identification.parameters import axis_size, chain, scaled_joint, split, unpack
@@ -185,7 +185,7 @@ class Misfit:
         models = self._models(theta, orders, False)[0]
         return self._residual(theta, orders, models, nuisance)[0]
 
-    def _models(self, theta: FloatArray, orders: tuple[int, ...], normal: bool):  # type: ignore[no-untyped-def]
+    def _models(self, theta: FloatArray, orders: tuple[int, ...], normal: bool):
         """Cross FRF on each axis' lines, its gradient in kernel units, and the axes' physics."""
         parts, joint = split(theta, orders)
         scaled = scaled_joint(joint)
@@ -228,7 +228,7 @@ class Misfit:
         air = axis.lines[:, 1] * np.exp(1j * axis.order * angle) * back
         return axis.lines[:, 0] * back - air, air
 
-    def _linearise(self, residual, own_jacobian, blocks, nuisance):  # type: ignore[no-untyped-def]
+    def _linearise(self, residual, own_jacobian, blocks, nuisance):
         """Gauss-Newton matrices of the parameters after eliminating two unknowns per cut (Schur complement)."""
         size = own_jacobian.shape[0]
         prior = self.data.cut_prior
@@ -260,9 +260,7 @@ class Misfit:
         flat = mixed.reshape(2 * cuts, size)
         hessian -= flat.T @ np.linalg.solve(inner, mixed).reshape(2 * cuts, size)
         index = tuple(axis.cut for axis in self.data.axes)
-        linear = Linearisation(
-            blocks, tuple(all_columns), index, own_jacobian, cut_prior, np.empty(0), hessian, inner, mixed
-        )
+        linear = Linearisation(blocks, tuple(all_columns), index, own_jacobian, cut_prior, np.empty(0), hessian, inner, mixed)
         return replace(linear, gradient=linear.pull(residual))
 
     def _columns(self, axis: AxisData, weight: FloatArray, nuisance: FloatArray) -> ComplexArray:

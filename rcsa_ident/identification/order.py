@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import pack, split, unpack, without_mode
 from rcsa_ident.identification.polish import Solution, polish
@@ -89,6 +89,9 @@ def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> t
 def _share(squares: FloatArray, noise: FloatArray, size: FloatArray, freedom: float, smallest: float) -> float:
     """Solve for the share by bisection of its logarithm: the sum falls with it."""
     low, high = smallest, 1.0
+    # lines of nothing, in a record without noise, say nothing about shares
+    told = (noise > 0.0) | (size > 0.0)
+    squares, noise, size = squares[told], noise[told], size[told]
     if np.sum(squares / (noise + 0.5 * low**2 * size)) <= freedom:
         return smallest
     for _ in range(60):

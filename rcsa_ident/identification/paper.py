@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.dynamics.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import dissipation
@@ -135,7 +135,8 @@ class PaperGeneticAlgorithm:
             omega = np.linspace(axis.omega.min(), axis.omega.max(), 400)
             worst = float(dissipation(omega, axes[axis.axis].modes.receptance(omega).values).min())
             if worst < -1e-9:
-                reasons.append(f"{str(axis.axis).upper()}: the modes are not passive, they feed energy in (down to {worst:.2f} of the mobility)")
+                name = str(axis.axis).upper()
+                reasons.append(f"{name}: the modes are not passive, they feed energy in (down to {worst:.2f} of the mobility)")
         assert problem is not None
         delays = problem.delays(axes[data.axes[-1].axis])
         return Identification(
@@ -231,7 +232,7 @@ class _Problem:
                 "model": model,
                 "tooling": tooling,
                 "cut": self.axis.cut,
-                "coherence": self.measured / (self.measured + 2.0 * self.axis.variance),
+                "coherence": self.measured / np.maximum(self.measured + 2.0 * self.axis.variance, 1e-300),
             },
         )
 
@@ -274,7 +275,7 @@ def _search(job: tuple[PaperGeneticAlgorithm, IdentificationData, int]) -> tuple
         def __init__(self) -> None:
             super().__init__(n_var=low.size, n_obj=1, xl=low, xu=high)
 
-        def _evaluate(self, x, out, *args, **kwargs):  # type: ignore[no-untyped-def]
+        def _evaluate(self, x, out, *args, **kwargs):
             out["F"] = problem.costs(np.asarray(x, dtype=float))[:, None]
 
     best: list[float] = []
@@ -282,8 +283,6 @@ def _search(job: tuple[PaperGeneticAlgorithm, IdentificationData, int]) -> tuple
     def follow(algorithm: Any) -> None:
         best.append(float(algorithm.opt.get("F").min()))
 
-    found = minimize(
-        Vectorised(), GA(pop_size=method.population), ("n_gen", method.generations), seed=seed, callback=follow, verbose=False
-    )
+    found = minimize(Vectorised(), GA(pop_size=method.population), ("n_gen", method.generations), seed=seed, callback=follow, verbose=False)
     step = max(len(best) // 500, 1)
     return np.asarray(found.X, dtype=float), best[::step]

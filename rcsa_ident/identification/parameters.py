@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.dynamics.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel, damped_modes
 from rcsa_ident.identification.data import LEVER
@@ -97,7 +97,7 @@ def selected(axis: AxisParameters, modes: np.ndarray) -> AxisParameters:
     exists for any damping, however light.
     """
     rows = axis.factor[modes]
-    factor = np.linalg.qr(rows.T, mode="r").T
+    factor = np.asarray(np.linalg.qr(rows.T, mode="r")).T
     factor = factor * np.where(np.diag(factor) < 0.0, -1.0, 1.0)
     # a mode that hangs on another one's damper alone has a zero there, and no logarithm
     own = np.maximum(np.diag(factor), 1e-9 * np.linalg.norm(rows, axis=1) + 1e-150)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.misfit import DELAY_UNIT, Evaluation, Misfit
 
 #: No parameter (all are logarithms or of order one) moves further in one step.
@@ -15,6 +15,8 @@ LARGEST_STEP = 1.0
 #: Share of a step at which the residual's bend is probed, and the largest acceleration over velocity that is believed.
 PROBE = 0.1
 LARGEST_BEND = 0.75
+#: Times the damping is raised fourfold for one step: from the least to far beyond any scale.
+RETRIES = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +74,7 @@ def polish(
     quiet = 0
     for step_number in range(max_steps):
         trial = None
-        for _ in range(8):
+        for _ in range(RETRIES):
             step = _step(misfit, theta, orders, here, damping)
             if step is not None:
                 candidate = misfit.evaluate(theta + step, orders, here.nuisance, grid)
@@ -116,5 +118,5 @@ def _step(misfit: Misfit, theta: FloatArray, orders: tuple[int, ...], here: Eval
     bend = change.times(1.0 / PROBE).minus(linear.push(velocity, cuts)).times(2.0 / PROBE)
     acceleration = -0.5 * scipy.linalg.cho_solve(factor, linear.pull(bend) / scale, check_finite=False) / scale
     # where the bend is as large as the step, the expansion says nothing
-    ratio = np.linalg.norm(acceleration * scale) / np.linalg.norm(velocity * scale)
-    return velocity + acceleration if 2.0 * ratio < LARGEST_BEND else velocity
+    bent = 2.0 * np.linalg.norm(acceleration * scale) < LARGEST_BEND * np.linalg.norm(velocity * scale)
+    return velocity + acceleration if bent else velocity

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.parameters import DAMPING_UNIT, axis_size, split
 
 

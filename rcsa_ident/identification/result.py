@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.dynamics.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.delimited import TextTable, read_table
 from rcsa_ident.io.files import write_text

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io.files import MEGABYTE, read_bytes
 from rcsa_ident.io.keys import listed

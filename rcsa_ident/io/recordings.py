@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io import delimited, hdf5
 from rcsa_ident.io.hdf5 import write_hdf5

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.dynamics.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.machines import MachineFile

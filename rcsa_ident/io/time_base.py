@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray
 
 #: Of a step: a time may stand this far from its place for other reasons than rounding.
 JITTER = 0.02

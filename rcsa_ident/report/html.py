@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident import __version__
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification.result import AxisResult, Identification
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.report import figures

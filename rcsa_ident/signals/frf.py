@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.signals.steady import SteadyRecord
 
 

@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from rcsa_ident.dynamics.arrays import FloatArray, frozen
+from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, positive
 

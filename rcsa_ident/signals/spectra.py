@@ -8,7 +8,7 @@ import numpy as np
 from scipy.fft import next_fast_len
 from scipy.signal import get_window
 
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals._kernels import order_signal, order_sums
 

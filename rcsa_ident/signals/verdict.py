@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import get_window
 
-from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, follow_speed, line_spectrum, refine_speed
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.signals._kernels import order_sums
 
 #: Share of the median tooth-passing amplitude by which a block may differ and still be steady.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rcsa_ident.dynamics.arrays import FloatArray, frozen
+from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.errors import InputError
 
 

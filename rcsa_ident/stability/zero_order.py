@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.directional import mean_directional_matrix
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability._kernels import envelope, largest_real_part, pitch_envelope

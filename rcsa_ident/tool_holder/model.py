@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.structure import Structure, poles

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.dynamics.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.virtual._kernels import mill
 from rcsa_ident.virtual.reduction import Poles

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse
 
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.errors import InputError
 from rcsa_ident.virtual.rotor import Rotor, frequency_motion

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.tool_holder.geometry import ToolAssembly

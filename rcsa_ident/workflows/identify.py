@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
-from rcsa_ident.dynamics.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.data import IdentificationData, prepare

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import Receptance

@@ -8,9 +8,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.dynamics.arrays import FloatArray
 from rcsa_ident.machining_setup import Tooling, Workpiece
 from rcsa_ident.virtual.campaign import SimulatedCut, SimulatedRecord, TrueFlange, TrueReceptances
 from rcsa_ident.virtual.machine import CutPlan, VirtualSpindle

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
-from rcsa_ident.dynamics.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import Receptance

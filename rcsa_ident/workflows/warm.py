@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.dynamics.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcsa_ident.dynamics.arrays import frozen
+from rcsa_ident.arrays import frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance, dissipation
 from rcsa_ident.errors import InputError

@@ -10,11 +10,9 @@ import pytest
 from rcsa_ident.cutting.force import force_lines
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.data import prepare
-from rcsa_ident.identification.default import DefaultMethod
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import axis_size
 from rcsa_ident.identification.priors import Priors
-from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.signals.measurement import AxisLines, CutMeasurement

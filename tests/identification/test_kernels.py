@@ -184,17 +184,14 @@ def test_best_grid_misfit_against_loops():
     turned = measured * np.exp(1j * weights[:, 0] * delays)
     table = np.ascontiguousarray(np.stack([turned.real, turned.imag], axis=1))
     totals = np.array([1.0, 2.0])
-    kernels.best_grid_misfit(
-        np.stack([model.real, model.imag]), np.abs(measured) ** 2, weights[:, 2].copy(), table, start, group, totals
-    )
+    kernels.best_grid_misfit(np.stack([model.real, model.imag]), np.abs(measured) ** 2, weights[:, 2].copy(), table, start, group, totals)
     expected = np.array([1.0, 2.0])
     for k in range(3):
         on_grid, fine = np.inf, np.inf
         for d in range(grid * 64):
             delay = d / (64 * grid) * prior[k, 3]
             each = [
-                weights[j, 2] * abs(measured[j] * np.exp(1j * weights[j, 0] * delay) - model[j]) ** 2
-                for j in range(start[k], start[k + 1])
+                weights[j, 2] * abs(measured[j] * np.exp(1j * weights[j, 0] * delay) - model[j]) ** 2 for j in range(start[k], start[k + 1])
             ]
             fine = min(fine, sum(each))
             on_grid = min(on_grid, sum(each)) if d % 64 == 0 else on_grid

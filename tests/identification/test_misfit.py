@@ -151,5 +151,7 @@ def test_a_line_of_nothing_without_noise_keeps_its_place(few, theta):
     lines = np.array(axis.lines)
     lines[3] = 0.0
     data = replace(few.only(Dof.X), axes=(replace(axis, lines=lines, variance=np.zeros(axis.omega.size)),))
-    found = Misfit(data, Priors(), (0.02,)).evaluate(np.concatenate([theta[: axis_size(3)], theta[-4:]]), (3,), np.zeros((len(data.cut_ids), 2)), 16)
+    found = Misfit(data, Priors(), (0.02,)).evaluate(
+        np.concatenate([theta[: axis_size(3)], theta[-4:]]), (3,), np.zeros((len(data.cut_ids), 2)), 16
+    )
     assert np.isfinite(found.cost)

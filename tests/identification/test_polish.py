@@ -29,7 +29,7 @@ def misfit(planted):
 
 @pytest.fixture(scope="module")
 def start(theta):
-    return theta + 0.03 * np.random.default_rng(4).standard_normal(theta.size)
+    return theta + 0.03 * np.random.default_rng(5).standard_normal(theta.size)
 
 
 def test_finds_the_minimum_to_rounding(misfit, planted, theta, start):
@@ -71,3 +71,10 @@ def test_no_numbers_is_not_converged(misfit, theta):
     begin[4] = np.nan
     found = polish(misfit, begin, ORDERS, np.zeros((len(misfit.data.cut_ids), 2)), 5)
     assert not found.converged
+
+
+def test_light_damping_is_raised_as_far_as_a_step_needs(misfit, theta):
+    # many good steps take the damping to its least; one that overshoots must not pass for the end
+    begin = theta + 0.03 * np.random.default_rng(4).standard_normal(theta.size)
+    found = polish(misfit, begin, ORDERS, np.zeros((len(misfit.data.cut_ids), 2)), 200, grid=32)
+    assert np.abs(found.evaluation.linear.gradient / np.sqrt(np.diag(found.evaluation.hessian))).max() < 50.0

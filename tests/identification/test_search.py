@@ -5,7 +5,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import axis_size
 from rcsa_ident.identification.priors import Priors
-from rcsa_ident.identification.search import SearchSettings, _by_frequency, explore, starts
+from rcsa_ident.identification.search import SearchSettings, _by_frequency, explore, starts, with_mode_below
 from tests.identification.conftest import machine_vector, remade
 
 SMALL = SearchSettings(modes=4, population=4, generations=3, steps=3)
@@ -71,3 +71,13 @@ def test_damping_lost_to_rounding_stops_nothing(misfit):
     theta = machine_vector((2600.0, 600.0, 1400.0), seed=3)
     theta[9:15] = [-30.0, 2.0, -40.0, 2.0, 0.0, -50.0]
     assert np.all(np.isfinite(_by_frequency(theta, 3)))
+
+
+def test_a_mode_moved_below_the_band(misfit):
+    theta = machine_vector((700.0, 1400.0, 2600.0), seed=3)
+    theta[5:7] = [0.01, -0.02]  # the second mode hardly shows
+    moved = with_mode_below(theta, 3, 500.0)
+    frequency = np.exp(moved[:3]) / (2.0 * np.pi)
+    np.testing.assert_allclose(frequency, [250.0, 700.0, 2600.0])
+    np.testing.assert_array_equal(moved[5:9], theta[[3, 4, 7, 8]])
+    np.testing.assert_array_equal(moved[-7:], theta[-7:])
