@@ -163,7 +163,7 @@ def _axis_result(i: int, data: IdentificationData, misfit: Misfit, solution: Sol
     parts, joint = split(solution.theta, solution.orders)
     first = sum(p.size for p in parts[:i])
     entries = np.r_[first : first + parts[i].size, solution.theta.size - 4 : solution.theta.size]
-    rest = misfit.residuals(solution.evaluation)[i]
+    rest = solution.evaluation.residual.lines[i]
     squares = np.abs(rest) ** 2
     tooling = data.cut_tooling[axis.cut]
     per_tooling = {name: float(squares[tooling == t].mean() / 2.0) for t, name in enumerate(data.toolings) if np.any(tooling == t)}

@@ -32,12 +32,15 @@ class Evaluation:
         Gradient and Gauss-Newton matrix of half the cost, where asked for.
     models : tuple of complex arrays [m/N]
         The model's cross FRF on the lines of each axis.
+    residual : Residual
+        Whose squares add up to the cost.
     """
 
     cost: float
     chi2: tuple[float, ...]
     nuisance: FloatArray
     models: tuple[ComplexArray, ...]
+    residual: Residual
     linear: Linearisation | None = None
 
     @property
@@ -178,7 +181,7 @@ class Misfit:
                 blocks.append((slice(first, first + axis_size(m)), -gradient * scale * np.sqrt(w)[:, None]))
                 first += axis_size(m)
             linear = self._linearise(residual, own_jacobian, tuple(blocks), nuisance)
-        return Evaluation(cost, chi2, nuisance, tuple(models), linear)
+        return Evaluation(cost, chi2, nuisance, tuple(models), residual, linear)
 
     def residual_at(self, theta: FloatArray, orders: tuple[int, ...], nuisance: FloatArray) -> Residual:
         """Return the residual with the cuts' delays and angles as they are given."""
@@ -208,10 +211,6 @@ class Misfit:
         prior = self.data.cut_prior
         cuts = np.sqrt(prior[:, 1:3]) * (nuisance - np.stack([prior[:, 0], np.zeros(len(prior))], axis=1))
         return Residual(lines, own, cuts), own_jacobian
-
-    def residuals(self, evaluation: Evaluation) -> list[ComplexArray]:
-        """Return each axis' residuals in standard deviations."""
-        return [self._rest(i, model, evaluation.nuisance) for i, model in enumerate(evaluation.models)]
 
     def without_delay(self, axis: AxisData, nuisance: FloatArray) -> ComplexArray:
         """Return the measured lines of an axis as they would be with tooth 1 at immersion 0 at the start [m/N]."""

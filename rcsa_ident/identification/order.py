@@ -80,7 +80,7 @@ def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> t
     used += 2.0 * len(misfit.data.cut_ids)
     free = max(1.0 - used / misfit.points, 0.1)
     shares = []
-    for axis, rest, weight in zip(misfit.data.axes, misfit.residuals(solution.evaluation), misfit.weight, strict=True):
+    for axis, rest, weight in zip(misfit.data.axes, solution.evaluation.residual.lines, misfit.weight, strict=True):
         squares, size = np.abs(rest) ** 2 / weight, np.abs(axis.measured) ** 2
         shares.append(_share(squares, axis.variance, size, 2.0 * axis.omega.size * free, smallest))
     return tuple(shares)

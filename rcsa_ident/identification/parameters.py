@@ -9,10 +9,11 @@ passive machine with real modes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel, damped_modes
@@ -53,6 +54,13 @@ def axis_size(order: int) -> int:
     return 3 * order + order * (order + 1) // 2 + 3
 
 
+@lru_cache
+def lower_triangle(order: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return rows and columns of the damping factor's entries in the vector's order, and which are on the diagonal."""
+    rows, cols = (frozen(index, np.intp) for index in np.tril_indices(order))
+    return rows, cols, frozen(rows == cols, np.bool_)
+
+
 def split(theta: FloatArray, orders: tuple[int, ...]) -> tuple[list[FloatArray], FloatArray]:
     """Return the axes' parts and the joint's."""
     edges = np.cumsum([axis_size(m) for m in orders])
@@ -63,10 +71,10 @@ def split(theta: FloatArray, orders: tuple[int, ...]) -> tuple[list[FloatArray],
 def unpack(part: FloatArray, order: int) -> AxisParameters:
     """Return the physics of an axis' part of the vector."""
     m = order
-    rows, cols = np.tril_indices(m)
+    rows, cols, diagonal = lower_triangle(m)
     lower = part[3 * m : -3]
     factor = np.zeros((m, m))
-    factor[rows, cols] = DAMPING_UNIT * np.where(rows == cols, np.exp(np.where(rows == cols, lower, 0.0)), lower)
+    factor[rows, cols] = DAMPING_UNIT * np.where(diagonal, np.exp(np.where(diagonal, lower, 0.0)), lower)
     residual = np.zeros((2, 2))
     residual[np.tril_indices(2)] = RESIDUAL_UNIT * part[-3:]
     return AxisParameters(np.exp(2.0 * part[:m]), part[m : 3 * m].reshape(m, 2), factor, residual)
@@ -75,9 +83,9 @@ def unpack(part: FloatArray, order: int) -> AxisParameters:
 def pack(axis: AxisParameters) -> FloatArray:
     """Return the vector of an axis; the inverse of `unpack`."""
     m = axis.order
-    rows, cols = np.tril_indices(m)
+    rows, cols, diagonal = lower_triangle(m)
     lower = axis.factor[rows, cols] / DAMPING_UNIT
-    lower = np.where(rows == cols, np.log(np.where(rows == cols, np.abs(lower), 1.0)), lower)
+    lower = np.where(diagonal, np.log(np.where(diagonal, np.abs(lower), 1.0)), lower)
     tail = axis.residual[np.tril_indices(2)] / RESIDUAL_UNIT
     return np.concatenate([0.5 * np.log(axis.stiffness), axis.psi.ravel(), lower, tail])
 
@@ -85,8 +93,8 @@ def pack(axis: AxisParameters) -> FloatArray:
 def chain(axis: AxisParameters) -> FloatArray:
     """Return d physics / d vector for each entry of an axis (the map is entry by entry), in the kernel's order."""
     m = axis.order
-    rows, cols = np.tril_indices(m)
-    factor = np.where(rows == cols, axis.factor[rows, cols], DAMPING_UNIT)
+    rows, cols, diagonal = lower_triangle(m)
+    factor = np.where(diagonal, axis.factor[rows, cols], DAMPING_UNIT)
     return np.concatenate([2.0 * axis.stiffness, np.ones(2 * m), factor, np.full(3, RESIDUAL_UNIT)])
 
 

@@ -114,7 +114,7 @@ def _step(misfit: Misfit, theta: FloatArray, orders: tuple[int, ...], here: Eval
         return velocity * (LARGEST_STEP / largest)
     cuts = linear.follow(velocity)
     ahead = here.nuisance + PROBE * cuts * np.array([DELAY_UNIT, 1.0])
-    change = misfit.residual_at(theta + PROBE * velocity, orders, ahead).minus(misfit.residual_at(theta, orders, here.nuisance))
+    change = misfit.residual_at(theta + PROBE * velocity, orders, ahead).minus(here.residual)
     bend = change.times(1.0 / PROBE).minus(linear.push(velocity, cuts)).times(2.0 / PROBE)
     acceleration = -0.5 * scipy.linalg.cho_solve(factor, linear.pull(bend) / scale, check_finite=False) / scale
     # where the bend is as large as the step, the expansion says nothing

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.identification.parameters import DAMPING_UNIT, axis_size, split
+from rcsa_ident.identification.parameters import DAMPING_UNIT, axis_size, lower_triangle, split
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +54,7 @@ def prior_rows(theta: FloatArray, orders: tuple[int, ...], priors: Priors) -> tu
     jacobian = np.zeros((theta.size, theta.size))
     first = 0
     for part, m in zip(parts, orders, strict=True):
-        rows, cols = np.tril_indices(m)
-        diagonal = rows == cols
+        diagonal = lower_triangle(m)[2]
         spread = np.concatenate(
             [
                 np.full(m, priors.frequency_spread),

@@ -9,7 +9,17 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import DAMPING_UNIT, AxisParameters, axis_size, pack, selected, split, unpack, without_mode
+from rcsa_ident.identification.parameters import (
+    DAMPING_UNIT,
+    AxisParameters,
+    axis_size,
+    lower_triangle,
+    pack,
+    selected,
+    split,
+    unpack,
+    without_mode,
+)
 from rcsa_ident.identification.polish import Solution, polish
 
 
@@ -40,8 +50,7 @@ def starts(count: int, modes: int, band_hz: tuple[float, float], misfit: Misfit,
     frequency = np.sort(rng.uniform(low, high, (count, modes)), axis=1)
     theta[:, :modes] = np.log(2.0 * np.pi * frequency)
     theta[:, modes : 3 * modes] = 0.1 * rng.standard_normal((count, 2 * modes))
-    rows, cols = np.tril_indices(modes)
-    own = 3 * modes + np.flatnonzero(rows == cols)
+    own = 3 * modes + np.flatnonzero(lower_triangle(modes)[2])
     theta[:, own] = 0.5 * np.log(2.0 * 0.05 * 2.0 * np.pi * frequency) - np.log(DAMPING_UNIT)
     theta[:, -7:-4] = [1.0, 0.1, 1.0]
     theta[:, -4:] = np.log(misfit.priors.joint)

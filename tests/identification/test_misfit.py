@@ -61,7 +61,7 @@ def jacobian(misfit, theta, here):
 def test_cost_is_all_residuals(misfit, theta, here):
     residual = misfit.residual_at(theta, ORDERS, here.nuisance)
     assert here.cost == pytest.approx(flat(residual) @ flat(residual), rel=1e-12)
-    for chi2, lines in zip(here.chi2, misfit.residuals(here), strict=True):
+    for chi2, lines in zip(here.chi2, here.residual.lines, strict=True):
         assert chi2 == pytest.approx(np.sum(np.abs(lines) ** 2), rel=1e-12)
     assert misfit.points == 2 * sum(a.omega.size for a in misfit.data.axes)
 
