@@ -1,4 +1,4 @@
-"""The default method: explore, refine from coarse to fine noise, drop modes by evidence, polish both axes together."""
+"""The default method: explore, refine from coarse to fine noise, drop and exchange modes by evidence, polish both axes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.order import drop_modes, evidence, model_error
+from rcsa_ident.identification.order import drop_modes, evidence, exchange_modes, model_error
 from rcsa_ident.identification.parameters import joint_of, modes_of, split, unpack
 from rcsa_ident.identification.polish import Solution, polish
 from rcsa_ident.identification.posterior import Posterior, spread
@@ -24,10 +24,12 @@ from rcsa_ident.identification.search import SearchSettings, explore, with_mode_
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 
 #: Above this share of unexplained signal the force model or the recordings are wrong.
-WORST_MODEL_ERROR = 0.05
+WORST_MODEL_ERROR = 0.02
 #: Solutions whose evidence lies closer than this are told apart by chance only.
 EVIDENCE_TIE = 6.0
 FEWEST_CUTS = 8
+#: Mean squared residual of a cut above which it contradicts the others.
+WORST_CUT = 25.0
 #: Half of the lines must carry at least this many times their noise (its amplitude's root mean square).
 LEAST_SIGNAL = 3.0
 
@@ -70,6 +72,9 @@ class DefaultMethod:
         sequences = np.random.SeedSequence(seed).spawn(len(data.axes))
         jobs = [(self, data.only(a.axis), s) for a, s in zip(data.axes, sequences, strict=True)]
         searched = list(map(_search_axis, jobs))
+        if len(searched) == 2:
+            crossed = [(self, job[1], own, other) for job, own, other in zip(jobs, searched, searched[::-1], strict=True)]
+            searched = list(map(_from_other_axis, crossed))
         return _finish(self, data, searched, seed)
 
 
@@ -109,16 +114,31 @@ def _search_axis(job: tuple[DefaultMethod, IdentificationData, np.random.SeedSeq
         misfit = Misfit(data, method.priors, (share,))
         best = polish(misfit, best.theta, best.orders, best.evaluation.nuisance, 60, tolerance=1e-3)
         report("learn noise", best.cost)
-    finals = [drop_modes(best, misfit, report)]
-    # a second, different road to the same place is the cheapest check that the place is right
-    for other in refined[1:]:
-        if other.cost < 2.0 * refined[0].cost:
-            second = polish(misfit, other.theta, other.orders, other.evaluation.nuisance, 60, tolerance=1e-3)
-            finals.append(drop_modes(second, misfit, report))
-            break
-    values = [evidence(s, misfit) for s in finals]
-    ranked = sorted(range(len(finals)), key=values.__getitem__)
-    return _AxisSearch([finals[i] for i in ranked], [values[i] for i in ranked], share, trace)
+    best = exchange_modes(drop_modes(best, misfit, report), misfit, band, report)
+    # with the right modes less is left unexplained than with the first ones
+    share = model_error(best, misfit)[0]
+    misfit = Misfit(data, method.priors, (share,))
+    best = polish(misfit, best.theta, best.orders, best.evaluation.nuisance, 100)
+    report("learn noise", best.cost)
+    return _ranked([best], misfit, share, trace)
+
+
+def _ranked(solutions: list[Solution], misfit: Misfit, share: float, trace: list[tuple[str, str, float]]) -> _AxisSearch:
+    values = [evidence(s, misfit) for s in solutions]
+    order = sorted(range(len(solutions)), key=values.__getitem__)
+    return _AxisSearch([solutions[i] for i in order], [values[i] for i in order], share, trace)
+
+
+def _from_other_axis(job: tuple[DefaultMethod, IdentificationData, _AxisSearch, _AxisSearch]) -> _AxisSearch:
+    """Start an axis once more from the other axis' answer: the same spindle, with somewhat other bearings and support."""
+    method, data, own, other = job
+    start = other.solutions[0]
+    rough = Misfit(data, method.priors, (method.coarse[1],))
+    misfit = Misfit(data, method.priors, (own.model_error,))
+    found = polish(rough, start.theta, start.orders, start.evaluation.nuisance, 60, grid=32)
+    found = drop_modes(polish(misfit, found.theta, found.orders, found.evaluation.nuisance, 100), misfit)
+    trace = [*own.trace, (str(data.axes[0].axis), "from the other axis", found.cost)]
+    return _ranked([*own.solutions, found], misfit, own.model_error, trace)
 
 
 def _finish(method: DefaultMethod, data: IdentificationData, searched: list[_AxisSearch], seed: int) -> Identification:
@@ -216,6 +236,7 @@ def _doubts(data: IdentificationData, searched: list[_AxisSearch], solution: Sol
                 f"{str(axis.axis).upper()}: {100 * share:.1f} % of each line stay unexplained (at most {100 * WORST_MODEL_ERROR:g} %): "
                 "cutting coefficients, toolings, tooth count or sensor signs may be wrong"
             )
+    reasons += _contradicting_cuts(data, solution)
     for axis, found in zip(data.axes, searched, strict=True):
         if len(found.solutions) > 1 and found.evidences[1] - found.evidences[0] < EVIDENCE_TIE:
             difference, band = _difference(misfit.data.only(axis.axis), *found.solutions[:2])
@@ -233,6 +254,16 @@ def _doubts(data: IdentificationData, searched: list[_AxisSearch], solution: Sol
     return reasons
 
 
+def _contradicting_cuts(data: IdentificationData, solution: Solution) -> list[str]:
+    squares, lines = np.zeros(len(data.cut_ids)), np.zeros(len(data.cut_ids))
+    for axis, rest in zip(data.axes, solution.evaluation.residual.lines, strict=True):
+        squares += np.bincount(axis.cut, np.abs(rest) ** 2, minlength=squares.size)
+        lines += 2.0 * np.bincount(axis.cut, minlength=squares.size)
+    worse = squares / np.maximum(lines, 1.0)
+    named = [f"{data.cut_ids[k]} ({worse[k]:.0f} times its variance)" for k in np.argsort(-worse) if worse[k] > WORST_CUT]
+    return [f"cuts that contradict the others: {', '.join(named[:5])}"] if named else []
+
+
 def _difference(data: IdentificationData, one: Solution, two: Solution) -> tuple[float, float]:
     """Relative difference of the flange receptance of two solutions of an axis over the band, and the first one's deviation."""
     axis = data.axes[0].axis
@@ -244,4 +275,6 @@ def _difference(data: IdentificationData, one: Solution, two: Solution) -> tuple
     first, second = (Posterior(s.theta, np.linalg.inv(s.evaluation.hessian)) for s in (one, two))
     value, other = flange(*first.machine(axis)), flange(*second.machine(axis))
     size = np.linalg.norm(value)
+    if size == 0.0:
+        return 0.0, 0.0
     return float(np.linalg.norm(value - other) / size), float(np.linalg.norm(spread(first, axis, flange)) / size)

@@ -8,7 +8,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import pack, split, unpack, without_mode
+from rcsa_ident.identification.parameters import pack, split, unpack, with_mode, without_mode
 from rcsa_ident.identification.polish import Solution, polish
 from rcsa_ident.identification.priors import log_volume, prior_rows
 
@@ -60,6 +60,51 @@ def drop_modes(solution: Solution, misfit: Misfit, report: Callable[[str, float]
             best, best_evidence = here, value
         elif value > best_evidence + GIVE_UP:
             break
+    return best
+
+
+def exchange_modes(
+    solution: Solution,
+    misfit: Misfit,
+    band_hz: tuple[float, float],
+    report: Callable[[str, float], None] | None = None,
+    places: int = 9,
+    rounds: int = 3,
+) -> Solution:
+    """Return the best model that is reached by adding a mode where it helps most and dropping those that are not needed.
+
+    A walk downwards alone can't mend a mode that once settled in the wrong place; this one can. It ends with the first round
+    that gains nothing.
+
+    Parameters
+    ----------
+    solution : Solution
+        Of one axis, polished.
+    band_hz : (float, float)
+        Lowest and highest line.
+    places : int
+        Frequencies at which a new mode is tried, in the band and on both sides of it, each with both signs of its slope.
+    rounds : int
+        Most rounds.
+    """
+    best, best_evidence = solution, evidence(solution, misfit)
+    for _ in range(rounds):
+        (part,), joint = split(best.theta, best.orders)
+        axis, orders = unpack(part, best.orders[0]), (best.orders[0] + 1,)
+        trials = []
+        for frequency in np.linspace(0.3 * band_hz[0], 1.5 * band_hz[1], places):
+            for slope in (0.1, -0.1):
+                theta = np.concatenate([pack(with_mode(axis, 2.0 * np.pi * frequency, (0.1, slope))), joint])
+                trials.append(polish(misfit, theta, orders, best.evaluation.nuisance, max_steps=5))
+        trials.sort(key=lambda s: s.cost)
+        grown = [polish(misfit, t.theta, orders, t.evaluation.nuisance, max_steps=60) for t in trials[:2]]
+        reached = drop_modes(min(grown, key=lambda s: s.cost), misfit)
+        value = evidence(reached, misfit)
+        if report is not None:
+            report("exchange", reached.cost)
+        if value >= best_evidence - 1.0:
+            break
+        best, best_evidence = reached, value
     return best
 
 

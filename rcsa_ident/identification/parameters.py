@@ -118,6 +118,13 @@ def without_mode(axis: AxisParameters, mode: int) -> AxisParameters:
     return selected(axis, np.flatnonzero(np.arange(axis.order) != mode))
 
 
+def with_mode(axis: AxisParameters, omega_n: float, psi: tuple[float, float], zeta: float = 0.05) -> AxisParameters:
+    """Return the axis with one more mode in front, whose damping is not coupled to the others'."""
+    factor = np.zeros((axis.order + 1, axis.order + 1))
+    factor[0, 0], factor[1:, 1:] = np.sqrt(2.0 * zeta * omega_n), axis.factor
+    return AxisParameters(np.append(omega_n**2, axis.stiffness), np.concatenate([[psi], axis.psi]), factor, axis.residual)
+
+
 def scaled_joint(logs: FloatArray) -> FloatArray:
     """Return k_t, k_r, c_t, c_r with the rotational ones per lever squared, as the kernel takes them."""
     return np.exp(logs) / np.array([1.0, LEVER**2, 1.0, LEVER**2])

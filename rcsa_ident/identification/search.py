@@ -11,13 +11,13 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import (
     DAMPING_UNIT,
-    AxisParameters,
     axis_size,
     lower_triangle,
     pack,
     selected,
     split,
     unpack,
+    with_mode,
     without_mode,
 )
 from rcsa_ident.identification.polish import Solution, polish
@@ -121,12 +121,7 @@ def with_mode_below(theta: FloatArray, modes: int, lowest_hz: float) -> FloatArr
     (part,), joint = split(theta, (modes,))
     axis = unpack(part, modes)
     weakest = int(np.argmin(np.sum(axis.psi**2, axis=1)))
-    rest = without_mode(axis, weakest)
-    omega = np.pi * lowest_hz
-    factor = np.zeros((modes, modes))
-    factor[0, 0], factor[1:, 1:] = np.sqrt(2.0 * 0.05 * omega), rest.factor
-    psi = np.concatenate([[[0.2, 0.2]], rest.psi])
-    return np.concatenate([pack(AxisParameters(np.append(omega**2, rest.stiffness), psi, factor, axis.residual)), joint])
+    return np.concatenate([pack(with_mode(without_mode(axis, weakest), np.pi * lowest_hz, (0.2, 0.2))), joint])
 
 
 def _by_frequency(theta: FloatArray, modes: int) -> FloatArray:
