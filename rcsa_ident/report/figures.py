@@ -1,4 +1,7 @@
-"""Figures of an identification, without a window: each function returns a figure, `svg` makes text of it."""
+"""Figures of an identification, without a window: each function returns a figure, `svg` makes text of it.
+
+One file for all, though a little long: they share one style, one palette and the way from figure to text.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +27,8 @@ STAGES = {
     "search": ("genetic search", "#9aa5b1"),
     "refine": ("refined candidates", "#0072B2"),
     "learn noise": ("noise learned from the data", "#009E73"),
+    "exchange": ("modes exchanged", "#CC79A7"),
+    "from the other axis": ("started from the other axis", "#E69F00"),
     "polish": ("both axes polished", "#C8501A"),
     "generation": ("best of each generation", "#0072B2"),
 }

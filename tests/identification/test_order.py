@@ -3,8 +3,8 @@ import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.order import drop_modes, evidence, model_error
-from rcsa_ident.identification.parameters import axis_size
+from rcsa_ident.identification.order import drop_modes, evidence, exchange_modes, model_error
+from rcsa_ident.identification.parameters import axis_size, pack, unpack, without_mode
 from rcsa_ident.identification.polish import polish
 from rcsa_ident.identification.priors import Priors
 from tests.identification.conftest import machine_vector, remade
@@ -42,6 +42,29 @@ def test_evidence_prefers_the_true_number_of_modes(few, theta):
     assert dict(seen)["3 modes"] < min(dict(seen)["4 modes"], dict(seen)["2 modes"], evidence(full, misfit))
     frequency = np.sort(np.exp(best.theta[:3])) / (2.0 * np.pi)
     np.testing.assert_allclose(frequency, [600.0, 1400.0, 2600.0], rtol=0.02)
+
+
+def test_exchange_brings_back_a_mode_that_the_search_has_missed(few, theta):
+    rng = np.random.default_rng(8)
+    data, _ = remade(few.only(Dof.X), theta, (3,), rng, noise=5e-3)
+    misfit = Misfit(data, Priors(), (5e-4,))
+    nuisance = np.zeros((len(data.cut_ids), 2))
+    right = polish(misfit, theta, (3,), nuisance, 100, grid=32)
+    kept = without_mode(unpack(theta[:-4], 3), 1)
+    poor = polish(misfit, np.concatenate([pack(kept), theta[-4:]]), (2,), nuisance, 60, grid=32)
+    assert evidence(poor, misfit) > evidence(right, misfit) + 100.0
+    found = exchange_modes(poor, misfit, (530.0, 4300.0))
+    assert found.orders == (3,)
+    assert evidence(found, misfit) == pytest.approx(evidence(right, misfit), abs=3.0)
+
+
+def test_exchange_leaves_the_right_model_alone(few, theta):
+    data, _ = remade(few.only(Dof.X), theta, (3,), np.random.default_rng(9), noise=5e-3)
+    misfit = Misfit(data, Priors(), (5e-4,))
+    right = polish(misfit, theta, (3,), np.zeros((len(data.cut_ids), 2)), 100, grid=32)
+    found = exchange_modes(right, misfit, (530.0, 4300.0))
+    assert found.orders == (3,)
+    assert evidence(found, misfit) <= evidence(right, misfit)
 
 
 def test_evidence_of_a_linear_model_is_exact(few, theta):
