@@ -234,7 +234,7 @@ def _doubts(data: IdentificationData, searched: list[_AxisSearch], solution: Sol
         if share > WORST_MODEL_ERROR:
             reasons.append(
                 f"{str(axis.axis).upper()}: {100 * share:.1f} % of each line stay unexplained (at most {100 * WORST_MODEL_ERROR:g} %): "
-                "cutting coefficients, toolings, tooth count or sensor signs may be wrong"
+                "cutting coefficients, toolings, tooth count or sensor signs may be wrong, or the dynamics change with speed"
             )
     reasons += _contradicting_cuts(data, solution)
     for axis, found in zip(data.axes, searched, strict=True):

@@ -23,6 +23,8 @@ from rcsa_ident.identification.result import AxisResult, Identification, Status
 
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 GRID = 64
+#: Mean squared residual, at 2 % model error, above which the answer is not to be believed.
+WORST_MISFIT = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,10 +134,14 @@ class PaperGeneticAlgorithm:
             problem = _Problem(self, data.only(axis.axis))
             axes[axis.axis] = problem.result(x)
             trace += [(str(axis.axis), "generation", float(c)) for c in costs]
+            name, misfit = str(axis.axis).upper(), axes[axis.axis].chi2_per_point
+            if misfit > WORST_MISFIT:
+                reasons.append(
+                    f"{name}: the modes miss the lines, chi2 per point {misfit:.0f} at 2 % of each line (at most {WORST_MISFIT:g})"
+                )
             omega = np.linspace(axis.omega.min(), axis.omega.max(), 400)
             worst = float(dissipation(omega, axes[axis.axis].modes.receptance(omega).values).min())
             if worst < -1e-9:
-                name = str(axis.axis).upper()
                 reasons.append(f"{name}: the modes are not passive, they feed energy in (down to {worst:.2f} of the mobility)")
         assert problem is not None
         delays = problem.delays(axes[data.axes[-1].axis])
