@@ -235,8 +235,8 @@ def tooltip_frf(
         all_sizes = 1e6 * np.abs(np.concatenate(list(tip.values())))
         all_real = 1e6 * np.concatenate(list(tip.values())).real
         reach = 0.08 * float(np.ptp(all_real))
-        grid[0, 0].set_ylim(0.5 * float(all_sizes.min()), 2.0 * float(all_sizes.max()))
-        grid[1, 0].set_ylim(float(all_real.min()) - reach, float(all_real.max()) + reach)
+        grid[0, 0].set_ylim(0.5 * float(np.min(all_sizes)), 2.0 * float(np.max(all_sizes)))
+        grid[1, 0].set_ylim(float(np.min(all_real)) - reach, float(np.max(all_real)) + reach)
         grid[0, 0].set_ylabel("|C11|  [µm/N]")
         grid[1, 0].set_ylabel("real part [µm/N]")
     return figure
@@ -272,7 +272,7 @@ def stability_figure(
     speed = lobes.spindle_speed * _RPM
     limit = 1e3 * np.minimum(lobes.limit_depth, max_depth)
     finite = limit[np.isfinite(lobes.limit_depth)]
-    ceiling = 1e3 * max_depth if finite.size < limit.size else min(1e3 * max_depth, 1.25 * float(limit.max()))
+    ceiling = 1e3 * max_depth if finite.size < limit.size else min(1e3 * max_depth, 1.25 * float(np.max(limit)))
     with mpl.rc_context(_STYLE):
         top.fill_between(speed, 0.0, limit, color="#009E73", alpha=0.13, lw=0)
         top.fill_between(speed, limit, ceiling, color="#C8501A", alpha=0.10, lw=0)
@@ -303,5 +303,5 @@ def stability_figure(
         bottom.plot(speed[order], chatter, color="#52606d")
         bottom.set_ylabel("chatter [Hz]")
         bottom.set_xlabel("spindle speed [rev/min]")
-        bottom.set_xlim(speed.min(), speed.max())
+        bottom.set_xlim(np.min(speed), np.max(speed))
     return figure

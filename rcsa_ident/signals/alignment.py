@@ -86,7 +86,7 @@ def trigger_edge(recording: Recording, speed: float) -> tuple[float, float] | No
     # a stray edge does not belong to the mark
     good = np.abs(late - np.median(late)) < 2.0 + 0.01 * period
     late, first = late[good], edges[good][0] - late[good][0]
-    low, high = late.max() - 1.0, late.min()
+    low, high = np.max(late) - 1.0, np.min(late)
     if high > low:
         time, std = first + 0.5 * (low + high), (high - low) / np.sqrt(12.0)
     else:

@@ -126,7 +126,7 @@ def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) ->
     order = np.arange(1, lines.amplitude.shape[0])[:, None]
     power = np.abs(lines.amplitude[1:, : samples.shape[1]]) ** 2
     information = power / np.maximum(lines.variance[1:, : samples.shape[1]], 1e-300)
-    visible = information.max() > VISIBLE
+    visible = bool(np.max(information) > VISIBLE)
     if _explained(lines, samples.shape[1]) < 0.5:
         other = refine_speed(samples, rate, programmed, search=WIDE_SEARCH)
         if _explained(line_spectrum(samples, rate, other, order.size * speed / (2.0 * np.pi)), samples.shape[1]) > 0.5:
@@ -170,7 +170,7 @@ def silence(power: FloatArray, variance: FloatArray) -> str | None:
     """
     ratio = power / np.maximum(2.0 * variance, 1e-300)
     # pure noise has a mean of 1, and its largest of n is rarely above log(n) + 7
-    if ratio.max() > np.log(ratio.size) + 7.0:
+    if np.max(ratio) > np.log(ratio.size) + 7.0:
         return None
     return f"no cutting: the largest tooth-passing line is {np.sqrt(power.max()) * 1e9:.3g} nm, which is noise"
 

@@ -145,8 +145,8 @@ def _cut_arrays(
     # angle from tooth j to the 1st, 2nd, ... one ahead of it, up to itself one turn earlier
     ahead = np.array([np.cumsum(np.roll(cutter.pitch, -j)) for j in range(cutter.teeth)])
     delay = ahead / (speed * step)
-    if delay.min() < 1.0:
-        raise InputError("step", f"{step:g} s", f"at most a tooth period, {delay.min() * step:g} s")
+    if np.min(delay) < 1.0:
+        raise InputError("step", f"{step:g} s", f"at most a tooth period, {np.min(delay) * step:g} s")
     lag = 2.0 * conditions.axial_depth / slices * np.tan(cutter.helix) / cutter.diameter
     width = conditions.axial_depth / slices
     feed = conditions.feed_per_tooth * cutter.teeth * speed / (2.0 * np.pi)
