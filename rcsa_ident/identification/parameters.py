@@ -22,7 +22,6 @@ from rcsa_ident.identification.data import LEVER
 #: Units of the damping factor [sqrt(rad/s)] and of the residual compliance's factor [sqrt(m/N)].
 DAMPING_UNIT = 30.0
 RESIDUAL_UNIT = np.sqrt(1e-9)
-JOINT_SIZE = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
