@@ -41,8 +41,3 @@ class LumpedJoint:
         translation = 1.0 / (self.translational_stiffness + 1j * omega * self.translational_damping)
         slope = 1.0 / (self.rotational_stiffness + 1j * omega * self.rotational_damping)
         return np.stack([slope if dof.is_slope else translation for dof in directions], axis=1)
-
-    def compliance(self, omega: FloatArray, planes: int = 1) -> ComplexArray:
-        """Return K(omega)^-1 over (translation, slope) of each bending plane, shape (n, 2 planes, 2 planes)."""
-        diagonal = self.compliance_along(omega, (Dof.X, Dof.SLOPE_X) * planes)
-        return diagonal[:, :, None] * np.eye(2 * planes)

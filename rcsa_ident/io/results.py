@@ -95,11 +95,6 @@ def write_result(path: str | Path, identification: Mapping[str, Any]) -> None:
     write_text(path, layout(data) + "\n")
 
 
-def write_json(path: str | Path, data: Any) -> None:
-    """Write JSON with numbers as they are (shortest text that reads back the same); NaN and infinity are refused."""
-    write_text(path, layout(plain(data)) + "\n")
-
-
 def read_json(path: str | Path, field: str) -> Any:
     """Return the content of a JSON file; a syntax error names its line, a doubled key and NaN are refused."""
     where = str(path)

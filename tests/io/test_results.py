@@ -15,7 +15,7 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.results import layout, read_result, spindle_from_json, spindle_to_json, write_json, write_result
+from rcsa_ident.io.results import layout, plain, read_result, spindle_from_json, spindle_to_json, write_result
 
 MODES = ModalModel(
     2 * np.pi * np.array([1285.2, 2400.0]),
@@ -199,9 +199,14 @@ def test_a_failed_result_needs_no_axes(tmp_path, result):
         (math.inf, "value: found inf"),
     ],
 )
-def test_what_json_cannot_hold_is_named(tmp_path, data, words):
+def test_what_json_cannot_hold_is_named(data, words):
     with pytest.raises(InputError, match=words):
-        write_json(tmp_path / "x.json", data)
+        plain(data)
+
+
+def test_a_result_that_json_cannot_hold_leaves_no_file(tmp_path, result):
+    with pytest.raises(InputError, match="found nan"):
+        write_result(tmp_path / "r.json", result | {"more": math.nan})
     assert list(tmp_path.iterdir()) == []
 
 
