@@ -18,6 +18,8 @@ class CuttingCoefficients:
     radial_ratio, axial_ratio : float [-]
         k_rc and k_ac, times K_tc.
     tangential_edge, radial_edge, axial_edge : float [N/m]
+    tangential_spread, ratio_spread, edge_spread : float [-]
+        Standard deviations of the logarithms of K_tc, of k_rc and of the edge forces: how well they are known. 0 means exactly.
     """
 
     tangential: float
@@ -26,6 +28,9 @@ class CuttingCoefficients:
     tangential_edge: float = 0.0
     radial_edge: float = 0.0
     axial_edge: float = 0.0
+    tangential_spread: float = 0.05
+    ratio_spread: float = 0.05
+    edge_spread: float = 0.1
 
     def __post_init__(self) -> None:
         positive("tangential coefficient", self.tangential, "N/m^2")
@@ -34,3 +39,6 @@ class CuttingCoefficients:
                 raise InputError(name, getattr(self, name), "a ratio from -1 to 5")
         for name in ("tangential_edge", "radial_edge", "axial_edge"):
             non_negative(name, getattr(self, name), "N/m")
+        for name in ("tangential_spread", "ratio_spread", "edge_spread"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise InputError(name, getattr(self, name), "a share from 0 to 1")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,6 +11,11 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
+
+#: What `force_and_slope` varies, in its order.
+SLOPES = ("tangential coefficient", "radial ratio", "tangential edge force", "radial edge force", "run-out")
+#: A cutter's usual eccentricity in its clamping [m].
+REFERENCE_RUNOUT = 2e-6
 
 
 def tooth_force(phi: FloatArray, chip: FloatArray, coefficients: CuttingCoefficients) -> FloatArray:
@@ -66,6 +72,32 @@ def force_lines(cutter: Cutter, conditions: CuttingConditions, coefficients: Cut
     window = _exponential_integral(q[None, :] - orders[:, None], entry, exit_) / (2.0 * np.pi)
     lines = (phases @ feed)[:, None] * (window @ chip_lines) + phases.sum(axis=1)[:, None] * (window @ edge_lines)
     return _over_depth(lines, cutter, conditions, orders)
+
+
+def force_and_slope(
+    cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, orders: np.ndarray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return the lines of `force_lines`, and how their logarithms change with what is never known exactly.
+
+    Returns
+    -------
+    complex arrays, shapes (m, 2) [N] and (m, 2, 5) [-]
+        The last axis is `SLOPES`: logarithms of K_tc, k_rc, K_te and K_re, and a run-out in units of `REFERENCE_RUNOUT`, whose
+        effect on the lines that all teeth share is a secant: teeth leave the material early. 0 where there is no force.
+    """
+
+    def lines(**changed: float) -> ComplexArray:
+        return force_lines(cutter, conditions, replace(coefficients, **changed), orders)
+
+    total = lines()
+    smooth = lines(tangential_edge=0.0, radial_edge=0.0)
+    tangential = lines(tangential_edge=0.0, radial_edge=0.0, radial_ratio=0.0)
+    edges = [lines(radial_edge=0.0) - smooth, lines(tangential_edge=0.0) - smooth]
+    # no tooth stands where the eccentricity is 0 or largest
+    eccentric = replace(cutter, runout=REFERENCE_RUNOUT * np.cos(cutter.tooth_angle - 0.125 * cutter.pitch[0]))
+    runout = runout_force_lines(eccentric, conditions, coefficients, orders) - total
+    change = np.stack([smooth, smooth - tangential, *edges, runout], axis=-1)
+    return total, np.divide(change, total[..., None], out=np.zeros_like(change), where=total[..., None] != 0.0)
 
 
 def _over_depth(lines: ComplexArray, cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray) -> ComplexArray:

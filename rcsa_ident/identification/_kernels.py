@@ -13,8 +13,8 @@ import numpy as np
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _factor_solve(matrix, right):
-    """Solve a complex symmetric system in place: L D L^T, lower triangle read, `right` (m, 2) overwritten."""
+def _factor_solve(matrix, right, columns):
+    """Solve a complex symmetric system in place: L D L^T, lower triangle read, the first `columns` of `right` overwritten."""
     m = right.shape[0]
     for j in range(m):
         inverse = 1.0 / matrix[j, j]
@@ -22,96 +22,140 @@ def _factor_solve(matrix, right):
             ratio = matrix[i, j] * inverse
             for k in range(i, m):
                 matrix[k, i] -= ratio * matrix[k, j]
-            right[i, 0] -= ratio * right[j, 0]
-            right[i, 1] -= ratio * right[j, 1]
+            for c in range(columns):
+                right[i, c] -= ratio * right[j, c]
+        # kept for the way back: the pivots are not needed otherwise
+        matrix[j, j] = inverse
     for j in range(m - 1, -1, -1):
-        first, second = right[j, 0], right[j, 1]
-        for i in range(j + 1, m):
-            first -= matrix[i, j] * right[i, 0]
-            second -= matrix[i, j] * right[i, 1]
-        right[j, 0] = first / matrix[j, j]
-        right[j, 1] = second / matrix[j, j]
+        inverse = matrix[j, j]
+        for c in range(columns):
+            total = right[j, c]
+            for i in range(j + 1, m):
+                total -= matrix[i, j] * right[i, c]
+            right[j, c] = total * inverse
 
 
 @numba.njit(cache=True, error_model="numpy")
-def cross_frf(stiffness, psi, factor, residual, joint, omega, flange, tip, values, gradient):
-    """Fill `values` (n,) with the flange motion per tip force and, if it has rows, `gradient` (n, p).
+def cross_frf(omega_n, psi, factor, softening, residual, joint, points, holder, values, gradient):
+    """Fill `values` (n, o) with motion per tip force and, if it has rows, `gradient` (n, o, p).
 
-    B = psi^T (diag(stiffness) - w^2 + i w factor factor^T)^-1 psi + residual residual^T,
-    g = e0^T B x with x = (A22 + K^-1 + B)^-1 A21 e0; dg = v^T dB x - y^T dK^-1 x, y = (A22 + K^-1 + B)^-1 B e0, v = e0 - y.
+    B = psi^T (K - w^2 + i w factor factor^T)^-1 psi + R, K_ij = omega_i omega_j (delta_ij + x softening_ij);
+    output b (a row: the flange's own, or the fixture's, or their difference) answers g = b x with
+    x = (A22 + K_joint^-1 + B)^-1 A21 e0; dg = db x - y^T (dB + dK_joint^-1) x, y = (A22 + K_joint^-1 + B)^-1 b^T.
 
     Parameters
     ----------
-    stiffness : (m,) squares of the natural frequencies
-    psi : (m, 2); factor : (m, m) lower triangular; residual : (2, 2) lower triangular
-    joint : (4,) k_t, k_r, c_t, c_r
-    omega : (n,); flange : (n, 3) A22; tip : (n, 2) A21 e0
+    omega_n : (m,); psi : (m, 3) flange t, flange r, fixture; factor : (m, m) lower triangular
+    softening : (m, m) symmetric, or (0, 0) where nothing changes with speed
+    residual : (3, 2): lower triangular factor of the flange's R; row 2: fixture to flange t and r, as it is
+    joint : (4,) k_t, k_r, c_t, c_r; points : (n, 2) omega, x; holder : (n, 5) A22 tt, tr, rr, A21 e0 t, r
 
-    The gradient's columns: stiffness (m), psi (2 m), factor's lower triangle by rows, residual's (3), joint (4).
+    One output is the flange's motion; two are gap (flange less fixture) and fixture. The gradient's columns: log omega_n (m),
+    psi's first two columns by rows (2 m), factor's lower triangle by rows, B's tt, tr, rr (3), with two outputs psi's third
+    column (m) and the fixture's residual (2), with softening its lower triangle by rows, joint (4).
     """
-    m = stiffness.size
+    m = omega_n.size
+    outputs = values.shape[1]
+    soft = softening.shape[0] > 0
     damping = factor @ factor.T
     r_tt = residual[0, 0] ** 2
     r_tr = residual[0, 0] * residual[1, 0]
     r_rr = residual[1, 0] ** 2 + residual[1, 1] ** 2
+    stiffness = np.zeros((m, m))
     dynamic = np.empty((m, m), dtype=np.complex128)
-    u = np.empty((m, 2), dtype=np.complex128)
+    u = np.empty((m, 3), dtype=np.complex128)
     p = np.empty(m, dtype=np.complex128)
     q = np.empty(m, dtype=np.complex128)
     lp = np.empty(m, dtype=np.complex128)
     lq = np.empty(m, dtype=np.complex128)
-    for f in range(omega.size):
-        w = omega[f]
+    for f in range(points.shape[0]):
+        w, x = points[f]
         for i in range(m):
             for j in range(i + 1):
-                dynamic[i, j] = complex(0.0, w * damping[i, j])
-            dynamic[i, i] += stiffness[i] - w * w
-            u[i, 0] = psi[i, 0]
-            u[i, 1] = psi[i, 1]
-        _factor_solve(dynamic, u)
+                k_ij = omega_n[i] ** 2 if i == j else 0.0
+                if soft:
+                    k_ij += x * softening[i, j] * omega_n[i] * omega_n[j]
+                stiffness[i, j] = k_ij
+                stiffness[j, i] = k_ij
+                dynamic[i, j] = complex(k_ij - (w * w if i == j else 0.0), w * damping[i, j])
+            for a in range(3):
+                u[i, a] = psi[i, a]
+        _factor_solve(dynamic, u, 1 + outputs)
         b_tt, b_tr, b_rr = complex(r_tt, 0.0), complex(r_tr, 0.0), complex(r_rr, 0.0)
+        s_t, s_r = complex(residual[2, 0], 0.0), complex(residual[2, 1], 0.0)
         for i in range(m):
             b_tt += psi[i, 0] * u[i, 0]
             b_tr += psi[i, 0] * u[i, 1]
             b_rr += psi[i, 1] * u[i, 1]
+            s_t += psi[i, 2] * u[i, 0]
+            s_r += psi[i, 2] * u[i, 1]
         k_t = 1.0 / complex(joint[0], w * joint[2])
         k_r = 1.0 / complex(joint[1], w * joint[3])
-        e_tt, e_tr, e_rr = flange[f, 0] + k_t + b_tt, flange[f, 1] + b_tr, flange[f, 2] + k_r + b_rr
+        e_tt, e_tr, e_rr = holder[f, 0] + k_t + b_tt, holder[f, 1] + b_tr, holder[f, 2] + k_r + b_rr
         inverse = 1.0 / (e_tt * e_rr - e_tr * e_tr)
-        x0 = (e_rr * tip[f, 0] - e_tr * tip[f, 1]) * inverse
-        x1 = (e_tt * tip[f, 1] - e_tr * tip[f, 0]) * inverse
-        values[f] = b_tt * x0 + b_tr * x1
-        if gradient.shape[0] == 0:
-            continue
-        y0 = (e_rr * b_tt - e_tr * b_tr) * inverse
-        y1 = (e_tt * b_tr - e_tr * b_tt) * inverse
-        v0, v1 = 1.0 - y0, -y1
+        x0 = (e_rr * holder[f, 3] - e_tr * holder[f, 4]) * inverse
+        x1 = (e_tt * holder[f, 4] - e_tr * holder[f, 3]) * inverse
         for i in range(m):
-            p[i] = u[i, 0] * v0 + u[i, 1] * v1
             q[i] = u[i, 0] * x0 + u[i, 1] * x1
-        for j in range(m):
-            sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
-            for i in range(j, m):
-                sum_p += factor[i, j] * p[i]
-                sum_q += factor[i, j] * q[i]
-            lp[j], lq[j] = sum_p, sum_q
-        row = gradient[f]
-        k = 3 * m
-        for i in range(m):
-            row[i] = -p[i] * q[i]
-            row[m + 2 * i] = v0 * q[i] + p[i] * x0
-            row[m + 2 * i + 1] = v1 * q[i] + p[i] * x1
-            for j in range(i + 1):
-                row[k] = complex(0.0, -w) * (p[i] * lq[j] + lp[j] * q[i])
-                k += 1
-        mixed = v0 * x1 + v1 * x0
-        row[k] = 2.0 * residual[0, 0] * v0 * x0 + residual[1, 0] * mixed
-        row[k + 1] = residual[0, 0] * mixed + 2.0 * residual[1, 0] * v1 * x1
-        row[k + 2] = 2.0 * residual[1, 1] * v1 * x1
-        row[k + 3] = y0 * x0 * k_t * k_t
-        row[k + 4] = y1 * x1 * k_r * k_r
-        row[k + 5] = complex(0.0, w) * row[k + 3]
-        row[k + 6] = complex(0.0, w) * row[k + 4]
+        for o in range(outputs):
+            # share of flange and fixture in the output
+            flange = 1.0 if o == 0 else 0.0
+            fixture = 0.0 if outputs == 1 else 2.0 * o - 1.0
+            b_t, b_r = flange * b_tt + fixture * s_t, flange * b_tr + fixture * s_r
+            values[f, o] = b_t * x0 + b_r * x1
+            if gradient.shape[0] == 0:
+                continue
+            y0 = (e_rr * b_t - e_tr * b_r) * inverse
+            y1 = (e_tt * b_r - e_tr * b_t) * inverse
+            v0, v1 = flange - y0, -y1
+            for i in range(m):
+                p[i] = u[i, 0] * v0 + u[i, 1] * v1
+                if outputs == 2:
+                    p[i] += fixture * u[i, 2]
+            for j in range(m):
+                sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
+                for i in range(j, m):
+                    sum_p += factor[i, j] * p[i]
+                    sum_q += factor[i, j] * q[i]
+                lp[j], lq[j] = sum_p, sum_q
+            row = gradient[f, o]
+            k = 3 * m
+            for i in range(m):
+                if soft:
+                    kp, kq = complex(0.0, 0.0), complex(0.0, 0.0)
+                    for j in range(m):
+                        kp += stiffness[i, j] * p[j]
+                        kq += stiffness[i, j] * q[j]
+                    row[i] = -p[i] * kq - kp * q[i]
+                else:
+                    row[i] = -2.0 * stiffness[i, i] * p[i] * q[i]
+                row[m + 2 * i] = v0 * q[i] + p[i] * x0
+                row[m + 2 * i + 1] = v1 * q[i] + p[i] * x1
+                for j in range(i + 1):
+                    row[k] = complex(0.0, -w) * (p[i] * lq[j] + lp[j] * q[i])
+                    k += 1
+            row[k] = v0 * x0
+            row[k + 1] = v0 * x1 + v1 * x0
+            row[k + 2] = v1 * x1
+            k += 3
+            if outputs == 2:
+                for i in range(m):
+                    row[k + i] = fixture * q[i]
+                row[k + m] = fixture * x0
+                row[k + m + 1] = fixture * x1
+                k += m + 2
+            if soft:
+                for i in range(m):
+                    scale = -x * omega_n[i]
+                    for j in range(i):
+                        row[k] = scale * omega_n[j] * (p[i] * q[j] + p[j] * q[i])
+                        k += 1
+                    row[k] = scale * omega_n[i] * p[i] * q[i]
+                    k += 1
+            row[k] = y0 * x0 * k_t * k_t
+            row[k + 1] = y1 * x1 * k_r * k_r
+            row[k + 2] = complex(0.0, w) * row[k]
+            row[k + 3] = complex(0.0, w) * row[k + 1]
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -123,58 +167,43 @@ def fit_cuts(lines, weights, model, start, prior, nuisance, grid):
 
     Parameters
     ----------
-    lines : (n, 2) complex, c and a; weights : (n, 3): omega, order, w; model : (n,) g
+    lines : (n, 2) complex, c and a; weights : (n, 3): omega, order, w; model : (n,) g; in each cut orders ascend
     start : (k + 1,) first line of each cut
     prior : (k, 4): delay's mean and weight, angle's weight, tooth-passing period
     nuisance : (k, 2): delay, angle
     grid : number of delays tried; 0 keeps to the neighbourhood of the given ones
     """
+    here = np.empty(6)
+    there = np.empty(6)
     for cut in range(start.size - 1):
         first, last = start[cut], start[cut + 1]
-        mean, delay_weight, angle_weight, period = prior[cut]
-        angle = nuisance[cut, 1]
-        best = _cut_misfit(lines, weights, model, first, last, nuisance[cut, 0], angle)
-        best += delay_weight * (nuisance[cut, 0] - mean) ** 2
-        delay = nuisance[cut, 0]
-        for k in range(grid):
-            trial = period * k / grid
-            trial += period * np.round((mean - trial) / period) if delay_weight > 0.0 else 0.0
-            value = _cut_misfit(lines, weights, model, first, last, trial, angle) + delay_weight * (trial - mean) ** 2
-            if value < best:
-                best, delay = value, trial
-        best += angle_weight * angle**2
+        mean, delay_weight, period = prior[cut, 0], prior[cut, 1], prior[cut, 3]
+        delay, angle = nuisance[cut]
+        if grid > 0:
+            best = _cut_misfit(lines, weights, model, first, last, delay, angle) + delay_weight * (delay - mean) ** 2
+            for k in range(grid):
+                trial = period * k / grid
+                trial += period * np.round((mean - trial) / period) if delay_weight > 0.0 else 0.0
+                value = _cut_misfit(lines, weights, model, first, last, trial, angle) + delay_weight * (trial - mean) ** 2
+                if value < best:
+                    best, delay = value, trial
+        _cut_normal(lines, weights, model, first, last, prior[cut], delay, angle, here)
         damping = 0.0
         for _ in range(12):
-            g0 = delay_weight * (delay - mean)
-            g1 = angle_weight * angle
-            h00, h01, h11 = delay_weight, 0.0, angle_weight
-            for j in range(first, last):
-                omega, order, weight = weights[j]
-                rotation = complex(math.cos(omega * delay), math.sin(omega * delay))
-                turned = lines[j, 1] * complex(math.cos(order * angle), math.sin(order * angle))
-                measured = (lines[j, 0] - turned) * rotation
-                rest = measured - model[j]
-                d0 = complex(0.0, omega) * measured
-                d1 = complex(0.0, -order) * turned * rotation
-                g0 += weight * (d0.real * rest.real + d0.imag * rest.imag)
-                g1 += weight * (d1.real * rest.real + d1.imag * rest.imag)
-                h00 += weight * (d0.real**2 + d0.imag**2)
-                h01 += weight * (d0.real * d1.real + d0.imag * d1.imag)
-                h11 += weight * (d1.real**2 + d1.imag**2)
-            h00 *= 1.0 + damping
-            h11 *= 1.0 + damping
-            determinant = h00 * h11 - h01 * h01
+            h00 = here[3] * (1.0 + damping)
+            h11 = here[5] * (1.0 + damping)
+            determinant = h00 * h11 - here[4] * here[4]
             if not determinant > 0.0:
                 break
-            step0 = -(h11 * g0 - h01 * g1) / determinant
-            step1 = -(h00 * g1 - h01 * g0) / determinant
-            value = _cut_misfit(lines, weights, model, first, last, delay + step0, angle + step1)
-            value += delay_weight * (delay + step0 - mean) ** 2 + angle_weight * (angle + step1) ** 2
-            if value <= best:
-                gained = best - value
-                delay, angle, best = delay + step0, angle + step1, value
+            step0 = -(h11 * here[1] - here[4] * here[2]) / determinant
+            step1 = -(h00 * here[2] - here[4] * here[1]) / determinant
+            _cut_normal(lines, weights, model, first, last, prior[cut], delay + step0, angle + step1, there)
+            if there[0] <= here[0]:
+                gained = here[0] - there[0]
+                delay, angle = delay + step0, angle + step1
+                here[:] = there
                 damping *= 0.1
-                if gained <= 1e-10 * best:
+                if gained <= 1e-10 * here[0]:
                     break
             else:
                 damping = max(10.0 * damping, 1e-2)
@@ -187,13 +216,106 @@ def fit_cuts(lines, weights, model, start, prior, nuisance, grid):
 @numba.njit(cache=True, error_model="numpy")
 def _cut_misfit(lines, weights, model, first, last, delay, angle):
     total = 0.0
+    turn, twist = complex(1.0, 0.0), complex(1.0, 0.0)
+    step, twist_step = turn, twist
+    order, gap = 0.0, 0.0
     for j in range(first, last):
-        omega, order, weight = weights[j]
-        rotation = complex(math.cos(omega * delay), math.sin(omega * delay))
-        turned = lines[j, 1] * complex(math.cos(order * angle), math.sin(order * angle))
-        rest = (lines[j, 0] - turned) * rotation - model[j]
-        total += weight * (rest.real**2 + rest.imag**2)
+        # harmonics stand at equal distances: one product takes the place of a sine and a cosine
+        ahead = weights[j, 1] - order
+        if ahead != 0.0:
+            if ahead != gap:
+                gap = ahead
+                phase = gap * weights[j, 0] / weights[j, 1] * delay
+                step = complex(math.cos(phase), math.sin(phase))
+                twist_step = complex(math.cos(gap * angle), math.sin(gap * angle))
+            order = weights[j, 1]
+            turn *= step
+            twist *= twist_step
+        rest = (lines[j, 0] - lines[j, 1] * twist) * turn - model[j]
+        total += weights[j, 2] * (rest.real**2 + rest.imag**2)
     return total
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _cut_normal(lines, weights, model, first, last, prior, delay, angle, out):
+    """Fill `out` with a cut's misfit and priors, half its gradient and its Gauss-Newton matrix: value, g0, g1, h00, h01, h11."""
+    late = delay - prior[0]
+    value = prior[1] * late**2 + prior[2] * angle**2
+    g0, g1 = prior[1] * late, prior[2] * angle
+    h00, h01, h11 = prior[1], 0.0, prior[2]
+    turn, twist = complex(1.0, 0.0), complex(1.0, 0.0)
+    step, twist_step = turn, twist
+    order, gap = 0.0, 0.0
+    for j in range(first, last):
+        omega, weight = weights[j, 0], weights[j, 2]
+        ahead = weights[j, 1] - order
+        if ahead != 0.0:
+            if ahead != gap:
+                gap = ahead
+                phase = gap * omega / weights[j, 1] * delay
+                step = complex(math.cos(phase), math.sin(phase))
+                twist_step = complex(math.cos(gap * angle), math.sin(gap * angle))
+            order = weights[j, 1]
+            turn *= step
+            twist *= twist_step
+        air = lines[j, 1] * twist
+        measured = (lines[j, 0] - air) * turn
+        air *= turn
+        rest = measured - model[j]
+        # d/d delay = i omega measured, d/d angle = -i order air
+        d0 = complex(-omega * measured.imag, omega * measured.real)
+        d1 = complex(order * air.imag, -order * air.real)
+        value += weight * (rest.real**2 + rest.imag**2)
+        g0 += weight * (d0.real * rest.real + d0.imag * rest.imag)
+        g1 += weight * (d1.real * rest.real + d1.imag * rest.imag)
+        h00 += weight * (d0.real**2 + d0.imag**2)
+        h01 += weight * (d0.real * d1.real + d0.imag * d1.imag)
+        h11 += weight * (d1.real**2 + d1.imag**2)
+    out[0], out[1], out[2], out[3], out[4], out[5] = value, g0, g1, h00, h01, h11
+
+
+@numba.njit(cache=True, error_model="numpy")
+def whiten(gradient, extra, model, weight, chain, out):
+    """Fill `out` (2 n, p + c) with the residual's real and imaginary rows: -sqrt(weight) (gradient chain, model extra).
+
+    Parameters
+    ----------
+    gradient : (n, p) complex; extra : (n, c) complex, d log model / d unknown of the force
+    model : (n,) complex; weight : (n,); chain : (p,)
+    """
+    n, p = gradient.shape
+    for f in range(n):
+        scale = -math.sqrt(weight[f])
+        for k in range(p):
+            out[f, k] = scale * chain[k] * gradient[f, k].real
+            out[n + f, k] = scale * chain[k] * gradient[f, k].imag
+        for c in range(extra.shape[1]):
+            value = scale * model[f] * extra[f, c]
+            out[f, p + c] = value.real
+            out[n + f, p + c] = value.imag
+
+
+@numba.njit(cache=True, error_model="numpy")
+def mix_cuts(jacobian, columns, cut, own, first, tail, inner, mixed):
+    """Add the lines of one axis to the cuts' own matrices `inner` (k, 2, 2) and `mixed` (k, 2, p).
+
+    Parameters
+    ----------
+    jacobian : (2 n, q) real over imaginary rows; its first `own` columns are the parameters from `first` on, the rest from `tail` on
+    columns : (n, 2) complex, change of the lines with delay and angle of their cut; cut : (n,)
+    """
+    n = cut.size
+    for f in range(n):
+        k = cut[f]
+        for i in range(2):
+            real, imag = columns[f, i].real, columns[f, i].imag
+            inner[k, i, 0] += real * columns[f, 0].real + imag * columns[f, 0].imag
+            inner[k, i, 1] += real * columns[f, 1].real + imag * columns[f, 1].imag
+            row = mixed[k, i]
+            for c in range(own):
+                row[first + c] += real * jacobian[f, c] + imag * jacobian[n + f, c]
+            for c in range(own, jacobian.shape[1]):
+                row[tail + c - own] += real * jacobian[f, c] + imag * jacobian[n + f, c]
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})

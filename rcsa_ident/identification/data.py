@@ -3,29 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.cutting.force import SLOPES
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.signals.measurement import CutMeasurement
+from rcsa_ident.signals.measurement import AxisLines, CutMeasurement
 
 #: Slopes are multiplied and moments divided by it, so that all receptances have one unit and size [m].
 LEVER = 0.1
+#: Standard deviation of a clamping's run-out, in units of the cutting model's reference.
+RUNOUT_SPREAD = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisData:
-    """Lines of one axis, sorted by cut.
+    """Points of one axis, sorted by cut and, in a cut, by order; each with one output (the flange's motion) or two (gap, fixture).
 
     Parameters
     ----------
-    omega, order, variance : arrays, shape (n,)
-        [rad/s], [-], [m^2/N^2] of the real and imaginary part each.
-    lines : complex array, shape (n, 2) [m/N]
+    omega, order : arrays, shape (n,)
+        [rad/s], [-].
+    variance : array, shape (n, o) [m^2/N^2]
+        Of the real and imaginary part each.
+    lines : complex array, shape (n, o, 2) [m/N]
         Cut and turned air cut over the simulated force.
     cut : array of int, shape (n,)
         Index into the data's cuts.
@@ -33,6 +38,8 @@ class AxisData:
         A22 of the cut's tooling: tt, tr, rr, scaled by the lever.
     tip : complex array, shape (n, 2) [m/N]
         A21 for a force at the tip: t, r.
+    force_slope : complex array, shape (n, c) [-]
+        Change of the force's logarithm with each uncertain coefficient.
     """
 
     axis: Dof
@@ -43,17 +50,39 @@ class AxisData:
     cut: np.ndarray
     flange: ComplexArray
     tip: ComplexArray
+    force_slope: ComplexArray
 
     def __post_init__(self) -> None:
         for name in ("omega", "order", "variance"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
-        for name in ("lines", "flange", "tip"):
+        for name in ("lines", "flange", "tip", "force_slope"):
             object.__setattr__(self, name, frozen(getattr(self, name), np.complex128))
 
     @property
+    def outputs(self) -> int:
+        """1 or 2."""
+        return self.variance.shape[1]
+
+    @property
     def measured(self) -> ComplexArray:
-        """Cut less air cut, shape (n,) [m/N]."""
-        return self.lines[:, 0] - self.lines[:, 1]
+        """The flange's motion, cut less air cut, shape (n,) [m/N]."""
+        return np.sum(self.lines[:, :, 0] - self.lines[:, :, 1], axis=1)
+
+    @property
+    def noise(self) -> FloatArray:
+        """Variance of the flange's motion, of the real and the imaginary part each, shape (n,) [m^2/N^2]."""
+        return np.sum(self.variance, axis=1)
+
+    def summed(self) -> AxisData:
+        """Return the same points with the flange's motion as the only output."""
+        if self.outputs == 1:
+            return self
+        return replace(self, variance=self.noise[:, None], lines=np.sum(self.lines, axis=1, keepdims=True))
+
+    def of(self, keep: np.ndarray) -> AxisData:
+        """Return some of the points: a mask or indices, shape (n,)."""
+        names = ("omega", "order", "variance", "lines", "cut", "flange", "tip", "force_slope")
+        return replace(self, **{name: getattr(self, name)[keep] for name in names})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,8 +97,16 @@ class IdentificationData:
     axes : tuple of AxisData
     spindle_speed : array, shape (k,) [rad/s]
     cut_prior : array, shape (k, 4)
-        Delay's mean [s] and weight [1/s^2] (0 without a trigger), weight of the angle between cut and air cut [1/rad^2],
-        tooth-passing period [s].
+        Delay's mean [s] and weight [1/s^2] (0 without a trigger of known tooth angle), weight of the angle between cut and air
+        cut [1/rad^2], tooth-passing period [s].
+    clamping : array of int, shape (k,)
+        Which unknown tooth angle stands between the cut's trigger and its delay; -1 where there is none.
+    edge : array, shape (k, 2)
+        Time of that trigger's edge [s] and its weight [1/s^2].
+    coefficient_names : tuple of str, length c
+        What is uncertain about the forces: logarithms of cutting coefficients, run-out of each tooling.
+    coefficient_spread : tuple of float, length c
+        Their standard deviations.
     """
 
     cut_ids: tuple[str, ...]
@@ -78,18 +115,68 @@ class IdentificationData:
     axes: tuple[AxisData, ...]
     spindle_speed: FloatArray
     cut_prior: FloatArray
+    clamping: np.ndarray
+    edge: FloatArray
+    coefficient_names: tuple[str, ...] = ()
+    coefficient_spread: tuple[float, ...] = ()
+
+    @property
+    def clampings(self) -> int:
+        """Number of unknown tooth angles."""
+        return int(np.max(self.clamping, initial=-1)) + 1
+
+    @property
+    def speed_range(self) -> tuple[float, float]:
+        """Middle of the spindle speeds and half their range [rad/s]; the latter 0 where nothing can change with speed."""
+        low, high = float(np.min(self.spindle_speed)), float(np.max(self.spindle_speed))
+        return 0.5 * (low + high), 0.5 * (high - low)
+
+    @property
+    def relative_speed(self) -> FloatArray:
+        """Of each cut, from -1 at the lowest to 1 at the highest, shape (k,)."""
+        middle, half = self.speed_range
+        return (self.spindle_speed - middle) / half if half > 0.0 else np.zeros(self.spindle_speed.size)
+
+    def with_smooth_errors(self, share: float, terms: int = 4) -> IdentificationData:
+        """Return the same data whose lines may be wrong by a smooth factor of their frequency, for each axis and tooling.
+
+        Where the model of force, tool-holder or sensor is off by a little, it is off by nearly the same in neighbouring lines,
+        and no number of cuts averages that out.
+
+        Parameters
+        ----------
+        share : float
+            Standard deviation of each term's real and imaginary part.
+        terms : int
+            Chebyshev polynomials from 0 Hz to the highest line.
+        """
+        toolings = len(self.toolings)
+        highest = max(float(a.omega.max()) for a in self.axes)
+        axes = []
+        for i, axis in enumerate(self.axes):
+            basis = np.polynomial.chebyshev.chebvander(2.0 * axis.omega / highest - 1.0, terms - 1)
+            columns = np.zeros((axis.omega.size, len(self.axes), toolings, 2, terms), dtype=complex)
+            place = (np.arange(axis.omega.size), i, self.cut_tooling[axis.cut])
+            columns[(*place, 0)], columns[(*place, 1)] = basis, 1j * basis
+            axes.append(replace(axis, force_slope=np.hstack([axis.force_slope, columns.reshape(axis.omega.size, -1)])))
+        count = len(self.axes) * toolings * 2 * terms
+        spread = (*self.coefficient_spread, *(share,) * count)
+        return replace(self, axes=tuple(axes), coefficient_spread=spread)
 
     def only(self, axis: Dof) -> IdentificationData:
         """Return the same data with one axis."""
-        return IdentificationData(
-            self.cut_ids, self.cut_tooling, self.toolings, tuple(a for a in self.axes if a.axis is axis), self.spindle_speed, self.cut_prior
-        )
+        return replace(self, axes=tuple(a for a in self.axes if a.axis is axis))
+
+    def summed(self) -> IdentificationData:
+        """Return the same data with the flange's motion as the only output, and without the triggers of unknown tooth angle."""
+        return replace(self, axes=tuple(a.summed() for a in self.axes), clamping=np.full(self.clamping.size, -1))
 
 
 def prepare(
     measurements: Sequence[CutMeasurement],
     receptances: Mapping[str, Callable[[FloatArray], Receptance]],
     teeth: Mapping[str, int],
+    coefficient_spread: Sequence[float] = (),
 ) -> IdentificationData:
     """Return the data of all measurements; each tool-holder is asked once for the frequencies of all its cuts.
 
@@ -99,6 +186,9 @@ def prepare(
     receptances : mapping of tooling to a function omega -> Receptance
         Free-free receptances with points ``tip`` and ``flange`` in one bending plane.
     teeth : mapping of tooling to its number of teeth
+    coefficient_spread : sequence of float, length c
+        Standard deviations of K_tc's, k_rc's, K_te's and K_re's logarithms; 0 where known exactly. Without them the forces are
+        taken as they are, and cutters to run true.
 
     Raises
     ------
@@ -109,37 +199,83 @@ def prepare(
         raise InputError("cuts", "none usable", "at least one usable cut")
     toolings = tuple(dict.fromkeys(m.tooling for m in measurements))
     axes = tuple(axis for axis in (Dof.X, Dof.Y) if any(axis in m.axes for m in measurements))
-    holder: dict[str, dict[float, int]] = {}
+    holder: dict[str, FloatArray] = {}
     table: dict[str, tuple[ComplexArray, ComplexArray]] = {}
     for name in toolings:
-        omega = np.unique(np.concatenate([m.axes[a].omega for m in measurements if m.tooling == name for a in m.axes]))
+        omega = np.unique(np.concatenate([m.axes[a].omega for m in measurements if m.tooling == name for a in m.axes] or [np.zeros(0)]))
         response = receptances[name](omega)
         a22, a21 = response["flange", "flange"], response["flange", "tip"]
         flange = np.stack([a22[:, 0, 0], LEVER * a22[:, 0, 1], LEVER**2 * a22[:, 1, 1]], axis=1)
         table[name] = flange, np.stack([a21[:, 0, 0], LEVER * a21[:, 1, 0]], axis=1)
-        holder[name] = {float(w): i for i, w in enumerate(omega)}
+        holder[name] = omega
+    uncertain = [c for c, spread in enumerate(coefficient_spread) if spread > 0.0]
+    names = [SLOPES[c] for c in uncertain]
+    spread = [float(coefficient_spread[c]) for c in uncertain]
+    if coefficient_spread:
+        names += [f"{SLOPES[-1]} of {name}" for name in toolings]
+        spread += [RUNOUT_SPREAD] * len(toolings)
     data = []
     for axis in axes:
-        present = [(k, m) for k, m in enumerate(measurements) if axis in m.axes]
-        rows = [[holder[m.tooling][float(w)] for w in m.axes[axis].omega] for _, m in present]
+        present = [(k, m, m.axes[axis]) for k, m in enumerate(measurements) if axis in m.axes]
+        # a cut without an accelerometer's lines leaves the axis with the sum of both
+        lines = (
+            [each.summed() for _, _, each in present] if len({each.outputs for _, _, each in present}) > 1 else [e for _, _, e in present]
+        )
+        rows = [np.searchsorted(holder[m.tooling], each.omega) for _, m, each in present]
         data.append(
             AxisData(
                 axis=axis,
-                omega=np.concatenate([m.axes[axis].omega for _, m in present]),
-                order=np.concatenate([m.axes[axis].order for _, m in present]).astype(float),
-                variance=np.concatenate([m.axes[axis].variance for _, m in present]),
-                lines=np.concatenate([np.stack([m.axes[axis].cut, m.axes[axis].air], axis=1) for _, m in present]),
-                cut=np.concatenate([np.full(m.axes[axis].omega.size, k) for k, m in present]),
-                flange=np.concatenate([table[m.tooling][0][r] for (_, m), r in zip(present, rows, strict=True)]),
-                tip=np.concatenate([table[m.tooling][1][r] for (_, m), r in zip(present, rows, strict=True)]),
+                omega=np.concatenate([each.omega for each in lines]),
+                order=np.concatenate([each.order for each in lines]).astype(float),
+                variance=np.concatenate([each.variance for each in lines]),
+                lines=np.concatenate([np.stack([each.cut, each.air], axis=2) for each in lines]),
+                cut=np.concatenate([np.full(each.omega.size, k) for k, _, each in present]),
+                flange=np.concatenate([table[m.tooling][0][r] for (_, m, _), r in zip(present, rows, strict=True)]),
+                tip=np.concatenate([table[m.tooling][1][r] for (_, m, _), r in zip(present, rows, strict=True)]),
+                force_slope=np.concatenate([_slopes(each, uncertain, toolings.index(m.tooling), len(names)) for _, m, each in present]),
             )
         )
     speed = np.array([m.spindle_speed for m in measurements])
-    prior = np.zeros((len(measurements), 4))
+    index = np.array([toolings.index(m.tooling) for m in measurements])
+    prior, clamping, edge = _cut_priors(measurements, speed, teeth)
+    return IdentificationData(
+        cut_ids=tuple(m.cut_id for m in measurements),
+        cut_tooling=index,
+        toolings=toolings,
+        axes=tuple(data),
+        spindle_speed=frozen(speed),
+        cut_prior=frozen(prior),
+        clamping=frozen(clamping, np.intp),
+        edge=frozen(edge),
+        coefficient_names=tuple(names),
+        coefficient_spread=tuple(spread),
+    )
+
+
+def _slopes(lines: AxisLines, uncertain: Sequence[int], tooling: int, count: int) -> ComplexArray:
+    """Columns of a cut's force slopes: the coefficients that all cuts share, then its own tooling's run-out, shape (n, count)."""
+    columns = np.zeros((lines.omega.size, count), dtype=complex)
+    columns[:, : len(uncertain)] = lines.force_slope[:, uncertain]
+    if count > len(uncertain):
+        columns[:, len(uncertain) + tooling] = lines.force_slope[:, -1]
+    return columns
+
+
+def _cut_priors(
+    measurements: Sequence[CutMeasurement], speed: FloatArray, teeth: Mapping[str, int]
+) -> tuple[FloatArray, np.ndarray, FloatArray]:
+    """What is known of each cut's delay and air-cut angle: the three last fields of the data but one."""
+    prior, edge = np.zeros((len(measurements), 4)), np.zeros((len(measurements), 2))
+    clamping = np.full(len(measurements), -1)
+    names: dict[str, int] = {}
     for k, m in enumerate(measurements):
-        if m.delay is not None and m.delay_std is not None:
-            prior[k, :2] = m.delay, 1.0 / m.delay_std**2
         prior[k, 2] = 1.0 / max(m.alignment_std, 1e-4) ** 2
         prior[k, 3] = 2.0 * np.pi / speed[k] / teeth[m.tooling]
-    index = np.array([toolings.index(m.tooling) for m in measurements])
-    return IdentificationData(tuple(m.cut_id for m in measurements), index, toolings, tuple(data), frozen(speed), frozen(prior))
+        if m.delay is None or m.delay_std is None:
+            continue
+        if m.tooth_angle_known:
+            prior[k, :2] = m.delay, 1.0 / m.delay_std**2
+        else:
+            clamping[k] = names.setdefault(m.tooling, len(names))
+            edge[k] = m.delay, 1.0 / m.delay_std**2
+    return prior, clamping, edge

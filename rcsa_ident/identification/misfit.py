@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.identification._kernels import cross_frf, fit_cuts
+from rcsa_ident.identification._kernels import cross_frf, fit_cuts, mix_cuts, whiten
 from rcsa_ident.identification.data import AxisData, IdentificationData
-from rcsa_ident.identification.parameters import axis_size, chain, scaled_joint, split, unpack
+from rcsa_ident.identification.parameters import JOINT, AxisLayout, AxisParameters, Layout, chain, scaled_joint, unpack
 from rcsa_ident.identification.priors import Priors, prior_rows
 
 #: Unit of a delay in the normal equations [s].
@@ -17,44 +17,20 @@ DELAY_UNIT = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Evaluation:
-    """Cost at a vector, and its normal equations where asked for.
+class Residual:
+    """Everything whose squares add up to the cost, in standard deviations.
 
     Parameters
     ----------
-    cost : float [-]
-        chi2 of all axes, of the cuts' priors and of the parameters' priors.
-    chi2 : tuple of float
-        Of each axis' lines.
-    nuisance : array, shape (k, 2)
-        Delay [s] and angle [rad] of each cut at the optimum for this vector.
-    linear : Linearisation or None
-        Gradient and Gauss-Newton matrix of half the cost, where asked for.
-    models : tuple of complex arrays [m/N]
-        The model's cross FRF on the lines of each axis.
-    residual : Residual
-        Whose squares add up to the cost.
+    lines : tuple of arrays, shape (2 n,)
+        Of each axis: real parts of all lines, then imaginary parts.
+    own : array, shape (p,)
+        Of the parameters' priors.
+    cuts : array, shape (k, 2)
+        Of the cuts' priors: delay, angle.
     """
 
-    cost: float
-    chi2: tuple[float, ...]
-    nuisance: FloatArray
-    models: tuple[ComplexArray, ...]
-    residual: Residual
-    linear: Linearisation | None = None
-
-    @property
-    def hessian(self) -> FloatArray:
-        """Gauss-Newton matrix of half the cost, shape (p, p)."""
-        assert self.linear is not None
-        return self.linear.hessian
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Residual:
-    """Everything whose squares add up to the cost: lines, parameters' priors, cuts' priors; all in standard deviations."""
-
-    lines: tuple[ComplexArray, ...]
+    lines: tuple[FloatArray, ...]
     own: FloatArray
     cuts: FloatArray
 
@@ -67,6 +43,52 @@ class Residual:
         """Return factor self."""
         return Residual(tuple(factor * a for a in self.lines), factor * self.own, factor * self.cuts)
 
+    @property
+    def chi2(self) -> tuple[float, ...]:
+        """Of each axis' lines."""
+        return tuple(float(r @ r) for r in self.lines)
+
+    @property
+    def cost(self) -> float:
+        """Sum of all squares."""
+        return sum(self.chi2) + float(self.own @ self.own) + float(np.sum(self.cuts**2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evaluation:
+    """Cost at a vector, and its normal equations where asked for.
+
+    Parameters
+    ----------
+    cost : float [-]
+        chi2 of all axes, of the cuts' priors and of the parameters' priors.
+    nuisance : array, shape (k, 2)
+        Delay [s] and angle [rad] of each cut at the optimum for this vector.
+    models : tuple of complex arrays, shape (n, o) [m/N]
+        The model's cross FRFs on the lines of each axis.
+    residual : Residual
+        Whose squares add up to the cost.
+    linear : Linearisation or None
+        Gradient and Gauss-Newton matrix of half the cost, where asked for.
+    """
+
+    cost: float
+    nuisance: FloatArray
+    models: tuple[ComplexArray, ...]
+    residual: Residual
+    linear: Linearisation | None = None
+
+    @property
+    def chi2(self) -> tuple[float, ...]:
+        """Of each axis' lines."""
+        return self.residual.chi2
+
+    @property
+    def hessian(self) -> FloatArray:
+        """Gauss-Newton matrix of half the cost, shape (p, p)."""
+        assert self.linear is not None
+        return self.linear.hessian
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Linearisation:
@@ -74,8 +96,9 @@ class Linearisation:
 
     Parameters
     ----------
-    blocks : tuple of (slice, complex array (n, q + 4))
-        Per axis: which parameters, and the lines' change with them and the joint's four.
+    layout : Layout
+    jacobians : tuple of arrays, shape (2 n, q + c)
+        Of each axis: the lines' change with its own parameters, the joint's and the coefficients'.
     columns : tuple of complex arrays, shape (n, 2)
         The lines' change with their cut's delay (in `DELAY_UNIT`) and angle.
     cut : tuple of int arrays, shape (n,)
@@ -83,44 +106,112 @@ class Linearisation:
         The priors' change.
     cut_prior : array, shape (k, 2)
         Square roots of the weights of the cuts' priors.
+    clamping : (array of int, array), shape (k,) each
+        Place in the vector of the tooth angle that a cut's prior depends on, and by how much (0 where by none).
     gradient, hessian : arrays, shapes (p,), (p, p)
     inner : array, shape (k, 2, 2)
     mixed : array, shape (k, 2, p)
+    compliance : tuple of complex arrays, shape (n, o, 3)
+        Of each axis: the model's change with the flange's receptance tt, tr, rr at its lines, for what may be added to it.
     """
 
-    blocks: tuple[tuple[slice, ComplexArray], ...]
+    layout: Layout
+    jacobians: tuple[FloatArray, ...]
     columns: tuple[ComplexArray, ...]
     cut: tuple[np.ndarray, ...]
     own: FloatArray
     cut_prior: FloatArray
+    clamping: tuple[np.ndarray, FloatArray]
     gradient: FloatArray
     hessian: FloatArray
     inner: FloatArray
     mixed: FloatArray
+    compliance: tuple[ComplexArray, ...]
 
     def follow(self, step: FloatArray) -> FloatArray:
         """Return how delay and angle of each cut follow a step of the parameters, shape (k, 2)."""
-        return -np.linalg.solve(self.inner, (self.mixed @ step)[:, :, None])[:, :, 0]
+        return -_solve_pairs(self.inner, self.mixed @ step)
 
     def push(self, step: FloatArray, cuts: FloatArray) -> Residual:
         """Return the residual's change with a step of the parameters and of the cuts' unknowns."""
-        lines = tuple(
-            jacobian @ np.concatenate([step[block], step[-4:]]) + np.einsum("ni,ni->n", columns, cuts[cut])
-            for (block, jacobian), columns, cut in zip(self.blocks, self.columns, self.cut, strict=True)
-        )
-        return Residual(lines, self.own @ step, self.cut_prior * cuts)
+        shared = step[self._shared]
+        lines = []
+        for i, (jacobian, columns, cut) in enumerate(zip(self.jacobians, self.columns, self.cut, strict=True)):
+            turned = columns[:, 0] * cuts[cut, 0] + columns[:, 1] * cuts[cut, 1]
+            change = jacobian @ np.concatenate([step[self.layout.axis(i)], shared])
+            lines.append(change + np.concatenate([turned.real, turned.imag]))
+        prior = self.cut_prior * cuts
+        prior[:, 0] += self.clamping[1] * step[self.clamping[0]]
+        return Residual(tuple(lines), self.own @ step, prior)
 
     def pull(self, residual: Residual) -> FloatArray:
         """Return the gradient that a residual would have, the cuts' unknowns eliminated, shape (p,)."""
         slope = self.own.T @ residual.own
         right = self.cut_prior * residual.cuts
-        for (block, jacobian), columns, cut, r in zip(self.blocks, self.columns, self.cut, residual.lines, strict=True):
-            down = (jacobian.conj().T @ r).real
-            slope[block] += down[:-4]
-            slope[-4:] += down[-4:]
-            for i in range(2):
-                right[:, i] += np.bincount(cut, (columns[:, i].conj() * r).real, minlength=right.shape[0])
-        return slope - np.einsum("kip,ki->p", self.mixed, np.linalg.solve(self.inner, right[:, :, None])[:, :, 0])
+        for i, (jacobian, columns, cut, r) in enumerate(zip(self.jacobians, self.columns, self.cut, residual.lines, strict=True)):
+            down = jacobian.T @ r
+            block = self.layout.axis(i)
+            size = block.stop - block.start
+            slope[block] += down[:size]
+            slope[self._shared] += down[size:]
+            n = cut.size
+            for j in range(2):
+                right[:, j] += np.bincount(cut, columns[:, j].real * r[:n] + columns[:, j].imag * r[n:], minlength=right.shape[0])
+        np.add.at(slope, self.clamping[0], self.clamping[1] * residual.cuts[:, 0])
+        return slope - np.tensordot(_solve_pairs(self.inner, right), self.mixed, axes=2)
+
+    def border(self, i: int, rows: FloatArray, residual: Residual) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return what further unknowns of axis `i` would add to the normal equations, three of them at a time.
+
+        Parameters
+        ----------
+        rows : array, shape (2 n, 3 q)
+            Change of the axis' lines with them.
+        residual : Residual
+
+        Returns
+        -------
+        gradient (3 q,), own matrices (q, 3, 3), mixed with the parameters (p, 3 q), the cuts' unknowns eliminated from all
+        """
+        columns, cut = self.columns[i], self.cut[i]
+        n, q = cut.size, rows.shape[1]
+        cuts = self.inner.shape[0]
+        turned = np.zeros((cuts, 2, q))
+        start = np.flatnonzero(np.diff(cut, prepend=-1))
+        for j in range(2):
+            products = columns[:, j].real[:, None] * rows[:n] + columns[:, j].imag[:, None] * rows[n:]
+            turned[cut[start], j] = np.add.reduceat(products, start, axis=0)
+        solved = np.linalg.solve(self.inner, turned)
+        right = self.cut_prior * residual.cuts
+        for lines, index, r in zip(self.columns, self.cut, residual.lines, strict=True):
+            for j in range(2):
+                right[:, j] += np.bincount(index, lines[:, j].real * r[: index.size] + lines[:, j].imag * r[index.size :], minlength=cuts)
+        gradient = rows.T @ residual.lines[i] - np.tensordot(right, solved, axes=2)
+        threes = rows.reshape(2 * n, -1, 3)
+        own = np.einsum("nki,nkj->kij", threes, threes, optimize=True)
+        own -= np.einsum("cjki,cjkl->kil", turned.reshape(cuts, 2, -1, 3), solved.reshape(cuts, 2, -1, 3), optimize=True)
+        mixed = np.zeros((self.layout.size, q))
+        block = self.layout.axis(i)
+        products = self.jacobians[i].T @ rows
+        mixed[block], mixed[self._shared] = products[: block.stop - block.start], products[block.stop - block.start :]
+        mixed -= np.tensordot(self.mixed, solved, axes=((0, 1), (0, 1)))
+        return gradient, own, mixed
+
+    @property
+    def _shared(self) -> slice:
+        return slice(self.layout.tail, self.layout.force.stop)
+
+    def delay_std(self, covariance: FloatArray) -> FloatArray:
+        """Return the standard deviation of each cut's delay, shape (k,) [s]: its own fit's, and what the parameters add.
+
+        Parameters
+        ----------
+        covariance : array, shape (p, p)
+            Of the parameters.
+        """
+        follow = np.linalg.solve(self.inner, self.mixed)[:, 0]
+        own = np.linalg.inv(self.inner)[:, 0, 0]
+        return np.sqrt(own + np.einsum("kp,pq,kq->k", follow, covariance, follow)) * DELAY_UNIT
 
 
 class Misfit:
@@ -132,169 +223,245 @@ class Misfit:
     priors : Priors
     model_error : tuple of float [-]
         Of each axis: standard deviation of what the force model leaves out, as a share of each line.
+    cut_weight : array, shape (k,), optional
+        Factor on the weights of each cut's lines: below 1 for one that contradicts the others.
     """
 
-    def __init__(self, data: IdentificationData, priors: Priors, model_error: tuple[float, ...]) -> None:
+    def __init__(
+        self, data: IdentificationData, priors: Priors, model_error: tuple[float, ...], cut_weight: FloatArray | None = None
+    ) -> None:
         self.data = data
         self.priors = priors
         self.model_error = model_error
-        self.weight = tuple(_weight(a, f) for a, f in zip(data.axes, model_error, strict=True))
+        self.cut_weight = np.ones(len(data.cut_ids)) if cut_weight is None else cut_weight
+        self._axes = tuple(_AxisLines(a, data.relative_speed, f, self.cut_weight) for a, f in zip(data.axes, model_error, strict=True))
         # lines of all axes, cut by cut: a cut's delay and angle are the same for both
-        cut = np.concatenate([a.cut for a in data.axes])
+        cut = np.concatenate([a.cut for a in self._axes])
         self._order = np.argsort(cut, kind="stable")
         self._start = np.searchsorted(cut[self._order], np.arange(len(data.cut_ids) + 1))
-        self._lines = np.concatenate([a.lines for a in data.axes])[self._order]
-        columns = [np.stack([a.omega, a.order, w], axis=1) for a, w in zip(data.axes, self.weight, strict=True)]
+        self._lines = np.concatenate([a.lines for a in self._axes])[self._order]
+        columns = [np.stack([a.omega, a.order, a.weight], axis=1) for a in self._axes]
         self._weights = np.concatenate(columns)[self._order]
 
     @property
     def points(self) -> int:
         """Number of real residuals of the lines."""
-        return 2 * sum(a.omega.size for a in self.data.axes)
+        return 2 * sum(a.omega.size for a in self._axes)
 
-    def evaluate(self, theta: FloatArray, orders: tuple[int, ...], nuisance: FloatArray, grid: int = 0, normal: bool = False) -> Evaluation:
+    def evaluate(self, theta: FloatArray, layout: Layout, nuisance: FloatArray, grid: int = 0, normal: bool = False) -> Evaluation:
         """Return the cost at `theta`, and with `normal` its gradient and Hessian.
 
         Parameters
         ----------
         theta : array, shape (p,)
             See `parameters`.
-        orders : tuple of int
-            Modes of each axis.
+        layout : Layout
         nuisance : array, shape (k, 2)
             Where each cut's fit starts; not changed.
         grid : int
             Delays tried over a tooth-passing period; 0 stays near `nuisance`.
         """
-        models, gradients, axes, scaled = self._models(theta, orders, normal)
+        models, gradients, axes = self._models(theta, layout, normal)
         nuisance = nuisance.copy()
-        fit_cuts(self._lines, self._weights, np.concatenate(models)[self._order], self._start, self.data.cut_prior, nuisance, grid)
-        residual, own_jacobian = self._residual(theta, orders, models, nuisance)
-        chi2 = tuple(float(np.sum(np.abs(r) ** 2)) for r in residual.lines)
-        cost = sum(chi2) + float(np.sum(residual.own**2)) + float(np.sum(residual.cuts**2))
-        linear = None
-        if normal:
-            blocks = []
-            first = 0
-            for axis, gradient, w, m in zip(axes, gradients, self.weight, orders, strict=True):
-                scale = np.concatenate([chain(axis), scaled])
-                blocks.append((slice(first, first + axis_size(m)), -gradient * scale * np.sqrt(w)[:, None]))
-                first += axis_size(m)
-            linear = self._linearise(residual, own_jacobian, tuple(blocks), nuisance)
-        return Evaluation(cost, chi2, nuisance, tuple(models), residual, linear)
+        prior = self._cut_prior(theta, layout)
+        fit_cuts(self._lines, self._weights, np.concatenate([m.ravel() for m in models])[self._order], self._start, prior, nuisance, grid)
+        residual = self._residual(theta, layout, models, nuisance, prior)
+        linear = self._linearise(theta, layout, axes, models, gradients, residual, nuisance, prior) if normal else None
+        return Evaluation(residual.cost, nuisance, tuple(models), residual, linear)
 
-    def residual_at(self, theta: FloatArray, orders: tuple[int, ...], nuisance: FloatArray) -> Residual:
+    def residual_at(self, theta: FloatArray, layout: Layout, nuisance: FloatArray) -> Residual:
         """Return the residual with the cuts' delays and angles as they are given."""
-        models = self._models(theta, orders, False)[0]
-        return self._residual(theta, orders, models, nuisance)[0]
+        models = self._models(theta, layout, False)[0]
+        return self._residual(theta, layout, models, nuisance, self._cut_prior(theta, layout))
 
-    def _models(self, theta: FloatArray, orders: tuple[int, ...], normal: bool):
-        """Cross FRF on each axis' lines, its gradient in kernel units, and the axes' physics."""
-        parts, joint = split(theta, orders)
-        scaled = scaled_joint(joint)
+    def without_delay(self, i: int, nuisance: FloatArray) -> ComplexArray:
+        """Return the measured flange motion of an axis with tooth 1 at immersion 0 at the start, shape (n,) [m/N]."""
+        lines = self._axes[i]
+        return np.sum(lines.turned(nuisance)[0].reshape(-1, lines.outputs), axis=1)
+
+    def weight(self, i: int) -> FloatArray:
+        """Return the weights of an axis' lines, shape (n, o) [N^2/m^2]."""
+        return self._axes[i].weight.reshape(-1, self._axes[i].outputs)
+
+    def _models(
+        self, theta: FloatArray, layout: Layout, normal: bool
+    ) -> tuple[list[ComplexArray], list[ComplexArray], list[AxisParameters]]:
+        """Cross FRFs on each axis' lines, their gradients in kernel units, and the axes' physics."""
+        joint = scaled_joint(theta[layout.joint])
         models, gradients, axes = [], [], []
-        for data, part, m in zip(self.data.axes, parts, orders, strict=True):
-            axis = unpack(part, m)
-            values = np.empty(data.omega.size, dtype=complex)
-            gradient = np.empty((data.omega.size if normal else 0, axis_size(m) + 4), dtype=complex)
-            cross_frf(axis.stiffness, axis.psi, axis.factor, axis.residual, scaled, data.omega, data.flange, data.tip, values, gradient)
+        for i, (lines, part) in enumerate(zip(self._axes, layout.axes, strict=True)):
+            axis = unpack(theta[layout.axis(i)], part)
+            n, o = lines.points.shape[0], lines.outputs
+            values = np.empty((n, o), dtype=complex)
+            gradient = np.empty((n if normal else 0, o, part.size + JOINT), dtype=complex)
+            psi = np.column_stack([axis.psi, axis.fixture])
+            residual = np.vstack([axis.residual, axis.fixture_residual])
+            cross_frf(axis.omega_n, psi, axis.factor, axis.softening, residual, joint, lines.points, lines.holder, values, gradient)
+            if layout.coefficients:
+                scale = np.exp(lines.force_slope @ theta[layout.force])[:, None]
+                values *= scale
+                gradient *= scale[:, :, None] if normal else 1.0
             axes.append(axis)
             models.append(values)
             gradients.append(gradient)
-        return models, gradients, axes, scaled
+        return models, gradients, axes
 
-    def _residual(
-        self, theta: FloatArray, orders: tuple[int, ...], models: list[ComplexArray], nuisance: FloatArray
-    ) -> tuple[Residual, FloatArray]:
-        lines = tuple(self._rest(i, model, nuisance) for i, model in enumerate(models))
-        own, own_jacobian = prior_rows(theta, orders, self.priors)
-        prior = self.data.cut_prior
-        cuts = np.sqrt(prior[:, 1:3]) * (nuisance - np.stack([prior[:, 0], np.zeros(len(prior))], axis=1))
-        return Residual(lines, own, cuts), own_jacobian
+    def _cut_prior(self, theta: FloatArray, layout: Layout) -> FloatArray:
+        """What is known of each cut, with the triggers of unknown tooth angle where that is an unknown of the layout, shape (k, 4)."""
+        if not layout.clampings:
+            return self.data.cut_prior
+        prior = self.data.cut_prior.copy()
+        known = self.data.clamping >= 0
+        angle = theta[layout.clamping][self.data.clamping[known]]
+        prior[known, 0] = self.data.edge[known, 0] + angle / self.data.spindle_speed[known]
+        prior[known, 1] = self.data.edge[known, 1]
+        return prior
 
-    def without_delay(self, axis: AxisData, nuisance: FloatArray) -> ComplexArray:
-        """Return the measured lines of an axis as they would be with tooth 1 at immersion 0 at the start [m/N]."""
-        return self._turned(axis, nuisance)[0]
+    def _residual(self, theta: FloatArray, layout: Layout, models: list[ComplexArray], nuisance: FloatArray, prior: FloatArray) -> Residual:
+        lines = tuple(axis.rest(model, nuisance) for axis, model in zip(self._axes, models, strict=True))
+        own = prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients]).residual(theta)
+        cuts = np.sqrt(prior[:, 1:3]) * nuisance
+        cuts[:, 0] -= np.sqrt(prior[:, 1]) * prior[:, 0]
+        return Residual(lines, own, cuts)
 
-    def _rest(self, i: int, model: ComplexArray, nuisance: FloatArray) -> ComplexArray:
-        return (self._turned(self.data.axes[i], nuisance)[0] - model) * np.sqrt(self.weight[i])
-
-    @staticmethod
-    def _turned(axis: AxisData, nuisance: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """Lines as they would be without delay, and the air cut's part of them."""
-        delay, angle = nuisance[axis.cut].T
-        back = np.exp(1j * axis.omega * delay)
-        air = axis.lines[:, 1] * np.exp(1j * axis.order * angle) * back
-        return axis.lines[:, 0] * back - air, air
-
-    def _linearise(self, residual, own_jacobian, blocks, nuisance):
+    def _linearise(
+        self,
+        theta: FloatArray,
+        layout: Layout,
+        axes: list[AxisParameters],
+        models: list[ComplexArray],
+        gradients: list[ComplexArray],
+        residual: Residual,
+        nuisance: FloatArray,
+        prior: FloatArray,
+    ) -> Linearisation:
         """Gauss-Newton matrices of the parameters after eliminating two unknowns per cut (Schur complement)."""
-        size = own_jacobian.shape[0]
-        prior = self.data.cut_prior
-        cuts = len(self.data.cut_ids)
+        size, cuts = layout.size, len(self.data.cut_ids)
+        own = prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients]).jacobian
+        hessian = own.T @ own
         cut_prior = np.sqrt(prior[:, 1:3]) * np.array([DELAY_UNIT, 1.0])
-        hessian = own_jacobian.T @ own_jacobian
         mixed = np.zeros((cuts, 2, size))
         inner = np.zeros((cuts, 2, 2))
-        inner[:, [0, 1], [0, 1]] = cut_prior**2
-        tail = slice(size - 4, size)
-        all_columns = []
-        for axis, weight, (block, jacobian) in zip(self.data.axes, self.weight, blocks, strict=True):
-            stacked = np.concatenate([jacobian.real, jacobian.imag])
-            square = stacked.T @ stacked
-            hessian[block, block] += square[:-4, :-4]
-            hessian[block, tail] += square[:-4, -4:]
-            hessian[tail, block] += square[-4:, :-4]
-            hessian[tail, tail] += square[-4:, -4:]
-            columns = self._columns(axis, weight, nuisance)
+        inner[:, 0, 0], inner[:, 1, 1] = cut_prior[:, 0] ** 2, cut_prior[:, 1] ** 2
+        joint = np.exp(theta[layout.joint])
+        jacobians, all_columns, compliance = [], [], []
+        for i, (lines, axis) in enumerate(zip(self._axes, axes, strict=True)):
+            block, core = layout.axis(i), layout.axes[i].core
+            compliance.append(gradients[i][:, :, core - 3 : core].copy())
+            gradients[i][:, :, core - 3 : core] = compliance[i] @ _residual_turn(axis.residual)
+            jacobian = lines.jacobian(gradients[i], models[i], _whole_chain(axis, layout.axes[i], joint), layout)
+            part = block.stop - block.start
+            place = np.r_[block, slice(layout.tail, layout.force.stop)]
+            hessian[np.ix_(place, place)] += jacobian.T @ jacobian
+            columns = lines.columns(nuisance)
+            mix_cuts(jacobian, columns, lines.cut, part, block.start, layout.tail, inner, mixed)
+            jacobians.append(jacobian)
             all_columns.append(columns)
-            first = np.flatnonzero(np.diff(axis.cut, prepend=-1))
-            present = axis.cut[first]
-            for i in range(2):
-                products = np.add.reduceat((columns[:, i].conj()[:, None] * jacobian).real, first, axis=0)
-                mixed[present, i, block] += products[:, :-4]
-                mixed[present, i, tail] += products[:, -4:]
-            self._add_inner(inner, axis, columns)
-        _without_information(inner)
-        flat = mixed.reshape(2 * cuts, size)
-        hessian -= flat.T @ np.linalg.solve(inner, mixed).reshape(2 * cuts, size)
-        index = tuple(axis.cut for axis in self.data.axes)
-        linear = Linearisation(blocks, tuple(all_columns), index, own_jacobian, cut_prior, np.empty(0), hessian, inner, mixed)
+        clamping = self._clamping(layout, prior)
+        if layout.clampings:
+            np.add.at(hessian, (clamping[0], clamping[0]), clamping[1] ** 2)
+            mixed[np.arange(cuts), 0, clamping[0]] += cut_prior[:, 0] * clamping[1]
+        _without_information(inner, prior[:, 3])
+        # inner = L L^T, cut by cut: hessian - mixed^T inner^-1 mixed = hessian - half^T half
+        first = np.sqrt(inner[:, 0, 0])
+        low = inner[:, 1, 0] / first
+        second = np.sqrt(np.maximum(inner[:, 1, 1] - low**2, 1e-12 * inner[:, 1, 1]))
+        upper = mixed[:, 0] / first[:, None]
+        half = np.concatenate([upper, (mixed[:, 1] - low[:, None] * upper) / second[:, None]])
+        hessian -= half.T @ half
+        index = tuple(lines.cut for lines in self._axes)
+        linear = Linearisation(
+            layout,
+            tuple(jacobians),
+            tuple(all_columns),
+            index,
+            own,
+            cut_prior,
+            clamping,
+            np.empty(0),
+            hessian,
+            inner,
+            mixed,
+            tuple(compliance),
+        )
         return replace(linear, gradient=linear.pull(residual))
 
-    def _columns(self, axis: AxisData, weight: FloatArray, nuisance: FloatArray) -> ComplexArray:
-        """The lines' change with delay and angle of their cut."""
-        measured, air = self._turned(axis, nuisance)
-        return np.stack([1j * axis.omega * DELAY_UNIT * measured, -1j * axis.order * air], axis=1) * np.sqrt(weight)[:, None]
-
-    @staticmethod
-    def _add_inner(inner: FloatArray, axis: AxisData, columns: ComplexArray) -> None:
-        for i in range(2):
-            for j in range(2):
-                products = (columns[:, i].conj() * columns[:, j]).real
-                inner[:, i, j] += np.bincount(axis.cut, products, minlength=inner.shape[0])
-
-    def delay_std(self, nuisance: FloatArray) -> FloatArray:
-        """Return each cut's standard deviation of the delay for a given model, shape (k,) [s]."""
-        prior = self.data.cut_prior
-        inner = np.zeros((len(prior), 2, 2))
-        inner[:, 0, 0], inner[:, 1, 1] = prior[:, 1] * DELAY_UNIT**2, prior[:, 2]
-        for axis, weight in zip(self.data.axes, self.weight, strict=True):
-            self._add_inner(inner, axis, self._columns(axis, weight, nuisance))
-        unknown = _without_information(inner)
-        # at worst it lies anywhere in a tooth-passing period
-        return np.where(unknown, prior[:, 3] / np.sqrt(12.0), np.sqrt(np.linalg.inv(inner)[:, 0, 0]) * DELAY_UNIT)
+    def _clamping(self, layout: Layout, prior: FloatArray) -> tuple[np.ndarray, FloatArray]:
+        """Place of the tooth angle that each cut's prior depends on, and the prior's change with it."""
+        cuts = len(self.data.cut_ids)
+        if not layout.clampings:
+            return np.zeros(cuts, dtype=np.intp), np.zeros(cuts)
+        told = self.data.clamping >= 0
+        place = layout.clamping.start + np.maximum(self.data.clamping, 0)
+        return place, np.where(told, -np.sqrt(prior[:, 1]) / self.data.spindle_speed, 0.0)
 
 
-def _without_information(inner: FloatArray) -> np.ndarray:
-    """Find the cuts whose delay nothing tells, no line and no trigger, shape (k,); any information keeps theirs solvable."""
+class _AxisLines:
+    """Lines of one axis as rows, output after output at each point, with what never changes about them."""
+
+    def __init__(self, axis: AxisData, relative_speed: FloatArray, model_error: float, cut_weight: FloatArray) -> None:
+        o = axis.outputs
+        self.outputs = o
+        self.points = np.column_stack([axis.omega, relative_speed[axis.cut]])
+        self.holder = np.concatenate([axis.flange, axis.tip], axis=1)
+        self.force_slope = axis.force_slope
+        self.omega, self.order, self.cut = np.repeat(axis.omega, o), np.repeat(axis.order, o), np.repeat(axis.cut, o)
+        self.lines = axis.lines.reshape(-1, 2)
+        self.weight = (_weight(axis, model_error) * cut_weight[axis.cut][:, None]).ravel()
+        self._root = np.sqrt(self.weight)
+        self._extra = np.repeat(axis.force_slope, o, axis=0)
+
+    def turned(self, nuisance: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Lines as they would be without delay, and the air cut's part of them, shape (n o,)."""
+        delay, angle = nuisance[self.cut].T
+        back = np.exp(1j * self.omega * delay)
+        air = self.lines[:, 1] * np.exp(1j * self.order * angle) * back
+        return self.lines[:, 0] * back - air, air
+
+    def rest(self, model: ComplexArray, nuisance: FloatArray) -> FloatArray:
+        """Residual, real over imaginary parts, shape (2 n o,)."""
+        rest = (self.turned(nuisance)[0] - model.ravel()) * self._root
+        return np.concatenate([rest.real, rest.imag])
+
+    def columns(self, nuisance: FloatArray) -> ComplexArray:
+        """The lines' change with delay and angle of their cut, shape (n o, 2)."""
+        measured, air = self.turned(nuisance)
+        return np.stack([1j * self.omega * DELAY_UNIT * measured, -1j * self.order * air], axis=1) * self._root[:, None]
+
+    def jacobian(self, gradient: ComplexArray, model: ComplexArray, scale: FloatArray, layout: Layout) -> FloatArray:
+        """The residual's change with the axis' own parameters, the joint and the coefficients, shape (2 n o, q + c)."""
+        rows = gradient.reshape(-1, gradient.shape[2])
+        out = np.empty((2 * rows.shape[0], rows.shape[1] + layout.coefficients))
+        whiten(rows, self._extra[:, : layout.coefficients], model.ravel(), self.weight, scale, out)
+        return out
+
+
+def _whole_chain(axis: AxisParameters, layout: AxisLayout, joint: FloatArray) -> FloatArray:
+    """d physics / d vector of an axis and the joint, whose kernel units are those of `scaled_joint`."""
+    return np.concatenate([chain(axis, layout), scaled_joint(np.log(joint))])
+
+
+def _residual_turn(factor: FloatArray) -> FloatArray:
+    """d (tt, tr, rr) / d (factor 00, 10, 11) of R = factor factor^T, shape (3, 3)."""
+    a, b, c = factor[0, 0], factor[1, 0], factor[1, 1]
+    return np.array([[2.0 * a, 0.0, 0.0], [b, a, 0.0], [0.0, 2.0 * b, 2.0 * c]])
+
+
+def _solve_pairs(inner: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve symmetric 2 x 2 systems (k, 2, 2) for right sides (k, 2)."""
+    a, b, c = inner[:, 0, 0], inner[:, 0, 1], inner[:, 1, 1]
+    determinant = a * c - b * b
+    return np.stack([(c * right[:, 0] - b * right[:, 1]) / determinant, (a * right[:, 1] - b * right[:, 0]) / determinant], axis=1)
+
+
+def _without_information(inner: FloatArray, period: FloatArray) -> None:
+    """A cut of which nothing tells the delay, no line and no trigger, has it anywhere in a tooth-passing period."""
     unknown = ~(inner[:, 0, 0] > 0.0)
-    inner[unknown, 0, 0] = 1.0
-    return unknown
+    inner[unknown, 0, 0] = 12.0 / (period[unknown] / DELAY_UNIT) ** 2
 
 
 def _weight(axis: AxisData, model_error: float) -> FloatArray:
-    size = np.abs(axis.measured) ** 2
+    size = np.abs(axis.lines[:, :, 0] - axis.lines[:, :, 1]) ** 2
     # a line of nothing in a record without noise is not infinitely sure
     floor = 1e-12 * float(np.mean(size)) if np.any(size) else 1e-30
     return 1.0 / np.maximum(axis.variance + 0.5 * model_error**2 * size, floor)

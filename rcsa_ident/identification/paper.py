@@ -94,7 +94,7 @@ class NoiseWeightedCost:
 
     def weights(self, data: AxisData) -> FloatArray:
         """Inverse variances."""
-        return 1.0 / (data.variance + 0.5 * self.model_error**2 * np.abs(data.measured) ** 2)
+        return 1.0 / (data.noise + 0.5 * self.model_error**2 * np.abs(data.measured) ** 2)
 
     def value(self, misfit: FloatArray, points: FloatArray, p3: FloatArray, space: SearchSpace) -> FloatArray:
         """Return the cost, shape (k,)."""
@@ -230,15 +230,14 @@ class _Problem:
             per_tooling={n: float(squares[tooling == t].mean() / 2.0) for t, n in enumerate(self.data.toolings) if np.any(tooling == t)},
             model_error=NoiseWeightedCost().model_error,
             parameters=(),
-            covariance=None,
-            theta=None,
+            posterior=None,
             measured={
                 "omega": self.axis.omega,
                 "value": measured,
                 "model": model,
                 "tooling": tooling,
                 "cut": self.axis.cut,
-                "coherence": self.measured / np.maximum(self.measured + 2.0 * self.axis.variance, 1e-300),
+                "coherence": self.measured / np.maximum(self.measured + 2.0 * self.axis.noise, 1e-300),
             },
         )
 

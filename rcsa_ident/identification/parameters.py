@@ -1,9 +1,11 @@
 """The unknowns as one vector, and the vector as physics.
 
 One axis with m modes: log natural frequencies (m), mass-normalised shapes (2 m: translation, lever x slope), the lower
-triangle of the damping factor L by rows (diagonal as logarithm), the residual compliance's factor (3). All axes follow each
-other; the joint's four logarithms, shared by all axes, stand at the end. With D = L L^T and R = R_f R_f^T every vector is a
-passive machine with real modes.
+triangle of the damping factor L by rows (diagonal as logarithm), the residual compliance's factor (3); where gap and fixture
+are two outputs the fixture's shapes (m) and its residual to the flange (2); where the machine changes with speed the lower
+triangle of its softening by rows. All axes follow each other. What they share stands at the end: the joint's four logarithms,
+logarithms of the cutting coefficients' scales, tooth angles of the clampings. With D = L L^T and R = R_f R_f^T every vector is
+a passive machine with real modes.
 """
 
 from __future__ import annotations
@@ -19,9 +21,104 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel, damped_modes
 from rcsa_ident.identification.data import LEVER
 
-#: Units of the damping factor [sqrt(rad/s)] and of the residual compliance's factor [sqrt(m/N)].
+#: Units of the damping factor [sqrt(rad/s)], of the residual compliance's factor [sqrt(m/N)] and of the fixture's residual [m/N].
 DAMPING_UNIT = 30.0
 RESIDUAL_UNIT = np.sqrt(1e-9)
+FIXTURE_UNIT = 1e-9
+#: Unknowns of the joint.
+JOINT = 4
+
+
+@dataclass(frozen=True, slots=True)
+class AxisLayout:
+    """What of an axis is unknown.
+
+    Parameters
+    ----------
+    modes : int
+    fixture : bool
+        Gap and fixture are two outputs; else their sum, the flange's own motion, is the only one.
+    softening : bool
+        The stiffness changes with the spindle's speed.
+    """
+
+    modes: int
+    fixture: bool = False
+    softening: bool = False
+
+    @property
+    def core(self) -> int:
+        """Length of the part that describes the flange at the campaign's middle speed."""
+        return 3 * self.modes + self.pairs + 3
+
+    @property
+    def pairs(self) -> int:
+        """Entries of a lower triangle."""
+        return self.modes * (self.modes + 1) // 2
+
+    @property
+    def size(self) -> int:
+        """Length of the axis' part of the vector."""
+        return self.core + (self.modes + 2) * self.fixture + self.pairs * self.softening
+
+    @property
+    def machine(self) -> np.ndarray:
+        """Places in the axis' part of all that describes the flange: core and softening, but not the fixture."""
+        places = np.arange(self.size)
+        return np.concatenate([places[: self.core], places[self.size - self.pairs * self.softening :]])
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Which unknown stands where in the vector.
+
+    Parameters
+    ----------
+    axes : tuple of AxisLayout
+    coefficients : int
+        Cutting coefficients whose scale is unknown.
+    clampings : int
+        Clampings whose tooth angle at the trigger's edge is unknown.
+    """
+
+    axes: tuple[AxisLayout, ...]
+    coefficients: int = 0
+    clampings: int = 0
+
+    @property
+    def tail(self) -> int:
+        """Where begins what all axes share."""
+        return sum(a.size for a in self.axes)
+
+    @property
+    def size(self) -> int:
+        """Length of the vector."""
+        return self.tail + JOINT + self.coefficients + self.clampings
+
+    def axis(self, i: int) -> slice:
+        """Return the part of an axis."""
+        first = sum(a.size for a in self.axes[:i])
+        return slice(first, first + self.axes[i].size)
+
+    @property
+    def joint(self) -> slice:
+        """Joint's logarithms."""
+        return slice(self.tail, self.tail + JOINT)
+
+    @property
+    def force(self) -> slice:
+        """Logarithms of the cutting coefficients' scales."""
+        return slice(self.tail + JOINT, self.size - self.clampings)
+
+    @property
+    def clamping(self) -> slice:
+        """Tooth angles [rad]."""
+        return slice(self.size - self.clampings, self.size)
+
+
+def plain(*modes: int) -> Layout:
+    """Return the layout of axes with so many modes each, and a joint."""
+    return Layout(tuple(AxisLayout(m) for m in modes))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,86 +127,145 @@ class AxisParameters:
 
     Parameters
     ----------
-    stiffness : array, shape (m,) [rad^2/s^2]
-        Squares of the natural frequencies.
+    omega_n : array, shape (m,) [rad/s]
     psi : array, shape (m, 2) [1/sqrt(kg)]
     factor : array, shape (m, m) [sqrt(rad/s)]
     residual : array, shape (2, 2) [sqrt(m/N)]
+    fixture : array, shape (m,) [1/sqrt(kg)]
+        Its shapes; zeros where the flange's motion is the only output.
+    fixture_residual : array, shape (2,) [m/N]
+        Fixture to flange translation and slope.
+    softening : array, shape (m, m) or (0, 0) [-]
+        Symmetric: K_ij = omega_i omega_j (delta_ij + x softening_ij) at relative speed x.
     """
 
-    stiffness: FloatArray
+    omega_n: FloatArray
     psi: FloatArray
     factor: FloatArray
     residual: FloatArray
+    fixture: FloatArray
+    fixture_residual: FloatArray
+    softening: FloatArray
 
     @property
     def order(self) -> int:
         """Number of modes."""
-        return self.stiffness.size
+        return self.omega_n.size
+
+    def at(self, x: float) -> AxisParameters:
+        """Return the machine at relative speed x (-1 and 1 are the campaign's lowest and highest), in its own modes there."""
+        if self.softening.size == 0:
+            return self
+        stiffness = np.outer(self.omega_n, self.omega_n) * (np.eye(self.order) + x * self.softening)
+        squares, turn = np.linalg.eigh(stiffness)
+        # far outside the measured speeds the straight line may cross zero: a machine does not
+        omega_n = np.sqrt(np.maximum(squares, 1e-6 * np.min(self.omega_n) ** 2))
+        factor = _lower(turn.T @ self.factor)
+        return AxisParameters(
+            omega_n, turn.T @ self.psi, factor, self.residual, turn.T @ self.fixture, self.fixture_residual, np.zeros((0, 0))
+        )
 
 
-def axis_size(order: int) -> int:
-    """Return the length of an axis' part of the vector."""
-    return 3 * order + order * (order + 1) // 2 + 3
+def simple_axis(omega_n: FloatArray, psi: FloatArray, factor: FloatArray, residual: FloatArray) -> AxisParameters:
+    """Return an axis whose only output is the flange and which does not change with speed."""
+    return AxisParameters(omega_n, psi, factor, residual, np.zeros(omega_n.size), np.zeros(2), np.zeros((0, 0)))
 
 
 @lru_cache
 def lower_triangle(order: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return rows and columns of the damping factor's entries in the vector's order, and which are on the diagonal."""
+    """Return rows and columns of a lower triangle's entries in the vector's order, and which are on the diagonal."""
     rows, cols = (frozen(index, np.intp) for index in np.tril_indices(order))
     return rows, cols, frozen(rows == cols, np.bool_)
 
 
-def split(theta: FloatArray, orders: tuple[int, ...]) -> tuple[list[FloatArray], FloatArray]:
+def parameter_names(layout: AxisLayout) -> tuple[str, ...]:
+    """Return the names of the unknowns of an axis' flange and the joint, in the vector's order."""
+    m = layout.modes
+    pairs = [(i, j) for i in range(m) for j in range(i + 1)]
+    names = [f"log natural_frequency_rad_s[{n}]" for n in range(m)]
+    names += [f"psi_{k}[{n}]" for n in range(m) for k in ("t", "lever*r")]
+    names += [f"log damping_factor[{i},{j}]" if i == j else f"damping_factor[{i},{j}]" for i, j in pairs]
+    names += [f"residual_factor[{i},{j}]" for i, j in ((0, 0), (1, 0), (1, 1))]
+    names += [f"softening[{i},{j}]" for i, j in pairs if layout.softening]
+    return (*names, "log joint.k_t", "log joint.k_r", "log joint.c_t", "log joint.c_r")
+
+
+def split(theta: FloatArray, layout: Layout) -> tuple[list[FloatArray], FloatArray]:
     """Return the axes' parts and the joint's."""
-    edges = np.cumsum([axis_size(m) for m in orders])
-    parts = np.split(theta, edges)
-    return parts[:-1], parts[-1]
+    return [theta[layout.axis(i)] for i in range(len(layout.axes))], theta[layout.joint]
 
 
-def unpack(part: FloatArray, order: int) -> AxisParameters:
+def unpack(part: FloatArray, layout: AxisLayout) -> AxisParameters:
     """Return the physics of an axis' part of the vector."""
-    m = order
+    m, core = layout.modes, layout.core
     rows, cols, diagonal = lower_triangle(m)
-    lower = part[3 * m : -3]
+    lower = DAMPING_UNIT * part[3 * m : core - 3]
+    lower[diagonal] = DAMPING_UNIT * np.exp(part[3 * m : core - 3][diagonal])
     factor = np.zeros((m, m))
-    factor[rows, cols] = DAMPING_UNIT * np.where(diagonal, np.exp(np.where(diagonal, lower, 0.0)), lower)
-    residual = np.zeros((2, 2))
-    residual[np.tril_indices(2)] = RESIDUAL_UNIT * part[-3:]
-    return AxisParameters(np.exp(2.0 * part[:m]), part[m : 3 * m].reshape(m, 2), factor, residual)
+    factor[rows, cols] = lower
+    a, b, c = RESIDUAL_UNIT * part[core - 3 : core]
+    fixture, fixture_residual, softening = np.zeros(m), np.zeros(2), np.zeros((0, 0))
+    if layout.fixture:
+        fixture, fixture_residual = part[core : core + m], FIXTURE_UNIT * part[core + m : core + m + 2]
+    if layout.softening:
+        softening = np.zeros((m, m))
+        softening[rows, cols] = softening[cols, rows] = part[-layout.pairs :]
+    residual = np.array([[a, 0.0], [b, c]])
+    return AxisParameters(np.exp(part[:m]), part[m : 3 * m].reshape(m, 2), factor, residual, fixture, fixture_residual, softening)
 
 
-def pack(axis: AxisParameters) -> FloatArray:
-    """Return the vector of an axis; the inverse of `unpack`."""
-    m = axis.order
-    rows, cols, diagonal = lower_triangle(m)
+def pack(axis: AxisParameters, layout: AxisLayout | None = None) -> FloatArray:
+    """Return the vector of an axis; the inverse of `unpack`. By default of its flange alone, at the middle speed."""
+    layout = AxisLayout(axis.order) if layout is None else layout
+    rows, cols, diagonal = lower_triangle(axis.order)
     lower = axis.factor[rows, cols] / DAMPING_UNIT
     lower = np.where(diagonal, np.log(np.where(diagonal, np.abs(lower), 1.0)), lower)
-    tail = axis.residual[np.tril_indices(2)] / RESIDUAL_UNIT
-    return np.concatenate([0.5 * np.log(axis.stiffness), axis.psi.ravel(), lower, tail])
+    parts = [np.log(axis.omega_n), axis.psi.ravel(), lower, axis.residual[[0, 1, 1], [0, 0, 1]] / RESIDUAL_UNIT]
+    if layout.fixture:
+        parts += [axis.fixture, axis.fixture_residual / FIXTURE_UNIT]
+    if layout.softening:
+        parts.append(axis.softening[rows, cols] if axis.softening.size else np.zeros(layout.pairs))
+    return np.concatenate(parts)
 
 
-def chain(axis: AxisParameters) -> FloatArray:
+def chain(axis: AxisParameters, layout: AxisLayout) -> FloatArray:
     """Return d physics / d vector for each entry of an axis (the map is entry by entry), in the kernel's order."""
     m = axis.order
     rows, cols, diagonal = lower_triangle(m)
     factor = np.where(diagonal, axis.factor[rows, cols], DAMPING_UNIT)
-    return np.concatenate([2.0 * axis.stiffness, np.ones(2 * m), factor, np.full(3, RESIDUAL_UNIT)])
+    parts = [np.ones(3 * m), factor, np.full(3, RESIDUAL_UNIT)]
+    if layout.fixture:
+        parts += [np.ones(m), np.full(2, FIXTURE_UNIT)]
+    if layout.softening:
+        parts.append(np.ones(layout.pairs))
+    return np.concatenate(parts)
 
 
-def selected(axis: AxisParameters, modes: np.ndarray) -> AxisParameters:
-    """Return the axis with some of its modes, in the given order, their damping as it was.
+def _lower(rows: FloatArray) -> FloatArray:
+    """Return the lower triangular L with L L^T = rows rows^T and a diagonal above zero.
 
-    The damping's factor is that of L's rows, L_s L_s^T = R^T R from L_s^T = Q R: unlike a Cholesky factor of the product it
-    exists for any damping, however light.
+    From rows^T = Q R: unlike a Cholesky factor of the product it exists for any damping, however light.
     """
-    rows = axis.factor[modes]
     factor = np.asarray(np.linalg.qr(rows.T, mode="r")).T
     factor = factor * np.where(np.diag(factor) < 0.0, -1.0, 1.0)
     # a mode that hangs on another one's damper alone has a zero there, and no logarithm
     own = np.maximum(np.diag(factor), 1e-9 * np.linalg.norm(rows, axis=1) + 1e-150)
     np.fill_diagonal(factor, own)
-    return AxisParameters(axis.stiffness[modes], axis.psi[modes], factor, axis.residual)
+    return factor
+
+
+def selected(axis: AxisParameters, modes: np.ndarray) -> AxisParameters:
+    """Return the axis with some of its modes, in the given order, their damping as it was."""
+    softening = axis.softening[np.ix_(modes, modes)] if axis.softening.size else axis.softening
+    return AxisParameters(
+        axis.omega_n[modes],
+        axis.psi[modes],
+        _lower(axis.factor[modes]),
+        axis.residual,
+        axis.fixture[modes],
+        axis.fixture_residual,
+        softening,
+    )
 
 
 def without_mode(axis: AxisParameters, mode: int) -> AxisParameters:
@@ -118,10 +274,19 @@ def without_mode(axis: AxisParameters, mode: int) -> AxisParameters:
 
 
 def with_mode(axis: AxisParameters, omega_n: float, psi: tuple[float, float], zeta: float = 0.05) -> AxisParameters:
-    """Return the axis with one more mode in front, whose damping is not coupled to the others'."""
+    """Return the axis with one more mode in front, uncoupled to the others, which the fixture does not feel."""
     factor = np.zeros((axis.order + 1, axis.order + 1))
     factor[0, 0], factor[1:, 1:] = np.sqrt(2.0 * zeta * omega_n), axis.factor
-    return AxisParameters(np.append(omega_n**2, axis.stiffness), np.concatenate([[psi], axis.psi]), factor, axis.residual)
+    softening = np.pad(axis.softening, ((1, 0), (1, 0))) if axis.softening.size else axis.softening
+    return AxisParameters(
+        np.append(omega_n, axis.omega_n),
+        np.concatenate([[psi], axis.psi]),
+        factor,
+        axis.residual,
+        np.append(0.0, axis.fixture),
+        axis.fixture_residual,
+        softening,
+    )
 
 
 def scaled_joint(logs: FloatArray) -> FloatArray:
@@ -139,4 +304,4 @@ def modes_of(axis: AxisParameters, dof: Dof) -> ModalModel:
     """Return the axis as complex modes at the flange (the paper's form), in SI, sorted by frequency."""
     lever = np.array([1.0, 1.0 / LEVER])
     residual = axis.residual @ axis.residual.T * np.outer(lever, lever)
-    return damped_modes(np.sqrt(axis.stiffness), axis.factor @ axis.factor.T, axis.psi * lever, residual, plane("flange", dof))
+    return damped_modes(axis.omega_n, axis.factor @ axis.factor.T, axis.psi * lever, residual, plane("flange", dof))

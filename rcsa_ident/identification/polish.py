@@ -9,6 +9,7 @@ import scipy.linalg
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.misfit import DELAY_UNIT, Evaluation, Misfit
+from rcsa_ident.identification.parameters import Layout
 
 #: No parameter (all are logarithms or of order one) moves further in one step.
 LARGEST_STEP = 1.0
@@ -17,6 +18,7 @@ PROBE = 0.1
 LARGEST_BEND = 0.75
 #: Times the damping is raised fourfold for one step: from the least to far beyond any scale.
 RETRIES = 20
+_CUT_UNITS = np.array([DELAY_UNIT, 1.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +28,7 @@ class Solution:
     Parameters
     ----------
     theta : array, shape (p,)
-    orders : tuple of int
+    layout : Layout
     evaluation : Evaluation
         With normal equations.
     converged : bool
@@ -35,7 +37,7 @@ class Solution:
     """
 
     theta: FloatArray
-    orders: tuple[int, ...]
+    layout: Layout
     evaluation: Evaluation
     converged: bool
     steps: int
@@ -49,7 +51,7 @@ class Solution:
 def polish(
     misfit: Misfit,
     theta: FloatArray,
-    orders: tuple[int, ...],
+    layout: Layout,
     nuisance: FloatArray,
     max_steps: int,
     grid: int = 0,
@@ -61,6 +63,7 @@ def polish(
     ----------
     misfit : Misfit
     theta : array, shape (p,)
+    layout : Layout
     nuisance : array, shape (k, 2)
         Where the cuts' own fits start.
     max_steps : int
@@ -69,33 +72,35 @@ def polish(
     tolerance : float
         Stop where two steps in a row lower the cost by less than this share.
     """
-    here = misfit.evaluate(theta, orders, nuisance, grid, normal=True)
+    here = misfit.evaluate(theta, layout, nuisance, grid, normal=True)
     damping = 1e-2
     quiet = 0
     for step_number in range(max_steps):
         trial = None
         for _ in range(RETRIES):
-            step = _step(misfit, theta, orders, here, damping)
+            step = _step(misfit, theta, layout, here, damping)
             if step is not None:
-                candidate = misfit.evaluate(theta + step, orders, here.nuisance, grid)
+                assert here.linear is not None
+                ahead = here.nuisance + here.linear.follow(step) * _CUT_UNITS
+                candidate = misfit.evaluate(theta + step, layout, ahead, grid)
                 if candidate.cost < here.cost:
                     trial = candidate
                     break
             damping *= 4.0
         if trial is None or step is None:
             # no descent at any damping: rounding is reached, or the model is stuck on a ridge; without a step nothing is reached
-            return Solution(theta, orders, here, step is not None, step_number)
+            return Solution(theta, layout, here, step is not None, step_number)
         gained = here.cost - trial.cost
         theta = theta + step
         damping = max(0.2 * damping, 1e-8)
-        here = misfit.evaluate(theta, orders, trial.nuisance, grid, normal=True)
+        here = misfit.evaluate(theta, layout, trial.nuisance, grid, normal=True)
         quiet = quiet + 1 if gained < tolerance * here.cost else 0
         if quiet == 2:
-            return Solution(theta, orders, here, True, step_number + 1)
-    return Solution(theta, orders, here, False, max_steps)
+            return Solution(theta, layout, here, True, step_number + 1)
+    return Solution(theta, layout, here, False, max_steps)
 
 
-def _step(misfit: Misfit, theta: FloatArray, orders: tuple[int, ...], here: Evaluation, damping: float) -> FloatArray | None:
+def _step(misfit: Misfit, theta: FloatArray, layout: Layout, here: Evaluation, damping: float) -> FloatArray | None:
     """Damped step with geodesic acceleration (Transtrum & Sethna, 2012): it bends along the valley, not into its wall."""
     linear = here.linear
     assert linear is not None
@@ -113,8 +118,8 @@ def _step(misfit: Misfit, theta: FloatArray, orders: tuple[int, ...], here: Eval
     if largest > LARGEST_STEP:
         return velocity * (LARGEST_STEP / largest)
     cuts = linear.follow(velocity)
-    ahead = here.nuisance + PROBE * cuts * np.array([DELAY_UNIT, 1.0])
-    change = misfit.residual_at(theta + PROBE * velocity, orders, ahead).minus(here.residual)
+    ahead = here.nuisance + PROBE * cuts * _CUT_UNITS
+    change = misfit.residual_at(theta + PROBE * velocity, layout, ahead).minus(here.residual)
     bend = change.times(1.0 / PROBE).minus(linear.push(velocity, cuts)).times(2.0 / PROBE)
     acceleration = -0.5 * scipy.linalg.cho_solve(factor, linear.pull(bend) / scale, check_finite=False) / scale
     # where the bend is as large as the step, the expansion says nothing

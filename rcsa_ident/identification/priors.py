@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
-from rcsa_ident.identification.parameters import DAMPING_UNIT, axis_size, lower_triangle, split
+from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.identification.parameters import DAMPING_UNIT, JOINT, Layout, lower_triangle
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,55 +31,95 @@ class Priors:
         Centres of k_t [N/m], k_r [N m/rad], c_t [N s/m], c_r [N m s/rad].
     joint_spread : float [-]
         Of their logarithms.
+    softening : float [-]
+        Spread of the stiffness' change from the middle of the campaign's speeds to its ends, as a share.
+    tooth_angle : float [rad]
+        Spread of a clamping's unknown tooth angle: wider than a turn, any angle will do.
     """
 
     frequency_hz: float = 1500.0
-    frequency_spread: float = 1.0
-    shape: float = 1.0
+    frequency_spread: float = 1.2
+    shape: float = 0.6
     damping_ratio: float = 0.04
-    damping_spread: float = 0.8
-    damping_coupling: float = 0.6
-    residual: float = 3.0
+    damping_spread: float = 1.0
+    damping_coupling: float = 0.7
+    residual: float = 2.0
     joint: tuple[float, float, float, float] = (2e9, 5e6, 1e3, 10.0)
     joint_spread: float = 1.5
+    softening: float = 0.03
+    tooth_angle: float = 10.0
 
 
-def prior_rows(theta: FloatArray, orders: tuple[int, ...], priors: Priors) -> tuple[FloatArray, FloatArray]:
-    """Return the priors as residuals with unit variance, shape (p,), and their Jacobian, shape (p, p).
+@dataclass(frozen=True, slots=True, eq=False)
+class PriorRows:
+    """The priors as residuals of unit variance, (theta - centre) / spread, where a mode's damping follows its frequency.
 
-    A mode's damping ratio is prior-bound through its own diagonal, 2 log L_nn - log(2 zeta omega_n), so its row has two
-    entries; every other row has one.
+    Parameters
+    ----------
+    centre, spread : arrays, shape (p,)
+    own : array of int
+        Diagonal entries of the damping factors: 2 log L_nn - log(2 zeta omega_n) is what is known, so these rows have a second
+        entry, at `frequency`.
+    frequency : array of int
+    jacobian : array, shape (p, p)
+        The same for every vector.
     """
-    parts, joint = split(theta, orders)
-    residual = np.empty(theta.size)
-    jacobian = np.zeros((theta.size, theta.size))
+
+    centre: FloatArray
+    spread: FloatArray
+    own: np.ndarray
+    frequency: np.ndarray
+    jacobian: FloatArray
+
+    def residual(self, theta: FloatArray) -> FloatArray:
+        """Return the residuals at a vector, shape (p,)."""
+        away = theta - self.centre
+        away[self.own] -= 0.5 * theta[self.frequency]
+        return away / self.spread
+
+
+@lru_cache(maxsize=64)
+def prior_rows(layout: Layout, priors: Priors, coefficients: tuple[float, ...] = ()) -> PriorRows:
+    """Return the priors of a layout's unknowns.
+
+    Parameters
+    ----------
+    coefficients : tuple of float
+        Standard deviations of the logarithms of the cutting coefficients' scales.
+    """
+    centre, spread, own, frequency = [], [], [], []
     first = 0
-    for part, m in zip(parts, orders, strict=True):
+    for axis in layout.axes:
+        m = axis.modes
         diagonal = lower_triangle(m)[2]
-        spread = np.concatenate(
-            [
-                np.full(m, priors.frequency_spread),
-                np.full(2 * m, priors.shape),
-                np.where(diagonal, 0.5 * priors.damping_spread, priors.damping_coupling),
-                np.full(3, priors.residual),
-            ]
-        )
-        centre = np.zeros(part.size)
-        centre[:m] = np.log(2.0 * np.pi * priors.frequency_hz)
-        own = 3 * m + np.flatnonzero(diagonal)
-        centre[own] = 0.5 * (np.log(2.0 * priors.damping_ratio) + part[:m]) - np.log(DAMPING_UNIT)
-        block = slice(first, first + axis_size(m))
-        residual[block] = (part - centre) / spread
-        jacobian[range(block.start, block.stop), range(block.start, block.stop)] = 1.0 / spread
-        jacobian[first + own, first + np.arange(m)] = -0.5 / spread[own]
-        first += axis_size(m)
-    residual[first:] = (joint - np.log(priors.joint)) / priors.joint_spread
-    jacobian[range(first, theta.size), range(first, theta.size)] = 1.0 / priors.joint_spread
-    return residual, jacobian
+        parts = [
+            np.full(m, priors.frequency_spread),
+            np.full(2 * m, priors.shape),
+            np.where(diagonal, 0.5 * priors.damping_spread, priors.damping_coupling),
+            np.full(3, priors.residual),
+        ]
+        if axis.fixture:
+            parts += [np.full(m, priors.shape), np.full(2, priors.residual**2)]
+        if axis.softening:
+            parts.append(np.full(axis.pairs, priors.softening))
+        middle = np.zeros(axis.size)
+        middle[:m] = np.log(2.0 * np.pi * priors.frequency_hz)
+        places = 3 * m + np.flatnonzero(diagonal)
+        middle[places] = 0.5 * np.log(2.0 * priors.damping_ratio) - np.log(DAMPING_UNIT)
+        centre.append(middle)
+        spread.append(np.concatenate(parts))
+        own.append(first + places)
+        frequency.append(first + np.arange(m))
+        first += axis.size
+    centre += [np.log(priors.joint), np.zeros(layout.coefficients + layout.clampings)]
+    spread += [np.full(JOINT, priors.joint_spread), np.asarray(coefficients, dtype=float), np.full(layout.clampings, priors.tooth_angle)]
+    middle, width = np.concatenate(centre), np.concatenate(spread)
+    rows, follows = np.concatenate(own), np.concatenate(frequency)
+    jacobian = np.diag(1.0 / width)
+    jacobian[rows, follows] = -0.5 / width[rows]
+    return PriorRows(frozen(middle), frozen(width), frozen(rows, np.intp), frozen(follows, np.intp), frozen(jacobian))
 
 
-def log_volume(orders: tuple[int, ...], priors: Priors) -> float:
+def log_volume(layout: Layout, priors: Priors, coefficients: tuple[float, ...] = ()) -> float:
     """Return log det of the priors' information matrix: the evidence compares it with the posterior's."""
-    size = sum(axis_size(m) for m in orders) + 4
-    jacobian = prior_rows(np.zeros(size), orders, priors)[1]
-    return float(2.0 * np.linalg.slogdet(jacobian)[1])
+    return float(-2.0 * np.sum(np.log(prior_rows(layout, priors, coefficients).spread)))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.identification.posterior import Posterior
 
 
 class Status(StrEnum):
@@ -34,10 +35,10 @@ class AxisResult:
     per_tooling : mapping of str to float
     model_error : float [-]
         Share of each line that neither the model nor the records' noise explains, learned from the residuals.
-    parameters, covariance : tuple of str, array (p, p), or None
-        Posterior covariance of this axis' unknowns and the joint's, where the method gives one.
-    theta : array, shape (p,), or None
-        The unknowns themselves, in the same order.
+    parameters : tuple of str
+        Names of the unknowns of flange and joint, in the posterior's order.
+    posterior : Posterior or None
+        Where the method gives one.
     measured : mapping with arrays omega, value, model, cut (index), coherence
         Lines without delay beside the model's: what a plot shows.
     """
@@ -48,8 +49,7 @@ class AxisResult:
     per_tooling: Mapping[str, float]
     model_error: float
     parameters: tuple[str, ...]
-    covariance: FloatArray | None
-    theta: FloatArray | None
+    posterior: Posterior | None
     measured: Mapping[str, FloatArray]
 
 
@@ -62,6 +62,11 @@ class Identification:
     status : Status
     reasons : tuple of str
         Why it is suspect or has failed.
+    notes : tuple of str
+        What the data cannot tell, and what was done about single cuts.
+    coefficients : mapping of str to (float, float)
+        What was found of the forces' uncertain coefficients and its standard deviation: logarithms of scales, run-outs in units of
+        the cutting model's reference.
     seed : int
     method : str
     axes : mapping of Dof to AxisResult
@@ -83,3 +88,5 @@ class Identification:
     delay_std: FloatArray
     spindle_speed: FloatArray
     trace: tuple[tuple[str, str, float], ...]
+    notes: tuple[str, ...] = ()
+    coefficients: Mapping[str, tuple[float, float]] = field(default_factory=dict)

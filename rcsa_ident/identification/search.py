@@ -11,14 +11,13 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import (
     DAMPING_UNIT,
-    axis_size,
+    AxisLayout,
     lower_triangle,
     pack,
+    plain,
     selected,
     split,
     unpack,
-    with_mode,
-    without_mode,
 )
 from rcsa_ident.identification.polish import Solution, polish
 
@@ -37,19 +36,25 @@ class SearchSettings:
     """
 
     modes: int = 10
-    population: int = 12
-    generations: int = 6
+    population: int = 8
+    generations: int = 4
     steps: int = 8
 
 
 def starts(count: int, modes: int, band_hz: tuple[float, float], misfit: Misfit, rng: np.random.Generator) -> FloatArray:
-    """Return random vectors, shape (count, p): frequencies spread over the band and around it, light uncoupled damping."""
-    size = axis_size(modes) + 4
-    low, high = 0.2 * band_hz[0], 1.08 * band_hz[1]
-    theta = np.zeros((count, size))
-    frequency = np.sort(rng.uniform(low, high, (count, modes)), axis=1)
+    """Return random vectors, shape (count, p): a mode below the band, one above it, the others in it, light uncoupled damping.
+
+    Every machine has modes below and above what is excited; a search that starts without them ends without them.
+    """
+    low, high = band_hz
+    theta = np.zeros((count, plain(modes).size))
+    frequency = rng.uniform(low, 1.08 * high, (count, modes))
+    frequency[:, 0] = rng.uniform(0.2, 0.6, count) * low
+    frequency[:, 1] = rng.uniform(1.3, 2.0, count) * high
+    frequency = np.sort(frequency, axis=1)
     theta[:, :modes] = np.log(2.0 * np.pi * frequency)
     theta[:, modes : 3 * modes] = 0.1 * rng.standard_normal((count, 2 * modes))
+    theta[:, 3 * modes - 2 : 3 * modes] *= 5.0
     own = 3 * modes + np.flatnonzero(lower_triangle(modes)[2])
     theta[:, own] = 0.5 * np.log(2.0 * 0.05 * 2.0 * np.pi * frequency) - np.log(DAMPING_UNIT)
     theta[:, -7:-4] = [1.0, 0.1, 1.0]
@@ -62,7 +67,7 @@ def explore(
     settings: SearchSettings,
     band_hz: tuple[float, float],
     rng: np.random.Generator,
-    report: Callable[[str, float], None] | None = None,
+    report: Callable[[str, float, Solution], None] | None = None,
 ) -> list[Solution]:
     """Return the last population, best first, for one axis.
 
@@ -79,7 +84,7 @@ def explore(
     from pymoo.operators.mutation.pm import PM
 
     first = starts(settings.population, settings.modes, band_hz, misfit, rng)
-    orders = (settings.modes,)
+    layout = plain(settings.modes)
     centre, reach = first.mean(axis=0), np.full(first.shape[1], 6.0)
     problem = Problem(n_var=first.shape[1], n_obj=1, xl=np.minimum(centre - reach, -reach), xu=np.maximum(centre + reach, reach))
     algorithm = GA(
@@ -98,12 +103,12 @@ def explore(
         improved = []
         for individual in offspring:
             theta = _by_frequency(np.asarray(individual.X, dtype=float), settings.modes)
-            solution = polish(misfit, theta, orders, np.zeros((len(misfit.data.cut_ids), 2)), settings.steps, grid=32)
+            solution = polish(misfit, theta, layout, np.zeros((len(misfit.data.cut_ids), 2)), settings.steps, grid=32)
             inside = np.clip(solution.theta, problem.xl, problem.xu)
             reached[inside.tobytes()] = solution
             improved.append(inside)
             if report is not None:
-                report("search", solution.cost)
+                report("search", solution.cost, solution)
         # what the steps have gained is inherited (Lamarck's way)
         offspring.set("X", np.array(improved))
         offspring.set("F", np.array([[reached[x.tobytes()].cost] for x in improved]))
@@ -112,22 +117,10 @@ def explore(
     return sorted((reached[key] for key in last), key=lambda s: s.cost)
 
 
-def with_mode_below(theta: FloatArray, modes: int, lowest_hz: float) -> FloatArray:
-    """Move the mode of least shape below the lowest line, where it stands for all that the machine does there.
-
-    Searches end without such a mode more often than not: while the noise is coarse nothing asks for one, and later no
-    small step leads there.
-    """
-    (part,), joint = split(theta, (modes,))
-    axis = unpack(part, modes)
-    weakest = int(np.argmin(np.sum(axis.psi**2, axis=1)))
-    return np.concatenate([pack(with_mode(without_mode(axis, weakest), np.pi * lowest_hz, (0.2, 0.2))), joint])
-
-
 def _by_frequency(theta: FloatArray, modes: int) -> FloatArray:
     """Sort the modes by frequency, so that crossover mixes like with like."""
-    (part,), joint = split(theta, (modes,))
+    (part,), joint = split(theta, plain(modes))
     order = np.argsort(part[:modes], kind="stable")
     if np.array_equal(order, np.arange(modes)):
         return theta
-    return np.concatenate([pack(selected(unpack(part, modes), order)), joint])
+    return np.concatenate([pack(selected(unpack(part, AxisLayout(modes)), order)), joint])

@@ -110,19 +110,20 @@ def angle_to_air(cut: SteadyRecord, air: SteadyRecord, teeth: int) -> tuple[floa
     return float(trial[best]), float(np.hypot(*std))
 
 
-def trigger_delay(recording: Recording, speed: float, teeth: int) -> tuple[float | None, float | None]:
-    """Return when tooth 1 stands at immersion 0 and its standard deviation [s]; None without a trigger of known tooth angle.
+def trigger_delay(recording: Recording, speed: float, teeth: int) -> tuple[float | None, float | None, bool]:
+    """Return when tooth 1 stands at immersion 0, its standard deviation [s], and whether the tooth angle at the edge is known.
 
-    With several pulses a turn it is known only up to the time between them, which is enough where a whole number of teeth
-    passes in it.
+    Where it is not, the time is that of the edge: the delay is later by the angle, the same in all cuts of a clamping. With
+    several pulses a turn both are known only up to the time between them, which is enough where a whole number of teeth
+    passes in it. None without a trigger that helps.
     """
     edge = trigger_edge(recording, speed)
-    if edge is None:
-        return None, None
-    sensor = _trigger(recording)
-    if sensor.tooth_angle is None or teeth % sensor.pulses_per_revolution != 0:
-        return None, None
-    return edge[0] - sensor.tooth_angle / speed, edge[1]
+    sensor = None if edge is None else _trigger(recording)
+    if edge is None or sensor is None or teeth % sensor.pulses_per_revolution != 0:
+        return None, None, True
+    if sensor.tooth_angle is None:
+        return *edge, False
+    return edge[0] - sensor.tooth_angle / speed, edge[1], True
 
 
 def _trigger(recording: Recording) -> Sensor:

@@ -17,9 +17,10 @@ class HarmonicPoints:
 
     Parameters
     ----------
-    cut, air : complex arrays, shape (n, axes) [m/N]
-        The receptance is cut - air; the air cut's line is turned by the angle between both records.
-    variance : array, shape (n, axes) [m^2/N^2]
+    cut, air : complex arrays, shape (n, axes, o) [m/N]
+        The receptance is cut - air; the air cut's line is turned by the angle between both records. Outputs are gap and
+        fixture, whose sum is the flange's motion, or that alone.
+    variance : array, shape (n, axes, o) [m^2/N^2]
         Of the real and of the imaginary part of cut - air each.
     coherence : array, shape (n, axes) [-]
     """
@@ -53,16 +54,16 @@ class LineEstimator:
 
     def points(self, cut: SteadyRecord, air: SteadyRecord | None, angle: float, order: np.ndarray, force: ComplexArray) -> HarmonicPoints:
         """Return the points; the variance is that of both lines, from the noise beside them and their scatter."""
-        amplitude, noise = cut.flange[order], cut.variance[order]
+        amplitude, noise = cut.outputs[order], cut.output_variance[order]
         still = np.zeros_like(amplitude)
         if air is not None:
-            still, still_noise = turned_air(air, angle, int(order[-1]))
+            still, still_noise = turned(air.outputs, air.output_variance, angle, int(order[-1]))
             still, noise = still[order], noise + still_noise[order]
-        variance = noise / np.abs(force) ** 2
-        power = np.abs((amplitude - still) / force) ** 2
+        variance = noise / np.abs(force[:, :, None]) ** 2
+        power = np.abs(np.sum(amplitude - still, axis=2) / force) ** 2
         # the noise is in the power, too
-        coherence = np.clip(1.0 - 2.0 * variance / np.maximum(power, 1e-300), 0.0, 1.0)
-        return HarmonicPoints(amplitude / force, still / force, variance, coherence)
+        coherence = np.clip(1.0 - 2.0 * np.sum(variance, axis=2) / np.maximum(power, 1e-300), 0.0, 1.0)
+        return HarmonicPoints(amplitude / force[:, :, None], still / force[:, :, None], variance, coherence)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,15 +92,23 @@ class AirCorrectedSpectra:
         left = np.array([air_corrected(*(np.delete(x, s, axis=0) for x in (displacement, same, still))) for s in range(self.segments)])
         spread = (self.segments - 1) / self.segments * np.sum(np.abs(left - left.mean(axis=0)) ** 2, axis=0)
         variance = 0.5 * spread * _overlap_factor(self.segments)
-        return HarmonicPoints(values, np.zeros_like(values), variance, coherence(displacement - still.mean(axis=0), same))
+        points = (values, np.zeros_like(values), variance)
+        return HarmonicPoints(*(each[:, :, None] for each in points), coherence(displacement - still.mean(axis=0), same))
 
 
 def turned_air(air: SteadyRecord, angle: float, highest: int) -> tuple[ComplexArray, FloatArray]:
     """Return an air cut's lines turned by an angle and their variance, orders 0..highest; 0 where the record has no such order."""
-    missing = max(highest - air.highest_order, 0)
-    amplitude = np.pad(air.flange, ((0, missing), (0, 0)))[: highest + 1]
-    variance = np.pad(air.variance, ((0, missing), (0, 0)), mode="edge")[: highest + 1]
-    return amplitude * np.exp(1j * np.arange(highest + 1) * angle)[:, None], variance
+    return turned(air.flange, air.variance, angle, highest)
+
+
+def turned(lines: ComplexArray, noise: FloatArray, angle: float, highest: int) -> tuple[ComplexArray, FloatArray]:
+    """Return lines (orders, ...) turned by an angle, and their variance, orders 0..highest; 0 where there is no such order."""
+    rest = [(0, 0)] * (lines.ndim - 1)
+    missing = max(highest + 1 - lines.shape[0], 0)
+    amplitude = np.pad(lines, [(0, missing), *rest])[: highest + 1]
+    variance = np.pad(noise, [(0, missing), *rest], mode="edge")[: highest + 1]
+    phase = np.exp(1j * np.arange(highest + 1) * angle)
+    return amplitude * phase.reshape(-1, *(1 for _ in rest)), variance
 
 
 def _overlap_factor(segments: int) -> float:

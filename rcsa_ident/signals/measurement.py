@@ -11,7 +11,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.force import force_lines
+from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.alignment import angle_to_air, trigger_delay
@@ -38,13 +38,17 @@ class AxisLines:
     order : array of int, shape (n,)
         Multiples of the spindle frequency.
     omega : array, shape (n,) [rad/s]
-    cut, air : complex arrays, shape (n,) [m/N]
-        Absolute flange displacement over the simulated force with tooth 1 at immersion 0 at the record's start; the air
-        cut's line is turned by the best estimate of the angle between both records.
-    variance : array, shape (n,) [m^2/N^2]
+    cut, air : complex arrays, shape (n, o) [m/N]
+        Displacement over the simulated force with tooth 1 at immersion 0 at the record's start; the air cut's line is turned
+        by the best estimate of the angle between both records. Outputs are gap and fixture, whose sum is the flange's absolute
+        motion, or that alone.
+    variance : array, shape (n, o) [m^2/N^2]
         Of the real and of the imaginary part of cut - air each.
     coherence : array, shape (n,) [-]
+        Of the flange's motion.
     force : complex array, shape (n,) [N]
+    force_slope : complex array, shape (n, 5) [-]
+        Change of the force's logarithm with `cutting.force.SLOPES`.
     """
 
     order: np.ndarray
@@ -54,11 +58,22 @@ class AxisLines:
     variance: FloatArray
     coherence: FloatArray
     force: ComplexArray
+    force_slope: ComplexArray
+
+    @property
+    def outputs(self) -> int:
+        """1 or 2."""
+        return self.cut.shape[1]
 
     @property
     def receptance(self) -> ComplexArray:
-        """Flange displacement per tip force, up to the cut's delay: true value times e^{-i omega delay}."""
-        return self.cut - self.air
+        """Flange displacement per tip force, up to the cut's delay, shape (n,): true value times e^{-i omega delay}."""
+        return np.sum(self.cut - self.air, axis=1)
+
+    def summed(self) -> AxisLines:
+        """Return the lines with the flange's motion as the only output."""
+        cut, air, variance = (np.sum(each, axis=1, keepdims=True) for each in (self.cut, self.air, self.variance))
+        return replace(self, cut=cut, air=air, variance=variance)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +89,8 @@ class CutMeasurement:
     alignment_std : float [rad]
         Standard deviation of the angle between cut and air cut; 0 without an air cut.
     delay, delay_std : float or None [s]
-        When tooth 1 stood at immersion 0, from a trigger whose tooth angle is known.
+        When tooth 1 stood at immersion 0, from a trigger whose tooth angle is known; else the time of the trigger's edge.
+    tooth_angle_known : bool
     """
 
     cut_id: str
@@ -84,6 +100,7 @@ class CutMeasurement:
     alignment_std: float
     delay: float | None = None
     delay_std: float | None = None
+    tooth_angle_known: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,18 +162,21 @@ def measure_cut(
     if reasons:
         return Reading(Verdict(reasons))
     speed = steady.spindle_speed
-    force = force_lines(cutter, replace(conditions, spindle_speed=speed), coefficients, harmonic)
+    force, slope = force_and_slope(cutter, replace(conditions, spindle_speed=speed), coefficients, harmonic)
     strong = WEAKEST_FORCE * np.abs(force).max()
-    seen = force[:, [0 if axis is Dof.X else 1 for axis in axes]]
-    keep = np.abs(seen) > strong
-    points = estimator.points(steady, still, angle, harmonic, np.where(keep, seen, max(strong, 1e-300)))
-    result = {
-        axis: AxisLines(
-            harmonic[k], harmonic[k] * speed, points.cut[k, i], points.air[k, i], points.variance[k, i], points.coherence[k, i], seen[k, i]
-        )
-        for i, (axis, k) in enumerate(zip(axes, keep.T, strict=True))
-        if k.any()
-    }
+    seen = [0 if axis is Dof.X else 1 for axis in axes]
+    keep = np.abs(force[:, seen]) > strong
+    points = estimator.points(steady, still, angle, harmonic, np.where(keep, force[:, seen], max(strong, 1e-300)))
+    result = {}
+    for i, (axis, k) in enumerate(zip(axes, keep.T, strict=True)):
+        # an axis without the fixture's acceleration has the gap alone
+        outputs = slice(None) if steady.has_fixture(axis) else slice(0, 1)
+        if k.any():
+            cut_points, air_points, variance = (each[k, i, outputs] for each in (points.cut, points.air, points.variance))
+            force_k, slope_k = force[k, seen[i]], slope[k, seen[i]]
+            result[axis] = AxisLines(
+                harmonic[k], harmonic[k] * speed, cut_points, air_points, variance, points.coherence[k, i], force_k, slope_k
+            )
     measurement = CutMeasurement(cut_id, tooling, speed, result, alignment_std, *trigger_delay(cut, speed, cutter.teeth))
     notes = () if air is not None else (NO_AIR,)
     return Reading(Verdict((), notes), measurement)

@@ -34,10 +34,10 @@ class SteadyRecord:
         1 for an air cut.
     lines : LineSpectrum
         Of these channels; phases from the recording's first sample.
-    flange : complex array, shape (orders, axes) [m]
-        Absolute displacement at each order.
-    variance : array, shape (orders, axes) [m^2]
-        Of its real and of its imaginary part each.
+    outputs : complex array, shape (orders, axes, o) [m]
+        Displacement at each order: gap and fixture, or the gap alone where no axis has the fixture's acceleration.
+    output_variance : array, shape (orders, axes, o) [m^2]
+        Of the real and of the imaginary part each.
     """
 
     recording: Recording
@@ -46,8 +46,22 @@ class SteadyRecord:
     part: slice
     teeth: int
     lines: LineSpectrum
-    flange: ComplexArray
-    variance: FloatArray
+    outputs: ComplexArray
+    output_variance: FloatArray
+
+    @property
+    def flange(self) -> ComplexArray:
+        """Absolute displacement of the flange at each order, shape (orders, axes) [m]."""
+        return np.sum(self.outputs, axis=2)
+
+    @property
+    def variance(self) -> FloatArray:
+        """Of its real and of its imaginary part each, shape (orders, axes) [m^2]."""
+        return np.sum(self.output_variance, axis=2)
+
+    def has_fixture(self, axis: Dof) -> bool:
+        """Return whether the fixture's motion along an axis was recorded."""
+        return self.recording.channel(Quantity.ACCELERATION, axis) is not None
 
     @property
     def spindle_speed(self) -> float:
@@ -113,9 +127,10 @@ def steady_record(recording: Recording, axes: Sequence[Dof], programmed: float, 
         lines = LineSpectrum(speed, lines.amplitude * shift[:, None], lines.variance, lines.scatter, lines.rest, lines.rate)
     weight = _weights(recording, axes, columns, np.arange(lines.amplitude.shape[0]) * speed)
     noise = np.stack([_line_variance(lines, c, teeth) for c in range(len(columns))], axis=1)
-    flange = np.einsum("mc,mca->ma", lines.amplitude, weight)
-    variance = np.einsum("mc,mca->ma", noise, np.abs(weight) ** 2)
-    return SteadyRecord(recording, tuple(axes), columns, part, teeth, lines, flange, variance)
+    kinds = [slice(0, len(axes)), slice(len(axes), None)][: 1 if len(columns) == len(axes) else 2]
+    outputs = np.stack([np.einsum("mc,mca->ma", lines.amplitude[:, k], weight[:, k]) for k in kinds], axis=2)
+    variance = np.stack([np.einsum("mc,mca->ma", noise[:, k], np.abs(weight[:, k]) ** 2) for k in kinds], axis=2)
+    return SteadyRecord(recording, tuple(axes), columns, part, teeth, lines, outputs, variance)
 
 
 def _columns(recording: Recording, axes: Sequence[Dof]) -> tuple[int, ...]:

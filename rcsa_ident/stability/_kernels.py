@@ -260,3 +260,40 @@ def pitch_envelope(omega, trace, determinant, stiffness, pitch, speeds):
                             lobes[i] = int(w / speeds[i] / pitch.size)
                     a, fa = b, fb
     return limit, chatter, lobes
+
+
+@numba.njit(cache=True)
+def receptance_at(omega, values, w):
+    """Return the entries of a receptance at any frequencies, shape (m, q), from those at `omega`, shape (n, q).
+
+    Quintics through six nodes between the nodes; below the lowest the real part as it is there and the imaginary part in
+    proportion to the frequency; zero above the highest; the conjugate at negative frequencies.
+    """
+    n, q = values.shape
+    result = np.zeros((w.size, q), dtype=np.complex128)
+    weight = np.empty(6)
+    for i in range(w.size):
+        place = abs(w[i])
+        if place > omega[n - 1]:
+            continue
+        if place < omega[0]:
+            for j in range(q):
+                result[i, j] = complex(values[0, j].real, values[0, j].imag * place / omega[0])
+        else:
+            k = min(np.searchsorted(omega, place), n - 1)
+            first = max(k - 3, 0)
+            last = min(k + 2, n - 1)
+            for a in range(first, last + 1):
+                above, below = 1.0, 1.0
+                for b in range(first, last + 1):
+                    if b != a:
+                        above *= place - omega[b]
+                        below *= omega[a] - omega[b]
+                weight[a - first] = above / below
+            for j in range(q):
+                for a in range(first, last + 1):
+                    result[i, j] += weight[a - first] * values[a, j]
+        if w[i] < 0.0:
+            for j in range(q):
+                result[i, j] = result[i, j].conjugate()
+    return result

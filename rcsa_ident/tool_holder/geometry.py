@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rcsa_ident.errors import InputError, non_negative, positive
 
@@ -187,3 +187,19 @@ def clamped(
         used.append(segment if segment.length <= left + 1e-9 else segment.part(0.0, left))
         left -= segment.length
     return ToolAssembly(tuple(used), holder, insertion, contact)
+
+
+def stiffened(assembly: ToolAssembly, share: float) -> ToolAssembly:
+    """Return the assembly with all moduli and its contact stiffer by a share: natural frequencies rise by half of it."""
+
+    def segments(old: tuple[BeamSegment, ...]) -> tuple[BeamSegment, ...]:
+        materials = [replace(s.material, youngs_modulus=s.material.youngs_modulus * (1.0 + share)) for s in old]
+        return tuple(replace(s, material=m) for s, m in zip(old, materials, strict=True))
+
+    contact = assembly.contact
+    contact = replace(
+        contact,
+        translational_stiffness=contact.translational_stiffness * (1.0 + share),
+        rotational_stiffness=contact.rotational_stiffness * (1.0 + share),
+    )
+    return replace(assembly, tool=segments(assembly.tool), holder=segments(assembly.holder), contact=contact)

@@ -88,7 +88,10 @@ def data_of(campaign: Campaign, judged: Sequence[JudgedCut]) -> IdentificationDa
         reasons = "; ".join(dict.fromkeys(r for j in judged for r in j.reading.verdict.reasons))
         raise InputError("cuts", f"none of {len(judged)} usable ({reasons})", "at least one usable cut")
     receptances = {name: partial(_receptance, campaign, name) for name in campaign.toolings}
-    return prepare(measurements, receptances, {name: t.cutter.teeth for name, t in campaign.toolings.items()})
+    teeth = {name: t.cutter.teeth for name, t in campaign.toolings.items()}
+    known = campaign.workpiece.coefficients
+    edges = [known.edge_spread if edge > 0.0 else 0.0 for edge in (known.tangential_edge, known.radial_edge)]
+    return prepare(measurements, receptances, teeth, (known.tangential_spread, known.ratio_spread, *edges))
 
 
 def _receptance(campaign: Campaign, name: str, omega: FloatArray) -> Receptance:

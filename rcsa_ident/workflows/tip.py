@@ -14,9 +14,11 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.identification.posterior import MachineAxis, spread
-from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.tool_holder.geometry import ToolAssembly, stiffened
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 
+#: Relative standard deviation of a tool-holder's stiffness that stands for its mesh.
+STIFFNESS_SPREAD = 5e-4
 _SECOND_PLANE = {Dof.X: Dof.Y, Dof.SLOPE_X: Dof.SLOPE_Y}
 
 
@@ -45,7 +47,14 @@ class TooltipResponse:
         return {axis: (np.sqrt(np.sum(each.real**2, axis=0)), np.sqrt(np.sum(each.imag**2, axis=0))) for axis, each in self.spread.items()}
 
 
-def tooltip(machine: Mapping[Dof, MachineAxis], assembly: ToolAssembly, omega: FloatArray, bands: bool = True) -> TooltipResponse:
+def tooltip(
+    machine: Mapping[Dof, MachineAxis],
+    assembly: ToolAssembly,
+    omega: FloatArray,
+    bands: bool = True,
+    speed: float | None = None,
+    stiffness_spread: float = STIFFNESS_SPREAD,
+) -> TooltipResponse:
     """Return the response of a tooling on an identified machine.
 
     Parameters
@@ -55,20 +64,30 @@ def tooltip(machine: Mapping[Dof, MachineAxis], assembly: ToolAssembly, omega: F
     omega : array, shape (n,) [rad/s]
     bands : bool
         Also propagate the posterior, where there is one: two responses for each of its directions.
+    speed : float or None [rad/s]
+        Spindle speed, for a machine that changes with it; by default the middle of the campaign's.
+    stiffness_spread : float
+        Standard deviation of the tool-holder's stiffness, as a share: the mesh alone by default; 0.01 for a modulus from a handbook.
     """
     omega = frozen(np.asarray(omega, dtype=float))
     # a tool-holder is alike in all directions: one solution serves both planes
     plane = tool_holder_receptance(assembly, omega)
     coupled, changes = {}, {}
+    stiffer = tool_holder_receptance(stiffened(assembly, stiffness_spread), omega) if bands and stiffness_spread > 0.0 else None
     for axis, part in machine.items():
         turned = plane if axis is Dof.X else turned_plane(plane)
-        coupled[axis] = couple(turned, part.spindle.receptance(omega), part.joint)
+        modes, joint = part.at(axis, speed)
+        flange = modes.receptance(omega)
+        coupled[axis] = couple(turned, flange, joint)
         if bands and part.posterior is not None:
 
             def tip(modes: ModalModel, joint: LumpedJoint, turned: Receptance = turned) -> ComplexArray:
                 return couple(turned, modes.receptance(omega), joint)["tip", "tip"][:, 0, 0]
 
-            changes[axis] = spread(part.posterior, axis, tip)
+            changes[axis] = spread(part.posterior, axis, tip, speed)
+            if stiffer is not None:
+                other = couple(stiffer if axis is Dof.X else turned_plane(stiffer), flange, joint)["tip", "tip"][:, 0, 0]
+                changes[axis] = np.vstack([changes[axis], other - coupled[axis]["tip", "tip"][:, 0, 0]])
     return TooltipResponse(coupled, changes)
 
 

@@ -1,0 +1,122 @@
+"""Every reason why an answer should not be believed at once, and what the data cannot tell, in words with numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.identification.data import IdentificationData
+from rcsa_ident.identification.final import AxisSearch
+from rcsa_ident.identification.misfit import Misfit
+from rcsa_ident.identification.parameters import JOINT
+from rcsa_ident.identification.polish import Solution
+from rcsa_ident.identification.posterior import Posterior, spread
+
+#: Above this share of unexplained signal the force model or the recordings are wrong.
+WORST_MODEL_ERROR = 0.02
+#: Solutions whose evidence lies closer than this are told apart by chance only.
+EVIDENCE_TIE = 6.0
+FEWEST_CUTS = 8
+#: Share of the cuts that may contradict the others before the whole is in doubt.
+MOST_BAD_CUTS = 0.1
+#: Half of the lines must carry at least this many times their noise (its amplitude's root mean square).
+LEAST_SIGNAL = 3.0
+#: A posterior narrower than this share of its prior was told by the data.
+TOLD = 0.5
+_JOINT = ("translational stiffness", "rotational stiffness", "translational damping", "rotational damping")
+
+
+def doubts(data: IdentificationData, searched: list[AxisSearch], solution: Solution, misfit: Misfit) -> list[str]:
+    """Return the reasons for `suspect`."""
+    reasons = []
+    if not solution.converged:
+        reasons.append(f"not converged: the polish still gained after {solution.steps} steps")
+    for axis in data.axes:
+        noise = np.sqrt(2.0 * axis.noise)
+        signal = float(np.median(np.abs(axis.measured) / np.where(noise > 0.0, noise, 1e-300)))
+        if signal < LEAST_SIGNAL:
+            reasons.append(f"{str(axis.axis).upper()}: half of the lines are below {signal:.2g} times their noise")
+    for axis, share in zip(data.axes, misfit.model_error, strict=True):
+        if share > WORST_MODEL_ERROR:
+            reasons.append(
+                f"{str(axis.axis).upper()}: {100 * share:.1f} % of each line stay unexplained (at most {100 * WORST_MODEL_ERROR:g} %): "
+                "cutting coefficients, toolings, tooth count or sensor signs may be wrong, or the dynamics change with speed"
+            )
+    bad = misfit.cut_weight < 1.0
+    if np.mean(bad) > MOST_BAD_CUTS:
+        reasons.append(f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, {_named(data, bad, misfit)}")
+    for axis, found in zip(data.axes, searched, strict=True):
+        if len(found.solutions) > 1 and found.evidences[1] - found.evidences[0] < EVIDENCE_TIE:
+            difference, band = _difference(data.only(axis.axis), *found.solutions[:2])
+            if difference > max(0.1, 3.0 * band):
+                reasons.append(
+                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.0f} % at the flange, "
+                    f"more than their deviation of {100 * band:.0f} %"
+                )
+    if len(data.toolings) < 2:
+        reasons.append("one tooling only: flange translation and slope can't be told apart; cut with a second, different holder")
+    for t, name in enumerate(data.toolings):
+        count = int(np.sum(data.cut_tooling == t))
+        if count < FEWEST_CUTS:
+            reasons.append(f"few cuts: {count} with {name}, at least {FEWEST_CUTS} are wanted")
+    return reasons
+
+
+def notes(data: IdentificationData, solution: Solution, misfit: Misfit, covariance: FloatArray) -> list[str]:
+    """Return what the data cannot tell, and what was done about single cuts."""
+    words = []
+    layout, priors = solution.layout, misfit.priors
+    deviation = np.sqrt(np.diag(covariance))
+    for name, std in zip(_JOINT, deviation[layout.joint], strict=True):
+        if std > TOLD * priors.joint_spread:
+            words.append(
+                f"joint: its {name} cannot be told from the flange's own compliance (known to a factor of {np.exp(std):.1f}); "
+                "both together are what the tooltip feels"
+            )
+    for i, axis in enumerate(data.axes):
+        natural = np.exp(solution.theta[layout.axis(i)][: layout.axes[i].modes]) / (2.0 * np.pi)
+        low, high = float(axis.omega.min() / (2.0 * np.pi)), float(axis.omega.max() / (2.0 * np.pi))
+        outside = np.sort(natural[(natural < low) | (natural > high)])
+        if outside.size:
+            listed = ", ".join(f"{f:.0f}" for f in outside)
+            words.append(
+                f"{str(axis.axis).upper()}: modes at {listed} Hz lie outside the excited band of {low:.0f} to {high:.0f} Hz: "
+                "they stand for all that the machine does there"
+            )
+    for name, place in zip(data.coefficient_names, range(layout.force.start, layout.force.stop), strict=False):
+        if deviation[place] > TOLD * data.coefficient_spread[place - layout.force.start]:
+            words.append(f"{name}: the cuts say little about it; it is known to {100 * deviation[place]:.1f} %, nearly as before")
+    bad = misfit.cut_weight < 1.0
+    if 0.0 < np.mean(bad) <= MOST_BAD_CUTS:
+        words.append(f"cuts that contradict the others and count less: {_named(data, bad, misfit)}")
+    return words
+
+
+def _named(data: IdentificationData, bad: np.ndarray, misfit: Misfit) -> str:
+    worst = [k for k in np.argsort(misfit.cut_weight, kind="stable") if bad[k]]
+    rest = f" and {len(worst) - 5} more" if len(worst) > 5 else ""
+    return ", ".join(f"{data.cut_ids[k]} ({1.0 / misfit.cut_weight[k]:.0f} times its variance)" for k in worst[:5]) + rest
+
+
+def _difference(data: IdentificationData, one: Solution, two: Solution) -> tuple[float, float]:
+    """Relative difference of the flange receptance of two solutions of an axis over the band, and the first one's deviation."""
+    axis = data.axes[0].axis
+    omega = np.linspace(data.axes[0].omega.min(), data.axes[0].omega.max(), 200)
+
+    def flange(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
+        return modes.receptance(omega).values[:, 0, 0]
+
+    first, second = (_flange_posterior(s) for s in (one, two))
+    value, other = flange(*first.machine(axis)), flange(*second.machine(axis))
+    size = np.linalg.norm(value)
+    if size == 0.0:
+        return 0.0, 0.0
+    return float(np.linalg.norm(value - other) / size), float(np.linalg.norm(spread(first, axis, flange)) / size)
+
+
+def _flange_posterior(solution: Solution) -> Posterior:
+    size = solution.layout.tail + JOINT
+    covariance = np.linalg.inv(solution.evaluation.hessian)[:size, :size]
+    return Posterior(solution.theta[:size], covariance, solution.layout.axes[0])

@@ -1,0 +1,138 @@
+"""The last polish: both axes with one joint and one delay per cut, gap and fixture apart, forces uncertain, speed if it matters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.identification.data import IdentificationData
+from rcsa_ident.identification.misfit import Misfit
+from rcsa_ident.identification.order import Report, cut_weights, evidence, exchange_modes, grow_modes, model_error
+from rcsa_ident.identification.parameters import Layout, pack, unpack
+from rcsa_ident.identification.polish import Solution, polish
+from rcsa_ident.identification.priors import Priors
+
+#: Relative range of speeds below which nothing is asked about a change with speed.
+LEAST_SPEED_RANGE = 0.05
+#: Modes per axis beyond what the evidence asks for.
+GROWN = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisSearch:
+    """What the search of one axis came to.
+
+    Parameters
+    ----------
+    solutions : list of Solution
+        By evidence, best first.
+    evidences : list of float
+    model_error : float
+    cut_weight : array, shape (k,)
+    trace : list of (axis, stage, cost)
+    """
+
+    solutions: list[Solution]
+    evidences: list[float]
+    model_error: float
+    cut_weight: FloatArray
+    trace: list[tuple[str, str, float]]
+
+
+def ranked(solutions: list[Solution], misfit: Misfit, trace: list[tuple[str, str, float]]) -> AxisSearch:
+    """Return solutions of one axis by their evidence."""
+    values = [evidence(s, misfit) for s in solutions]
+    order = sorted(range(len(solutions)), key=values.__getitem__)
+    return AxisSearch([solutions[i] for i in order], [values[i] for i in order], misfit.model_error[0], misfit.cut_weight, trace)
+
+
+def finish(data: IdentificationData, priors: Priors, searched: list[AxisSearch], report: Report) -> tuple[Solution, Misfit, Solution]:
+    """Return the solution of all axes together, the misfit whose minimum it is, and what the evidence alone would have chosen.
+
+    Parameters
+    ----------
+    data : IdentificationData
+        With both outputs, where they were recorded.
+    searched : list of AxisSearch
+        One for each axis.
+    report : callable
+    """
+    summed = data.summed()
+    best = [s.solutions[0] for s in searched]
+    layout = Layout(tuple(s.layout.axes[0] for s in best), len(data.coefficient_spread))
+    force = np.zeros(layout.coefficients)
+    named = len(data.coefficient_names)
+    force[:named] = np.mean([s.theta[s.layout.force][:named] for s in best], axis=0)
+    theta = np.concatenate([*(s.theta[s.layout.axis(0)] for s in best), np.mean([s.theta[s.layout.joint] for s in best], axis=0), force])
+    shares = tuple(s.model_error for s in searched)
+    weight = np.min([s.cut_weight for s in searched], axis=0)
+    start = Misfit(summed, priors, tuple(max(f, 0.02) for f in shares), weight)
+    found = polish(start, theta, layout, best[0].evaluation.nuisance, 40, grid=32)
+    found, misfit = _settled(data, priors, _start(data, found, False), shares, weight, report)
+    middle, half = data.speed_range
+    if half > LEAST_SPEED_RANGE * middle:
+        moving, other = _settled(data, priors, _start(data, found, True), misfit.model_error, misfit.cut_weight, report)
+        if evidence(moving, other) < evidence(found, misfit):
+            found, misfit = moving, other
+    omega = np.concatenate([a.omega for a in data.axes])
+    band = float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))
+
+    found = exchange_modes(found, misfit, band, report, rounds=2)
+    chosen = found
+    for _ in range(GROWN):
+        found = grow_modes(found, misfit, band)
+        report("grow", found.cost, found)
+    return *_settled(data, priors, found, misfit.model_error, misfit.cut_weight, report), chosen
+
+
+def _settled(
+    data: IdentificationData,
+    priors: Priors,
+    start: Solution | tuple[FloatArray, Layout, FloatArray],
+    shares: tuple[float, ...],
+    weight: FloatArray,
+    report: Report,
+) -> tuple[Solution, Misfit]:
+    """Polish and learn the noise in turns until it stays."""
+    theta, layout, nuisance = (start.theta, start.layout, start.evaluation.nuisance) if isinstance(start, Solution) else start
+    for _ in range(4):
+        misfit = Misfit(data, priors, shares, weight)
+        found = polish(misfit, theta, layout, nuisance, 300, tolerance=1e-5)
+        report("polish", found.cost, found)
+        learned = model_error(found, misfit)
+        if all(abs(a / b - 1.0) < 0.05 for a, b in zip(learned, shares, strict=True)):
+            break
+        theta, nuisance, shares, weight = found.theta, found.evaluation.nuisance, learned, cut_weights(found, misfit)
+    return found, misfit
+
+
+def _start(data: IdentificationData, found: Solution, softening: bool) -> tuple[FloatArray, Layout, FloatArray]:
+    """Return a vector with all that the data may tell, from one with less: what is new starts at nothing."""
+    old = found.layout
+    axes = tuple(replace(a, fixture=axis.outputs == 2, softening=softening) for a, axis in zip(old.axes, data.axes, strict=True))
+    layout = Layout(axes, len(data.coefficient_spread), data.clampings)
+    parts = [pack(unpack(found.theta[old.axis(i)], old.axes[i]), axes[i]) for i in range(len(axes))]
+    force = np.zeros(layout.coefficients)
+    force[: old.coefficients] = found.theta[old.force]
+    nuisance = found.evaluation.nuisance
+    angles = found.theta[old.clamping]
+    if not old.clampings and layout.clampings:
+        angles, nuisance = _tooth_angles(data, nuisance)
+    return np.concatenate([*parts, found.theta[old.joint], force, angles]), layout, nuisance
+
+
+def _tooth_angles(data: IdentificationData, nuisance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return each clamping's tooth angle from delays fitted without it, and the delays in the tooth-passing period that it means."""
+    angles, nuisance = np.zeros(data.clampings), nuisance.copy()
+    period = data.cut_prior[:, 3]
+    for c in range(data.clampings):
+        of = data.clamping == c
+        turned = (nuisance[of, 0] - data.edge[of, 0]) / period[of]
+        pitch = period[of] * data.spindle_speed[of]
+        mean = np.angle(np.mean(np.exp(2j * np.pi * turned))) / (2.0 * np.pi)
+        angles[c] = mean * pitch[0]
+        expected = data.edge[of, 0] + angles[c] / data.spindle_speed[of]
+        nuisance[of, 0] += period[of] * np.round((expected - nuisance[of, 0]) / period[of])
+    return angles, nuisance
