@@ -18,6 +18,12 @@ from rcsa_ident.identification.priors import Priors
 LEAST_SPEED_RANGE = 0.05
 #: Modes per axis beyond what the evidence asks for.
 GROWN = 1
+#: Least model error of a first polish of both axes together, and whose joint and force it starts from (None is their mean).
+STARTS = ((0.005, None), (0.02, 0), (0.005, 1), (0.02, 1), (0.02, None))
+#: Costs closer than this are one answer.
+SAME_POLISH = 5.0
+#: Evidences closer than this belong to one answer, with a mode more or less that hardly matters.
+SAME_ANSWER = 60.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,6 +46,19 @@ class AxisSearch:
     cut_weight: FloatArray
     trace: list[tuple[str, str, float]]
 
+    @property
+    def confirmed(self) -> bool:
+        """Whether two independent starts have come to the same answer."""
+        return len(self.evidences) > 1 and self.evidences[1] - self.evidences[0] < SAME_ANSWER
+
+    def joined(self, other: AxisSearch) -> AxisSearch:
+        """Return both searches' solutions in the order of their evidence; what was learned of the noise is the better one's."""
+        better = self if self.evidences[0] <= other.evidences[0] else other
+        solutions, evidences = [*self.solutions, *other.solutions], [*self.evidences, *other.evidences]
+        order = sorted(range(len(solutions)), key=evidences.__getitem__)
+        trace = [*self.trace, *other.trace]
+        return AxisSearch([solutions[i] for i in order], [evidences[i] for i in order], better.model_error, better.cut_weight, trace)
+
 
 def ranked(solutions: list[Solution], misfit: Misfit, trace: list[tuple[str, str, float]]) -> AxisSearch:
     """Return solutions of one axis by their evidence."""
@@ -59,18 +78,8 @@ def finish(data: IdentificationData, priors: Priors, searched: list[AxisSearch],
         One for each axis.
     report : callable
     """
-    summed = data.summed()
-    best = [s.solutions[0] for s in searched]
-    layout = Layout(tuple(s.layout.axes[0] for s in best), len(data.coefficient_spread))
-    force = np.zeros(layout.coefficients)
-    named = len(data.coefficient_names)
-    force[:named] = np.mean([s.theta[s.layout.force][:named] for s in best], axis=0)
-    theta = np.concatenate([*(s.theta[s.layout.axis(0)] for s in best), np.mean([s.theta[s.layout.joint] for s in best], axis=0), force])
-    shares = tuple(s.model_error for s in searched)
-    weight = np.min([s.cut_weight for s in searched], axis=0)
-    start = Misfit(summed, priors, tuple(max(f, 0.02) for f in shares), weight)
-    found = polish(start, theta, layout, best[0].evaluation.nuisance, 40, grid=32)
-    found, misfit = _settled(data, priors, _start(data, found, False), shares, weight, report)
+    found, shares, weight = _together(data, priors, searched)
+    found, misfit = _settled(data, priors, found, shares, weight, report)
     middle, half = data.speed_range
     if half > LEAST_SPEED_RANGE * middle:
         moving, other = _settled(data, priors, _start(data, found, True), misfit.model_error, misfit.cut_weight, report)
@@ -85,6 +94,35 @@ def finish(data: IdentificationData, priors: Priors, searched: list[AxisSearch],
         found = grow_modes(found, misfit, band)
         report("grow", found.cost, found)
     return *_settled(data, priors, found, misfit.model_error, misfit.cut_weight, report), chosen
+
+
+def _together(data: IdentificationData, priors: Priors, searched: list[AxisSearch]) -> tuple[Solution, tuple[float, ...], FloatArray]:
+    """Return the axes' answers polished together with one joint and one force, their model errors and the cuts' weights.
+
+    Where each axis has found its own joint and its own force, what lies between them may end in another valley: from a few
+    starts, until two have come to the same answer.
+    """
+    summed = data.summed()
+    best = [s.solutions[0] for s in searched]
+    layout = Layout(tuple(s.layout.axes[0] for s in best), len(data.coefficient_spread))
+    shares = tuple(s.model_error for s in searched)
+    weight = np.min([s.cut_weight for s in searched], axis=0)
+    fine = Misfit(data, priors, shares, weight)
+    named = len(data.coefficient_names)
+    found: list[Solution] = []
+    for coarse, source in STARTS:
+        chosen = best if source is None else [best[source % len(best)]]
+        force = np.zeros(layout.coefficients)
+        force[:named] = np.mean([s.theta[s.layout.force][:named] for s in chosen], axis=0)
+        joint = np.mean([s.theta[s.layout.joint] for s in chosen], axis=0)
+        theta = np.concatenate([*(s.theta[s.layout.axis(0)] for s in best), joint, force])
+        rough = Misfit(summed, priors, tuple(max(f, coarse) for f in shares), weight)
+        start = polish(rough, theta, layout, best[0].evaluation.nuisance, 40, grid=32)
+        found.append(polish(fine, *_start(data, start, False), 60))
+        found.sort(key=lambda s: s.cost)
+        if len(found) > 1 and found[1].cost - found[0].cost < SAME_POLISH:
+            break
+    return found[0], shares, weight
 
 
 def _settled(

@@ -20,6 +20,8 @@ from rcsa_ident.identification.priors import log_volume, prior_rows
 GIVE_UP, GIVE_UP_SOON = 60.0, 15.0
 #: Omissions of which the cost is lowest before anything is fitted anew; the others are not tried.
 TRIED = 5
+#: Steps of a polish on the way down, and how many times the best trial's cost another one may have to be polished, too.
+WALK, FAR = 10, 3.0
 #: Mean square of a cut's residuals, over the median of all cuts, above which it contradicts the others.
 OUTLYING = 25.0
 #: Damping ratios with which a new mode is tried, and at how many frequencies.
@@ -71,17 +73,18 @@ def drop_modes(solution: Solution, misfit: Misfit, report: Report | None = None,
                 theta, changed = _with_axis(here, i, each)
                 trials.append((misfit.evaluate(theta, changed, here.evaluation.nuisance).cost, theta, changed))
         if not trials:
-            return best
+            break
         trials.sort(key=lambda t: t[0])
         tried = [polish(misfit, theta, layout, here.evaluation.nuisance, max_steps=2) for _, theta, layout in trials[:TRIED]]
-        here = _polished(tried, misfit, 2)
+        here = _polished(tried, misfit, 2, WALK)
         value = evidence(here, misfit)
         if report is not None:
             report(f"{sum(a.modes for a in here.layout.axes)} modes", value, here)
         if value < best_evidence:
             best, best_evidence = here, value
         elif value > best_evidence + give_up:
-            return best
+            break
+    return best if best is solution else _polished([best], misfit, 1)
 
 
 def exchange_modes(
@@ -191,10 +194,11 @@ def _rank_one(entries: FloatArray) -> FloatArray:
     return np.sqrt(max(values[1], 1e-4)) * vectors[:, 1]
 
 
-def _polished(trials: list[Solution], misfit: Misfit, count: int) -> Solution:
-    """The best of the first `count` trials after they have been polished."""
+def _polished(trials: list[Solution], misfit: Misfit, count: int, steps: int = 30) -> Solution:
+    """The best of the first `count` trials after they have been polished; what lies far behind is left out."""
     trials = sorted(trials, key=lambda s: s.cost)[:count]
-    return min((polish(misfit, t.theta, t.layout, t.evaluation.nuisance, max_steps=30) for t in trials), key=lambda s: s.cost)
+    near = [t for t in trials if t.cost < FAR * trials[0].cost]
+    return min((polish(misfit, t.theta, t.layout, t.evaluation.nuisance, steps) for t in near), key=lambda s: s.cost)
 
 
 def _with_axis(solution: Solution, i: int, axis: AxisParameters) -> tuple[FloatArray, Layout]:

@@ -37,12 +37,12 @@ class SearchSettings:
 
     modes: int = 10
     population: int = 8
-    generations: int = 4
+    generations: int = 5
     steps: int = 8
 
 
 def starts(count: int, modes: int, band_hz: tuple[float, float], misfit: Misfit, rng: np.random.Generator) -> FloatArray:
-    """Return random vectors, shape (count, p): a mode below the band, one above it, the others in it, light uncoupled damping.
+    """Return random vectors, shape (count, p): a mode below the band, one above it, the others in it, light or heavy damping, uncoupled.
 
     Every machine has modes below and above what is excited; a search that starts without them ends without them.
     """
@@ -56,7 +56,8 @@ def starts(count: int, modes: int, band_hz: tuple[float, float], misfit: Misfit,
     theta[:, modes : 3 * modes] = 0.1 * rng.standard_normal((count, 2 * modes))
     theta[:, 3 * modes - 2 : 3 * modes] *= 5.0
     own = 3 * modes + np.flatnonzero(lower_triangle(modes)[2])
-    theta[:, own] = 0.5 * np.log(2.0 * 0.05 * 2.0 * np.pi * frequency) - np.log(DAMPING_UNIT)
+    damping = np.exp(rng.uniform(np.log(0.03), np.log(0.15), (count, modes)))
+    theta[:, own] = 0.5 * np.log(2.0 * damping * 2.0 * np.pi * frequency) - np.log(DAMPING_UNIT)
     theta[:, -7:-4] = [1.0, 0.1, 1.0]
     theta[:, -4:] = np.log(misfit.priors.joint)
     return theta

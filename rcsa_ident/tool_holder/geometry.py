@@ -197,9 +197,7 @@ def stiffened(assembly: ToolAssembly, share: float) -> ToolAssembly:
         return tuple(replace(s, material=m) for s, m in zip(old, materials, strict=True))
 
     contact = assembly.contact
-    contact = replace(
-        contact,
-        translational_stiffness=contact.translational_stiffness * (1.0 + share),
-        rotational_stiffness=contact.rotational_stiffness * (1.0 + share),
-    )
+    if contact is not None:
+        translational, rotational = contact.translational_stiffness, contact.rotational_stiffness
+        contact = replace(contact, translational_stiffness=translational * (1.0 + share), rotational_stiffness=rotational * (1.0 + share))
     return replace(assembly, tool=segments(assembly.tool), holder=segments(assembly.holder), contact=contact)
