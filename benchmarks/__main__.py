@@ -1,4 +1,7 @@
-"""``python -m benchmarks [--json] [claim ...]``: run the claims and print {claim, ours, peer, ratio, unit, accuracy}."""
+"""``python -m benchmarks [--json] [claim ...]``: run the claims and print {claim, ours, peer, ratio, unit, accuracy}.
+
+``python -m benchmarks study --help`` and ``search_trace --help`` tell of the studies, which have options of their own.
+"""
 
 from __future__ import annotations
 
@@ -6,23 +9,27 @@ import argparse
 import importlib
 import json
 import os
+import sys
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 #: Each is a module with ``run() -> list of rows``.
-CLAIMS = ("candidate", "lobes", "published_modes", "bad_input", "tooltip_error")
-#: Minutes rather than seconds: only where asked for.
-LONG = ("tooltip_error",)
+CLAIMS = ("candidate", "lobes", "published_modes", "bad_input")
+#: Each is a module with ``main(arguments)``.
+STUDIES = ("study", "search_trace")
 
 
 def main() -> None:
-    """Run the named claims, by default all that take seconds."""
+    """Run the named claims, by default all of them, or a study."""
+    if sys.argv[1:2] and sys.argv[1] in STUDIES:
+        importlib.import_module(f"benchmarks.{sys.argv[1]}").main(sys.argv[2:])
+        return
     parser = argparse.ArgumentParser(prog="benchmarks", description=__doc__)
     parser.add_argument("claims", nargs="*", choices=[*CLAIMS, []], metavar="claim", help=f"some of {', '.join(CLAIMS)}")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     rows = []
-    for name in arguments.claims or [c for c in CLAIMS if c not in LONG]:
+    for name in arguments.claims or CLAIMS:
         rows += importlib.import_module(f"benchmarks.{name}").run()
     if arguments.json:
         print(json.dumps(rows, indent=1))

@@ -8,7 +8,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
 
 import typer  # noqa: E402
 
-from rcsa_ident.cli import demo, identify, lobes, machine  # noqa: E402
+from rcsa_ident.cli import demo, identify, lobes, machine, plan  # noqa: E402
 
 app = typer.Typer(
     name="rcsa-ident",
@@ -24,6 +24,7 @@ app.command("check")(identify.check)
 app.command("identify")(identify.identify)
 app.command("tooltip")(lobes.tooltip)
 app.command("lobes")(lobes.lobes)
+app.command("plan")(plan.plan)
 app.command("simulate")(machine.simulate)
 app.command("warm")(machine.warm)
 

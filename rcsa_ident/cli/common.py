@@ -1,33 +1,27 @@
-"""What all commands share: exit codes, errors in one sentence, worker processes, progress, output."""
+"""What all commands share: exit codes, errors in one sentence, progress, output."""
 
 from __future__ import annotations
 
 import functools
 import json
-import multiprocessing
 import os
-import signal
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
 from rcsa_ident.errors import InputError, RcsaIdentError
 
-FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
-#: Reading and searching do not get faster beyond it.
-MOST_PROCESSES = 8
+if TYPE_CHECKING:
+    from rich.progress import Progress, ProgressColumn, TaskID
 
-Processes = Annotated[
-    int | None, typer.Option(min=1, max=64, help="Worker processes; by default one a core, at most 8.", show_default=False)
-]
+FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of tables.")]
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same answer, on any number of processes.")]
 
@@ -62,51 +56,6 @@ def _refuse(sentence: str, code: int, as_json: bool | None, details: dict[str, A
     raise typer.Exit(code)
 
 
-def _die_on_interrupt() -> None:
-    # a worker has nothing to tidy up, and the main process says what happened
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
-@dataclass(frozen=True, slots=True)
-class Workers:
-    """A `map` that may run in several processes; results come in the order of the tasks."""
-
-    pool: ProcessPoolExecutor | None
-
-    def map(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterable[Any]:
-        """Few long tasks."""
-        return map(function, tasks) if self.pool is None else self.pool.map(function, tasks)
-
-    def map_many(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterable[Any]:
-        """Many short tasks, sent four at a time."""
-        return map(function, tasks) if self.pool is None else self.pool.map(function, tasks, chunksize=4)
-
-
-@contextmanager
-def workers(processes: int | None) -> Iterator[Workers]:
-    """Yield worker processes; on the way out they are gone, at once if something went wrong."""
-    count = processes or min(_cores(), MOST_PROCESSES)
-    if count == 1:
-        yield Workers(None)
-        return
-    pool = ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), initializer=_die_on_interrupt)
-    try:
-        yield Workers(pool)
-    except BaseException:
-        for child in multiprocessing.active_children():
-            child.terminate()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _cores() -> int:
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
-        return os.cpu_count() or 1
-
-
 @dataclass(slots=True)
 class Stages:
     """Progress on stderr and the seconds that each stage took.
@@ -120,18 +69,44 @@ class Stages:
     quiet: bool = False
     seconds: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def visible(self) -> bool:
+        """Whether somebody may look on."""
+        return not self.quiet and sys.stderr.isatty()
+
     @contextmanager
-    def stage(self, title: str) -> Iterator[Callable[[int, int], None]]:
-        """Show a stage while it runs; yield what takes (done, total)."""
+    def stage(self, title: str) -> Iterator[Line]:
+        """Show a stage while it runs."""
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
         start = time.perf_counter()
-        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-        with Progress(*columns, console=Console(stderr=True), transient=True, disable=self.quiet or not sys.stderr.isatty()) as progress:
-            task = progress.add_task(title, total=None)
-            yield lambda done, total: progress.update(task, completed=done, total=total)
+        columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
+        counted = (*columns[:2], BarColumn(), MofNCompleteColumn(), columns[2])
+        with Progress(*columns, console=Console(stderr=True), transient=True, disable=not self.visible) as progress:
+            yield Line(progress, progress.add_task(title, total=None), title, counted)
         self.seconds[title] = time.perf_counter() - start
+
+
+class Line:
+    """What is shown of a stage while it runs."""
+
+    def __init__(self, progress: Progress, task: TaskID, title: str, counted: tuple[ProgressColumn, ...]) -> None:
+        self._progress, self._task, self._title, self._counted = progress, task, title, counted
+        self._said: dict[str, str] = {}
+
+    def __call__(self, done: int, total: int) -> None:
+        """Show how many of how many are done."""
+        self._progress.columns = self._counted
+        self._progress.update(self._task, completed=done, total=total)
+
+    def tell(self, axis: str, stage: str, cost: float) -> None:
+        """Show where the search of an axis is; a word about both axes takes the place of those about each."""
+        if axis == "both" or "both" in self._said:
+            self._said.clear()
+        self._said[axis] = f"{axis.upper() if len(axis) == 1 else axis}: {stage}, cost {cost:.4g}"
+        words = "  ".join(self._said[axis] for axis in sorted(self._said))
+        self._progress.update(self._task, description=f"{self._title}  {words}")
 
 
 def emit(data: Any) -> None:

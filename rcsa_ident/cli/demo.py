@@ -9,13 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rcsa_ident.cli.common import Json, Processes, Seed, Stages, answers, emit, say, warn, workers
+from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn
 from rcsa_ident.cli.identify import Method, leave, read_and_judge, result_of, search, warn_left_out
 from rcsa_ident.cli.lobes import lobes_summary, tip_response, write_lobes, write_response
+from rcsa_ident.cli.processes import Processes, workers
 from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.result import Identification
     from rcsa_ident.machining_setup import Campaign, Tooling
     from rcsa_ident.report.html import ToolingPage
@@ -45,6 +49,7 @@ def demo(
     from rcsa_ident.io.files import write_text
     from rcsa_ident.io.results import write_result
     from rcsa_ident.report.html import report_html
+    from rcsa_ident.workflows.identify import mode_deviations
 
     stages = Stages(quiet=json_)
     _folder(out)
@@ -52,7 +57,8 @@ def demo(
         campaign, judged = read_and_judge(data, pool, stages)
         extra = _further_toolings(campaign, data, tooling)
         found = search(campaign, judged, Method.default, seed, pool, stages)
-        result = result_of(found, campaign, judged)
+        deviations = mode_deviations(found)
+        result = result_of(found, campaign, judged, deviations)
         write_result(out / "RESULT.json", result)
         pages: list[ToolingPage] = []
         if found.axes:
@@ -63,12 +69,12 @@ def demo(
                     pages.append(page)
                     progress(len(pages), len(wanted))
     with stages.stage("report"):
-        text = report_html(found, campaign, [(j.cut, j.reading) for j in judged], pages, stages.seconds)
+        text = report_html(found, campaign, [(j.cut, j.reading) for j in judged], pages, stages.seconds, deviations)
         write_text(out / "report.html", text)
     if json_:
         emit(_summary(found, pages, stages, out))
     else:
-        _show(pages, found)
+        _show(pages, found, deviations)
         warn_left_out(result)
         say(
             ", ".join(f"{name} {seconds:.1f} s" for name, seconds in stages.seconds.items())
@@ -107,23 +113,24 @@ def _page(
 
     from rcsa_ident.cutting.conditions import Engagement
     from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.identification.posterior import MachineAxis, Posterior
+    from rcsa_ident.identification.posterior import MachineAxis
     from rcsa_ident.machine.spindle import Spindle
     from rcsa_ident.report.html import ToolingPage
     from rcsa_ident.workflows.lobes import LobeConditions, band_warning, best_speeds, lobe_bands, measured_tip, tooling_lobes
+    from rcsa_ident.workflows.speeds import MachineOverSpeed, lobes_over_speed
 
     name, tooling = named
-    machine = {}
-    for axis, part in found.axes.items():
-        posterior = None if part.theta is None or part.covariance is None else Posterior(part.theta, part.covariance)
-        machine[axis] = MachineAxis(Spindle(part.modes), part.joint, posterior)
+    machine = {axis: MachineAxis(Spindle(part.modes), part.joint, part.posterior) for axis, part in found.axes.items()}
     frequency = np.arange(100.0, band_hz[1] + 0.5, 1.0)
     response = tip_response(machine, tooling.assembly, frequency, bands=True)
     speeds = np.arange(SPEEDS[0], SPEEDS[1] + 0.5 * SPEEDS[2], SPEEDS[2]) * (np.pi / 30.0)
     coefficients = campaign.workpiece.coefficients
     conditions = LobeConditions(tooling.cutter, coefficients, Engagement.from_immersion(0.5, "down"), 0.0, speeds, MAX_DEPTH)
-    lobes = tooling_lobes(response, conditions)
-    spread = lobe_bands(response, conditions)
+    over_speed = MachineOverSpeed(machine)
+    if over_speed.speed_range is None:
+        lobes, spread = tooling_lobes(response, conditions), lobe_bands(response, conditions)
+    else:
+        lobes, spread = lobes_over_speed(over_speed, tooling.assembly, 2.0 * np.pi * frequency, conditions)
     safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
     write_response(out / f"FRF_{safe}.csv", frequency, response)
     write_lobes(out / f"LOBES_{safe}.csv", lobes, spread)
@@ -183,12 +190,12 @@ def _truth(
     return true, error, coverage
 
 
-def _show(pages: list[ToolingPage], found: Identification) -> None:
+def _show(pages: list[ToolingPage], found: Identification, deviations: Mapping[Dof, tuple[FloatArray, FloatArray]]) -> None:
     from rich.table import Table
 
     from rcsa_ident.cli.tables import console, show_identification
 
-    show_identification(found)
+    show_identification(found, deviations)
     known = any(page.error for page in pages)
     headers = ["tooling", "recorded", *(["error X\n%", "error Y\n%"] if known else []), "stable\nanywhere\nmm", "best speeds\nrev/min (mm)"]
     table = Table(*headers, title="tooltip and stability, half-immersion down-milling", title_justify="left")
@@ -212,6 +219,7 @@ def _summary(found: Identification, pages: list[ToolingPage], stages: Stages, ou
     return {
         "status": str(found.status),
         "reasons": list(found.reasons),
+        "notes": list(found.notes),
         "seed": found.seed,
         "cuts_used": len(found.cut_ids),
         "toolings": toolings,

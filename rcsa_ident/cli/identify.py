@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+import math
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -14,22 +15,29 @@ from rcsa_ident.cli.common import (
     BAD_INPUT,
     NOT_CONVERGED,
     Json,
-    Processes,
     Seed,
     Stages,
-    Workers,
     answers,
     emit,
     say,
     warn,
-    workers,
     writable,
 )
+from rcsa_ident.cli.processes import Processes, Workers, tell, workers
+from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.identification.data import IdentificationData
+    from rcsa_ident.identification.default import DefaultMethod
+    from rcsa_ident.identification.posterior import Posterior
     from rcsa_ident.identification.result import Identification
     from rcsa_ident.machining_setup import Campaign
-    from rcsa_ident.workflows.identify import JudgedCut
+    from rcsa_ident.workflows.identify import JudgedCut, Map
+    from rcsa_ident.workflows.speed_bands import SpeedBand
 
 CampaignFolder = Annotated[Path, typer.Argument(help="Folder with campaign.toml, toolings and recordings.", show_default=False)]
 
@@ -69,6 +77,13 @@ def identify(
     method: Annotated[Method, typer.Option(help="paper: the published genetic algorithm, a baseline that takes longer.")] = Method.default,
     seed: Seed = 1,
     processes: Processes = None,
+    start: Annotated[
+        Path | None,
+        typer.Option(help="RESULT.json of the same machine: its modes are refined with this campaign's cuts.", show_default=False),
+    ] = None,
+    speed_bands: Annotated[
+        int, typer.Option(min=1, max=50, help="More than 1: also a model for each of so many equal ranges of spindle speed.")
+    ] = 1,
     report: Annotated[Path | None, typer.Option(help="Also write an HTML report.", show_default=False)] = None,
     json_: Json = False,
 ) -> None:
@@ -83,24 +98,41 @@ def identify(
     writable(out)
     if report is not None:
         writable(report, "--report")
+    if method is Method.paper and (start is not None or speed_bands > 1):
+        raise InputError("--start" if start is not None else "--speed-bands", "--method paper", "the default method, which has a posterior")
     stages = Stages(quiet=json_)
     with workers(processes) as pool:
+        known = None if start is None else read_start(start)
         campaign, judged = read_and_judge(campaign_dir, pool, stages)
-        found = search(campaign, judged, method, seed, pool, stages)
-    data = result_of(found, campaign, judged)
+        if speed_bands > 1:
+            from rcsa_ident.workflows.speed_bands import divided
+
+            divided(judged, speed_bands)
+        found = search(campaign, judged, method, seed, pool, stages, known)
+        bands = search_bands(campaign, judged, speed_bands, found, seed, pool, stages)
+    from rcsa_ident.workflows.identify import mode_deviations
+
+    deviations = mode_deviations(found)
+    data = result_of(found, campaign, judged, deviations, bands)
+    if start is not None:
+        data["started_from"] = start.name
     write_result(out, data)
     if report is not None:
         from rcsa_ident.report.html import report_html
 
-        write_text(report, report_html(found, campaign, [(j.cut, j.reading) for j in judged]))
+        write_text(report, report_html(found, campaign, [(j.cut, j.reading) for j in judged], deviations=deviations))
     if json_:
         summary = {key: data[key] for key in ("status", "reasons", "seed", "method", "campaign", "band_hz")}
+        summary |= {key: data[key] for key in ("notes", "coefficients")}
         axes = {name: {k: axis[k] for k in ("modes", "joint", "misfit", "model_error")} for name, axis in data["axes"].items()}
         emit(summary | {"axes": axes, "seconds": stages.seconds, "result": str(out)})
     else:
         from rcsa_ident.cli.tables import show_identification
 
-        show_identification(found)
+        show_identification(found, deviations)
+        for band in bands:
+            low, high = (speed * 30.0 / math.pi for speed in band.speeds)
+            say(f"{low:.0f} to {high:.0f} rev/min: {band.found.status}, {len(band.found.cut_ids)} cuts")
         warn_left_out(data)
         say(", ".join(f"{name} {seconds:.1f} s" for name, seconds in stages.seconds.items()))
         say(f"written: {out}" + (f", {report}" if report else ""))
@@ -119,8 +151,47 @@ def read_and_judge(folder: Path, pool: Workers, stages: Stages) -> tuple[Campaig
     return campaign, judged
 
 
-def search(campaign: Campaign, judged: list[JudgedCut], method: Method, seed: int, pool: Workers, stages: Stages) -> Identification:
-    """Return the identification by the method of that name."""
+def read_start(path: Path) -> Mapping[Dof, Posterior]:
+    """Return the posteriors of an earlier answer.
+
+    Raises
+    ------
+    InputError
+        If the file holds none, as with the published method.
+    """
+    from rcsa_ident.io.identifications import machine_from_json
+    from rcsa_ident.io.results import read_result
+
+    data = read_result(path)
+    machine = machine_from_json(data, str(path))
+    found = {axis: part.posterior for axis, part in machine.items() if part.posterior is not None}
+    if len(found) < len(machine):
+        missing = next(axis.upper() for axis in machine if axis not in found)
+        allowed = "a result of the default method, with unknowns and covariance of each axis"
+        raise InputError(f"axes.{missing}", f"no covariance (method {data['method']})", allowed, str(path))
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Telling:
+    """The default method, which says where it is."""
+
+    method: DefaultMethod
+
+    def run(self, data: IdentificationData, seed: int, map: Map) -> Identification:
+        return self.method.run(data, seed, map, tell)
+
+
+def search(
+    campaign: Campaign,
+    judged: list[JudgedCut],
+    method: Method,
+    seed: int,
+    pool: Workers,
+    stages: Stages,
+    start: Mapping[Dof, Posterior] | None = None,
+) -> Identification:
+    """Return the identification by the method of that name; the default one may start from an earlier answer."""
     from rcsa_ident.workflows import identify as workflow
 
     chosen: workflow.Method
@@ -131,17 +202,41 @@ def search(campaign: Campaign, judged: list[JudgedCut], method: Method, seed: in
     else:
         from rcsa_ident.identification.default import DefaultMethod
 
-        chosen = DefaultMethod()
-    with stages.stage("identification"):
+        chosen = _Telling(DefaultMethod(start=start)) if stages.visible else DefaultMethod(start=start)
+    with stages.stage("identification") as line, pool.listening(line.tell):
         return workflow.identify(campaign, judged, chosen, seed, pool.map)
 
 
-def result_of(found: Identification, campaign: Campaign, judged: list[JudgedCut]) -> dict[str, Any]:
+def search_bands(
+    campaign: Campaign, judged: list[JudgedCut], count: int, whole: Identification, seed: int, pool: Workers, stages: Stages
+) -> list[SpeedBand]:
+    """Return a model for each of `count` ranges of spindle speed, from the whole campaign's on; none where only one is wanted."""
+    from rcsa_ident.identification.default import DefaultMethod
+    from rcsa_ident.workflows.speed_bands import speed_bands
+
+    start = {axis: part.posterior for axis, part in whole.axes.items() if part.posterior is not None}
+    if count == 1 or not start:
+        return []
+    with stages.stage("speed bands"):
+        return speed_bands(campaign, judged, count, DefaultMethod(start=start), seed, pool.map)
+
+
+def result_of(
+    found: Identification,
+    campaign: Campaign,
+    judged: list[JudgedCut],
+    deviations: Mapping[Dof, tuple[FloatArray, FloatArray]],
+    bands: Sequence[SpeedBand] = (),
+) -> dict[str, Any]:
     """Return the content of RESULT.json."""
-    from rcsa_ident.io.identifications import identification_to_json
+    from rcsa_ident.io.identifications import identification_to_json, speed_band_to_json
+    from rcsa_ident.workflows.identify import mode_deviations
 
     left_out = [(j.cut.id, "; ".join(j.reading.verdict.reasons)) for j in judged if not j.reading.verdict.usable]
-    return identification_to_json(found, campaign, left_out)
+    data = identification_to_json(found, campaign, left_out, deviations)
+    if bands:
+        data["speed_bands"] = [speed_band_to_json(band.speeds, band.found, mode_deviations(band.found)) for band in bands]
+    return data
 
 
 def warn_left_out(data: dict[str, Any]) -> None:

@@ -15,11 +15,14 @@ from rcsa_ident.cli.conditions import Strategy, coefficients, engagement, feed_a
 from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rcsa_ident.arrays import FloatArray
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.posterior import MachineAxis
     from rcsa_ident.stability.result import StabilityLobes
     from rcsa_ident.workflows.lobes import LobeConditions
+    from rcsa_ident.workflows.speeds import MachineOverSpeed
     from rcsa_ident.workflows.tip import TooltipResponse
 
 #: Lower end of the receptances that lobes are computed from, and their step [Hz].
@@ -27,7 +30,12 @@ LOWEST, STEP = 100.0, 1.0
 
 ResultFile = Annotated[Path, typer.Argument(help="RESULT.json of an identification.", show_default=False)]
 ToolingFile = Annotated[Path, typer.Argument(help="TOOLING.toml; it need not have been cut with.", show_default=False)]
-Bands = Annotated[bool, typer.Option(help="Add columns with what the noise of the records leaves open.")]
+Bands = Annotated[bool, typer.Option(help="Add columns with what the records leave open.")]
+
+
+StiffnessSpread = Annotated[
+    float, typer.Option(help="How well the tool-holder's stiffness is known, %: part of the bands. 1 for a modulus from a handbook.")
+]
 
 
 class LobeMethod(StrEnum):
@@ -46,22 +54,36 @@ def tooltip(
         float | None, typer.Option("--to", help="Highest frequency, Hz; default: end of the identified band.", show_default=False)
     ] = None,
     step: Annotated[float, typer.Option(help="Frequency step, Hz.")] = 1.0,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            help="Spindle speed, rev/min, for a machine that changes with it; default: the middle of the campaign's.", show_default=False
+        ),
+    ] = None,
     bands: Bands = True,
+    stiffness_spread: StiffnessSpread = 0.05,
     json_: Json = False,
 ) -> None:
     """Predict the tooltip FRF of any tooling on the identified machine."""
+    import numpy as np
+
+    from rcsa_ident.errors import positive
     from rcsa_ident.io.setups import read_tooling
 
     writable(out)
-    machine, data = read_machine(result)
+    omega = None if speed is None else positive("--speed", speed, "rev/min") * math.pi / 30.0
+    share = _share(stiffness_spread)
+    machine, data = read_machine_over_speed(result)
     assembly = read_tooling(tooling).assembly
     last = data["band_hz"][1] if to is None else to
     frequency = inclusive(from_, last, step, ("--from", "--to", "--step"), "Hz")
     if to is not None and to > 1.001 * data["band_hz"][1]:
         warn(f"the machine was identified up to {data['band_hz'][1]:.0f} Hz; above that the FRF is extrapolated")
+    if omega is not None:
+        _warn_outside(machine, np.array([omega]))
     stages = Stages(quiet=json_)
     with stages.stage("tooltip"):
-        response = tip_response(machine, assembly, frequency, bands)
+        response = tip_response(machine.at(omega), assembly, frequency, bands, omega, share)
     write_response(out, frequency, response)
     peaks = peaks_of(frequency, response)
     if json_:
@@ -110,6 +132,7 @@ def lobes(
     krc: Annotated[float | None, typer.Option(help="Radial ratio; default: the result's workpiece.", show_default=False)] = None,
     method: Annotated[LobeMethod, typer.Option(help="How the limit is found.")] = LobeMethod.zero_order,
     bands: Bands = True,
+    stiffness_spread: StiffnessSpread = 0.05,
     json_: Json = False,
 ) -> None:
     """Compute stability lobes of a tooling: on an identified machine, from a modal model or from tap tests."""
@@ -128,7 +151,7 @@ def lobes(
         )
         raise InputError("files", f"{len(files)} files", wanted)
     tooling = read_tooling(files[-1])
-    result = None if own_tip else read_machine(files[0])
+    result = None if own_tip else read_machine_over_speed(files[0])
     conditions = LobeConditions(
         tooling.cutter,
         coefficients(ktc_mpa, krc, None if result is None else (result[1], str(files[0]))),
@@ -142,7 +165,7 @@ def lobes(
         if result is None:
             found, spread, doubts = conditions.lobes(tip_of(modes, frf or [])), None, list[str]()
         else:
-            found, spread, doubts = machine_lobes(*result, tooling.assembly, conditions, bands)
+            found, spread, doubts = machine_lobes(*result, tooling.assembly, conditions, bands, _share(stiffness_spread))
     write_lobes(out, found, spread)
     best = best_speeds(found)
     if json_:
@@ -154,6 +177,21 @@ def lobes(
     for doubt in (*found.warnings, *doubts):
         warn(doubt)
     say(f"written: {out} ({found.spindle_speed.size} speeds, {stages.seconds['lobes']:.2f} s)")
+
+
+def _share(percent: float) -> float:
+    if not 0.0 <= percent <= 50.0:
+        raise InputError("--stiffness-spread", percent, "a number from 0 to 50 [%]")
+    return percent / 100.0
+
+
+def _warn_outside(machine: MachineOverSpeed, speeds: FloatArray) -> None:
+    """Say where a machine that changes with speed is asked for speeds that it was not cut at."""
+    known = machine.speed_range
+    # the last digit of a speed that was written in rev/min is nobody's wish
+    if known is not None and (speeds.min() < known[0] * (1.0 - 1e-9) or speeds.max() > known[1] * (1.0 + 1e-9)):
+        low, high = (speed * 30.0 / math.pi for speed in known)
+        warn(f"the machine was identified from {low:.0f} to {high:.0f} rev/min; outside it stays what it is at the nearest of them")
 
 
 def read_machine(path: Path) -> tuple[dict[Dof, MachineAxis], dict[str, Any]]:
@@ -168,13 +206,30 @@ def read_machine(path: Path) -> tuple[dict[Dof, MachineAxis], dict[str, Any]]:
     return machine, data
 
 
-def tip_response(machine: dict[Dof, MachineAxis], assembly: Any, frequency: FloatArray, bands: bool) -> TooltipResponse:
-    """Return the tip's response at frequencies in Hz."""
+def read_machine_over_speed(path: Path) -> tuple[MachineOverSpeed, dict[str, Any]]:
+    """Return the machine of a result file, with the models of single speed bands, beside the file's content."""
+    from rcsa_ident.io.identifications import speed_bands_from_json
+    from rcsa_ident.workflows.speeds import MachineOverSpeed
+
+    machine, data = read_machine(path)
+    return MachineOverSpeed(machine, speed_bands_from_json(data, str(path))), data
+
+
+def tip_response(
+    machine: Mapping[Dof, MachineAxis],
+    assembly: Any,
+    frequency: FloatArray,
+    bands: bool,
+    speed: float | None = None,
+    stiffness_spread: float | None = None,
+) -> TooltipResponse:
+    """Return the tip's response at frequencies in Hz and a spindle speed in rad/s."""
     import numpy as np
 
+    from rcsa_ident.workflows.tip import STIFFNESS_SPREAD
     from rcsa_ident.workflows.tip import tooltip as run
 
-    return run(machine, assembly, 2.0 * np.pi * frequency, bands)
+    return run(machine, assembly, 2.0 * np.pi * frequency, bands, speed, STIFFNESS_SPREAD if stiffness_spread is None else stiffness_spread)
 
 
 def write_response(path: Path, frequency: FloatArray, response: TooltipResponse) -> None:
@@ -207,18 +262,18 @@ def peaks_of(frequency: FloatArray, response: TooltipResponse) -> dict[Dof, Any]
 
 
 def machine_lobes(
-    machine: dict[Dof, MachineAxis], data: dict[str, Any], assembly: Any, conditions: LobeConditions, bands: bool
+    machine: MachineOverSpeed, data: dict[str, Any], assembly: Any, conditions: LobeConditions, bands: bool, stiffness_spread: float
 ) -> tuple[StabilityLobes, tuple[FloatArray, FloatArray] | None, list[str]]:
     """Return the lobes on an identified machine, their band and what speaks against them."""
     import numpy as np
 
-    from rcsa_ident.workflows.lobes import band_warning, lobe_bands, tooling_lobes
+    from rcsa_ident.workflows.lobes import band_warning
+    from rcsa_ident.workflows.speeds import lobes_over_speed
 
     low, high = data["band_hz"]
-    frequency = np.arange(min(LOWEST, low), high + 0.5 * STEP, STEP)
-    response = tip_response(machine, assembly, frequency, bands)
-    found = tooling_lobes(response, conditions)
-    spread = lobe_bands(response, conditions) if bands else None
+    _warn_outside(machine, conditions.speeds)
+    omega = 2.0 * np.pi * np.arange(min(LOWEST, low), high + 0.5 * STEP, STEP)
+    found, spread = lobes_over_speed(machine, assembly, omega, conditions, bands, stiffness_spread)
     doubt = band_warning(found, (low, high))
     return found, spread, [doubt] if doubt else []
 

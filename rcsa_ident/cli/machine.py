@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from rcsa_ident.cli.common import Json, Processes, Seed, Stages, answers, emit, say, workers
+from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say
+from rcsa_ident.cli.processes import Processes, workers
 
 
 @answers
@@ -22,7 +23,7 @@ def simulate(
     from rcsa_ident.cli.simulation import simulate_campaign as run
 
     stages = Stages(quiet=json_)
-    with stages.stage("cuts") as progress, workers(processes) as pool:
+    with stages.stage("cuts") as progress, workers(processes, ("rcsa_ident.workflows.simulate",)) as pool:
         done = run(machine, out, seed, progress, pool.map)
     seconds = stages.seconds["cuts"]
     if json_:

@@ -8,9 +8,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import Identification
-from rcsa_ident.report.rows import RecordingRow, mode_rows
+from rcsa_ident.report.rows import RecordingRow, coefficient_rows, mode_rows, two_digits
 from rcsa_ident.stability.result import StabilityLobes
 
 _RPM = 9.549296585513721
@@ -46,22 +47,27 @@ def show_recordings(rows: Sequence[RecordingRow]) -> None:
         out.print(f"[yellow]*[/] {count} recordings: {escape(note)}")
 
 
-def show_identification(found: Identification) -> None:
-    """Print status, modes, joint and misfit."""
+def show_identification(found: Identification, deviations: Mapping[Dof, tuple[FloatArray, FloatArray]]) -> None:
+    """Print status, modes with their standard deviations, joint, coefficients and misfit, and what the data cannot tell."""
     out = console()
     colour = _COLOURS[str(found.status)]
     out.print(f"status [bold {colour}]{found.status}[/], method {found.method}, seed {found.seed}, {len(found.cut_ids)} cuts used")
     for reason in found.reasons:
-        out.print(f"  [{colour}]{escape(reason)}[/]")
+        out.print(f"  [{colour}]{escape(reason)}[/]", soft_wrap=True)
     for axis, part in found.axes.items():
         table = Table(
-            "f_n Hz", "zeta %", "|phi_t| 1e-3", "|phi_r| 1e-3", title=f"modes at the flange, {axis.upper()}", title_justify="left"
+            "f_n Hz", "±", "zeta %", "±", "|phi_t| 1e-3", "|phi_r| 1e-3", title=f"modes at the flange, {axis.upper()}", title_justify="left"
         )
         for column in table.columns:
             column.justify = "right"
-        for row in mode_rows(part.modes):
+        for row in mode_rows(part.modes, deviations.get(axis)):
             table.add_row(
-                f"{row.frequency_hz:.1f}", f"{row.damping_percent:.2f}", f"{1e3 * abs(row.phi_t):.3f}", f"{1e3 * abs(row.phi_r):.2f}"
+                f"{row.frequency_hz:.1f}",
+                "" if row.frequency_std_hz is None else two_digits(row.frequency_std_hz),
+                f"{row.damping_percent:.2f}",
+                "" if row.damping_std_percent is None else two_digits(row.damping_std_percent),
+                f"{1e3 * abs(row.phi_t):.3f}",
+                f"{1e3 * abs(row.phi_r):.2f}",
             )
         out.print(table)
         misfit = ", ".join(f"{escape(name)} {value:.2f}" for name, value in part.per_tooling.items())
@@ -72,6 +78,10 @@ def show_identification(found: Identification) -> None:
             f"joint: k_t {joint.translational_stiffness:.3g} N/m, c_t {joint.translational_damping:.3g} N s/m, "
             f"k_r {joint.rotational_stiffness:.3g} N m/rad, c_r {joint.rotational_damping:.3g} N m s/rad"
         )
+    for each in coefficient_rows(found.coefficients):
+        out.print(f"{escape(each.name)}: {two_digits(each.std, each.value)} ± {two_digits(each.std)} {each.unit}")
+    for note in found.notes:
+        out.print(f"note: {escape(note)}", soft_wrap=True)
 
 
 def show_lobes(lobes: StabilityLobes, best: Sequence[tuple[float, float]], max_depth: float) -> None:

@@ -175,14 +175,15 @@ def _result(
     assert evaluation.linear is not None
     covariance = WIDER**2 * np.linalg.inv(evaluation.hessian)
     covariance = 0.5 * (covariance + covariance.T)
-    reasons = doubts(data, searched, solution, misfit)
+    axes = {axis.axis: _axis_result(i, data, misfit, solution, covariance, chosen) for i, axis in enumerate(data.axes)}
+    reasons = doubts(data, searched, solution, misfit, [p for p in (axis.posterior for axis in axes.values()) if p is not None])
     scales = zip(solution.theta[force].tolist(), np.sqrt(np.diag(covariance)[force]).tolist(), strict=True)
     return Identification(
         status=Status.SUSPECT if reasons else Status.CONVERGED,
         reasons=tuple(reasons),
         seed=seed,
         method=method.name,
-        axes={axis.axis: _axis_result(i, data, misfit, solution, covariance, chosen) for i, axis in enumerate(data.axes)},
+        axes=axes,
         cut_ids=data.cut_ids,
         delay=evaluation.nuisance[:, 0],
         delay_std=evaluation.linear.delay_std(covariance),

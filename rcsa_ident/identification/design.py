@@ -21,8 +21,7 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.identification._kernels import cross_frf
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
-from rcsa_ident.identification.misfit import _residual_turn
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, chain, lower_triangle, scaled_joint, unpack
+from rcsa_ident.identification.parameters import JOINT, AxisLayout, chain, lower_triangle, residual_turn, scaled_joint, unpack
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.signals.measurement import MAX_FREQUENCY, WEAKEST_FORCE, AxisLines, CutMeasurement
 
@@ -297,7 +296,7 @@ def tip_changes(posterior: Posterior, holder: Receptance) -> tuple[ComplexArray,
         Tool-holder, free, in one bending plane: points ``tip`` and ``flange``.
     """
     values, slopes = _tip(posterior.theta, posterior.layout, holder)
-    rivals = [_tip(r, posterior._layout_of(r.size - JOINT), holder)[0] - values for r in posterior.rivals]
+    rivals = [_tip(r, posterior.layout_of(r.size - JOINT), holder)[0] - values for r in posterior.rivals]
     return values, np.column_stack([slopes @ _directions(posterior), *rivals])
 
 
@@ -315,7 +314,7 @@ def _lines(axis: AxisData, spindle_speed: FloatArray, posterior: Posterior) -> t
     points = np.column_stack([axis.omega, x])
     holder = np.concatenate([axis.flange, axis.tip], axis=1)
     values, slopes = _cross(posterior.theta, posterior.layout, points, holder, True)
-    rivals = [_cross(r, posterior._layout_of(r.size - JOINT), points, holder, False)[0] - values for r in posterior.rivals]
+    rivals = [_cross(r, posterior.layout_of(r.size - JOINT), points, holder, False)[0] - values for r in posterior.rivals]
     return values, np.column_stack([slopes @ _directions(posterior), *rivals])
 
 
@@ -332,7 +331,7 @@ def _cross(
     psi, residual = np.column_stack([axis.psi, axis.fixture]), np.vstack([axis.residual, axis.fixture_residual])
     cross_frf(axis.omega_n, psi, axis.factor, axis.softening, residual, joint, points, holder, values, gradient)
     columns, core = gradient[:, 0], layout.core
-    columns[:, core - 3 : core] = columns[:, core - 3 : core] @ _residual_turn(axis.residual)
+    columns[:, core - 3 : core] = columns[:, core - 3 : core] @ residual_turn(axis.residual)
     # the kernel's joint is in units of itself, its logarithm is the unknown
     return values[:, 0], columns * np.concatenate([chain(axis, layout), joint])
 
@@ -358,7 +357,7 @@ def _tip(theta: FloatArray, layout: AxisLayout, holder: Receptance) -> tuple[Com
         -2.0 * (axis.omega_n * q) ** 2,
         (2.0 * q[:, :, None] * x[:, None, :]).reshape(omega.size, -1),
         -2j * omega[:, None] * q[:, rows] * (q @ axis.factor)[:, cols],
-        np.stack([x[:, 0] ** 2, 2.0 * x[:, 0] * x[:, 1], x[:, 1] ** 2], axis=1) @ _residual_turn(axis.residual),
+        np.stack([x[:, 0] ** 2, 2.0 * x[:, 0] * x[:, 1], x[:, 1] ** 2], axis=1) @ residual_turn(axis.residual),
         # at the middle speed the softening does nothing
         np.zeros((omega.size, layout.pairs * layout.softening)),
         opened,

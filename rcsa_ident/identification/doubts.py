@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.identification.data import IdentificationData
+from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.final import AxisSearch
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import JOINT
@@ -18,6 +21,8 @@ from rcsa_ident.identification.posterior import Posterior, spread
 WORST_MODEL_ERROR = 0.02
 #: Solutions whose evidence lies closer than this are told apart by chance only.
 EVIDENCE_TIE = 6.0
+#: Relative difference of two such solutions, and deviation of the answer, from which on they matter.
+LARGEST_DIFFERENCE, LARGEST_BAND = 0.02, 0.01
 FEWEST_CUTS = 8
 #: Share of the cuts that may contradict the others before the whole is in doubt.
 MOST_BAD_CUTS = 0.1
@@ -28,8 +33,10 @@ TOLD = 0.5
 _JOINT = ("translational stiffness", "rotational stiffness", "translational damping", "rotational damping")
 
 
-def doubts(data: IdentificationData, searched: list[AxisSearch], solution: Solution, misfit: Misfit) -> list[str]:
-    """Return the reasons for `suspect`."""
+def doubts(
+    data: IdentificationData, searched: list[AxisSearch], solution: Solution, misfit: Misfit, posteriors: Sequence[Posterior]
+) -> list[str]:
+    """Return the reasons for `suspect`; `posteriors` are those of the axes."""
     reasons = []
     if not solution.converged:
         reasons.append(f"not converged: the polish still gained after {solution.steps} steps")
@@ -49,12 +56,19 @@ def doubts(data: IdentificationData, searched: list[AxisSearch], solution: Solut
         reasons.append(f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, {_named(data, bad, misfit)}")
     for axis, found in zip(data.axes, searched, strict=True):
         if len(found.solutions) > 1 and found.evidences[1] - found.evidences[0] < EVIDENCE_TIE:
-            difference, band = _difference(data.only(axis.axis), *found.solutions[:2])
-            if difference > max(0.1, 3.0 * band):
+            difference, band = _difference(axis, *found.solutions[:2])
+            if difference > max(LARGEST_DIFFERENCE, 3.0 * band):
                 reasons.append(
-                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.0f} % at the flange, "
-                    f"more than their deviation of {100 * band:.0f} %"
+                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.1f} % in what a tooltip "
+                    f"feels of the machine, more than their deviation of {100 * band:.1f} %"
                 )
+    for axis, posterior in zip(data.axes, posteriors, strict=True):
+        band = _band(posterior, axis)
+        if band > LARGEST_BAND:
+            reasons.append(
+                f"{str(axis.axis).upper()}: what a tooltip feels of the machine is known to {100 * band:.1f} % only (at most "
+                f"{100 * LARGEST_BAND:g} %), and with tools that were never cut to several times that: more or quieter cuts are wanted"
+            )
     if len(data.toolings) < 2:
         reasons.append("one tooling only: flange translation and slope can't be told apart; cut with a second, different holder")
     for t, name in enumerate(data.toolings):
@@ -100,20 +114,36 @@ def _named(data: IdentificationData, bad: np.ndarray, misfit: Misfit) -> str:
     return ", ".join(f"{data.cut_ids[k]} ({1.0 / misfit.cut_weight[k]:.0f} times its variance)" for k in worst[:5]) + rest
 
 
-def _difference(data: IdentificationData, one: Solution, two: Solution) -> tuple[float, float]:
-    """Relative difference of the flange receptance of two solutions of an axis over the band, and the first one's deviation."""
-    axis = data.axes[0].axis
-    omega = np.linspace(data.axes[0].omega.min(), data.axes[0].omega.max(), 200)
+def _felt(axis: AxisData) -> Callable[[ModalModel, LumpedJoint], ComplexArray]:
+    """What a tooltip feels of the machine, a^T (A22 + K^-1 + B)^-1 a with a = A21 of the cut toolings, at the axis' lines."""
+    lever = np.array([[1.0, LEVER], [LEVER, LEVER**2]])
+    flange = axis.flange[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
+    directions = tuple(c.dof for c in plane("flange", axis.axis))
 
-    def flange(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
-        return modes.receptance(omega).values[:, 0, 0]
+    def felt(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
+        soft = joint.compliance_along(axis.omega, directions)[:, :, None] * np.eye(2)
+        together = flange + lever * (soft + modes.receptance(axis.omega).values)
+        return np.einsum("ni,ni->n", axis.tip, np.linalg.solve(together, axis.tip[:, :, None])[:, :, 0])
 
+    return felt
+
+
+def _band(posterior: Posterior, axis: AxisData) -> float:
+    """Relative standard deviation of what a tooltip feels of the machine."""
+    felt = _felt(axis)
+    value = felt(*posterior.machine(axis.axis))
+    return float(np.linalg.norm(spread(posterior, axis.axis, felt)) / max(float(np.linalg.norm(value)), 1e-300))
+
+
+def _difference(axis: AxisData, one: Solution, two: Solution) -> tuple[float, float]:
+    """Relative difference of two solutions in what a tooltip feels, and the first one's deviation."""
+    felt = _felt(axis)
     first, second = (_flange_posterior(s) for s in (one, two))
-    value, other = flange(*first.machine(axis)), flange(*second.machine(axis))
+    value, other = felt(*first.machine(axis.axis)), felt(*second.machine(axis.axis))
     size = np.linalg.norm(value)
     if size == 0.0:
         return 0.0, 0.0
-    return float(np.linalg.norm(value - other) / size), float(np.linalg.norm(spread(first, axis, flange)) / size)
+    return float(np.linalg.norm(value - other) / size), _band(first, axis)
 
 
 def _flange_posterior(solution: Solution) -> Posterior:

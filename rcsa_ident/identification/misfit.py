@@ -9,7 +9,7 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification._kernels import cross_frf, fit_cuts, mix_cuts, whiten
 from rcsa_ident.identification.data import AxisData, IdentificationData
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, AxisParameters, Layout, chain, scaled_joint, unpack
+from rcsa_ident.identification.parameters import JOINT, AxisLayout, AxisParameters, Layout, chain, residual_turn, scaled_joint, unpack
 from rcsa_ident.identification.priors import Priors, prior_rows
 
 #: Unit of a delay in the normal equations [s].
@@ -348,7 +348,7 @@ class Misfit:
         for i, (lines, axis) in enumerate(zip(self._axes, axes, strict=True)):
             block, core = layout.axis(i), layout.axes[i].core
             compliance.append(gradients[i][:, :, core - 3 : core].copy())
-            gradients[i][:, :, core - 3 : core] = compliance[i] @ _residual_turn(axis.residual)
+            gradients[i][:, :, core - 3 : core] = compliance[i] @ residual_turn(axis.residual)
             jacobian = lines.jacobian(gradients[i], models[i], _whole_chain(axis, layout.axes[i], joint), layout)
             part = block.stop - block.start
             place = np.r_[block, slice(layout.tail, layout.force.stop)]
@@ -439,12 +439,6 @@ class _AxisLines:
 def _whole_chain(axis: AxisParameters, layout: AxisLayout, joint: FloatArray) -> FloatArray:
     """d physics / d vector of an axis and the joint, whose kernel units are those of `scaled_joint`."""
     return np.concatenate([chain(axis, layout), scaled_joint(np.log(joint))])
-
-
-def _residual_turn(factor: FloatArray) -> FloatArray:
-    """d (tt, tr, rr) / d (factor 00, 10, 11) of R = factor factor^T, shape (3, 3)."""
-    a, b, c = factor[0, 0], factor[1, 0], factor[1, 1]
-    return np.array([[2.0 * a, 0.0, 0.0], [b, a, 0.0], [0.0, 2.0 * b, 2.0 * c]])
 
 
 def _solve_pairs(inner: FloatArray, right: FloatArray) -> FloatArray:

@@ -241,6 +241,12 @@ def chain(axis: AxisParameters, layout: AxisLayout) -> FloatArray:
     return np.concatenate(parts)
 
 
+def residual_turn(factor: FloatArray) -> FloatArray:
+    """Return d (tt, tr, rr) / d (factor 00, 10, 11) of R = factor factor^T, shape (3, 3)."""
+    a, b, c = factor[0, 0], factor[1, 0], factor[1, 1]
+    return np.array([[2.0 * a, 0.0, 0.0], [b, a, 0.0], [0.0, 2.0 * b, 2.0 * c]])
+
+
 def _lower(rows: FloatArray) -> FloatArray:
     """Return the lower triangular L with L L^T = rows rows^T and a diagonal above zero.
 

@@ -53,12 +53,13 @@ class Posterior:
         Outside the campaign's speeds the machine of the nearest of them answers.
         """
         vector = self.theta if theta is None else theta
-        layout = self.layout if vector.size == self.theta.size else self._layout_of(vector.size - JOINT)
+        layout = self.layout if vector.size == self.theta.size else self.layout_of(vector.size - JOINT)
         middle, half = self.speed_range
         x = 0.0 if speed is None or half == 0.0 else float(np.clip((speed - middle) / half, -1.0, 1.0))
         return modes_of(unpack(vector[:-JOINT], layout).at(x), axis), joint_of(vector[-JOINT:])
 
-    def _layout_of(self, size: int) -> AxisLayout:
+    def layout_of(self, size: int) -> AxisLayout:
+        """Return the layout of a rival whose part without the joint has this size."""
         layouts = (replace(self.layout, modes=m) for m in range(1, 100))
         found = next((layout for layout in layouts if layout.size == size), None)
         if found is None:

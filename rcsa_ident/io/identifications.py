@@ -2,30 +2,38 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from rcsa_ident import __version__
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.cutting.force import REFERENCE_RUNOUT, SLOPES
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.errors import InputError
-from rcsa_ident.identification.parameters import axis_size
+from rcsa_ident.identification.parameters import JOINT, AxisLayout
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.result import AxisResult, Identification
-from rcsa_ident.io.keys import Table
+from rcsa_ident.io.keys import Table, describe
 from rcsa_ident.io.results import AXES, SCHEMA_VERSION, spindle_from_json, spindle_to_json
+from rcsa_ident.io.workpieces import workpiece_keys, workpiece_of
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machining_setup import Campaign, Workpiece
 from rcsa_ident.signals.recording import Quantity, Sensor
 
-#: Edge forces of a workpiece: key and unit in N/m.
-_EDGES = {"tangential_edge_n_per_mm": 1e3, "radial_edge_n_per_mm": 1e3, "axial_edge_n_per_mm": 1e3}
+_RPM = 30.0 / math.pi
+_MOST_MODES = 200
+#: Standard deviations of natural frequencies [rad/s] and damping ratios, per axis.
+ModeDeviations = Mapping[Dof, tuple[FloatArray, FloatArray]]
 
 
 def identification_to_json(
-    identification: Identification, campaign: Campaign, left_out: Sequence[tuple[str, str]], max_frequency_hz: float = 4300.0
+    identification: Identification,
+    campaign: Campaign,
+    left_out: Sequence[tuple[str, str]],
+    deviations: ModeDeviations | None = None,
+    max_frequency_hz: float = 4300.0,
 ) -> dict[str, Any]:
     """Return the content of RESULT.json.
 
@@ -35,6 +43,8 @@ def identification_to_json(
     campaign : Campaign
         That it came from.
     left_out : sequence of (cut id, reason)
+    deviations : mapping of Dof to (array, array), optional
+        Standard deviations of each mode's natural frequency [rad/s] and damping ratio.
     max_frequency_hz : float [Hz]
         Upper end of the band where the identification carries no lines.
 
@@ -49,6 +59,7 @@ def identification_to_json(
         "schema_version": SCHEMA_VERSION,
         "status": str(identification.status),
         "reasons": list(identification.reasons),
+        "notes": list(identification.notes),
         "seed": identification.seed,
         "method": identification.method,
         "software": f"rcsa-ident {__version__}",
@@ -58,22 +69,57 @@ def identification_to_json(
             "cuts_left_out": [{"id": cut, "reason": reason} for cut, reason in left_out],
         },
         "sensors": {sensor.name: _sensor_to_json(sensor) for sensor in campaign.sensors},
-        "workpiece": workpiece_to_json(campaign.workpiece),
+        "workpiece": workpiece_keys(campaign.workpiece, all_spreads=True),
+        "coefficients": {name: _coefficient(name, *found) for name, found in identification.coefficients.items()},
         "band_hz": [w / (2.0 * np.pi) for w in band],
-        "axes": {axis.upper(): _axis_to_json(part) for axis, part in identification.axes.items()},
+        "axes": _axes_to_json(identification, deviations or {}),
         "delays": _delays(identification, campaign),
     }
 
 
-def _axis_to_json(axis: AxisResult) -> dict[str, Any]:
+def speed_band_to_json(
+    speeds: tuple[float, float], identification: Identification, deviations: ModeDeviations | None = None
+) -> dict[str, Any]:
+    """Return one entry of ``speed_bands``: what the cuts of a range of spindle speeds [rad/s] say for themselves."""
+    return {
+        "speed_range_rpm": [speed * _RPM for speed in speeds],
+        "cuts_used": len(identification.cut_ids),
+        "status": str(identification.status),
+        "reasons": list(identification.reasons),
+        "notes": list(identification.notes),
+        "axes": _axes_to_json(identification, deviations or {}),
+    }
+
+
+def _axes_to_json(identification: Identification, deviations: ModeDeviations) -> dict[str, Any]:
+    return {axis.upper(): _axis_to_json(part, deviations.get(axis)) for axis, part in identification.axes.items()}
+
+
+def _axis_to_json(axis: AxisResult, deviation: tuple[FloatArray, FloatArray] | None) -> dict[str, Any]:
     data = spindle_to_json(axis.modes, axis.joint)
-    if axis.covariance is not None and axis.theta is not None:
-        data["unknowns"] = axis.theta.tolist()
-        # a file is checked for symmetry, an inverse is symmetric up to rounding
-        data["covariance"] = {"parameters": list(axis.parameters), "matrix": (0.5 * (axis.covariance + axis.covariance.T)).tolist()}
+    if deviation is not None:
+        for mode, omega_n, zeta in zip(data["modes"], *(d.tolist() for d in deviation), strict=True):
+            mode |= {"natural_frequency_std_hz": omega_n / (2.0 * math.pi), "damping_ratio_std": zeta}
+    posterior = axis.posterior
+    if posterior is not None:
+        middle, half = posterior.speed_range
+        data["layout"] = {"modes": posterior.layout.modes, "softening": posterior.layout.softening}
+        data["speed_range_rpm"] = [(middle - half) * _RPM, (middle + half) * _RPM]
+        data["unknowns"] = posterior.theta.tolist()
+        data["rivals"] = [rival.tolist() for rival in posterior.rivals]
+        data["covariance"] = {"parameters": list(axis.parameters), "matrix": posterior.covariance.tolist()}
     data["misfit"] = {"chi2_per_point": axis.chi2_per_point, "per_tooling": dict(axis.per_tooling)}
     data["model_error"] = axis.model_error
     return data
+
+
+def _coefficient(name: str, value: float, std: float) -> dict[str, float]:
+    """A factor on what the campaign says, or a run-out; with its standard deviation."""
+    if name.startswith(SLOPES[-1]):
+        unit = 1e6 * REFERENCE_RUNOUT
+        return {"runout_um": value * unit, "std_um": std * unit}
+    scale = math.exp(value)
+    return {"scale": scale, "std": scale * std}
 
 
 def _sensor_to_json(sensor: Sensor) -> dict[str, Any]:
@@ -89,16 +135,6 @@ def _sensor_to_json(sensor: Sensor) -> dict[str, Any]:
     if sensor.bandwidth is not None:
         data["bandwidth_hz"] = sensor.bandwidth
     return data
-
-
-def workpiece_to_json(workpiece: Workpiece) -> dict[str, Any]:
-    """Return a workpiece as campaign and result write it; what is zero is left away."""
-    c = workpiece.coefficients
-    data = {"name": workpiece.name, "tangential_coefficient_mpa": c.tangential * 1e-6, "radial_ratio": c.radial_ratio}
-    if c.axial_ratio != 0.0:
-        data["axial_ratio"] = c.axial_ratio
-    edges = (c.tangential_edge, c.radial_edge, c.axial_edge)
-    return data | {key: value / unit for (key, unit), value in zip(_EDGES.items(), edges, strict=True) if value != 0.0}
 
 
 def _delays(identification: Identification, campaign: Campaign) -> dict[str, dict[str, float]]:
@@ -126,14 +162,29 @@ def machine_from_json(data: Mapping[str, Any], where: str) -> dict[Dof, MachineA
     InputError
         If the identification has failed and no axis is there, or unknowns and covariance do not belong together.
     """
+    return _machine(Table(data, where))
+
+
+def speed_bands_from_json(data: Mapping[str, Any], where: str) -> list[tuple[tuple[float, float], dict[Dof, MachineAxis]]]:
+    """Return the lowest and highest speed [rad/s] and the machine of each speed band; none where the file has none."""
     top = Table(data, where)
-    axes = top.named_tables("axes")
+    tables = top.tables("speed_bands") if data.get("speed_bands") else []
+    found = []
+    for table in tables:
+        low, high = table.numbers("speed_range_rpm", 2, "rev/min")
+        if table.table("axes").data:
+            found.append(((low / _RPM, high / _RPM), _machine(table)))
+    return found
+
+
+def _machine(table: Table) -> dict[Dof, MachineAxis]:
+    axes = table.named_tables("axes")
     if not axes:
-        raise InputError("axes", "no axis: the identification has failed", "a result with axis X, Y or both", where)
+        table.refuse("axes", "no axis: the identification has failed", "a result with axis X, Y or both")
     machine = {}
     for name, dof in AXES.items():
         if name in axes:
-            modes, joint = spindle_from_json(axes[name].data, dof, where, axes[name].path)
+            modes, joint = spindle_from_json(axes[name].data, dof, table.where, axes[name].path)
             machine[dof] = MachineAxis(Spindle(modes), joint, _posterior(axes[name]))
     return machine
 
@@ -143,22 +194,53 @@ def _posterior(axis: Table) -> Posterior | None:
         return None
     unknowns = axis.numbers("unknowns", None)
     matrix = np.array(axis.table("covariance").data["matrix"], dtype=float)
-    if not any(axis_size(m) + 4 == len(unknowns) for m in range(1, 200)):
-        axis.refuse("unknowns", f"{len(unknowns)} numbers", "as many as a whole number of modes and the joint have")
+    layout = _layout(axis, len(unknowns))
     if matrix.shape != (len(unknowns),) * 2:
         axis.refuse("covariance.matrix", f"{len(matrix)} rows", f"a row for each of the {len(unknowns)} unknowns")
-    return Posterior(np.array(unknowns), matrix)
+    low, high = axis.numbers("speed_range_rpm", 2, "rev/min") if "speed_range_rpm" in axis else (0.0, 0.0)
+    if not 0.0 <= low <= high:
+        axis.refuse("speed_range_rpm", f"{[low, high]}", "lowest and highest speed, 0 <= lowest <= highest [rev/min]")
+    speed_range = 0.5 * (low + high) / _RPM, 0.5 * (high - low) / _RPM
+    return Posterior(np.array(unknowns), matrix, layout, speed_range, tuple(_rivals(axis, layout)))
+
+
+def _layout(axis: Table, size: int) -> AxisLayout:
+    """The layout that a file says; one that says nothing holds a machine that does not change with speed."""
+    if "layout" not in axis:
+        found = _layout_of_size(size, False)
+        if found is None:
+            axis.refuse("unknowns", f"{size} numbers", "as many as a whole number of modes and the joint have")
+        return found
+    table = axis.table("layout")
+    softening = table.value("softening", "true or false", False)
+    if not isinstance(softening, bool):
+        table.refuse("softening", describe(softening), "true or false")
+    layout = AxisLayout(table.number("modes", least=1, most=_MOST_MODES, whole=True), softening=softening)
+    if layout.size + JOINT != size:
+        axis.refuse("unknowns", f"{size} numbers", f"{layout.size + JOINT}, as {layout.modes} modes and the joint have")
+    return layout
+
+
+def _rivals(axis: Table, layout: AxisLayout) -> list[FloatArray]:
+    """Unknowns of rival models, each of a whole number of modes."""
+    allowed = "lists of numbers, each as many as a whole number of modes and the joint have"
+    rows = axis.value("rivals", allowed, [])
+    if not isinstance(rows, list):
+        axis.refuse("rivals", describe(rows), allowed)
+    found = []
+    for i, row in enumerate(rows):
+        numbers = Table({f"rivals[{i}]": row}, axis.where, axis.path).numbers(f"rivals[{i}]", None)
+        if _layout_of_size(len(numbers), layout.softening) is None:
+            axis.refuse(f"rivals[{i}]", f"{len(numbers)} numbers", allowed)
+        found.append(np.array(numbers))
+    return found
+
+
+def _layout_of_size(size: int, softening: bool) -> AxisLayout | None:
+    layouts = (AxisLayout(m, softening=softening) for m in range(1, _MOST_MODES))
+    return next((layout for layout in layouts if layout.size + JOINT == size), None)
 
 
 def workpiece_from_json(data: Mapping[str, Any], where: str) -> Workpiece:
     """Return the workpiece of a result."""
-    table = Table(data, where).table("workpiece")
-    return Workpiece(
-        table.text("name"),
-        CuttingCoefficients(
-            table.number("tangential_coefficient_mpa", "MPa", above=0.0) * 1e6,
-            table.number("radial_ratio", "", least=-1.0, most=5.0),
-            table.number("axial_ratio", "", 0.0, least=-5.0, most=5.0),
-            *(table.number(key, "N/mm", 0.0, least=0.0) * unit for key, unit in _EDGES.items()),
-        ),
-    )
+    return workpiece_of(Table(data, where).table("workpiece"))

@@ -16,6 +16,7 @@ from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes, write_text
 from rcsa_ident.io.keys import Table, as_number, describe
+from rcsa_ident.io.workpieces import workpiece_of
 from rcsa_ident.signals.recording import Quantity
 
 SCHEMA_VERSION = 1
@@ -145,24 +146,35 @@ def check_result(data: Any, where: str) -> None:
         if sensor.text("quantity", choices=tuple(Quantity)) != Quantity.TRIGGER:
             sensor.text("axis", choices=tuple(AXES))
             sensor.number("sensitivity")
-    workpiece = top.table("workpiece")
-    workpiece.text("name")
-    workpiece.number("tangential_coefficient_mpa", "MPa", above=0.0)
-    workpiece.number("radial_ratio", "", least=-1.0, most=5.0)
+    workpiece_of(top.table("workpiece"))
+    if "notes" in top:
+        _texts(top, "notes")
     low, high = top.numbers("band_hz", 2, "Hz")
     if not 0.0 <= low < high:
         top.refuse("band_hz", [low, high], "lower and upper end, 0 <= lower < upper [Hz]")
-    axes = top.named_tables("axes")
-    if not axes and status != "failed":
-        top.refuse("axes", "an empty table", "X, Y or both")
-    for name, axis in axes.items():
-        if name not in AXES:
-            top.refuse("axes", name, "X, Y or both")
-        spindle_from_json(axis.data, AXES[name], where, axis.path)
-        _check_statistics(axis)
+    _check_axes(top, status)
+    for band in top.tables("speed_bands") if top.data.get("speed_bands") else []:
+        slowest, fastest = band.numbers("speed_range_rpm", 2, "rev/min")
+        if not 0.0 <= slowest <= fastest:
+            band.refuse("speed_range_rpm", f"{[slowest, fastest]}", "lowest and highest speed, 0 <= lowest <= highest [rev/min]")
+        _check_axes(band, band.text("status", choices=STATUSES))
+    for coefficient in top.named_tables("coefficients", default={}).values():
+        for key in coefficient:
+            coefficient.number(key)
     for delay in top.named_tables("delays", default={}).values():
         delay.number("angle_deg", "deg")
         delay.number("std_deg", "deg", least=0.0)
+
+
+def _check_axes(table: Table, status: str) -> None:
+    axes = table.named_tables("axes")
+    if not axes and status != "failed":
+        table.refuse("axes", "an empty table", "X, Y or both")
+    for name, axis in axes.items():
+        if name not in AXES:
+            table.refuse("axes", name, "X, Y or both")
+        spindle_from_json(axis.data, AXES[name], table.where, axis.path)
+        _check_statistics(axis)
 
 
 def _check_campaign(campaign: Table) -> None:

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes
 from rcsa_ident.io.keys import Table, as_number, describe
-from rcsa_ident.machining_setup import Campaign, Cut, Tooling, Workpiece
+from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
+from rcsa_ident.machining_setup import Campaign, Cut, Tooling
 from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, clamped
 
@@ -36,10 +36,6 @@ _MATERIAL = ("youngs_modulus_gpa", "density", "poisson", "loss_factor")
 _CAMPAIGN = ("campaign", "sensors", "workpiece", "toolings", "cuts")
 _SENSOR = ("quantity", "axis", "sensitivity", "delay_s", "bandwidth_hz")
 _TRIGGER = ("quantity", "sensitivity", "delay_s", "bandwidth_hz", "pulses_per_revolution", "tooth_angle_deg")
-WORKPIECE_KEYS = (
-    "name", "tangential_coefficient_mpa", "radial_ratio", "axial_ratio",
-    "tangential_edge_n_per_mm", "radial_edge_n_per_mm", "axial_edge_n_per_mm",
-)  # fmt: skip
 _CUT = (
     "id", "tooling", "spindle_speed_rpm", "axial_depth_mm", "feed_per_tooth_mm", "entry_angle_deg", "exit_angle_deg",
     "feed_direction", "cut", "air",
@@ -210,17 +206,6 @@ def _sensor(name: str, data: Any, where: str) -> Sensor:
         table.number("pulses_per_revolution", "", 1, least=1, most=100000, whole=True),
         None if angle is None else float(np.radians(angle)),
     )
-
-
-def workpiece_of(table: Table) -> Workpiece:
-    edges = [table.number(f"{way}_edge_n_per_mm", "N/mm", 0.0, least=0.0, most=1000.0) * 1e3 for way in ("tangential", "radial", "axial")]
-    coefficients = CuttingCoefficients(
-        table.number("tangential_coefficient_mpa", "MPa", above=0.0, most=50000.0) * 1e6,
-        table.number("radial_ratio", "", least=-1.0, most=5.0),
-        table.number("axial_ratio", "", 0.0, least=-5.0, most=5.0),
-        *edges,
-    )
-    return Workpiece(table.text("name"), coefficients)
 
 
 def _cut(table: Table, folder: Path, toolings: Mapping[str, Tooling]) -> Cut:

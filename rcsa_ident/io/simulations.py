@@ -14,6 +14,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.machines import MachineFile
 from rcsa_ident.io.recordings import write_hdf5
+from rcsa_ident.io.workpieces import workpiece_keys
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.virtual.campaign import SimulatedCut, TrueFlange, TrueReceptances
 
@@ -112,16 +113,9 @@ def _campaign_text(setup: MachineFile, toolings: Sequence[Tooling]) -> str:
             "pulses_per_revolution = 1",
             f"tooth_angle_deg = {np.degrees(suite.tooth_angle):.9g}",
         ]
-    c = setup.workpiece.coefficients
-    lines += ["[workpiece]", f"name = {_quoted(setup.workpiece.name)}", f"tangential_coefficient_mpa = {c.tangential * 1e-6:.9g}"]
-    lines += [f"radial_ratio = {c.radial_ratio:.9g}"]
-    optional = (
-        ("axial_ratio", c.axial_ratio, 1.0),
-        ("tangential_edge_n_per_mm", c.tangential_edge, 1e-3),
-        ("radial_edge_n_per_mm", c.radial_edge, 1e-3),
-        ("axial_edge_n_per_mm", c.axial_edge, 1e-3),
-    )
-    lines += [f"{key} = {value * scale:.9g}" for key, value, scale in optional if value != 0.0]
+    lines.append("[workpiece]")
+    for key, value in workpiece_keys(setup.workpiece).items():
+        lines.append(f"{key} = {_quoted(value) if isinstance(value, str) else format(value, '.9g')}")
     lines += ["[toolings]", *(f"{_quoted(t.name)} = {_quoted(f'toolings/{t.name}.toml')}" for t in toolings)]
     for tooling in toolings:
         for i, speed in enumerate(plan.spindle_speeds):

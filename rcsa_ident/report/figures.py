@@ -30,6 +30,7 @@ STAGES = {
     "exchange": ("modes exchanged", "#CC79A7"),
     "from the other axis": ("started from the other axis", "#E69F00"),
     "polish": ("both axes polished", "#C8501A"),
+    "grow": ("a mode beyond the evidence", "#56B4E9"),
     "generation": ("best of each generation", "#0072B2"),
 }
 _TRUTH = "#1f2933"
@@ -278,7 +279,7 @@ def stability_figure(
         top.fill_between(speed, limit, ceiling, color="#C8501A", alpha=0.10, lw=0)
         if band is not None:
             low, high = (1e3 * np.minimum(edge, max_depth) for edge in band)
-            top.fill_between(speed, low, high, color=COLOURS["X"], alpha=0.35, lw=0, label="95 % (records' noise)")
+            top.fill_between(speed, low, high, color=COLOURS["X"], alpha=0.35, lw=0, label="95 % of what the records leave open")
         top.plot(speed, limit, color=COLOURS["X"], label="stability limit")
         if true_limit is not None:
             top.plot(speed, 1e3 * np.minimum(true_limit, max_depth), "--", color=_TRUTH, lw=1.1, label="from the true FRF")

@@ -11,10 +11,12 @@ import numpy as np
 
 from rcsa_ident import __version__
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.parameters import JOINT
 from rcsa_ident.identification.result import AxisResult, Identification
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.report import figures
-from rcsa_ident.report.rows import mode_rows, peak_row, recording_rows
+from rcsa_ident.report.rows import coefficient_rows, mode_rows, peak_row, recording_rows, two_digits
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.result import StabilityLobes
 
@@ -76,6 +78,7 @@ def report_html(
     readings: Iterable[tuple[Cut, Reading]],
     toolings: Sequence[ToolingPage] = (),
     seconds: Mapping[str, float] | None = None,
+    deviations: Mapping[Dof, tuple[FloatArray, FloatArray]] | None = None,
 ) -> str:
     """Return the page.
 
@@ -88,6 +91,8 @@ def report_html(
     toolings : sequence of ToolingPage
     seconds : mapping of stage to float
         How long each took.
+    deviations : mapping of Dof to (array, array), optional
+        Standard deviations of each mode's natural frequency [rad/s] and damping ratio.
     """
     from jinja2 import Environment, StrictUndefined
 
@@ -95,6 +100,7 @@ def report_html(
     tooling_of = {cut.id: cut.tooling for cut in campaign.cuts}
     template = files("rcsa_ident.report").joinpath("template.html").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"two_digits": two_digits, "thousandths": _thousandths}
     return environment.from_string(template).render(
         version=__version__,
         campaign=campaign,
@@ -104,7 +110,13 @@ def report_html(
         left_out=[row for row in rows if not row.usable],
         noted=sum(bool(row.notes) for row in rows),
         coefficients=campaign.workpiece.coefficients,
-        axes=[_axis(axis.upper(), part, [tooling_of[c] for c in found.cut_ids]) for axis, part in found.axes.items()],
+        axes=[
+            _axis(axis.upper(), part, [tooling_of[c] for c in found.cut_ids], (deviations or {}).get(axis))
+            for axis, part in found.axes.items()
+        ],
+        scales=coefficient_rows(found.coefficients),
+        has_std=bool(deviations),
+        softening=any(part.posterior is not None and part.posterior.layout.softening for part in found.axes.values()),
         joint=_joint(next(iter(found.axes.values()))) if found.axes else [],
         untold=UNTOLD,
         convergence=figures.svg(figures.convergence(found), "search") if found.axes and found.trace else "",
@@ -115,12 +127,18 @@ def report_html(
     )
 
 
-def _axis(name: str, part: AxisResult, tooling: Sequence[str]) -> dict[str, Any]:
+def _thousandths(value: complex, places: int) -> str:
+    """A complex number in thousandths, with true minus signs."""
+    real, imaginary = (f"{abs(1e3 * part):.{places}f}" for part in (value.real, value.imag))
+    return f"{'−' if value.real < 0.0 else ''}{real} {'−' if value.imag < 0.0 else '+'} {imaginary} i"
+
+
+def _axis(name: str, part: AxisResult, tooling: Sequence[str], deviation: tuple[FloatArray, FloatArray] | None) -> dict[str, Any]:
     omega = part.measured.get("omega", np.zeros(0))
     return {
         "name": name,
         "part": part,
-        "modes": mode_rows(part.modes),
+        "modes": mode_rows(part.modes, deviation),
         "residual": part.modes.residual.tolist(),
         "band": (float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))) if omega.size else None,
         "points": omega.size,
@@ -137,7 +155,8 @@ def _joint(part: AxisResult) -> list[dict[str, Any]]:
         ("translational damping c_t", joint.translational_damping, "N s/m"),
         ("rotational damping c_r", joint.rotational_damping, "N m s/rad"),
     )
-    deviation = [None] * 4 if part.covariance is None else np.sqrt(np.maximum(np.diag(part.covariance)[-4:], 0.0)).tolist()
+    posterior = part.posterior
+    deviation = [None] * 4 if posterior is None else np.sqrt(np.maximum(np.diag(posterior.covariance)[-JOINT:], 0.0)).tolist()
     return [
         {"name": name, "value": value, "unit": unit, "std": std, "range": None if std is None else _range(value, std)}
         for (name, value, unit), std in zip(values, deviation, strict=True)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.cutting.force import REFERENCE_RUNOUT, SLOPES
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.measurement import Reading
@@ -48,7 +50,7 @@ def recording_rows(readings: Iterable[tuple[Cut, Reading]]) -> list[RecordingRow
             rows.append(RecordingRow(*common))
             continue
         ratios = {
-            axis.upper(): float(10.0 * np.log10(np.median(np.abs(lines.receptance) ** 2 / (2.0 * lines.variance))))
+            axis.upper(): float(10.0 * np.log10(np.median(np.abs(lines.receptance) ** 2 / (2.0 * np.sum(lines.variance, axis=1)))))
             for axis, lines in found.axes.items()
             if lines.omega.size
         }
@@ -59,21 +61,68 @@ def recording_rows(readings: Iterable[tuple[Cut, Reading]]) -> list[RecordingRow
 
 @dataclass(frozen=True, slots=True)
 class ModeRow:
-    """One mode at the flange: shapes times 10^3, as the field prints them."""
+    """One mode at the flange, in the field's units; standard deviations where a posterior gives them.
+
+    Parameters
+    ----------
+    frequency_hz, damping_percent : float
+    phi_t, phi_r : complex [sqrt(s/kg)], [sqrt(s/(kg m^2))]
+    frequency_std_hz, damping_std_percent : float or None
+    """
 
     frequency_hz: float
     damping_percent: float
     phi_t: complex
     phi_r: complex
+    frequency_std_hz: float | None = None
+    damping_std_percent: float | None = None
 
 
-def mode_rows(modes: ModalModel) -> list[ModeRow]:
-    """Return a row for each mode, by frequency."""
+def mode_rows(modes: ModalModel, deviation: tuple[FloatArray, FloatArray] | None = None) -> list[ModeRow]:
+    """Return a row for each mode, by frequency.
+
+    Parameters
+    ----------
+    modes : ModalModel
+    deviation : (array, array), optional
+        Standard deviations of natural frequencies [rad/s] and damping ratios, in the modes' order.
+    """
     order = np.argsort(modes.omega_n)
+    deviations = (
+        [(None, None)] * order.size if deviation is None else [(d / (2.0 * np.pi), 100.0 * z) for d, z in zip(*deviation, strict=True)]
+    )
     return [
-        ModeRow(float(modes.omega_n[n] / (2.0 * np.pi)), float(100.0 * modes.zeta[n]), complex(modes.phi[n, 0]), complex(modes.phi[n, 1]))
+        ModeRow(
+            float(modes.omega_n[n] / (2.0 * np.pi)),
+            float(100.0 * modes.zeta[n]),
+            complex(modes.phi[n, 0]),
+            complex(modes.phi[n, 1]),
+            *deviations[n],
+        )
         for n in order
     ]
+
+
+@dataclass(frozen=True, slots=True)
+class CoefficientRow:
+    """What was found of a force's uncertain coefficient: a factor on what the campaign says, or a run-out [µm]."""
+
+    name: str
+    value: float
+    std: float
+    unit: str
+
+
+def coefficient_rows(found: Mapping[str, tuple[float, float]]) -> list[CoefficientRow]:
+    """Return a row for each coefficient of an identification, whose logarithms become factors."""
+    rows = []
+    for name, (value, std) in found.items():
+        if name.startswith(SLOPES[-1]):
+            unit = 1e6 * REFERENCE_RUNOUT
+            rows.append(CoefficientRow(name, value * unit, std * unit, "µm"))
+        else:
+            rows.append(CoefficientRow(name, float(np.exp(value)), float(np.exp(value)) * std, "times the campaign's"))
+    return rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,3 +138,9 @@ def peak_row(frequency_hz: np.ndarray, values: np.ndarray) -> PeakRow:
     """Return the largest peak of a receptance [m/N]."""
     k = int(np.argmax(np.abs(values)))
     return PeakRow(float(frequency_hz[k]), float(np.abs(values[k])), float(values.real.min()))
+
+
+def two_digits(std: float, value: float | None = None) -> str:
+    """Return a standard deviation with two digits and no exponent, below a millionth 0; or a value with as many places as it."""
+    places = max(0, 1 - int(np.floor(np.log10(std)))) if std > 1e-6 else 0 if value is None else 6
+    return f"{std if value is None else value:.{places}f}"

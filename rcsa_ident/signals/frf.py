@@ -92,8 +92,8 @@ class AirCorrectedSpectra:
         left = np.array([air_corrected(*(np.delete(x, s, axis=0) for x in (displacement, same, still))) for s in range(self.segments)])
         spread = (self.segments - 1) / self.segments * np.sum(np.abs(left - left.mean(axis=0)) ** 2, axis=0)
         variance = 0.5 * spread * _overlap_factor(self.segments)
-        points = (values, np.zeros_like(values), variance)
-        return HarmonicPoints(*(each[:, :, None] for each in points), coherence(displacement - still.mean(axis=0), same))
+        shared = coherence(displacement - still.mean(axis=0), same)
+        return HarmonicPoints(values[:, :, None], np.zeros_like(values)[:, :, None], variance[:, :, None], shared)
 
 
 def turned_air(air: SteadyRecord, angle: float, highest: int) -> tuple[ComplexArray, FloatArray]:

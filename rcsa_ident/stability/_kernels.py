@@ -281,8 +281,8 @@ def receptance_at(omega, values, w):
                 result[i, j] = complex(values[0, j].real, values[0, j].imag * place / omega[0])
         else:
             k = min(np.searchsorted(omega, place), n - 1)
-            first = max(k - 3, 0)
-            last = min(k + 2, n - 1)
+            first = max(min(k - 3, n - 6), 0)
+            last = min(first + 5, n - 1)
             for a in range(first, last + 1):
                 above, below = 1.0, 1.0
                 for b in range(first, last + 1):

@@ -7,10 +7,14 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
-from rcsa_ident.arrays import FloatArray
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.data import IdentificationData, prepare
+from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.signals.measurement import Reading, measure_cut
@@ -19,6 +23,8 @@ from rcsa_ident.signals.verdict import Verdict
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
+#: Change of an unknown (all are logarithms or of order one) from which a slope is taken.
+_STEP = 1e-5
 #: Reads the recordings of a cut: the cut itself, and its air cut where there is one.
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
 
@@ -79,6 +85,34 @@ def identify(campaign: Campaign, judged: Sequence[JudgedCut], method: Method, se
         If no cut is usable.
     """
     return method.run(data_of(campaign, judged), seed, map)
+
+
+def mode_deviations(found: Identification) -> dict[Dof, tuple[FloatArray, FloatArray]]:
+    """Return the standard deviations of natural frequencies [rad/s] and damping ratios of the axes that have a posterior.
+
+    Linear propagation, sqrt(diag(J C J^T)), of the unknowns' covariance C; shape (m,) each, in the order of the axis' modes.
+    """
+    return {axis: _mode_deviation(axis, part.posterior) for axis, part in found.axes.items() if part.posterior is not None}
+
+
+def _mode_deviation(axis: Dof, posterior: Posterior) -> tuple[FloatArray, FloatArray]:
+    pole = posterior.machine(axis)[0].pole
+    size = np.abs(pole)
+
+    def poles(step: FloatArray) -> ComplexArray:
+        moved = posterior.machine(axis, posterior.theta + step)[0].pole
+        # modes that stand close may change places: each goes on from where it was
+        return moved[np.argmin(np.abs(moved[None, :] - pole[:, None]), axis=1)]
+
+    slope = np.array([(poles(step) - poles(-step)) / (2.0 * _STEP) for step in _STEP * np.eye(posterior.theta.size)])
+    frequency = (slope * pole.conj()).real / size
+    # zeta = -Re(pole) / |pole|
+    damping = (frequency * pole.real / size - slope.real) / size
+
+    def deviation(jacobian: FloatArray) -> FloatArray:
+        return np.sqrt(np.maximum(np.einsum("pm,pq,qm->m", jacobian, posterior.covariance, jacobian), 0.0))
+
+    return deviation(frequency), deviation(damping)
 
 
 def data_of(campaign: Campaign, judged: Sequence[JudgedCut]) -> IdentificationData:

@@ -80,6 +80,46 @@ def lobe_bands(
     (array, array), shape (n,) each [m]
         Infinite where the cut is stable up to the depth that was asked for.
     """
+    limits = _drawn_limits(response, conditions, draws, seed)
+    if limits is None:
+        return None
+    # an infinite limit has its rank like any other, but can't be interpolated
+    low, high = np.quantile(limits, (0.025, 0.975), axis=0, method="nearest")
+    return low, high
+
+
+def stability_probability(
+    response: TooltipResponse, conditions: LobeConditions, depths: FloatArray, draws: int = 200, seed: int = 1
+) -> FloatArray | None:
+    """Return how probable it is that cuts are stable, or None without a posterior: the share of the machines that the records allow.
+
+    Parameters
+    ----------
+    response : TooltipResponse
+        With its spread.
+    conditions : LobeConditions
+        Its speeds are those of the cuts.
+    depths : array, shape (d,) or (d, n) [m]
+        The same at every speed, or one for each; up to the largest depth of the conditions.
+    draws : int
+        Receptances drawn from the posterior, the axes independently of each other: the answer is good to about 1 / (2 sqrt(draws)).
+    seed : int
+
+    Returns
+    -------
+    array, shape (d, n)
+        From 0 to 1, at each speed never more at the larger of two depths.
+    """
+    depths = np.asarray(depths, dtype=float)
+    depths = depths[:, None] if depths.ndim == 1 else depths
+    if not np.all((depths > 0.0) & (depths <= conditions.max_depth)):
+        raise InputError("depths", depths.ravel().tolist(), f"above 0 and up to {conditions.max_depth:g} m")
+    limits = _drawn_limits(response, conditions, draws, seed)
+    return None if limits is None else np.mean(limits[:, None, :] > depths, axis=0)
+
+
+def _drawn_limits(response: TooltipResponse, conditions: LobeConditions, draws: int, seed: int) -> FloatArray | None:
+    """Limits of machines drawn from the posterior, shape (draws, n), or None without one."""
     if draws < 2 or any(axis not in response.spread for axis in response.coupled):
         return None
     rng = np.random.default_rng(seed)
@@ -91,9 +131,7 @@ def lobe_bands(
             drawn = response.tip(axis) + rng.standard_normal(change.shape[0]) @ change
             curves[axis] = (receptance.omega / (2.0 * np.pi), drawn)
         limits[i] = conditions.lobes(measured_tip(curves)).limit_depth
-    # an infinite limit has its rank like any other, but can't be interpolated
-    low, high = np.quantile(limits, (0.025, 0.975), axis=0, method="nearest")
-    return low, high
+    return limits
 
 
 def best_speeds(lobes: StabilityLobes, count: int = 3) -> list[tuple[float, float]]:

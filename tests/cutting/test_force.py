@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,7 +12,7 @@ from hypothesis import strategies as st
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.force import force_history, force_lines, runout_force_lines
+from rcsa_ident.cutting.force import REFERENCE_RUNOUT, SLOPES, force_and_slope, force_history, force_lines, runout_force_lines
 from rcsa_ident.errors import InputError
 
 COEFFICIENTS = CuttingCoefficients(9.02e8, 0.26, 0.1, 1.5e4, 2.0e4, 5e3)
@@ -147,6 +149,62 @@ def test_one_deep_tooth_takes_the_whole_feed():
     np.testing.assert_allclose(found, single * np.exp(1j * ORDERS * np.pi / 2.0)[:, None], atol=1e-9 * np.abs(single).max())
 
 
+NAMES = ("tangential", "radial_ratio", "tangential_edge", "radial_edge")
+
+
+def test_order_of_the_slopes():
+    assert SLOPES == ("tangential coefficient", "radial ratio", "tangential edge force", "radial edge force", "run-out")
+
+
+@pytest.mark.parametrize("cut", list(CUTS))
+@pytest.mark.parametrize("name", list(CUTTERS))
+def test_slopes_against_differences(name, cut):
+    """d log F / d log coefficient, one at a time, of the force as it is defined."""
+    cutter, conditions = CUTTERS[name], CUTS[cut]
+    orders = cutter.teeth * np.arange(0, 7)
+    force, slope = force_and_slope(cutter, conditions, COEFFICIENTS, orders)
+    np.testing.assert_allclose(force, force_lines(cutter, conditions, COEFFICIENTS, orders), rtol=1e-12)
+    assert slope.shape == (7, 2, len(SLOPES))
+    for k, field in enumerate(NAMES):
+        step = 1e-4
+        ahead, behind = (
+            force_lines(cutter, conditions, replace(COEFFICIENTS, **{field: getattr(COEFFICIENTS, field) * np.exp(s)}), orders)
+            for s in (step, -step)
+        )
+        expected = (ahead - behind) / (2.0 * step)
+        np.testing.assert_allclose(slope[:, :, k] * force, expected, atol=1e-7 * np.abs(force).max())
+
+
+def test_tangential_coefficient_carries_the_radial_one():
+    """k_rc is a ratio: without edges K_tc scales the whole force."""
+    force, slope = force_and_slope(CUTTERS["straight"], HALF, CuttingCoefficients(9e8, 0.3), 4 * np.arange(1, 5))
+    np.testing.assert_allclose(slope[:, :, 0], 1.0, rtol=1e-12)
+    np.testing.assert_array_equal(slope[:, :, 2:4], 0.0)
+    assert np.all(np.isfinite(force))
+
+
+@pytest.mark.parametrize("name", list(CUTTERS))
+def test_run_outs_slope_is_a_secant_to_a_tilted_cutter(name):
+    """Tooth by tooth: an axis off the spindle's by the reference, between two teeth."""
+    cutter = CUTTERS[name]
+    orders = cutter.teeth * np.arange(0, 7)
+    force, slope = force_and_slope(cutter, HALF, COEFFICIENTS, orders)
+    offset = REFERENCE_RUNOUT * np.cos(cutter.tooth_angle - cutter.pitch[0] / 8.0)
+    eccentric = replace(cutter, runout=offset)
+    expected = runout_force_lines(eccentric, HALF, COEFFICIENTS, orders) - force
+    np.testing.assert_allclose(slope[:, :, 4] * force, expected, atol=1e-10 * np.abs(force).max())
+    sampled = sampled_lines(eccentric, HALF, COEFFICIENTS, orders, 5000) - sampled_lines(cutter, HALF, COEFFICIENTS, orders, 5000)
+    np.testing.assert_allclose(slope[:, :, 4] * force, sampled, atol=1e-3 * np.abs(force).max())
+
+
+def test_no_force_no_slope():
+    """A slot cut by four equal teeth has a constant force: its other lines are nothing, and nothing changes them by a share."""
+    still = CuttingConditions(800.0, 0.0, 5e-5, Engagement(0.0, np.pi))
+    force, slope = force_and_slope(CUTTERS["straight"], still, COEFFICIENTS, ORDERS)
+    np.testing.assert_array_equal(force, 0.0)
+    np.testing.assert_array_equal(slope, 0.0)
+
+
 def test_axial_force_of_the_history():
     history = force_history(Cutter(1, 0.012), HALF, COEFFICIENTS, np.array([0.75 * np.pi, 0.2]), slices=1)
     assert history[0, 2] == pytest.approx(2e-3 * (9.02e7 * 1e-4 * np.sin(0.75 * np.pi) + 5e3))
@@ -170,6 +228,9 @@ def test_axial_force_of_the_history():
         (lambda: CuttingConditions(0.0, 1e-3, 1e-4, HALF.engagement), "spindle_speed"),
         (lambda: CuttingCoefficients(9e8, 7.0), "radial_ratio"),
         (lambda: CuttingCoefficients(9e8, 0.3, np.nan), "axial_ratio"),
+        (lambda: CuttingCoefficients(9e8, 0.3, tangential_spread=-0.1), "tangential_spread"),
+        (lambda: CuttingCoefficients(9e8, 0.3, ratio_spread=1.5), "ratio_spread"),
+        (lambda: CuttingCoefficients(9e8, 0.3, edge_spread=np.nan), "edge_spread"),
     ],
 )
 def test_refused(make, words):

@@ -73,7 +73,7 @@ def test_cost_of_a_candidate_is_that_of_its_coupled_modes(few, problem, shop):
         holder = tool_holder_receptance(shop.toolings[few.toolings[few.cut_tooling[k]]].assembly, axis.omega[mine])
         frf = couple(holder, modes.receptance(holder.omega), LumpedJoint(*joint))["spindle", "tip"][:, 0, 0]
         value[mine] = frf * np.exp(-1j * holder.omega * delays[k])
-    lines = np.stack([value, 0.0 * value], axis=1)
+    lines = np.stack([value, 0.0 * value], axis=1)[:, None, :]
     own = _Problem(PaperGeneticAlgorithm(), replace(few, axes=(replace(axis, lines=lines),)))
     size = 1e6 * np.linalg.norm(value)
     assert own.costs(x[None])[0] == pytest.approx(700.0 * np.abs(x[20:30]).sum(), abs=2e-3 * size)
@@ -100,7 +100,7 @@ def published_lines(few):
         fields["flange"][mine] = np.stack([a22[:, 0, 0], LEVER * a22[:, 0, 1], LEVER**2 * a22[:, 1, 1]], axis=1)
         fields["tip"][mine] = np.stack([a21[:, 0, 0], LEVER * a21[:, 1, 0]], axis=1)
         frf = couple(holder, modes.receptance(holder.omega), LumpedJoint(**PUBLISHED_JOINT))["spindle", "tip"][:, 0, 0]
-        fields["lines"][mine] = np.stack([frf, 0.0 * frf], axis=1)
+        fields["lines"][mine] = np.stack([frf, 0.0 * frf], axis=1)[:, None, :]
     return replace(few, axes=(replace(axis, **fields),)), table
 
 
@@ -151,7 +151,16 @@ def test_modes_that_feed_energy_in_are_named(found):
     # p4 and p6 leave the phase free: hardly any candidate of Table 2 is passive
     assert found.status is Status.SUSPECT
     assert any("not passive" in reason for reason in found.reasons)
-    assert found.axes[Dof.X].covariance is None
+    assert found.axes[Dof.X].posterior is None
+
+
+def test_two_outputs_are_taken_as_their_sum(rich):
+    """The paper knows the flange's motion only."""
+    low, high = _Problem(PaperGeneticAlgorithm(), rich.only(Dof.X)).bounds()
+    x = low + np.random.default_rng(1).uniform(size=(3, low.size)) * (high - low)
+    for cost in (LiteralCost(), NoiseWeightedCost()):
+        both, one = (_Problem(PaperGeneticAlgorithm(cost), data.only(Dof.X)).costs(x) for data in (rich, rich.summed()))
+        np.testing.assert_allclose(both, one, rtol=1e-12)
 
 
 def test_wide_boxes_hold_what_table_2_leaves_out(few):

@@ -3,17 +3,34 @@ import math
 import numpy as np
 import pytest
 
-from rcsa_ident.identification.parameters import axis_size
+from rcsa_ident.identification.parameters import AxisLayout, Layout, plain
 from rcsa_ident.identification.priors import Priors, log_volume, prior_rows
 
-PRIORS = Priors(frequency_hz=1200.0, frequency_spread=0.7, shape=0.8, damping_ratio=0.05, damping_coupling=0.5, residual=2.0)
+PRIORS = Priors(
+    frequency_hz=1200.0,
+    frequency_spread=0.7,
+    shape=0.8,
+    damping_ratio=0.05,
+    damping_coupling=0.5,
+    residual=1.7,
+    softening=0.02,
+    tooth_angle=8.0,
+)
 UNIT = 30.0  # of the damping factor [sqrt(rad/s)]
+LAYOUTS = {
+    "one mode": plain(1),
+    "two axes": plain(2, 4),
+    "fixture": Layout((AxisLayout(3, fixture=True),), coefficients=2),
+    "everything": Layout((AxisLayout(2, True, True), AxisLayout(3, True, True)), coefficients=3, clampings=2),
+}
+SPREADS = (0.05, 0.1, 3.0)
 
 
-def naive(theta, orders, priors):
+def naive(theta, layout, priors, coefficients):
     """Twice the negative log density without its constant, entry by entry from what the docstring promises."""
     total, k = 0.0, 0
-    for m in orders:
+    for axis in layout.axes:
+        m = axis.modes
         frequency = theta[k : k + m]
         total += sum(((f - math.log(2.0 * math.pi * priors.frequency_hz)) / priors.frequency_spread) ** 2 for f in frequency)
         k += m
@@ -30,44 +47,72 @@ def naive(theta, orders, priors):
                 k += 1
         total += sum((r / priors.residual) ** 2 for r in theta[k : k + 3])
         k += 3
-    return total + sum(((v - math.log(c)) / priors.joint_spread) ** 2 for v, c in zip(theta[k:], priors.joint, strict=True))
+        if axis.fixture:
+            total += sum((p / priors.shape) ** 2 for p in theta[k : k + m])
+            # a product of two factors, not a factor
+            total += sum((r / priors.residual**2) ** 2 for r in theta[k + m : k + m + 2])
+            k += m + 2
+        if axis.softening:
+            pairs = m * (m + 1) // 2
+            total += sum((s / priors.softening) ** 2 for s in theta[k : k + pairs])
+            k += pairs
+    total += sum(((v - math.log(c)) / priors.joint_spread) ** 2 for v, c in zip(theta[k : k + 4], priors.joint, strict=True))
+    k += 4
+    total += sum((v / s) ** 2 for v, s in zip(theta[k : k + len(coefficients)], coefficients, strict=True))
+    k += len(coefficients)
+    return total + sum((angle / priors.tooth_angle) ** 2 for angle in theta[k:])
 
 
-@pytest.fixture(params=[(1,), (3,), (2, 4)])
-def orders(request):
-    return request.param
+@pytest.fixture(params=list(LAYOUTS))
+def layout(request):
+    return LAYOUTS[request.param]
 
 
 @pytest.fixture
-def theta(orders):
-    rng = np.random.default_rng(4)
-    vector = rng.standard_normal(sum(axis_size(m) for m in orders) + 4)
+def spreads(layout):
+    return SPREADS[: layout.coefficients]
+
+
+@pytest.fixture
+def theta(layout):
+    vector = np.random.default_rng(4).standard_normal(layout.size)
     vector[:1] += 8.0
-    vector[-4:] += np.log(PRIORS.joint)
+    vector[layout.joint] += np.log(PRIORS.joint)
     return vector
 
 
-def test_rows_are_the_density(theta, orders):
-    rows, _ = prior_rows(theta, orders, PRIORS)
-    assert rows @ rows == pytest.approx(naive(theta, orders, PRIORS), rel=1e-12)
+def test_rows_are_the_density(theta, layout, spreads):
+    rows = prior_rows(layout, PRIORS, spreads).residual(theta)
+    assert rows.shape == theta.shape
+    assert rows @ rows == pytest.approx(naive(theta, layout, PRIORS, spreads), rel=1e-12)
 
 
-def test_jacobian_against_differences(theta, orders):
-    _, jacobian = prior_rows(theta, orders, PRIORS)
+def test_residual_and_jacobian_are_one(theta, layout, spreads):
+    """The rows are straight in the vector: their differences are the Jacobian, at any distance."""
+    rows = prior_rows(layout, PRIORS, spreads)
+    other = theta + np.random.default_rng(5).standard_normal(theta.size)
+    np.testing.assert_allclose(rows.residual(other) - rows.residual(theta), rows.jacobian @ (other - theta), rtol=1e-9, atol=1e-9)
     for k in range(theta.size):
         step = np.zeros(theta.size)
-        step[k] = 1e-5
-        ahead, behind = (prior_rows(theta + s, orders, PRIORS)[0] for s in (step, -step))
-        np.testing.assert_allclose(jacobian[:, k], (ahead - behind) / 2e-5, rtol=1e-6, atol=1e-9)
+        step[k] = 1.0
+        np.testing.assert_allclose(rows.jacobian[:, k], rows.residual(theta + step) - rows.residual(theta), rtol=1e-9, atol=1e-9)
 
 
-def test_log_volume_is_that_of_the_information(theta, orders):
-    _, jacobian = prior_rows(theta, orders, PRIORS)
+def test_the_vector_is_left_alone(theta, layout, spreads):
+    before = theta.copy()
+    prior_rows(layout, PRIORS, spreads).residual(theta)
+    np.testing.assert_array_equal(theta, before)
+
+
+def test_log_volume_is_that_of_the_information(layout, spreads):
+    jacobian = prior_rows(layout, PRIORS, spreads).jacobian
     sign, expected = np.linalg.slogdet(jacobian.T @ jacobian)
     assert sign == 1.0
-    assert log_volume(orders, PRIORS) == pytest.approx(expected, rel=1e-12)
+    assert log_volume(layout, PRIORS, spreads) == pytest.approx(expected, rel=1e-12)
 
 
 def test_wider_priors_fill_more():
     narrow, wide = Priors(shape=0.5), Priors(shape=5.0)
-    assert log_volume((3,), narrow) - log_volume((3,), wide) == pytest.approx(2.0 * 6 * np.log(10.0))
+    assert log_volume(plain(3), narrow) - log_volume(plain(3), wide) == pytest.approx(2.0 * 6 * np.log(10.0))
+    fixture = Layout((AxisLayout(3, fixture=True),))
+    assert log_volume(fixture, narrow) - log_volume(fixture, wide) == pytest.approx(2.0 * 9 * np.log(10.0))

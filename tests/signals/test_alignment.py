@@ -119,16 +119,33 @@ def test_no_trigger_no_edge():
     assert trigger_edge(trigger(0.71 * speed, 2e-3), speed) is None
     flat = Recording(RATE, np.zeros((7168, 1)), (Sensor("t", Quantity.TRIGGER),))
     assert trigger_edge(flat, speed) is None
-    assert trigger_delay(flat, speed, 4) == (None, None)
+    assert trigger_delay(flat, speed, 4) == (None, None, True)
 
 
-def test_delay_needs_a_tooth_angle_and_marks_that_fit_the_teeth():
+def test_a_known_tooth_angle_makes_a_delay():
     speed = 9013.0 * RPM
-    assert trigger_delay(trigger(speed, 2e-3), speed, 4) == (None, None)
-    delay, std = trigger_delay(trigger(speed, 2e-3, tooth_angle=0.4), speed, 4)
+    delay, std, known = trigger_delay(trigger(speed, 2e-3, tooth_angle=0.4), speed, 4)
+    assert known
     assert delay == pytest.approx(2e-3 - 0.4 / speed, abs=3.0 * std)
-    assert trigger_delay(trigger(speed, 1e-3, pulses=3, tooth_angle=0.4), speed, 4) == (None, None)
-    assert trigger_delay(trigger(speed, 1e-3, pulses=2, tooth_angle=0.4), speed, 4)[0] is not None
+    assert trigger_delay(trigger(speed, 2e-3, tooth_angle=0.0), speed, 4)[2]
+
+
+def test_without_one_the_edge_is_given_and_it_is_said():
+    speed = 9013.0 * RPM
+    record = trigger(speed, 2e-3)
+    assert trigger_delay(record, speed, 4) == (*trigger_edge(record, speed), False)
+
+
+@pytest.mark.parametrize("tooth_angle", [None, 0.4])
+def test_marks_have_to_fit_the_teeth(tooth_angle):
+    speed = 9013.0 * RPM
+    for pulses, fits in ((1, True), (2, True), (3, False), (4, True)):
+        found = trigger_delay(trigger(speed, 1e-3, pulses=pulses, tooth_angle=tooth_angle), speed, 4)
+        if fits:
+            assert found[0] is not None
+            assert found[2] == (tooth_angle is not None)
+        else:
+            assert found == (None, None, True)
 
 
 @pytest.mark.parametrize("pulses", [1, 2, 4, 5])
@@ -139,4 +156,7 @@ def test_a_trigger_turns_the_air_cut(pulses):
     assert measured.alignment_std < 3e-3
     for axis, lines in measured.axes.items():
         error = np.abs(lines.receptance - made.expected(lines, axis))
-        assert np.all(error * np.abs(lines.force) < 4.0 * np.sqrt(2.0 * lines.variance) * np.abs(lines.force) + lines.order * 3.0e-3 * 6e-7)
+        assert np.all(
+            error * np.abs(lines.force)
+            < 4.0 * np.sqrt(2.0 * lines.variance.sum(axis=1)) * np.abs(lines.force) + lines.order * 3.0e-3 * 6e-7
+        )

@@ -97,8 +97,8 @@ def test_the_jackknife_is_calibrated():
     for seed in range(30):
         made = pair(seed=seed, rpm=14000.0, roundness=0.0, noise=2e-8, accelerometers=False, duration=0.2)
         for axis, lines in made.measure(estimator=AirCorrectedSpectra()).measurement.axes.items():
-            error = (lines.receptance - made.expected(lines, axis)) / np.sqrt(lines.variance)
-            strong = np.abs(lines.receptance) > 10.0 * np.sqrt(lines.variance)
+            error = (lines.receptance - made.expected(lines, axis)) / np.sqrt(lines.variance[:, 0])
+            strong = np.abs(lines.receptance) > 10.0 * np.sqrt(lines.variance[:, 0])
             z += [*error[strong].real, *error[strong].imag]
     assert len(z) > 100
     # a variance from eight segments is itself known to a third: z has Student's tails
@@ -116,3 +116,24 @@ def test_coherence_of_the_spectra():
 def test_without_an_air_cut_spectra_are_h2():
     made = pair(seed=3, roundness=0.0, noise=1e-9)
     assert far(made.measure(estimator=AirCorrectedSpectra(), air=None), made) < 2e-2
+
+
+def test_the_papers_spectra_have_one_output():
+    """They are of the flange's absolute motion, whatever was recorded; nothing is left to subtract."""
+    for axis, lines in pair(seed=1, rpm=14000.0).measure(estimator=AirCorrectedSpectra()).measurement.axes.items():
+        assert lines.outputs == 1, axis
+        assert np.all(lines.air == 0.0)
+        assert np.all(lines.variance > 0.0)
+
+
+def test_turning_lines_by_an_angle():
+    rng = np.random.default_rng(5)
+    lines, noise = rng.normal(size=(6, 2, 2)) + 1j * rng.normal(size=(6, 2, 2)), rng.uniform(1.0, 2.0, (6, 2, 2))
+    # longer than the record: no line there, and no better known than its last one
+    turned, variance = frf.turned(lines, noise, 0.3, 7)
+    assert turned.shape == variance.shape == (8, 2, 2)
+    for order in range(6):
+        np.testing.assert_allclose(turned[order], lines[order] * np.exp(0.3j * order), rtol=1e-12)
+    np.testing.assert_array_equal(turned[6:], 0.0)
+    np.testing.assert_array_equal(variance, noise[[0, 1, 2, 3, 4, 5, 5, 5]])
+    assert frf.turned(lines, noise, 0.3, 3)[0].shape[0] == 4

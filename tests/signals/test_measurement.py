@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rcsa_ident.cutting.force import SLOPES, force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.machines import read_machine
@@ -12,7 +13,7 @@ from rcsa_ident.signals.measurement import measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from rcsa_ident.workflows.simulate import simulate
-from tests.signals.synthetic import COEFFICIENTS, RPM, conditions, pair
+from tests.signals.synthetic import COEFFICIENTS, FIXTURE, RPM, conditions, pair
 
 AXES = (Dof.X, Dof.Y)
 
@@ -21,7 +22,7 @@ def errors(made, **changes):
     """Errors over their standard deviation, real and imaginary."""
     z = []
     for axis, lines in made.measure(**changes).measurement.axes.items():
-        rest = (lines.receptance - made.expected(lines, axis)) / np.sqrt(lines.variance)
+        rest = (lines.receptance - made.expected(lines, axis)) / np.sqrt(lines.variance.sum(axis=1))
         z += [*rest.real, *rest.imag]
     return np.array(z)
 
@@ -43,7 +44,7 @@ def test_the_angle_to_the_air_cut_explains_the_rest():
         measured = made.measure().measurement
         for axis, lines in measured.axes.items():
             rest = lines.receptance - made.expected(lines, axis)
-            total = 2.0 * lines.variance + (lines.order * np.abs(lines.air) * measured.alignment_std) ** 2
+            total = 2.0 * lines.variance.sum(axis=1) + (lines.order * np.abs(lines.air.sum(axis=1)) * measured.alignment_std) ** 2
             z += [*(np.abs(rest) / np.sqrt(total))]
     assert np.sqrt(np.mean(np.square(z))) == pytest.approx(1.0, abs=0.25)
 
@@ -57,7 +58,7 @@ def test_variance_is_in_proportion():
         # cut and air cut, white noise: 2 times 2 sigma^2 / n over the force's square
         lines = few.axes[axis]
         expected = 2.0 * 2.0 * 4e-9**2 / 7168 / np.abs(lines.force) ** 2
-        assert np.median(lines.variance / expected) == pytest.approx(1.0, abs=0.25)
+        assert np.median(lines.variance[:, 0] / expected) == pytest.approx(1.0, abs=0.25)
 
 
 def test_coherence():
@@ -74,7 +75,7 @@ def test_a_force_that_scatters_widens_the_variance():
     steady = pair(0, 12000.0).measure().measurement.axes[Dof.X]
     unsteady = pair(0, 12000.0, scatter=0.03).measure().measurement.axes[Dof.X]
     strong = np.argmax(np.abs(steady.receptance * steady.force))
-    assert unsteady.variance[strong] > 100.0 * steady.variance[strong]
+    assert unsteady.variance[strong, 0] > 100.0 * steady.variance[strong, 0]
     assert 0.4 < np.sqrt(np.mean(z**2)) < 2.0
 
 
@@ -96,8 +97,57 @@ def test_the_fixtures_motion_is_added_with_its_sign():
         made = pair(10, 12000.0, bad_compensation=sensor)
         lines = made.measure().measurement.axes[Dof.X]
         expected = made.expected(lines, Dof.X)
-        strong = np.abs(lines.air) < 0.05 * np.abs(lines.cut)
+        strong = np.abs(lines.air.sum(axis=1)) < 0.05 * np.abs(lines.cut.sum(axis=1))
         assert np.median(np.abs(lines.receptance - expected)[strong] / np.abs(expected)[strong]) == pytest.approx(missing, rel=0.1)
+
+
+def test_gap_and_fixture_are_two_outputs():
+    """Each is what its own sensor saw of the true motion; together they are the flange's."""
+    for seed in range(4):
+        made = pair(seed, 12000.0)
+        for axis, lines in made.measure().measurement.axes.items():
+            assert lines.cut.shape == lines.air.shape == lines.variance.shape == (lines.order.size, 2)
+            flange = made.expected(lines, axis)
+            rest = lines.cut - lines.air - flange[:, None] * np.array([1.0 - FIXTURE, FIXTURE])
+            z = rest / np.sqrt(2.0 * lines.variance)
+            assert np.sqrt(np.mean(np.abs(z) ** 2)) < 1.5
+            # an accelerometer sees no roundness
+            assert np.all(np.abs(lines.air[:, 1]) < 5.0 * np.sqrt(2.0 * lines.variance[:, 1]))
+            np.testing.assert_allclose(lines.receptance, np.sum(lines.cut - lines.air, axis=1), rtol=1e-12)
+            one = lines.summed()
+            assert one.outputs == 1
+            np.testing.assert_allclose(one.receptance, lines.receptance, rtol=1e-12)
+            np.testing.assert_allclose(one.variance[:, 0], lines.variance.sum(axis=1), rtol=1e-12)
+
+
+def test_without_accelerometers_there_is_one_output():
+    for axis, lines in pair(10, 12000.0, accelerometers=False).measure().measurement.axes.items():
+        assert lines.outputs == 1, axis
+        assert lines.summed().outputs == 1
+
+
+def test_an_accelerometer_on_one_axis():
+    """The other axis has the gap alone, as if there were none at all; its lines do not mix."""
+    # with a trigger the angle to the air cut does not come from the lines
+    made = pair(10, 12000.0, trigger={})
+    keep = [i for i, s in enumerate(made.cut.sensors) if s.name != "fixture_y"]
+    cut, air = (Recording(r.rate, r.samples[:, keep], tuple(r.sensors[i] for i in keep)) for r in (made.cut, made.air))
+    found = made.measure(cut=cut, air=air).measurement
+    both = made.measure().measurement
+    assert [found.axes[a].outputs for a in AXES] == [2, 1]
+    for field in ("cut", "air", "variance"):
+        np.testing.assert_allclose(getattr(found.axes[Dof.X], field), getattr(both.axes[Dof.X], field), rtol=1e-9)
+        np.testing.assert_allclose(getattr(found.axes[Dof.Y], field)[:, 0], getattr(both.axes[Dof.Y], field)[:, 0], rtol=1e-9)
+
+
+def test_lines_carry_force_and_slopes_at_the_records_speed():
+    made = pair(10, 11500.0)
+    for axis, lines in made.measure().measurement.axes.items():
+        force, slope = force_and_slope(made.cutter, conditions(made.speed / RPM), COEFFICIENTS, lines.order)
+        column = 0 if axis is Dof.X else 1
+        np.testing.assert_allclose(lines.force, force[:, column], rtol=1e-4)
+        assert lines.force_slope.shape == (lines.order.size, len(SLOPES))
+        np.testing.assert_allclose(lines.force_slope, slope[:, column], rtol=1e-3, atol=1e-4)
 
 
 def test_one_axis_alone():
@@ -143,9 +193,26 @@ def test_a_trigger_gives_the_delay(tooth_angle):
     for seed in range(5):
         made = pair(seed, 12000.0, trigger={"tooth_angle": tooth_angle})
         measured = made.measure().measurement
+        assert measured.tooth_angle_known
         turns = (measured.delay + made.angle / made.speed) * made.speed / (2.0 * np.pi)
         assert (turns - round(turns)) * 2.0 * np.pi / made.speed == pytest.approx(0.0, abs=4.0 * measured.delay_std)
         assert measured.delay_std * made.cut.rate < 0.3
+
+
+def test_a_trigger_of_unknown_tooth_angle_gives_its_edge():
+    """The angle that turns edges into delays is the same in all cuts of a clamping."""
+    angles = []
+    for seed in range(5):
+        made = pair(seed, 12000.0, trigger={})
+        measured = made.measure().measurement
+        assert not measured.tooth_angle_known
+        delay = -made.angle / made.speed  # tooth 1 at immersion 0, up to turns
+        angles.append(((delay - measured.delay) * made.speed) % (2.0 * np.pi))
+    spread = np.angle(np.exp(1j * np.array(angles)))
+    # `pair` marks tooth 1 at immersion 0 where no angle is given: edge and delay are one
+    assert np.abs(spread).max() < 4.0 * measured.delay_std * made.speed
+    none = pair(0, 12000.0).measure().measurement
+    assert (none.delay, none.delay_std, none.tooth_angle_known) == (None, None, True)
 
 
 def test_a_limit_below_the_first_harmonic():

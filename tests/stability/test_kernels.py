@@ -70,3 +70,23 @@ def test_no_limit_where_no_eigenvalue_has_a_positive_real_part():
     assert np.isinf(limit[0])
     assert np.isnan(chatter[0])
     assert lobe[0] == -1
+
+
+def test_receptance_at_any_frequency():
+    values = np.array([model(w).ravel() for w in OMEGA])
+    inside = np.array([OMEGA[0], OMEGA[1] + 1.0, OMEGA[80] + 11.0, OMEGA[-2] + 3.0, OMEGA[-1]])
+    exact = np.array([model(w).ravel() for w in inside])
+    found = kernels.receptance_at(OMEGA, values, inside)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=2e-5 * np.abs(values).max())
+    np.testing.assert_allclose(kernels.receptance_at(OMEGA, values, OMEGA[::17]), values[::17], rtol=1e-12)
+    # a real signal's response
+    np.testing.assert_array_equal(kernels.receptance_at(OMEGA, values, -inside), found.conj())
+    assert np.all(kernels.receptance_at(OMEGA, values, np.array([OMEGA[-1] + 1.0, -1e9])) == 0.0)
+    low = kernels.receptance_at(OMEGA, values, np.array([0.0, 0.5 * OMEGA[0]]))
+    np.testing.assert_array_equal(low[0], values[0].real)
+    np.testing.assert_allclose(low[1], values[0].real + 0.5j * values[0].imag, rtol=1e-12)
+    # quintics are exact for polynomials of fifth degree, also where the lines lie unevenly
+    uneven = np.cumsum(np.linspace(1.0, 2.0, 12))
+    w = np.linspace(1.1, uneven[-1] - 0.1, 30)
+    power = (np.array([1.0, 0.5j]) * uneven[:, None] ** np.array([5, 3])).astype(complex)
+    np.testing.assert_allclose(kernels.receptance_at(uneven, power, w), np.array([1.0, 0.5j]) * w[:, None] ** np.array([5, 3]), rtol=1e-9)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from rcsa_ident.dynamics.structure import natural_frequencies
 from rcsa_ident.errors import InputError
-from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, ToolAssembly, clamped
+from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, ToolAssembly, clamped, stiffened
+from rcsa_ident.tool_holder.model import tool_holder_structure
 
 STEEL = MATERIALS["steel"]
 TOOL = (BeamSegment(0.03, 0.01, STEEL, end_diameter=0.012), BeamSegment(0.08, 0.012, STEEL))
@@ -53,3 +57,26 @@ def test_parts_of_a_cone_fit_together():
 def test_refused(make, words):
     with pytest.raises(InputError, match=words):
         make()
+
+
+@pytest.mark.parametrize("contact", [None, Contact(2e10, 6e5, 6e4, 9.0)])
+def test_stiffened_is_all_moduli_and_the_contact(contact):
+    assembly = ToolAssembly(TOOL, HOLDER, 0.04, contact)
+    stiffer = stiffened(assembly, 0.02)
+    for old, new in zip((*assembly.tool, *assembly.holder), (*stiffer.tool, *stiffer.holder), strict=True):
+        assert new.material.youngs_modulus == pytest.approx(1.02 * old.material.youngs_modulus)
+        assert replace(new, material=old.material) == old
+        assert replace(new.material, youngs_modulus=old.material.youngs_modulus) == old.material
+    assert stiffer.insertion == assembly.insertion
+    if contact is None:
+        assert stiffer.contact is None
+    else:
+        assert stiffer.contact == replace(contact, translational_stiffness=1.02 * 2e10, rotational_stiffness=1.02 * 6e5)
+
+
+@pytest.mark.parametrize("contact", [None, Contact(2e10, 6e5)])
+def test_natural_frequencies_rise_by_half_the_share(contact):
+    """K is all stiffness there is: every natural frequency of the free assembly by the square root, exactly."""
+    assembly = ToolAssembly(TOOL, HOLDER, 0.04, contact)
+    plain, stiffer = (natural_frequencies(tool_holder_structure(a, 5000.0))[2:8] for a in (assembly, stiffened(assembly, 0.02)))
+    assert stiffer / plain == pytest.approx(1.02**0.5, rel=1e-9)

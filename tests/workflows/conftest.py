@@ -10,8 +10,8 @@ import pytest
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.identification.default import parameter_names
-from rcsa_ident.identification.parameters import AxisParameters, joint_of, modes_of, pack, unpack
+from rcsa_ident.identification.parameters import AxisLayout, joint_of, modes_of, pack, parameter_names, simple_axis, unpack
+from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import AxisResult, Identification, Status
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machining_setup import Campaign, Cut, Workpiece
@@ -62,19 +62,19 @@ def campaign(tmp_path: Path, tooling_file: Path) -> Campaign:
 @pytest.fixture
 def identification() -> Identification:
     """Two axes of two modes each with a posterior; the third cut is left out."""
-    axes = {}
+    axes, layout = {}, AxisLayout(2)
     logs = np.log([2e9, 5e6, 1e4, 10.0])
     for axis, shift in ((Dof.X, 1.0), (Dof.Y, 0.95)):
         natural = 2.0 * np.pi * shift * np.array([900.0, 2000.0])
         damping = np.diag(2.0 * np.array([0.05, 0.04]) * natural)
-        physics = AxisParameters(natural**2, np.array([[0.15, 0.1], [0.2, -0.3]]), np.linalg.cholesky(damping), np.diag([2e-5, 3e-5]))
+        physics = simple_axis(natural, np.array([[0.15, 0.1], [0.2, -0.3]]), np.linalg.cholesky(damping), np.diag([2e-5, 3e-5]))
         theta = np.concatenate([pack(physics), logs])
         deviation = np.full(theta.size, 0.004)
         omega = 2.0 * np.pi * np.array([600.0, 1200.0, 3000.0, 700.0])
         value = np.array([1e-8, 3e-8j, -1e-9, 2e-8 + 1e-8j])
         axes[axis] = AxisResult(
-            modes_of(unpack(theta[:-4], 2), axis), joint_of(logs), 1.1, {"T1": 1.1}, 0.004, parameter_names(2),
-            np.diag(deviation**2), theta,
+            modes_of(unpack(theta[:-4], layout), axis), joint_of(logs), 1.1, {"T1": 1.1}, 0.004, parameter_names(layout),
+            Posterior(theta, np.diag(deviation**2), layout, (1050.0, 50.0)),
             {"omega": omega, "value": value, "model": 1.01 * value, "cut": np.array([0, 0, 0, 1]), "coherence": np.ones(4)},
         )  # fmt: skip
     trace = [
@@ -93,4 +93,6 @@ def identification() -> Identification:
         np.array([1e-6, 2e-6]),
         np.array([1000.0, 1100.0]),
         (*trace, ("both", "polish", 2.0)),
+        ("run-out of T1: the cuts say little about it; it is known to 250 %, nearly as before",),
+        {"tangential coefficient": (0.03, 0.02), "run-out of T1": (0.4, 2.5)},
     )

@@ -4,12 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.stats
 
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
+from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.workflows.lobes import band_warning, best_speeds, modal_tip
+from rcsa_ident.stability.zero_order import ZeroOrder
+from rcsa_ident.workflows.lobes import (
+    LobeConditions,
+    band_warning,
+    best_speeds,
+    lobe_bands,
+    modal_tip,
+    stability_probability,
+    tooling_lobes,
+)
+from rcsa_ident.workflows.tip import TooltipResponse
 
 
 def lobes(limit, chatter=None):
@@ -60,3 +76,64 @@ def test_a_mode_too_sharp_to_resolve_is_refused():
     model = normal_modes(np.array([5000.0]), np.array([1e-7]), np.ones((1, 1)), (Coordinate("tip", Dof.X),))
     with pytest.raises(InputError, match="damping_ratio"):
         modal_tip({Dof.X: model})
+
+
+OMEGA = 2.0 * np.pi * np.arange(100.0, 3000.0, 2.0)
+
+
+def posterior_of_scale(deviation):
+    """A tip whose receptances are known but for one factor: the limit is then known but for its inverse."""
+
+    def plane(axis, frequency):
+        tip = (Coordinate("tip", axis),)
+        mode = normal_modes(np.array([2.0 * np.pi * frequency]), np.array([0.03]), np.array([[4.0]]), tip)
+        return Receptance(OMEGA, mode.receptance(OMEGA).values, tip, tip)
+
+    coupled = plane(Dof.X, 900.0)
+    return TooltipResponse({Dof.X: coupled}, {Dof.X: deviation * coupled.values[:, 0, 0][None]})
+
+
+def asked(method, speeds=(600.0, 800.0, 1100.0)):
+    return LobeConditions(
+        Cutter(2, 0.012), CuttingCoefficients(9e8, 0.3), Engagement.from_immersion(0.5, "down"), 0.3, np.array(speeds), 0.1, method
+    )
+
+
+@pytest.mark.parametrize(("method", "draws"), [(ZeroOrder(), 400), (MultiFrequency(), 40)])
+def test_probability_of_stability_of_a_scale(method, draws):
+    """With G (1 + 0.1 z) the limit is a / (1 + 0.1 z): a cut of depth d is stable where z < 10 (a / d - 1)."""
+    response, conditions = posterior_of_scale(0.1), asked(method)
+    limit = tooling_lobes(response, conditions).limit_depth
+    ratio = np.array([0.8, 0.95, 1.0, 1.05, 1.3])
+    found = stability_probability(response, conditions, ratio[:, None] * limit, draws=draws, seed=3)
+    # the very draws that were made
+    z = np.random.default_rng(3).standard_normal(draws)
+    expected = np.mean(z < 10.0 * (1.0 / ratio[:, None] - 1.0), axis=1)
+    np.testing.assert_allclose(found, np.repeat(expected[:, None], 3, axis=1), atol=1.0 / draws)
+    exact = scipy.stats.norm.cdf(10.0 * (1.0 / ratio - 1.0))
+    np.testing.assert_allclose(found, np.repeat(exact[:, None], 3, axis=1), atol=3.0 * 0.5 / np.sqrt(draws))
+
+
+def test_probability_and_bands_tell_the_same():
+    response, conditions = posterior_of_scale(0.1), asked(ZeroOrder())
+    low, high = lobe_bands(response, conditions, draws=200)
+    inside = stability_probability(response, conditions, np.stack([low * 0.999, high * 1.001]), draws=200)
+    np.testing.assert_allclose(inside[0], 0.975, atol=0.011)
+    np.testing.assert_allclose(inside[1], 0.025, atol=0.011)
+    even = stability_probability(response, conditions, np.linspace(0.5, 1.5, 9) * low.min())
+    assert even.shape == (9, 3)
+    assert np.all(np.diff(even, axis=0) <= 0.0)
+
+
+def test_without_a_posterior_nothing_is_probable():
+    response = posterior_of_scale(0.1)
+    assert stability_probability(TooltipResponse(response.coupled), asked(ZeroOrder()), np.array([1e-3])) is None
+    assert lobe_bands(TooltipResponse(response.coupled), asked(ZeroOrder())) is None
+    certain = stability_probability(posterior_of_scale(0.0), asked(ZeroOrder()), np.array([1e-6, 0.1]))
+    np.testing.assert_array_equal(certain, [[1.0] * 3, [0.0] * 3])
+
+
+@pytest.mark.parametrize("depths", [[0.0], [0.2], [np.nan]])
+def test_depths_that_can_not_be_asked_for(depths):
+    with pytest.raises(InputError, match="depths"):
+        stability_probability(posterior_of_scale(0.1), asked(ZeroOrder()), np.array(depths))

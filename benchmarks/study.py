@@ -1,0 +1,266 @@
+"""The study of the identification: drawn machines, with trigger, without, and at three times the noise, beside the paper's method.
+
+``python -m benchmarks study``. Everything goes through files: a machine file is drawn, its cuts are simulated, written, read, judged
+and identified, the result is written and read; its tooltip FRFs are compared with the virtual machine's own full equations.
+Every finished run is a line of ``results.jsonl`` in the scratch folder; a study that was interrupted goes on from there.
+
+Error of a tooltip FRF: ||dC11|| / ||C11|| over 600-4000 Hz in 5 Hz steps, X and Y each. Coverage: share of the real and imaginary
+parts whose error is at most 0.6745 (50 %) or 1.645 (90 %) standard deviations of the band.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import multiprocessing
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.machines import CONDITIONS, EVALUATION, random_machine, under
+from benchmarks.page import DOCS, append_row, draw_study, read_rows, write_block
+from benchmarks.study_table import AIMS, line, table
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.cli.simulation import simulate_campaign
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.data import IdentificationData
+from rcsa_ident.identification.default import DefaultMethod
+from rcsa_ident.identification.paper import WIDE, NoiseWeightedCost, PaperGeneticAlgorithm
+from rcsa_ident.identification.posterior import MachineAxis
+from rcsa_ident.io.curves import read_frf_csv
+from rcsa_ident.io.identifications import identification_to_json, machine_from_json
+from rcsa_ident.io.machines import MachineFile, read_machine
+from rcsa_ident.io.recordings import read_recording
+from rcsa_ident.io.results import read_result, write_result
+from rcsa_ident.io.setups import read_campaign, read_tooling
+from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.signals.recording import Recording
+from rcsa_ident.workflows.identify import JudgedCut, Method, data_of, judge
+from rcsa_ident.workflows.tip import tooltip
+from rcsa_ident.workflows.warm import STEPS
+
+MACHINES = Path(__file__).resolve().parent.parent / "data" / "machines"
+#: The machine that lies inside the search space of the published algorithm, seed of its cuts.
+INSIDE, INSIDE_SEED = "table2", 101
+METHODS: dict[str, Method] = {
+    "default": DefaultMethod(),
+    "paper, literal": PaperGeneticAlgorithm(),
+    "paper, noise weights": PaperGeneticAlgorithm(NoiseWeightedCost()),
+    "paper, noise weights, wide boxes": PaperGeneticAlgorithm(NoiseWeightedCost(), WIDE),
+}
+FREQUENCY = np.arange(600.0, 4000.1, 5.0)
+#: Half-widths of the bands in standard deviations.
+BANDS = {"50": 0.6745, "90": 1.645}
+#: What a failed identification is compared as: it predicts no motion.
+NOTHING = {kind: {"errors": [1.0, 1.0], "bands": None} for kind in ("cut", "similar", "different")}
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One identification: the name of a drawn machine is its seed, other names are those of ``data/machines``."""
+
+    machine: str
+    condition: str
+    method: str
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """As part of a file's name."""
+        return "-".join(f"{self.machine} {self.condition} {self.method} {self.seed}".replace(",", "").split())
+
+
+def run_of(row: dict[str, Any]) -> Run:
+    """Return what a row of results belongs to."""
+    return Run(row["machine"], row["condition"], row["method"], row["seed"])
+
+
+def relative_error(found: ComplexArray, true: ComplexArray) -> float:
+    """Return ||found - true|| / ||true||."""
+    return float(np.linalg.norm(found - true) / np.linalg.norm(true))
+
+
+def in_deviations(error: ComplexArray, deviation: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """Return the error's real and imaginary parts in the band's standard deviations, shape (2 n,); 0 where both vanish."""
+    parts, sigma = np.concatenate([error.real, error.imag]), np.concatenate(deviation)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(parts == 0.0, 0.0, parts / sigma)
+
+
+def coverage(z: FloatArray) -> dict[str, float]:
+    """Return the share inside each of the `BANDS`, and the errors' root mean square, of errors in standard deviations."""
+    inside = {name: float(np.mean(np.abs(z) <= width)) for name, width in BANDS.items()}
+    return {**inside, "rms": float(np.sqrt(np.mean(z**2)))}
+
+
+def machine_of(scratch: Path, name: str) -> MachineFile:
+    """Return a machine of the study; a drawn one is written first."""
+    if not name.isdigit():
+        return read_machine(MACHINES / f"{name}.toml")
+    folder = scratch / name / "machine"
+    if not folder.is_dir():
+        folder.parent.mkdir(exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=scratch) as half, contextlib.suppress(OSError):
+            # another process may have drawn the same machine meanwhile
+            random_machine(int(name), Path(half) / "machine").parent.rename(folder)
+    return read_machine(folder / "machine.toml")
+
+
+def campaign_folder(scratch: Path, name: str, condition: str) -> Path:
+    """Return the folder of a campaign, simulated if it is not there; what was half done is not taken for done."""
+    folder = scratch / name / condition
+    if folder.is_dir():
+        return folder
+    seed = int(name) if name.isdigit() else INSIDE_SEED
+    with tempfile.TemporaryDirectory(dir=scratch) as half:
+        made = simulate_campaign(under(machine_of(scratch, name), condition), Path(half) / "campaign", seed)
+        folder.parent.mkdir(exist_ok=True)
+        shutil.rmtree(truth_folder(folder), ignore_errors=True)
+        made.truth.rename(truth_folder(folder))
+        made.folder.rename(folder)
+    return folder
+
+
+def truth_folder(campaign: Path) -> Path:
+    """Return where the truth of a campaign lies."""
+    return campaign.with_name(f"{campaign.name}.truth")
+
+
+def read_cut(campaign: Campaign, cut: Cut) -> tuple[Recording, Recording | None]:
+    """Return the recordings of a cut."""
+    read = partial(read_recording, sensors=campaign.sensors, default_rate=campaign.sampling_rate)
+    return read(cut.recording), None if cut.air is None else read(cut.air)
+
+
+def read_data(folder: Path) -> tuple[Campaign, list[JudgedCut], IdentificationData]:
+    """Return a campaign with its verdicts and its lines."""
+    campaign = read_campaign(folder)
+    judged = judge(campaign, partial(read_cut, campaign))
+    return campaign, judged, data_of(campaign, judged)
+
+
+def compared(machine: dict[Dof, MachineAxis], setup: MachineFile, truth: Path) -> dict[str, dict[str, Any]]:
+    """Return errors [X, Y] and coverage of the tooltip FRFs of the toolings that cut and of those that never did."""
+    kinds = {"cut": setup.toolings, **{kind: (path,) for kind, path in zip(AIMS, setup.truth_toolings, strict=True)}}
+    found: dict[str, dict[str, Any]] = {}
+    for kind, paths in kinds.items():
+        errors, deviations = [], []
+        for path in paths:
+            tooling = read_tooling(path)
+            true = read_frf_csv(truth / "tip" / f"{tooling.name}.csv")
+            at = np.searchsorted(true.frequency, FREQUENCY - 1e-6)
+            response = tooltip(machine, tooling.assembly, 2.0 * np.pi * FREQUENCY)
+            for axis, name in ((Dof.X, "X"), (Dof.Y, "Y")):
+                error = response.tip(axis) - true.values[name][at]
+                errors.append(relative_error(response.tip(axis), true.values[name][at]))
+                if axis in response.deviation:
+                    deviations.append(in_deviations(error, response.deviation[axis]))
+        bands = coverage(np.concatenate(deviations)) if deviations else None
+        found[kind] = {"errors": [float(f"{e:.4g}") for e in errors], "bands": bands}
+    return found
+
+
+@cache
+def warm() -> None:
+    """Load the compiled kernels, once in a process: the clock measures the method."""
+    for step in STEPS.values():
+        step()
+
+
+def perform(scratch: Path, run: Run) -> dict[str, Any]:
+    """Identify a campaign from its files and compare the result with the truth."""
+    warm()
+    folder = campaign_folder(scratch, run.machine, run.condition)
+    setup = machine_of(scratch, run.machine)
+    begin = time.perf_counter()
+    campaign, judged, data = read_data(folder)
+    read = time.perf_counter()
+    found = METHODS[run.method].run(data, run.seed, map)
+    done = time.perf_counter()
+    path = scratch / "results" / f"{run.name}.json"
+    path.parent.mkdir(exist_ok=True)
+    left_out = [(j.cut.id, "; ".join(j.reading.verdict.reasons)) for j in judged if j.reading.measurement is None]
+    write_result(path, identification_to_json(found, campaign, left_out))
+    return {
+        "machine": run.machine,
+        "condition": run.condition,
+        "method": run.method,
+        "seed": run.seed,
+        "status": str(found.status),
+        "reasons": list(found.reasons),
+        "cuts": len(data.cut_ids),
+        "modes": [int(axis.modes.omega_n.size) for axis in found.axes.values()],
+        "model_error": [float(f"{axis.model_error:.4g}") for axis in found.axes.values()],
+        "seconds": {"read": round(read - begin, 2), "identify": round(done - read, 2)},
+        **(compared(machine_from_json(read_result(path), str(path)), setup, truth_folder(folder)) if found.axes else NOTHING),
+    }
+
+
+def planned(machines: Sequence[str], conditions: Sequence[str], methods: Sequence[str], seeds: Sequence[int]) -> list[Run]:
+    """Return the default method's runs under all conditions, the paper's on campaigns without trigger and on the `INSIDE` machine."""
+    runs = []
+    for machine in machines:
+        for condition in conditions if machine != INSIDE else ["no-trigger"]:
+            chosen = [m for m in methods if m == "default" or condition == "no-trigger"]
+            runs += [Run(machine, condition, method, seed) for method in chosen for seed in seeds]
+    return runs
+
+
+def run(
+    scratch: Path,
+    machines: Sequence[str],
+    conditions: Sequence[str] = tuple(CONDITIONS),
+    methods: Sequence[str] = tuple(METHODS),
+    seeds: Sequence[int] = (1,),
+    processes: int = 1,
+) -> list[dict[str, Any]]:
+    """Return a row for every run, in order; rows that ``results.jsonl`` in `scratch` holds are not computed again."""
+    scratch.mkdir(parents=True, exist_ok=True)
+    path = scratch / "results.jsonl"
+    known = {run_of(r): r for r in read_rows(path)}
+    runs = planned(machines, conditions, methods, seeds)
+    todo = [r for r in runs if r not in known]
+    campaigns = dict.fromkeys((r.machine, r.condition) for r in todo)
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+        mapper: Callable[..., Iterable[Any]] = pool.map if processes > 1 else map
+        for folder in mapper(partial(_simulated, scratch), campaigns):
+            print(f"campaign: {folder}", flush=True)
+        for row in mapper(partial(perform, scratch), todo):
+            append_row(path, row)
+            known[run_of(row)] = row
+            print(line(row), flush=True)
+    return [known[r] for r in runs]
+
+
+def _simulated(scratch: Path, campaign: tuple[str, str]) -> str:
+    return str(campaign_folder(scratch, *campaign).relative_to(scratch))
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Run the study, by default all of it: hours on two cores."""
+    parser = argparse.ArgumentParser(prog="benchmarks study", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scratch", type=Path, help="folder of campaigns and results; default: a new temporary one")
+    parser.add_argument("--machines", nargs="+", default=[*(str(s) for s in EVALUATION), INSIDE], help="seeds, or names in data/machines")
+    parser.add_argument("--conditions", nargs="+", choices=tuple(CONDITIONS), default=tuple(CONDITIONS))
+    parser.add_argument("--methods", nargs="+", choices=tuple(METHODS), default=tuple(METHODS))
+    parser.add_argument("--seeds", nargs="+", type=int, default=[1], help="of the search")
+    parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--page", action="store_true", help="write tables, picture and docs/study.jsonl for docs/study.md")
+    given = parser.parse_args(arguments)
+    scratch = given.scratch or Path(tempfile.mkdtemp(prefix="rcsa-ident-study-"))
+    print(f"scratch folder: {scratch}", flush=True)
+    rows = run(scratch, given.machines, given.conditions, given.methods, given.seeds, given.processes)
+    print(f"\n{table(rows)}")
+    if given.page:
+        (DOCS / "study.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+        draw_study(rows)
+        write_block("study", table(rows))

@@ -1,0 +1,104 @@
+"""What the study found, as Markdown: median and worst, bands, status against the truth, and every run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.machines import CONDITIONS
+
+#: Aims for toolings that never cut, and what no run that calls itself converged may exceed.
+AIMS, WORST = {"similar": 0.01, "different": 0.025}, 0.05
+
+
+def line(row: dict[str, Any]) -> str:
+    """Return a run in one line."""
+    errors = "  ".join(f"{kind} {row[kind]['errors'][0]:.4f} {row[kind]['errors'][1]:.4f}" for kind in AIMS)
+    bands = ""
+    if row["similar"]["bands"]:
+        bands = "  90 % band " + " ".join(f"{100 * row[kind]['bands']['90']:.0f}" for kind in ("cut", *AIMS))
+    seconds = row["seconds"]
+    return (
+        f"{row['machine']:>6} {row['condition']:<10} {row['method']:<32} seed {row['seed']}  {errors}{bands}  "
+        f"{row['status']}  {seconds['read']:.1f} + {seconds['identify']:.1f} s"
+    )
+
+
+def _summary(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Median and worst of each method under each condition, drawn machines together, others each for itself."""
+    lines = [
+        "| machines | condition | method | runs | similar: median | worst | different: median | worst | converged | seconds |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
+    for row in rows:
+        machines = "drawn" if row["machine"].isdigit() else row["machine"]
+        groups.setdefault((machines, row["condition"], row["method"]), []).append(row)
+    for key, members in groups.items():
+        cells = [*key, str(len(members))]
+        for kind in AIMS:
+            errors = np.array([e for row in members for e in row[kind]["errors"]])
+            cells += [f"{np.median(errors):.4f}", f"{errors.max():.4f}"]
+        converged = sum(row["status"] == "converged" for row in members)
+        seconds = float(np.median([sum(row["seconds"].values()) for row in members]))
+        lines.append("| " + " | ".join([*cells, f"{converged} of {len(members)}", f"{seconds:.1f}"]) + " |")
+    return lines
+
+
+def _bands(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Coverage of the default method's bands, mean over the runs and the least of them."""
+    lines = [
+        "| condition | toolings | in the 50 % band | in the 90 % band | least of a run | rms error / deviation |",
+        "|---|---|---|---|---|---|",
+    ]
+    for condition in CONDITIONS:
+        members = [r for r in rows if r["condition"] == condition and r["method"] == "default" and r["machine"].isdigit()]
+        for kind in ("cut", *AIMS) if members else ():
+            bands = [row[kind]["bands"] for row in members if row[kind]["bands"]]
+            half, most, rms = (np.array([b[name] for b in bands]) for name in ("50", "90", "rms"))
+            lines.append(
+                f"| {condition} | {kind} | {100 * half.mean():.0f} % | {100 * most.mean():.0f} % | {100 * most.min():.0f} % "
+                f"| {np.sqrt(np.mean(rms**2)):.2f} |"
+            )
+    return lines
+
+
+def counts(rows: Sequence[dict[str, Any]]) -> dict[str, int]:
+    """Return how the default method's status meets the truth: runs, converged above `WORST`, good runs, good ones called suspect."""
+    members = [r for r in rows if r["method"] == "default" and r["machine"].isdigit()]
+    worst = [max(e for kind in AIMS for e in r[kind]["errors"]) for r in members]
+    good = [all(e <= aim for kind, aim in AIMS.items() for e in r[kind]["errors"]) for r in members]
+    converged = [r["status"] == "converged" for r in members]
+    return {
+        "runs": len(members),
+        "converged above": sum(c and w > WORST for c, w in zip(converged, worst, strict=True)),
+        "good": sum(good),
+        "good but suspect": sum(g and not c for g, c in zip(good, converged, strict=True)),
+    }
+
+
+def table(rows: Sequence[dict[str, Any]]) -> str:
+    """Return the study as Markdown: summary, bands, status, and every run of the default method."""
+    lines = [*_summary(rows), ""]
+    number = counts(rows)
+    if number["runs"]:
+        lines += [*_bands(rows), ""]
+        lines += [
+            f"Of {number['runs']} runs of the default method, {number['converged above']} are `converged` with an error above {WORST}. "
+            f"{number['good']} are good (at most {AIMS['similar']} similar and {AIMS['different']} different holder); "
+            f"{number['good but suspect']} of these are called suspect.",
+            "",
+            "| machine | condition | seed | similar X | Y | different X | Y | status | model error X | Y | modes | seconds |",
+            "|---|---|---|---|---|---|---|---|---|---|---|---|",
+        ]
+    for row in rows:
+        if row["method"] == "default":
+            errors = [f"{e:.4f}" for kind in AIMS for e in row[kind]["errors"]]
+            shares = [f"{100 * e:.2f} %" for e in row["model_error"]]
+            modes, seconds = ", ".join(str(m) for m in row["modes"]), f"{sum(row['seconds'].values()):.1f}"
+            cells = [row["machine"], row["condition"], str(row["seed"]), *errors, row["status"], *shares, modes, seconds]
+            lines.append("| " + " | ".join(cells) + " |")
+    doubts = [f"- {r['machine']}, {r['condition']}: {reason}" for r in rows if r["method"] == "default" for reason in r["reasons"]]
+    return "\n".join([*lines, "", *doubts]).rstrip() + "\n"

@@ -1,0 +1,270 @@
+"""plan: which cuts to make next."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cli.conditions import Strategy, engagement, feed_angle
+from rcsa_ident.errors import InputError, positive
+
+if TYPE_CHECKING:
+    from rcsa_ident.cutting.coefficients import CuttingCoefficients
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.identification.design import Goal
+    from rcsa_ident.identification.posterior import MachineAxis
+    from rcsa_ident.workflows.plan import PlannedCut, PlannedCuts
+
+_RPM = 30.0 / math.pi
+#: Recordings of a campaign that its noise is learned from.
+MOST_READ = 8
+
+
+class GoalName(StrEnum):
+    """What the cuts should serve, by name."""
+
+    tooltip = "tooltip"
+    unknowns = "unknowns"
+
+
+@answers
+def plan(
+    result: Annotated[Path, typer.Argument(help="RESULT.json of an identification.", show_default=False)],
+    toolings: Annotated[list[Path], typer.Option(help="TOOLING.toml to cut with; once each.", show_default=False)],
+    target: Annotated[list[Path], typer.Option(help="TOOLING.toml whose tooltip is wanted; once each.", show_default=False)],
+    out: Annotated[Path, typer.Option(help="PLAN.toml to write: [[cuts]] for a campaign.toml.", show_default=False)],
+    depths_mm: Annotated[str, typer.Option(help="Axial depths to choose from, mm, with commas between them.")] = "0.4",
+    cuts: Annotated[int, typer.Option(min=1, max=500, help="Most cuts.")] = 16,
+    band: Annotated[
+        float | None,
+        typer.Option(help="Wanted standard deviation of the tooltip FRF, percent: the fewest cuts that reach it.", show_default=False),
+    ] = None,
+    goal: Annotated[GoalName, typer.Option(help="Narrow bands of the targets, or most information on all unknowns.")] = GoalName.tooltip,
+    speed_from: Annotated[
+        float | None, typer.Option(help="Lowest spindle speed, rev/min; default: the campaign's.", show_default=False)
+    ] = None,
+    speed_to: Annotated[float | None, typer.Option(help="Highest spindle speed; default: the campaign's.", show_default=False)] = None,
+    immersion: Annotated[float, typer.Option(help="Radial depth over diameter, up to 1 (a slot).")] = 0.5,
+    strategy: Annotated[Strategy, typer.Option(help="Up or down milling.")] = Strategy.down,
+    entry_deg: Annotated[
+        float | None, typer.Option(help="Entry angle from the normal direction, instead of --immersion.", show_default=False)
+    ] = None,
+    exit_deg: Annotated[float | None, typer.Option(help="Exit angle.", show_default=False)] = None,
+    feed_direction: Annotated[str, typer.Option(help="+X -X +Y -Y, or degrees from +X.")] = "+X",
+    feed_per_tooth_mm: Annotated[float, typer.Option(help="Feed per tooth, mm.")] = 0.1,
+    margin: Annotated[float, typer.Option(help="The stability limit is at least so many times the depth.")] = 1.5,
+    from_: Annotated[
+        float | None, typer.Option("--from", help="Where the tooltip is wanted, Hz; default: the identified band.", show_default=False)
+    ] = None,
+    to: Annotated[float | None, typer.Option("--to", help="Highest frequency, Hz.", show_default=False)] = None,
+    noise_nm: Annotated[float, typer.Option(help="Standard deviation of a displacement line's real and imaginary part, nm.")] = 0.1,
+    campaign: Annotated[
+        Path | None, typer.Option(help="Campaign to learn the noise from, instead of --noise-nm.", show_default=False)
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Choose the stable cuts that tell most about the tooltips that are wanted, and say what they will be good for."""
+    from rcsa_ident.cli.lobes import read_machine
+    from rcsa_ident.io.files import write_text
+    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.workflows.plan import Allowed, plan_cuts
+
+    writable(out)
+    machine, data = read_machine(result)
+    wanted = None if band is None else 1e-2 * positive("--band", band, "%")
+    allowed = Allowed(
+        *_speeds(machine, speed_from, speed_to),
+        _depths(depths_mm),
+        positive("--feed-per-tooth-mm", feed_per_tooth_mm, "mm") * 1e-3,
+        engagement(immersion, strategy, entry_deg, exit_deg),
+        feed_angle(feed_direction),
+        margin,
+    )
+    low, high = data["band_hz"]
+    stages = Stages(quiet=json_)
+    with stages.stage("plan"):
+        noise = positive("--noise-nm", noise_nm, "nm") * 1e-9 if campaign is None else _noise_of(campaign)
+        planned = plan_cuts(
+            machine,
+            [read_tooling(path) for path in toolings],
+            [read_tooling(path) for path in target],
+            allowed,
+            _coefficients(data, str(result)),
+            noise,
+            _model_errors(machine, data),
+            (low if from_ is None else from_, high if to is None else to),
+            cuts,
+            wanted,
+            _goal(goal),
+        )
+    write_text(out, plan_text(planned))
+    if json_:
+        emit(_summary(planned, wanted) | {"noise_nm": noise * 1e9, "seconds": stages.seconds, "out": str(out)})
+        return
+    _show(planned)
+    for doubt in planned.warnings:
+        warn(doubt)
+    say(f"written: {out} ({len(planned.cuts)} cuts, {stages.seconds['plan']:.2f} s)")
+
+
+def plan_text(planned: PlannedCuts) -> str:
+    """Return the cuts as a campaign file has them; the recordings are named, not yet made."""
+    lines = []
+    for name, cut in zip(_names(planned), planned.cuts, strict=True):
+        c = cut.conditions
+        lines += [
+            "[[cuts]]",
+            f"id = {_quoted(name)}",
+            f"tooling = {_quoted(cut.tooling)}",
+            f"spindle_speed_rpm = {float(f'{c.spindle_speed * _RPM:.9g}')}",
+            f"axial_depth_mm = {float(f'{c.axial_depth * 1e3:.9g}')}",
+            f"feed_per_tooth_mm = {float(f'{c.feed_per_tooth * 1e3:.9g}')}",
+            f"entry_angle_deg = {float(f'{math.degrees(c.engagement.entry):.9g}')}",
+            f"exit_angle_deg = {float(f'{math.degrees(c.engagement.exit):.9g}')}",
+            f"feed_direction = {_direction(c.feed_angle)}",
+            f"cut = {_quoted(f'recordings/{name}_cut.h5')}",
+            f"air = {_quoted(f'recordings/{name}_air.h5')}",
+            "",
+        ]
+    return "\n".join(lines)
+
+
+def _names(planned: PlannedCuts) -> list[str]:
+    """An id for each cut: tooling and place in the plan."""
+    return [f"{cut.tooling}-plan-{i:02d}" for i, cut in enumerate(planned.cuts, start=1)]
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _direction(angle: float) -> str:
+    from rcsa_ident.io.setups import FEED_DIRECTIONS
+
+    named = next((name for name, known in FEED_DIRECTIONS.items() if abs(angle - known) < 1e-12), None)
+    return f"{math.degrees(angle):.9g}" if named is None else _quoted(named)
+
+
+def _depths(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(sorted({positive("--depths-mm", float(part), "mm") * 1e-3 for part in text.split(",")}))
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError("--depths-mm", text, "numbers with commas between them [mm]") from None
+
+
+def _speeds(machine: dict[Dof, MachineAxis], lowest: float | None, highest: float | None) -> tuple[float, float]:
+    """The speeds asked for, those of the campaign where nothing is said [rad/s]."""
+    middle, half = next((p.posterior.speed_range for p in machine.values() if p.posterior is not None), (0.0, 0.0))
+    found = []
+    for name, given, known in (("--speed-from", lowest, middle - half), ("--speed-to", highest, middle + half)):
+        if given is None and known <= 0.0:
+            raise InputError(name, "nothing", "a spindle speed [rev/min]: the result does not say which ones were cut")
+        found.append(known if given is None else positive(name, given, "rev/min") / _RPM)
+    if found[1] < found[0]:
+        raise InputError("--speed-to", found[1] * _RPM, f"--speed-from ({found[0] * _RPM:g}) or more [rev/min]")
+    return found[0], found[1]
+
+
+def _coefficients(data: dict[str, Any], where: str) -> CuttingCoefficients:
+    """The result's cutting coefficients, as well known as the identification has left them."""
+    from dataclasses import replace
+
+    from rcsa_ident.cutting.force import SLOPES
+    from rcsa_ident.io.identifications import workpiece_from_json
+
+    given = workpiece_from_json(data, where).coefficients
+    found = data.get("coefficients", {})
+    known = {}
+    for name, spread in zip(SLOPES, ("tangential_spread", "ratio_spread"), strict=False):
+        if name in found:
+            known[spread] = min(float(found[name]["std"]) / float(found[name]["scale"]), getattr(given, spread))
+    return replace(given, **known)
+
+
+def _model_errors(machine: dict[Dof, MachineAxis], data: dict[str, Any]) -> dict[Dof, float]:
+    return {axis: float(data["axes"][axis.upper()].get("model_error", 0.0)) for axis in machine}
+
+
+def _goal(name: GoalName) -> Goal:
+    from rcsa_ident.identification.design import MeanVariance, Volume
+
+    goals: dict[GoalName, Callable[[], Goal]] = {GoalName.tooltip: MeanVariance, GoalName.unknowns: Volume}
+    return goals[name]()
+
+
+def _noise_of(folder: Path) -> float:
+    """Noise of a displacement line in a few cuts of a campaign [m]."""
+    from functools import partial
+
+    from rcsa_ident.io.recordings import read_cut
+    from rcsa_ident.io.setups import read_campaign
+    from rcsa_ident.workflows.identify import judge_cut
+    from rcsa_ident.workflows.plan import line_noise
+
+    known = read_campaign(folder)
+    read = partial(read_cut, known.sensors, known.sampling_rate)
+    some = known.cuts[:: max(1, math.ceil(len(known.cuts) / MOST_READ))]
+    found = [judge_cut(known, read, cut).measurement for cut in some]
+    return line_noise([m for m in found if m is not None])
+
+
+def _row(name: str, cut: PlannedCut) -> dict[str, Any]:
+    c = cut.conditions
+    return {
+        "id": name,
+        "tooling": cut.tooling,
+        "spindle_speed_rpm": float(f"{c.spindle_speed * _RPM:.9g}"),
+        "axial_depth_mm": float(f"{c.axial_depth * 1e3:.9g}"),
+        "limit_depth_mm": cut.limit_depth * 1e3,
+    }
+
+
+def _summary(planned: PlannedCuts, wanted: float | None) -> dict[str, Any]:
+    """What a machine wants to know of a plan."""
+    rows = [_row(name, cut) for name, cut in zip(_names(planned), planned.cuts, strict=True)]
+    bands = [dict(zip(planned.targets, (100.0 * row).tolist(), strict=True)) for row in planned.band]
+    summary: dict[str, Any] = {
+        "cuts": [row | {"band_percent": after} for row, after in zip(rows, bands[1:], strict=True)],
+        "band_percent": bands[0],
+        "even_band_percent": dict(zip(planned.targets, (100.0 * planned.even).tolist(), strict=True)),
+        "candidates": planned.candidates,
+        "unstable": planned.unstable,
+        "warnings": list(planned.warnings),
+    }
+    if wanted is not None:
+        enough = planned.fewest(wanted)
+        summary["fewest"] = {"cuts": enough.cuts, "band_percent": 100.0 * enough.band, "reached": enough.reached}
+    return summary
+
+
+def _show(planned: PlannedCuts) -> None:
+    """Print the cuts with what they are expected to leave open."""
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    names = [f"{escape(name)}\n± %" for name in planned.targets]
+    table = Table("", "tooling", "spindle speed\nrev/min", "depth\nmm", "stable up to\nmm", *names, title="cuts", title_justify="left")
+    for column in (*table.columns[:1], *table.columns[2:]):
+        column.justify = "right"
+    table.add_row("", "before", "", "", "", *(f"{100.0 * v:.3f}" for v in planned.band[0]))
+    for i, (cut, after) in enumerate(zip(planned.cuts, planned.band[1:], strict=True), start=1):
+        c, limit = cut.conditions, f"{cut.limit_depth * 1e3:.2f}" if math.isfinite(cut.limit_depth) else "more"
+        numbers = (f"{c.spindle_speed * _RPM:.0f}", f"{c.axial_depth * 1e3:g}", limit, *(f"{100.0 * v:.3f}" for v in after))
+        table.add_row(str(i), escape(cut.tooling), *numbers)
+    out = Console(highlight=False)
+    out.print(table)
+    even = ", ".join(f"{escape(name)} {100.0 * v:.3f} %" for name, v in zip(planned.targets, planned.even, strict=True))
+    out.print(
+        f"chosen from {planned.candidates} stable cuts ({planned.unstable} more may chatter); "
+        f"as many at even distances would come to {even}"
+    )

@@ -1,0 +1,400 @@
+"""Which cuts to make next: those that tell most about the tooltips that are wanted, among those that are stable and allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.force import force_and_slope
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError, positive
+from rcsa_ident.identification.data import prepare
+from rcsa_ident.identification.default import SMOOTH_ERROR
+from rcsa_ident.identification.design import (
+    Goal,
+    MeanVariance,
+    Prospects,
+    compressed,
+    deviations,
+    exchanged,
+    expected_cut,
+    greedy,
+    harmonics,
+    information,
+    tip_changes,
+    unknowns,
+)
+from rcsa_ident.identification.posterior import MachineAxis, Posterior
+from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.signals.measurement import MAX_FREQUENCY, CutMeasurement
+from rcsa_ident.stability.lobes import StabilityMethod
+from rcsa_ident.stability.zero_order import ZeroOrder
+from rcsa_ident.tool_holder.geometry import stiffened
+from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.workflows.lobes import LobeConditions, tooling_lobes
+from rcsa_ident.workflows.tip import STIFFNESS_SPREAD, tooltip
+
+#: Two cuts of one tooling differ by at least this share of their speed; a programmed speed is met within as much.
+SPACING = 0.01
+#: Frequencies at which the wanted tooltip is judged, and those of the receptances behind the lobes [Hz]: lowest, step.
+JUDGED = 160
+LOBE_FREQUENCIES = (100.0, 2.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Allowed:
+    """Which cuts may be made.
+
+    Parameters
+    ----------
+    lowest, highest : float [rad/s]
+        Spindle speeds.
+    depths : tuple of float [m]
+        Axial depths to choose from.
+    feed_per_tooth : float [m]
+    engagement : Engagement
+    feed_angle : float [rad]
+    margin : float [-]
+        The stability limit is at least so many times the depth, at the speed and `SPACING` around it.
+    method : StabilityMethod
+    """
+
+    lowest: float
+    highest: float
+    depths: tuple[float, ...]
+    feed_per_tooth: float
+    engagement: Engagement
+    feed_angle: float = 0.0
+    margin: float = 1.5
+    method: StabilityMethod = field(default_factory=ZeroOrder)
+
+    def __post_init__(self) -> None:
+        positive("lowest speed", self.lowest, "rad/s")
+        positive("feed per tooth", self.feed_per_tooth, "m")
+        if not self.lowest <= self.highest < np.inf:
+            raise InputError("highest speed", self.highest, f"a finite speed, the lowest ({self.lowest:g}) or more [rad/s]")
+        if not self.depths:
+            raise InputError("depths", "none", "at least one depth")
+        for depth in self.depths:
+            positive("depth", depth, "m")
+        if not 1.0 <= self.margin < np.inf:
+            raise InputError("margin", self.margin, "a finite number, 1 or more")
+
+    @property
+    def speeds(self) -> FloatArray:
+        """Whole rev/min, a little more than `SPACING` apart, shape (n,) [rad/s]."""
+        count = int(np.log(self.highest / self.lowest) / (1.02 * SPACING)) + 1
+        rpm = np.geomspace(self.lowest, self.highest, count) * (30.0 / np.pi)
+        # rounding does not lead out of what is allowed
+        inside = np.clip(np.round(rpm), np.ceil(rpm[0] - 1e-6), max(np.floor(rpm[-1] + 1e-6), np.ceil(rpm[0] - 1e-6)))
+        return np.unique(inside) * (np.pi / 30.0)
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedCut:
+    """A cut to make.
+
+    Parameters
+    ----------
+    tooling : str
+    conditions : CuttingConditions
+    limit_depth : float [m]
+        Up to which it is expected to be stable; infinite beyond what was looked at.
+    """
+
+    tooling: str
+    conditions: CuttingConditions
+    limit_depth: float
+
+
+@dataclass(frozen=True, slots=True)
+class Fewest:
+    """How many of a plan's cuts a wanted band takes.
+
+    Parameters
+    ----------
+    cuts : int
+        The first so many; all of them where the band is not reached.
+    band : float [-]
+        What they reach: the largest of the targets'.
+    reached : bool
+    """
+
+    cuts: int
+    band: float
+    reached: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlannedCuts:
+    """Cuts to make next, those that tell most first.
+
+    Parameters
+    ----------
+    cuts : tuple of PlannedCut, length n
+    targets : tuple of str, length t
+        The toolings whose tooltips are wanted.
+    band : array, shape (n + 1, t) [-]
+        Expected relative standard deviation of each target's tooltip FRF, before and after each cut.
+    even : array, shape (t,) [-]
+        The same after as many cuts at even distances of the allowed speeds, as deep as they may be.
+    even_cuts : tuple of PlannedCut
+        These.
+    candidates, unstable : int
+        Cuts to choose from, and those that were left out since they may chatter.
+    warnings : tuple of str
+        What did not go as it was asked for.
+    """
+
+    cuts: tuple[PlannedCut, ...]
+    targets: tuple[str, ...]
+    band: FloatArray
+    even: FloatArray
+    even_cuts: tuple[PlannedCut, ...]
+    candidates: int
+    unstable: int
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "band", frozen(self.band))
+        object.__setattr__(self, "even", frozen(self.even))
+
+    def fewest(self, wanted: float) -> Fewest:
+        """Return the fewest of the first cuts after which no target's band is wider than `wanted` [-]."""
+        widest = self.band.max(axis=1)
+        enough = np.flatnonzero(widest <= positive("wanted band", wanted))
+        cuts = int(enough[0]) if enough.size else len(self.cuts)
+        return Fewest(cuts, float(widest[cuts]), bool(enough.size))
+
+
+def plan_cuts(
+    machine: Mapping[Dof, MachineAxis],
+    toolings: Sequence[Tooling],
+    targets: Sequence[Tooling],
+    allowed: Allowed,
+    coefficients: CuttingCoefficients,
+    noise: float,
+    model_error: Mapping[Dof, float],
+    band_hz: tuple[float, float],
+    count: int,
+    wanted: float | None = None,
+    goal: Goal | None = None,
+) -> PlannedCuts:
+    """Return the cuts that tell most about the targets' tooltips: greedy choice, then exchange.
+
+    Parameters
+    ----------
+    machine : mapping of Dof to MachineAxis
+        With posteriors.
+    toolings : sequence of Tooling
+        To cut with.
+    targets : sequence of Tooling
+        Whose tooltip FRFs are wanted; they need not be cut with.
+    allowed : Allowed
+    coefficients : CuttingCoefficients
+        With the spreads of what is not known about them.
+    noise : float [m]
+        Standard deviation of a displacement line's real and imaginary part each.
+    model_error : mapping of Dof to float
+        Share of each line that stays unexplained, as identified.
+    band_hz : (float, float)
+        Where the tooltips are wanted.
+    count : int
+        Most cuts.
+    wanted : float or None [-]
+        Stop at the fewest cuts that are found to bring all targets' bands below it.
+    goal : Goal or None
+        By default the targets' mean variance.
+
+    Raises
+    ------
+    InputError
+        If an axis has no posterior, or no cut is stable and allowed.
+    """
+    _check(machine, toolings, targets, count, band_hz)
+    goal = MeanVariance() if goal is None else goal
+    posteriors = {axis: part.posterior for axis, part in machine.items() if part.posterior is not None}
+    candidates, unstable, deepest = _candidates(machine, toolings, allowed, coefficients)
+    if not candidates:
+        found = f"none of {unstable} stable with a margin of {allowed.margin:g} (the deepest stable one would be {1e3 * deepest:.3g} mm)"
+        raise InputError("cuts", found, "depths, speeds and toolings of which at least one is")
+    prospects = _prospects(candidates, posteriors, toolings, targets, coefficients, noise, model_error, band_hz)
+    order = greedy(prospects, count, goal)
+    warnings = []
+    if len(order) < count:
+        warnings.append(f"only {len(order)} of {count} cuts: no further speed is stable and {100 * SPACING:g} % away from the others")
+    order = exchanged(prospects, order, goal) if wanted is None else _shortest(prospects, order, goal, positive("wanted band", wanted))
+    even = _even(candidates, toolings, allowed, len(order))
+    band = deviations(prospects, order)
+    if wanted is not None and band[-1].max() > wanted:
+        warnings.append(
+            f"the band of {100 * wanted:.3g} % is not reached: {len(order)} cuts come to {100 * band[-1].max():.3g} % "
+            f"({100 * band[0].max():.3g} % without them)"
+        )
+    return PlannedCuts(
+        tuple(candidates[k] for k in order),
+        tuple(t.name for t in targets),
+        band,
+        prospects.deviation(prospects.covariance(even)),
+        tuple(candidates[k] for k in even),
+        len(candidates),
+        unstable,
+        tuple(warnings),
+    )
+
+
+def line_noise(measurements: Sequence[CutMeasurement]) -> float:
+    """Return the standard deviation of a displacement line's real and imaginary part in some cuts: the median over all lines [m]."""
+    each = [np.sqrt(np.sum(lines.variance, axis=1)) * np.abs(lines.force) for m in measurements for lines in m.axes.values()]
+    if not each:
+        raise InputError("cuts", "none usable", "at least one usable cut to learn the noise from")
+    return float(np.median(np.concatenate(each)))
+
+
+def _check(
+    machine: Mapping[Dof, MachineAxis], toolings: Sequence[Tooling], targets: Sequence[Tooling], count: int, band_hz: tuple[float, float]
+) -> None:
+    for axis, part in machine.items():
+        if part.posterior is None:
+            raise InputError(f"axis {axis.upper()}", "no covariance", "an identification with a posterior")
+    for name, given in (("toolings", toolings), ("targets", targets)):
+        if not given:
+            raise InputError(name, "none", "at least one tooling")
+        names = [t.name for t in given]
+        if len(set(names)) < len(names):
+            raise InputError(name, ", ".join(names), "toolings of different names")
+    if count < 1:
+        raise InputError("cuts", count, "1 or more")
+    if not 0.0 < band_hz[0] < band_hz[1] < np.inf:
+        raise InputError("band", list(band_hz), "lower and upper end, 0 < lower < upper [Hz]")
+
+
+def _candidates(
+    machine: Mapping[Dof, MachineAxis], toolings: Sequence[Tooling], allowed: Allowed, coefficients: CuttingCoefficients
+) -> tuple[list[PlannedCut], int, float]:
+    """All stable cuts, tooling by tooling, speed by speed; how many may chatter; the deepest that would be stable anywhere [m]."""
+    omega = 2.0 * np.pi * np.arange(LOBE_FREQUENCIES[0], MAX_FREQUENCY, LOBE_FREQUENCIES[1])
+    around = np.array([1.0 - SPACING, 1.0, 1.0 + SPACING])
+    speeds = allowed.speeds
+    deepest, unstable, cuts = 0.0, 0, []
+    for tooling in toolings:
+        # a speed whose first tooth-passing line lies above the band shows nothing
+        seen = speeds[speeds * tooling.cutter.teeth <= 2.0 * np.pi * MAX_FREQUENCY]
+        if not seen.size:
+            continue
+        conditions = LobeConditions(
+            tooling.cutter,
+            coefficients,
+            allowed.engagement,
+            allowed.feed_angle,
+            np.outer(around, seen).ravel(),
+            2.0 * allowed.margin * max(allowed.depths),
+            allowed.method,
+        )
+        lobes = tooling_lobes(tooltip(machine, tooling.assembly, omega, bands=False), conditions)
+        limits = lobes.limit_depth.reshape(around.size, -1).min(axis=0)
+        deepest = max(deepest, float(limits.max()) / allowed.margin)
+        for speed, limit in zip(seen.tolist(), limits.tolist(), strict=True):
+            for depth in allowed.depths:
+                if allowed.margin * depth > limit:
+                    unstable += 1
+                    continue
+                chosen = CuttingConditions(speed, depth, allowed.feed_per_tooth, allowed.engagement, allowed.feed_angle)
+                cuts.append(PlannedCut(tooling.name, chosen, limit))
+    return cuts, unstable, deepest
+
+
+def _prospects(
+    candidates: Sequence[PlannedCut],
+    posteriors: Mapping[Dof, Posterior],
+    toolings: Sequence[Tooling],
+    targets: Sequence[Tooling],
+    coefficients: CuttingCoefficients,
+    noise: float,
+    model_error: Mapping[Dof, float],
+    band_hz: tuple[float, float],
+) -> Prospects:
+    """What the candidates would tell, and what of it matters to the targets' tooltips."""
+    named, axes = {t.name: t for t in toolings}, list(posteriors)
+    forces, cuts = {}, []
+    lowest = min(c.conditions.spindle_speed for c in candidates)
+    for k, cut in enumerate(candidates):
+        cutter, speed = named[cut.tooling].cutter, cut.conditions.spindle_speed
+        alike = cut.tooling, cut.conditions.axial_depth
+        if alike not in forces:
+            forces[alike] = force_and_slope(cutter, cut.conditions, coefficients, harmonics(cutter.teeth, lowest))
+        cuts.append(expected_cut(f"{k}", cut.tooling, speed, cutter.teeth, *forces[alike], noise, axes))
+    receptances = {name: partial(tool_holder_receptance, t.assembly) for name, t in named.items()}
+    edges = [coefficients.edge_spread if edge > 0.0 else 0.0 for edge in (coefficients.tangential_edge, coefficients.radial_edge)]
+    spreads = (coefficients.tangential_spread, coefficients.ratio_spread, *edges)
+    data = prepare(cuts, receptances, {name: t.cutter.teeth for name, t in named.items()}, spreads).with_smooth_errors(SMOOTH_ERROR)
+    rows = tuple(compressed(each) for each in information(data, posteriors, model_error))
+    size = rows[0].shape[1]
+    omega = 2.0 * np.pi * np.linspace(*band_hz, JUDGED)
+    starts, first = {}, 0
+    for each in data.axes:
+        starts[each.axis] = first
+        first += unknowns(posteriors[each.axis])
+    wanted, floor = [], []
+    for target in targets:
+        exact, stiffer = (tool_holder_receptance(a, omega) for a in (target.assembly, stiffened(target.assembly, STIFFNESS_SPREAD)))
+        weights, least = np.zeros((size, len(axes), 2 * JUDGED)), 0.0
+        for i, (axis, posterior) in enumerate(posteriors.items()):
+            value, change = tip_changes(posterior, exact)
+            norm = float(np.linalg.norm(value)) * np.sqrt(len(axes))
+            weights[starts[axis] : starts[axis] + change.shape[1], i] = np.vstack([change.real, change.imag]).T / norm
+            least += (float(np.linalg.norm(tip_changes(posterior, stiffer)[0] - value)) / norm) ** 2
+        wanted.append(weights.reshape(size, -1))
+        floor.append(least)
+    return Prospects(rows, tuple(wanted), tuple(floor), _apart(candidates))
+
+
+def _apart(candidates: Sequence[PlannedCut]) -> np.ndarray:
+    """True for two cuts of one tooling whose speeds are nearly the same, shape (k, k)."""
+    speed = np.array([c.conditions.spindle_speed for c in candidates])
+    tooling = np.array([c.tooling for c in candidates])
+    ratio = np.abs(np.log(speed[:, None] / speed[None, :]))
+    return (tooling[:, None] == tooling[None, :]) & (ratio < np.log1p(SPACING) * (1.0 - 1e-6))
+
+
+def _shortest(prospects: Prospects, order: list[int], goal: Goal, wanted: float) -> list[int]:
+    """The fewest cuts that are found to reach a band: the greedy choice's, then ever fewer as long as an exchange reaches it."""
+    band = deviations(prospects, order).max(axis=1)
+    if band[0] <= wanted:
+        return []
+    enough = np.flatnonzero(band <= wanted)
+    best = order[: int(enough[0])] if enough.size else exchanged(prospects, order, goal)
+    if not enough.size and deviations(prospects, best)[-1].max() > wanted:
+        return best
+    while len(best) > 1:
+        fewer = exchanged(prospects, greedy(prospects, len(best) - 1, goal), goal)
+        if prospects.deviation(prospects.covariance(fewer)).max() > wanted:
+            break
+        best = fewer
+    return best
+
+
+def _even(candidates: Sequence[PlannedCut], toolings: Sequence[Tooling], allowed: Allowed, count: int) -> list[int]:
+    """As many cuts as a plan has, shared evenly among the toolings, at stable speeds nearest to even distances, as deep as allowed."""
+    chosen: list[int] = []
+    present = [t.name for t in toolings if any(c.tooling == t.name for c in candidates)]
+    for i, name in enumerate(present):
+        own = [k for k, c in enumerate(candidates) if c.tooling == name]
+        deepest: dict[float, int] = {}
+        for k in own:
+            speed = candidates[k].conditions.spindle_speed
+            if speed not in deepest or candidates[k].conditions.axial_depth > candidates[deepest[speed]].conditions.axial_depth:
+                deepest[speed] = k
+        share = count // len(present) + (i < count % len(present))
+        places = np.linspace(allowed.lowest, allowed.highest, share) if share > 1 else [0.5 * (allowed.lowest + allowed.highest)] * share
+        for place in places:
+            if not deepest:
+                break
+            chosen.append(deepest.pop(min(deepest, key=lambda s: abs(s - place))))
+    return chosen

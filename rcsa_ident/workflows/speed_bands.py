@@ -1,0 +1,96 @@
+"""One model for each of several ranges of spindle speed: how the machine changes with it, without a law for the change."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.data import IdentificationData
+from rcsa_ident.identification.doubts import FEWEST_CUTS
+from rcsa_ident.identification.result import Identification
+from rcsa_ident.machining_setup import Campaign
+from rcsa_ident.workflows.identify import JudgedCut, Map, Method, data_of
+
+_RPM = 30.0 / np.pi
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpeedBand:
+    """A range of spindle speeds and what its cuts say for themselves.
+
+    Parameters
+    ----------
+    speeds : (float, float) [rad/s]
+        Lowest and highest; one band ends where the next begins.
+    found : Identification
+    """
+
+    speeds: tuple[float, float]
+    found: Identification
+
+
+def speed_bands(campaign: Campaign, judged: Sequence[JudgedCut], count: int, method: Method, seed: int, map: Map = map) -> list[SpeedBand]:
+    """Return one identification for each of `count` equal ranges of the usable cuts' spindle speeds.
+
+    Parameters
+    ----------
+    count : int
+    method : Method
+        That starts from the whole campaign's answer: a band alone has too few cuts to be explored.
+    map : callable
+        The bands do not depend on each other.
+
+    Raises
+    ------
+    InputError
+        If a band has too few cuts with one of the toolings.
+    """
+    jobs = [_BandJob(method, speeds, data_of(campaign, cuts), seed) for speeds, cuts in divided(judged, count)]
+    return list(map(_identify_band, jobs))
+
+
+def divided(judged: Sequence[JudgedCut], count: int) -> list[tuple[tuple[float, float], list[JudgedCut]]]:
+    """Return `count` equal ranges of speed [rad/s], each with its usable cuts.
+
+    Raises
+    ------
+    InputError
+        If a range has too few cuts with one of the toolings.
+    """
+    usable = [(j, j.reading.measurement.spindle_speed) for j in judged if j.reading.measurement is not None]
+    if not usable:
+        raise InputError("cuts", f"none of {len(judged)} usable", "at least one usable cut")
+    speeds = [speed for _, speed in usable]
+    edges = np.linspace(min(speeds), max(speeds), count + 1)
+    band_of = np.clip(np.searchsorted(edges, speeds, side="right") - 1, 0, count - 1)
+    found = []
+    for b in range(count):
+        cuts = [j for (j, _), own in zip(usable, band_of, strict=True) if own == b]
+        low, high = float(edges[b]), float(edges[b + 1])
+        for name in dict.fromkeys(j.cut.tooling for j, _ in usable):
+            number = sum(j.cut.tooling == name for j in cuts)
+            if number < FEWEST_CUTS:
+                raise InputError(
+                    "--speed-bands",
+                    f"{number} cuts with {name} from {low * _RPM:.0f} to {high * _RPM:.0f} rev/min",
+                    f"at least {FEWEST_CUTS} cuts with each tooling in each of {count} bands: fewer bands, or more cuts",
+                )
+        found.append(((low, high), cuts))
+    return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _BandJob:
+    """The identification of one band."""
+
+    method: Method
+    speeds: tuple[float, float]
+    data: IdentificationData
+    seed: int
+
+
+def _identify_band(job: _BandJob) -> SpeedBand:
+    return SpeedBand(job.speeds, job.method.run(job.data, job.seed, map))

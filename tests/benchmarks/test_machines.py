@@ -1,0 +1,108 @@
+import hashlib
+import tomllib
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from benchmarks import machines
+from benchmarks.machines import CONDITIONS, CUT, DEVELOPMENT, EVALUATION, HELD_OUT, MARGIN, least_limit, random_machine, under
+from rcsa_ident.io.machines import read_machine
+from rcsa_ident.io.setups import read_tooling
+
+ALL = (*EVALUATION, *DEVELOPMENT)
+
+
+def texts(folder):
+    return {str(p.relative_to(folder)): p.read_text() for p in sorted(folder.rglob("*.toml"))}
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    """Every machine of the study as it is drawn, before the depth is lowered for stability."""
+    root = tmp_path_factory.mktemp("drawn")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(machines, "least_limit", lambda machine: np.inf)
+        return {seed: random_machine(seed, root / str(seed)) for seed in ALL}
+
+
+def test_seeds_are_fixed():
+    assert EVALUATION == (1, 2, 3, 4, 5, 6, 7, 8, 9, 10)
+    assert DEVELOPMENT == (101, 102, 103)
+
+
+def test_the_machines_stay_what_they_were(drawn):
+    # one that is drawn anew would make the study's figures those of other machines
+    joined = "".join(text for seed in ALL for text in texts(drawn[seed].parent).values())
+    assert hashlib.sha256(joined.encode()).hexdigest() == "88884ddcf72b78e6f08e51a2c7e31b0c2ee6b88367f80a93a03ea8124e2bb5bb"
+
+
+def test_no_two_are_alike(drawn):
+    bodies = [read_machine(drawn[seed]).spindle for seed in ALL]
+    assert all(len({getattr(body, part) for body in bodies}) == len(ALL) for part in ("shaft", "bearings", "housing", "joint"))
+    toolings = ["".join(texts(drawn[seed].parent / "toolings").values()) for seed in ALL]
+    assert len(set(toolings)) == len(ALL)
+
+
+@pytest.mark.parametrize("seed", ALL)
+def test_every_machine_is_what_it_is_said_to_be(drawn, seed):
+    machine = read_machine(drawn[seed])
+    spindle = machine.spindle
+    assert 2 <= len(spindle.bearings) <= 4
+    assert all(a.position < b.position for a, b in pairwise(spindle.bearings))
+    assert all(0.85 * b.stiffness[0] <= b.stiffness[1] * 1.001 <= 1.002 * b.stiffness[0] for b in spindle.bearings)
+    softening = {b.softening * np.pi / 30.0 for b in spindle.bearings}
+    assert len(softening) == 1
+    assert softening == {0.0} or 0.99e-6 <= softening.pop() <= 5.01e-6
+    assert 700e6 <= machine.workpiece.coefficients.tangential <= 1000e6
+    assert 0.2e-3 <= machine.plan.axial_depth <= 0.4e-3
+    assert len(machine.plan.spindle_speeds) == 40
+
+
+@pytest.mark.parametrize("seed", ALL)
+def test_toolings_are_what_they_are_said_to_be(drawn, seed):
+    machine = read_machine(drawn[seed])
+    paths = (*machine.toolings, *machine.truth_toolings)
+    first, second, similar, different = (read_tooling(path) for path in paths)
+    assert [t.name for t in (first, second, similar, different)] == [*CUT, *HELD_OUT]
+    for tooling in (first, second, similar, different):
+        assert tooling.cutter.teeth in (2, 3, 4)
+        assert 0.010 <= tooling.cutter.diameter <= 0.016
+        assert 0.030 <= tooling.assembly.tool_length - tooling.assembly.insertion <= 0.090
+    like = [t for t in (first, second) if t.assembly.holder == similar.assembly.holder]
+    assert len(like) == 1
+    assert like[0].assembly.contact == similar.assembly.contact
+    stickouts = [t.assembly.tool_length - t.assembly.insertion for t in (like[0], similar)]
+    assert 0.0039 < abs(stickouts[0] - stickouts[1]) < 0.0091
+    kinds = [path.read_text().splitlines()[0] for path in paths]
+    assert len({kinds[0], kinds[1], kinds[3]}) == 3
+
+
+def test_the_depth_is_lowered_until_every_cut_is_stable_and_nothing_else_changes(drawn, tmp_path, monkeypatch):
+    limits = []
+
+    def limit(machine):
+        limits.append(least_limit(machine))
+        return limits[-1]
+
+    monkeypatch.setattr(machines, "least_limit", limit)
+    lowered, plain = texts(random_machine(101, tmp_path).parent), texts(drawn[101].parent)
+    depth, before = (tomllib.loads(t["machine.toml"])["cuts"]["axial_depth_mm"] for t in (lowered, plain))
+    # the largest of the steps by a tenth that keeps the margin; the file has microns
+    steps = round(np.log(depth / before) / np.log(0.9))
+    assert steps >= 1
+    assert depth == pytest.approx(before * 0.9**steps, abs=1e-3)
+    assert (depth - 5e-4) * MARGIN * 1e-3 <= limits[0] < depth / 0.9 * MARGIN * 1e-3
+    line = f"axial_depth_mm = {depth:.3f}"
+    assert lowered == {**plain, "machine.toml": plain["machine.toml"].replace(f"axial_depth_mm = {before:.3f}", line)}
+
+
+def test_conditions_change_the_sensors_only(drawn):
+    machine = read_machine(drawn[101])
+    seen = {name: under(machine, name) for name in CONDITIONS}
+    assert [seen[name].sensors.trigger for name in ("trigger", "no-trigger", "noise-x3")] == [True, False, False]
+    assert seen["no-trigger"].sensors.gap_noise == machine.sensors.gap_noise == 2e-9
+    assert seen["noise-x3"].sensors.gap_noise == pytest.approx(6e-9)
+    assert seen["noise-x3"].sensors.acceleration_noise == pytest.approx(0.15)
+    assert all(s.spindle is machine.spindle and s.plan is machine.plan for s in seen.values())
+    assert machine.sensors.tooth_angle != 0.0

@@ -1,0 +1,46 @@
+"""A result file and a campaign that the commands can read."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from rcsa_ident.io.identifications import identification_to_json
+from rcsa_ident.io.results import write_result
+from tests.cli import by_hand
+
+SAMPLES = Path(__file__).resolve().parents[2] / "data" / "sample_runs"
+
+
+@pytest.fixture
+def result_file(tmp_path: Path) -> Path:
+    """Of a machine that stays what it is at all speeds; T1.toml lies beside it."""
+    return written(tmp_path / "RESULT.json", False)
+
+
+@pytest.fixture
+def softening_file(tmp_path: Path) -> Path:
+    """Of one that changes with speed."""
+    return written(tmp_path / "SOFT.json", True)
+
+
+def written(path: Path, softening: bool) -> Path:
+    write_result(path, identification_to_json(by_hand.identification(softening), by_hand.campaign(path.parent), by_hand.LEFT_OUT))
+    return path
+
+
+@pytest.fixture(scope="session")
+def small_campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Every fourth cut of the sample runs."""
+    folder = tmp_path_factory.mktemp("small")
+    shutil.copytree(SAMPLES / "toolings", folder / "toolings")
+    (folder / "recordings").mkdir()
+    head, *cuts = (SAMPLES / "campaign.toml").read_text(encoding="utf-8").split("[[cuts]]")
+    for cut in cuts[::4]:
+        for kind in ("cut", "air"):
+            name = next(line.split('"')[1] for line in cut.splitlines() if line.startswith(f"{kind} ="))
+            shutil.copyfile(SAMPLES / name, folder / name)
+    (folder / "campaign.toml").write_text(head + "".join("[[cuts]]" + cut for cut in cuts[::4]), encoding="utf-8")
+    return folder

@@ -1,0 +1,149 @@
+"""The command as a user meets it: files, figures, sentences."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from rcsa_ident.cli.plan import plan
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.parameters import AxisLayout, AxisParameters, pack, parameter_names
+from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.io.results import spindle_to_json, write_result
+from rcsa_ident.io.setups import read_campaign
+
+DATA = Path(__file__).parents[2] / "data"
+TOOLINGS = DATA / "machines" / "toolings"
+NAMES = [f"{key}={TOOLINGS / name}" for key, name in (("--toolings", "S1-ER32.toml"), ("--toolings", "S2-PG25.toml"))]
+RPM = np.pi / 30.0
+
+app = typer.Typer()
+app.command()(plan)
+
+
+def run(*arguments, code=0):
+    result = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert result.exit_code == code, result.output + repr(result.exception)
+    return result
+
+
+def axis_of(axis, shift, speed_range):
+    natural = 2.0 * np.pi * shift * np.array([950.0, 1750.0, 3300.0])
+    shapes = np.array([[0.14, 0.12], [0.18, -0.2], [0.15, 0.4]])
+    factor = np.diag(np.sqrt(2.0 * 0.05 * natural))
+    physics = AxisParameters(natural, shapes, factor, np.diag([2e-5, 3e-5]), np.zeros(3), np.zeros(2), np.zeros((0, 0)))
+    theta = np.concatenate([pack(physics), np.log([3e9, 6e6, 2e3, 10.0])])
+    layout = AxisLayout(3)
+    data = spindle_to_json(*Posterior(theta, 4e-4 * np.eye(theta.size), layout).machine(axis))
+    data |= {"layout": {"modes": 3, "softening": False}, "unknowns": theta, "model_error": 2e-3}
+    data |= {"covariance": {"parameters": list(parameter_names(layout)), "matrix": 4e-4 * np.eye(theta.size)}}
+    return data | ({"speed_range_rpm": list(speed_range)} if speed_range else {})
+
+
+def result_in(folder, speed_range=(8000.0, 16000.0), **more):
+    data = {
+        "schema_version": 1, "status": "converged", "reasons": [], "seed": 1, "method": "default", "software": "rcsa-ident",
+        "campaign": {"name": "by hand", "cuts_used": 20, "cuts_left_out": []}, "sensors": {},
+        "workpiece": {"name": "EN AW-6082", "tangential_coefficient_mpa": 902.0, "radial_ratio": 0.26},
+        "band_hz": [600.0, 4000.0],
+        "axes": {"X": axis_of(Dof.X, 1.0, speed_range), "Y": axis_of(Dof.Y, 0.93, speed_range)},
+    }  # fmt: skip
+    path = folder / "RESULT.json"
+    write_result(path, data | more)
+    return path
+
+
+def options(folder, *more):
+    toolings = [word for pair in NAMES for word in pair.split("=", 1)]
+    return [*toolings, "--target", TOOLINGS / "S4-shrink.toml", "--out", folder / "PLAN.toml", "--depths-mm", "0.1,0.2", *more]
+
+
+def test_the_plan_is_a_piece_of_a_campaign_file(tmp_path):
+    campaign = tmp_path / "campaign"
+    (campaign / "toolings").mkdir(parents=True)
+    (campaign / "recordings").mkdir()
+    shown = run(result_in(tmp_path), *options(tmp_path, "--cuts", 3, "--feed-direction", "-Y", "--entry-deg", 90, "--exit-deg", 150))
+    assert "at even distances" in shown.stdout
+    head = (DATA / "sample_runs" / "campaign.toml").read_text(encoding="utf-8").split("[[cuts]]")[0]
+    text = (tmp_path / "PLAN.toml").read_text(encoding="utf-8")
+    (campaign / "campaign.toml").write_text(head + text, encoding="utf-8")
+    for name in ("S1-ER32", "S2-PG25"):
+        (campaign / "toolings" / f"{name}.toml").write_bytes((TOOLINGS / f"{name}.toml").read_bytes())
+    for cut in tomllib.loads(text)["cuts"]:
+        for key in ("cut", "air"):
+            (campaign / cut[key]).touch()
+    cuts = read_campaign(campaign).cuts
+    assert len({c.id for c in cuts}) == len(cuts) == 3
+    for cut in cuts:
+        conditions = cut.conditions
+        assert 8000.0 - 1e-6 <= conditions.spindle_speed / RPM <= 16000.0 + 1e-6
+        assert conditions.axial_depth in (1e-4, 2e-4)
+        assert conditions.feed_angle == pytest.approx(-0.5 * np.pi)
+        assert np.degrees([conditions.engagement.entry, conditions.engagement.exit]) == pytest.approx([90.0, 150.0])
+
+
+def test_figures_for_machines(tmp_path):
+    arguments = [result_in(tmp_path), *options(tmp_path, "--cuts", 4, "--json")]
+    first = json.loads(run(*arguments).stdout)
+    bands = [first["band_percent"]["S4-shrink"], *(c["band_percent"]["S4-shrink"] for c in first["cuts"])]
+    assert np.all(np.diff(bands) < 0.0)
+    assert bands[-1] < first["even_band_percent"]["S4-shrink"] < bands[0]
+    assert [c["spindle_speed_rpm"] for c in first["cuts"]] == [c["spindle_speed_rpm"] for c in json.loads(run(*arguments).stdout)["cuts"]]
+    wanted = json.loads(run(*arguments, "--band", bands[2]).stdout)
+    assert wanted["fewest"]["reached"]
+    assert len(wanted["cuts"]) == wanted["fewest"]["cuts"] <= 2
+
+
+def test_a_band_out_of_reach_is_a_warning(tmp_path):
+    shown = run(result_in(tmp_path), *options(tmp_path, "--cuts", 2, "--band", 1e-4))
+    assert "the band of 0.0001 % is not reached: 2 cuts come to" in shown.stderr
+    assert shown.stdout.count("S1-ER32") + shown.stdout.count("S2-PG25") == 2
+
+
+def test_better_known_forces_narrow_the_band(tmp_path):
+    found = []
+    for std in (0.05, 1e-4):
+        known = {name: {"scale": 1.0, "std": std} for name in ("tangential coefficient", "radial ratio")}
+        summary = json.loads(run(result_in(tmp_path, coefficients=known), *options(tmp_path, "--cuts", 2, "--json")).stdout)
+        found.append(summary["cuts"][-1]["band_percent"]["S4-shrink"])
+    assert found[1] < found[0]
+
+
+def test_noise_of_a_campaign(tmp_path):
+    summary = json.loads(run(result_in(tmp_path), *options(tmp_path, "--cuts", 1, "--campaign", DATA / "sample_runs", "--json")).stdout)
+    # 2 nm rms over 7168 samples in the gap's cut and air cut: 2 nm sqrt(2 / 7168) sqrt(2), and the fixture's share
+    assert summary["noise_nm"] == pytest.approx(0.05, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--depths-mm", "deep"], "--depths-mm"),
+        (["--depths-mm", "0.1,-1"], "--depths-mm"),
+        (["--depths-mm", "50"], "none of"),
+        (["--speed-to", "7000"], "--speed-to"),
+        (["--margin", "0.5"], "margin"),
+        (["--immersion", "2"], "immersion"),
+        (["--noise-nm", "0"], "--noise-nm"),
+        (["--band", "0"], "--band"),
+        (["--from", "5000"], "band"),
+        (["--campaign", "nowhere"], "no such folder"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_code_2(tmp_path, more, words):
+    result = run(result_in(tmp_path), *options(tmp_path, *more), code=2)
+    assert words in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "PLAN.toml").exists()
+
+
+def test_speeds_that_nobody_knows_are_asked_for(tmp_path):
+    path = result_in(tmp_path, speed_range=None)
+    assert "--speed-from" in run(path, *options(tmp_path), code=2).stderr
+    run(path, *options(tmp_path, "--cuts", 1, "--speed-from", 8000, "--speed-to", 10000))

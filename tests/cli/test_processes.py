@@ -1,0 +1,126 @@
+"""Worker processes: same results in the same order as without them, nothing left behind, words that arrive."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from rcsa_ident.cli.processes import tell, workers
+
+
+def square(x):
+    return x * x
+
+
+def own_process(_):
+    time.sleep(0.05)
+    return os.getpid()
+
+
+def refuse_seven(x):
+    if x == 7:
+        raise ValueError("seven")
+    return x
+
+
+def say_something(x):
+    time.sleep(0.15)
+    tell("x", f"stage {x}", float(x))
+    return x
+
+
+@pytest.fixture(scope="module")
+def two():
+    with workers(2, early=()) as pool:
+        yield pool
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 7, 100])
+def test_results_come_in_the_order_of_the_tasks(two, count):
+    wanted = [k * k for k in range(count)]
+    assert list(two.map(square, range(count))) == wanted
+    assert list(two.map_many(square, range(count))) == wanted
+    with workers(1) as alone:
+        assert list(alone.map(square, range(count))) == list(alone.map_many(square, range(count))) == wanted
+
+
+def test_the_main_process_works_too(two):
+    assert os.getpid() in (found := set(two.map(own_process, range(40))))
+    assert len(found) == 2
+
+
+def test_an_error_comes_out_where_its_task_stands(two):
+    results = iter(two.map(refuse_seven, range(20)))
+    # a task of this process may come before those of the other, but never after its own turn
+    with pytest.raises(ValueError, match="seven"):
+        for _ in range(8):
+            next(results)
+    assert list(two.map(square, [3])) == [9]
+
+
+def test_words_of_workers_and_of_this_process_arrive(two):
+    heard = []
+    with two.listening(lambda *word: heard.append((*word, threading.current_thread() is threading.main_thread()))):
+        assert list(two.map(say_something, range(8))) == list(range(8))
+        time.sleep(0.3)
+    assert {main for *_, main in heard} == {True, False}
+    assert all(axis == "x" and stage == f"stage {cost:.0f}" for axis, stage, cost, _ in heard)
+    tell("x", "nobody listens", 0.0)
+    assert all(stage != "nobody listens" for _, stage, _, _ in heard)
+
+
+def test_after_an_error_no_worker_is_left():
+    with pytest.raises(ZeroDivisionError), workers(3, early=()) as pool:
+        assert list(pool.map(square, range(5))) == [0, 1, 4, 9, 16]
+        children = multiprocessing.active_children()
+        raise ZeroDivisionError
+    for child in children:
+        child.join(5.0)
+        assert not child.is_alive()
+
+
+CTRL_C = """
+import os, sys, time
+sys.path.insert(0, {root!r})
+from rcsa_ident.cli.processes import workers
+def main():
+    try:
+        with workers(3, early=()) as pool:
+            for child in __import__("multiprocessing").active_children():
+                print(child.pid, flush=True)
+            print("ready", flush=True)
+            list(pool.map(time.sleep, [{pause}] * 9))
+    except KeyboardInterrupt:
+        print("interrupted", flush=True)
+if __name__ == "__main__":
+    main()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no process groups")
+@pytest.mark.parametrize("wait", [0.0, 1.0], ids=["while they start", "while they work"])
+def test_ctrl_c_ends_all_of_them_without_a_word(tmp_path, wait):
+    script = tmp_path / "script.py"
+    root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+    script.write_text(CTRL_C.format(root=root, pause=30.0), encoding="utf-8")
+    with subprocess.Popen(
+        [sys.executable, str(script)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as running:
+        lines = [line.strip() for line in iter(running.stdout.readline, "ready\n")]
+        time.sleep(wait)
+        # as a terminal does: to all processes of the group
+        os.killpg(running.pid, signal.SIGINT)
+        out, err = running.communicate(timeout=20)
+    assert out == "interrupted\n"
+    assert err == ""
+    assert len(lines) == 2
+    for pid in map(int, lines):
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)

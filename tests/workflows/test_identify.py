@@ -1,0 +1,79 @@
+"""Standard deviations of modes, against closed forms and against draws."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.parameters import AxisLayout, pack, simple_axis
+from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.workflows.identify import mode_deviations
+from tests.cli import by_hand
+
+
+def identification_of(posterior):
+    found = by_hand.identification()
+    return replace(found, axes={Dof.X: replace(found.axes[Dof.X], posterior=posterior)})
+
+
+def test_an_uncoupled_mode_in_closed_form():
+    natural, zeta = np.array([5000.0, 12000.0]), np.array([0.03, 0.06])
+    axis = simple_axis(natural, np.ones((2, 2)), np.diag(np.sqrt(2.0 * zeta * natural)), np.eye(2) * 1e-5)
+    theta = np.concatenate([pack(axis), by_hand.JOINT_LOGS])
+    covariance = np.zeros((theta.size,) * 2)
+    # log omega_n of both, and log L_00, log L_11 behind the frequencies and shapes
+    s_omega, s_factor, correlation = 0.01, 0.05, 0.4
+    for n, place in ((0, 6), (1, 8)):
+        covariance[n, n], covariance[place, place] = s_omega**2, s_factor**2
+        covariance[n, place] = covariance[place, n] = correlation * s_omega * s_factor
+    known = Posterior(theta, covariance, AxisLayout(2))
+    omega_std, zeta_std = mode_deviations(identification_of(known))[Dof.X]
+    np.testing.assert_allclose(omega_std, s_omega * natural, rtol=1e-7)
+    # zeta = L^2 / (2 omega_n)
+    relative = np.sqrt(4.0 * s_factor**2 + s_omega**2 - 4.0 * correlation * s_factor * s_omega)
+    np.testing.assert_allclose(zeta_std, relative * zeta, rtol=1e-6)
+
+
+def test_coupled_modes_scatter_as_drawn_machines_do():
+    known = by_hand.posterior(softening=True)
+    known = replace(known, covariance=known.covariance * 0.01)
+    omega_std, zeta_std = mode_deviations(identification_of(known))[Dof.X]
+    rng = np.random.default_rng(5)
+    draws = [known.machine(Dof.X, theta)[0] for theta in rng.multivariate_normal(known.theta, known.covariance, 4000)]
+    # a standard deviation of 4000 draws is good to 1.1 %
+    np.testing.assert_allclose(np.std([d.omega_n for d in draws], axis=0), omega_std, rtol=0.05)
+    np.testing.assert_allclose(np.std([d.zeta for d in draws], axis=0), zeta_std, rtol=0.05)
+
+
+def test_an_overdamped_mode_has_its_two_real_poles():
+    natural = np.array([5000.0, 9000.0])
+    axis = simple_axis(natural, np.ones((2, 2)), np.diag(np.sqrt(2.0 * np.array([0.05, 1.5]) * natural)), np.eye(2) * 1e-5)
+    theta = np.concatenate([pack(axis), by_hand.JOINT_LOGS])
+    known = Posterior(theta, 1e-6 * np.eye(theta.size), AxisLayout(2))
+    omega_std, zeta_std = mode_deviations(identification_of(known))[Dof.X]
+    modes = known.machine(Dof.X)[0]
+    assert omega_std.size == modes.omega_n.size == 3
+    assert np.all(np.isfinite(omega_std) & (omega_std > 0.0))
+    np.testing.assert_allclose(zeta_std[modes.zeta == 1.0], 0.0, atol=1e-9)
+
+
+def test_no_posterior_no_deviation():
+    found = by_hand.identification()
+    axes = {Dof.X: replace(found.axes[Dof.X], posterior=None), Dof.Y: found.axes[Dof.Y]}
+    assert list(mode_deviations(replace(found, axes=axes))) == [Dof.Y]
+
+
+@pytest.mark.parametrize("axis", [Dof.X, Dof.Y])
+def test_they_stand_in_the_modes_order(axis):
+    found = by_hand.identification()
+    part = found.axes[axis]
+    # as if only the second natural frequency were unknown
+    covariance = np.zeros_like(part.posterior.covariance)
+    covariance[1, 1] = 1e-4
+    only = replace(found, axes={axis: replace(part, posterior=replace(part.posterior, covariance=covariance))})
+    omega_std, _ = mode_deviations(only)[axis]
+    assert omega_std[1] == pytest.approx(0.01 * part.modes.omega_n[1], rel=0.02)
+    assert omega_std[0] < 0.1 * omega_std[1]
