@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.machines import CONDITIONS
+from rcsa_ident.arrays import FloatArray
 
 #: Aims for toolings that never cut, and what no run that calls itself converged may exceed.
 AIMS, WORST = {"similar": 0.01, "different": 0.025}, 0.05
@@ -29,8 +30,9 @@ def line(row: dict[str, Any]) -> str:
 def _summary(rows: Sequence[dict[str, Any]]) -> list[str]:
     """Median and worst of each method under each condition, drawn machines together, others each for itself."""
     lines = [
-        "| machines | condition | method | runs | similar: median | worst | different: median | worst | converged | seconds |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| machines | condition | method | runs | similar: median | worst | different: median | worst | converged | seconds "
+        "| medians over the default's: similar, different, seconds |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for row in rows:
@@ -42,9 +44,17 @@ def _summary(rows: Sequence[dict[str, Any]]) -> list[str]:
             errors = np.array([e for row in members for e in row[kind]["errors"]])
             cells += [f"{np.median(errors):.4f}", f"{errors.max():.4f}"]
         converged = sum(row["status"] == "converged" for row in members)
-        seconds = float(np.median([sum(row["seconds"].values()) for row in members]))
-        lines.append("| " + " | ".join([*cells, f"{converged} of {len(members)}", f"{seconds:.1f}"]) + " |")
+        cells += [f"{converged} of {len(members)}", f"{_medians(members)[-1]:.1f}"]
+        default = groups.get((*key[:2], "default"))
+        ratios = _medians(members) / _medians(default) if default and default is not members else ()
+        lines.append("| " + " | ".join([*cells, ", ".join(f"{ratio:.3g}" for ratio in ratios) or "-"]) + " |")
     return lines
+
+
+def _medians(members: Sequence[dict[str, Any]]) -> FloatArray:
+    """Of the errors of either kind, and of the seconds."""
+    errors = [np.median([e for row in members for e in row[kind]["errors"]]) for kind in AIMS]
+    return np.array([*errors, np.median([sum(row["seconds"].values()) for row in members])])
 
 
 def _bands(rows: Sequence[dict[str, Any]]) -> list[str]:

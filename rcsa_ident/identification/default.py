@@ -177,7 +177,9 @@ def _result(
     covariance = 0.5 * (covariance + covariance.T)
     axes = {axis.axis: _axis_result(i, data, misfit, solution, covariance, chosen) for i, axis in enumerate(data.axes)}
     reasons = doubts(data, searched, solution, misfit, [p for p in (axis.posterior for axis in axes.values()) if p is not None])
-    scales = zip(solution.theta[force].tolist(), np.sqrt(np.diag(covariance)[force]).tolist(), strict=True)
+    # wider bands do not make less known than was known before
+    known = np.minimum(np.sqrt(np.diag(covariance)[force]), misfit.data.coefficient_spread)
+    scales = zip(solution.theta[force].tolist(), known.tolist(), strict=True)
     return Identification(
         status=Status.SUSPECT if reasons else Status.CONVERGED,
         reasons=tuple(reasons),

@@ -180,11 +180,13 @@ def merged(axis: AxisParameters) -> list[AxisParameters]:
     for low, high in pairwise(order.tolist()):
         if axis.omega_n[high] < CLOSE * axis.omega_n[low]:
             both = axis.psi[[low, high]]
-            psi, omega_n = axis.psi.copy(), axis.omega_n.copy()
+            psi, omega_n, fixture = axis.psi.copy(), axis.omega_n.copy(), axis.fixture.copy()
             psi[low] = _rank_one(np.array([both[:, 0] @ both[:, 0], both[:, 0] @ both[:, 1], both[:, 1] @ both[:, 1]]))
+            # both modes' motion of the fixture, and whichever sign the new shape has
+            fixture[low] = psi[low] @ (axis.fixture[[low, high]] @ both) / (psi[low] @ psi[low])
             share = np.sum(both**2, axis=1) / max(float(np.sum(both**2)), 1e-300)
             omega_n[low] = np.exp(share @ np.log(axis.omega_n[[low, high]]))
-            found.append(without_mode(replace(axis, psi=psi, omega_n=omega_n), high))
+            found.append(without_mode(replace(axis, psi=psi, omega_n=omega_n, fixture=fixture), high))
     return found
 
 
@@ -197,7 +199,7 @@ def _rank_one(entries: FloatArray) -> FloatArray:
 def _polished(trials: list[Solution], misfit: Misfit, count: int, steps: int = 30) -> Solution:
     """The best of the first `count` trials after they have been polished; what lies far behind is left out."""
     trials = sorted(trials, key=lambda s: s.cost)[:count]
-    near = [t for t in trials if t.cost < FAR * trials[0].cost]
+    near = [trials[0], *(t for t in trials[1:] if t.cost < FAR * trials[0].cost)]
     return min((polish(misfit, t.theta, t.layout, t.evaluation.nuisance, steps) for t in near), key=lambda s: s.cost)
 
 
@@ -230,7 +232,9 @@ def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> t
     shares = []
     for i, (axis, rest) in enumerate(zip(data.axes, solution.evaluation.residual.lines, strict=True)):
         weight = misfit.weight(i).ravel()
-        squares = (rest[: weight.size] ** 2 + rest[weight.size :] ** 2) / weight
+        # a cut that contradicts the others does not count against them here, either
+        counted = np.repeat(misfit.cut_weight[axis.cut], axis.outputs)
+        squares = counted * (rest[: weight.size] ** 2 + rest[weight.size :] ** 2) / weight
         size = np.abs(axis.lines[:, :, 0] - axis.lines[:, :, 1]).ravel() ** 2
         shares.append(_share(squares, axis.variance.ravel(), size, 2.0 * weight.size * free, smallest))
     return tuple(shares)

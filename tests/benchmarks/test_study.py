@@ -135,8 +135,9 @@ def test_status_is_counted_against_the_truth():
 def test_the_table_holds_all_machines_and_says_median_and_worst():
     text = table(ROWS)
     similar = np.median([0.002, 0.01, 0.004, 0.004, 0.002, 0.011, 0.02, 0.02, 0.5, 0.5])
-    assert f"| drawn | trigger | default | 5 | {similar:.4f} | 0.5000 | 0.0225 | 0.9000 | 3 of 5 | 5.0 |" in text
-    assert "| drawn | trigger | paper, literal | 1 |" in text
+    assert f"| drawn | trigger | default | 5 | {similar:.4f} | 0.5000 | 0.0225 | 0.9000 | 3 of 5 | 5.0 | - |" in text
+    ratios = f"{0.9 / similar:.3g}, {0.9 / 0.0225:.3g}, 1"
+    assert f"| drawn | trigger | paper, literal | 1 | 0.9000 | 0.9000 | 0.9000 | 0.9000 | 1 of 1 | 5.0 | {ratios} |" in text
     assert "| table2 | trigger | default | 1 |" in text
     assert all(f"| {name} | trigger | 1 |" in text for name in ("1", "2", "3", "4", "5", "table2"))
     assert "- 5, trigger: a doubt" in text

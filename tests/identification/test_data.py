@@ -62,7 +62,7 @@ def campaigns(draw):
 def test_every_line_is_there_once_with_its_own_holder(cuts):
     data = prepared(cuts)
     assert data.cut_ids == tuple(c.cut_id for c in cuts)
-    assert set(a.axis for a in data.axes) == {axis for c in cuts for axis in c.axes}
+    assert {a.axis for a in data.axes} == {axis for c in cuts for axis in c.axes}
     for axis in data.axes:
         given_outputs = {c.axes[axis.axis].outputs for c in cuts if axis.axis in c.axes}
         assert axis.outputs == (2 if given_outputs == {2} else 1)

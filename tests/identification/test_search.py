@@ -60,7 +60,7 @@ def test_starts_spread_over_the_band(misfit):
     inside = frequency[:, 1:-1]
     assert BAND[0] <= inside.min() < 1.3 * BAND[0]
     assert 0.95 * BAND[1] < inside.max() <= 1.08 * BAND[1]
-    rows, cols, diagonal = lower_triangle(modes)
+    rows, _, diagonal = lower_triangle(modes)
     lower = theta[:, 3 * modes : plain(modes).axes[0].core - 3]
     np.testing.assert_array_equal(lower[:, ~diagonal], 0.0)
     damping = (DAMPING_UNIT * np.exp(lower[:, diagonal])) ** 2 / (2.0 * np.exp(theta[:, rows[diagonal]]))

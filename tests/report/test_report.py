@@ -14,11 +14,13 @@ from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.identification.parameters import AxisLayout, parameter_names
+from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import AxisResult, Identification, Status
 from rcsa_ident.machining_setup import Campaign, Cut, Tooling, Workpiece
 from rcsa_ident.report.figures import svg, tooltip_frf
 from rcsa_ident.report.html import ToolingPage, report_html
-from rcsa_ident.report.rows import recording_rows
+from rcsa_ident.report.rows import coefficient_rows, mode_rows, recording_rows, two_digits
 from rcsa_ident.signals.measurement import AxisLines, CutMeasurement, Reading
 from rcsa_ident.signals.verdict import Verdict
 from rcsa_ident.stability.result import StabilityLobes
@@ -40,8 +42,12 @@ def campaign(tmp_path):
 
 @pytest.fixture
 def readings(campaign):
-    value = np.array([1e-8 + 1e-8j, 2e-8])
-    lines = AxisLines(np.array([4, 8]), np.array([4e3, 8e3]), value, 0.0 * value, np.full(2, 1e-20), np.ones(2), value)
+    # gap and fixture: the flange's motion and its noise are their sums
+    value = np.array([[0.7e-8 + 1e-8j, 0.3e-8], [3e-8, -1e-8]])
+    variance = np.array([[0.75e-20, 0.25e-20], [0.5e-20, 0.5e-20]])
+    force = np.ones(2, dtype=complex)
+    slope = np.zeros((2, 5), dtype=complex)
+    lines = AxisLines(np.array([4, 8]), np.array([4e3, 8e3]), value, 0.0 * value, variance, np.ones(2), force, slope)
     good = Reading(Verdict((), ("no air cut",)), CutMeasurement("cut-0", NAME, 1001.0, {Dof.X: lines}, 0.0))
     return [(campaign.cuts[0], good), (campaign.cuts[1], good), (campaign.cuts[2], Reading(Verdict(("chatter: 3 µm at 1500 Hz",))))]
 
@@ -55,11 +61,17 @@ def found():
     value = 1e-4 / omega * np.exp(-1j * omega / 3e3)
     measured = {"omega": omega, "value": value, "model": value, "cut": np.arange(12) % 2, "coherence": np.ones(12)}
     joint = LumpedJoint(2e9, 5e6, 1e4, 10.0)
-    covariance = np.diag([1.0, 1e-4, 1.0, 1e-4, 1e-4])
-    part = AxisResult(modes, joint, 1.23, {NAME: 1.23}, 0.004, ("a", "b", "c", "d", "e"), covariance, np.zeros(5), measured)
+    layout = AxisLayout(1)
+    covariance = np.diag([1.0] * layout.size + [1e-4, 1.0, 1e-4, 1e-4])
+    posterior = Posterior(np.zeros(layout.size + 4), covariance, layout)
+    part = AxisResult(modes, joint, 1.23, {NAME: 1.23}, 0.004, parameter_names(layout), posterior, measured)
     trace = (("x", "search", 30.0), ("x", "search", 20.0), ("x", "3 modes", -5.0), ("x", "2 modes", -9.0), ("both", "polish", 4.0))
     cuts = ("cut-0", "cut-1")
-    return Identification(Status.SUSPECT, ("few cuts: 2",), 1, "default", {Dof.X: part}, cuts, np.zeros(2), np.ones(2), np.ones(2), trace)
+    notes = ("run-out of <T1>: the cuts say little about it",)
+    scales = {"tangential coefficient": (np.log(1.1), 0.01), f"run-out of {NAME}": (-0.6, 0.02)}
+    return Identification(
+        Status.SUSPECT, ("few cuts: 2",), 1, "default", {Dof.X: part}, cuts, np.zeros(2), np.ones(2), np.ones(2), trace, notes, scales
+    )
 
 
 def page_of(name=NAME, **more):
@@ -169,3 +181,46 @@ def test_rows_say_what_a_recording_is_worth(readings):
     assert rows[0].signal_to_noise_db == {"X": pytest.approx(10.0 * np.log10(1.5e4))}
     assert rows[2].found_rpm is None
     assert rows[2].signal_to_noise_db == {}
+
+
+def test_the_page_says_what_was_found_beside_the_machine(found, campaign, readings):
+    text = report_html(found, campaign, readings, deviations={Dof.X: (2.0 * np.pi * np.array([1.234, 56.78]), np.array([1e-4, 0.02]))})
+    words = " ".join(" ".join(parsed(text).text).split())
+    assert "run-out of <T1>: the cuts say little about it" in words
+    # 1.1 +- 0.011, and -0.6 x 2 um with 0.02 x 2 um
+    for row in ("tangential coefficient 1.100 0.011 times the campaign's", f"run-out of {NAME} -1.200 0.040 µm"):
+        assert row in words
+    # 5000 rad/s with 5 %, 10000 rad/s with 4 %
+    assert "795.8 1.2 5.00 0.010 1.000 − 1.000 i" in words
+    assert "1591.5 57 4.00 2.0 1.000 − 1.000 i" in words
+
+
+def test_without_deviations_there_are_no_columns_for_them(found, campaign, readings):
+    words = " ".join(" ".join(parsed(report_html(found, campaign, readings)).text).split())
+    assert "795.8 5.00 1.000 − 1.000 i" in words
+    assert "one standard deviation" not in words
+
+
+def test_rows_of_coefficients_are_factors_and_micrometres():
+    scale, runout = coefficient_rows({"radial ratio": (np.log(0.8), 0.05), "run-out of T": (1.5, 0.5)})
+    assert (scale.value, scale.std) == (pytest.approx(0.8), pytest.approx(0.04))
+    assert (runout.value, runout.std, runout.unit) == (pytest.approx(3.0), pytest.approx(1.0), "µm")
+
+
+def test_deviations_follow_their_modes_when_sorted():
+    modes = ModalModel(np.array([2e4, 1e4]) * np.pi, np.array([0.02, 0.01]), np.ones((2, 2)) * 1j, np.zeros((2, 2)), plane("flange", Dof.X))
+    rows = mode_rows(modes, (2.0 * np.pi * np.array([7.0, 3.0]), np.array([0.002, 0.001])))
+    assert [(r.frequency_hz, r.frequency_std_hz, r.damping_std_percent) for r in rows] == [
+        (pytest.approx(5e3), pytest.approx(3.0), pytest.approx(0.1)),
+        (pytest.approx(1e4), pytest.approx(7.0), pytest.approx(0.2)),
+    ]
+    assert mode_rows(modes)[0].frequency_std_hz is None
+
+
+@pytest.mark.parametrize(
+    ("std", "text"), [(0.0, "0"), (1e-9, "0"), (0.0456, "0.046"), (1.26, "1.3"), (9.99, "10.0"), (57.4, "57"), (1234.5, "1234")]
+)  # fmt: skip
+def test_two_digits(std, text):
+    assert two_digits(std) == text
+    value = float(two_digits(std, 3.14159265))
+    assert abs(value - 3.14159265) <= 0.06 * max(std, 1e-5) or std > 1.0

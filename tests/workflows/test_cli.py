@@ -100,8 +100,8 @@ def test_the_result_holds_what_later_commands_need(result_file, identification, 
     assert data["axes"]["X"]["model_error"] == 0.004
     machine = machine_from_json(data, str(result_file))
     for axis, part in identification.axes.items():
-        np.testing.assert_array_equal(machine[axis].posterior.theta, part.theta)
-        np.testing.assert_array_equal(machine[axis].posterior.covariance, part.covariance)
+        np.testing.assert_array_equal(machine[axis].posterior.theta, part.posterior.theta)
+        np.testing.assert_array_equal(machine[axis].posterior.covariance, part.posterior.covariance)
         np.testing.assert_array_equal(machine[axis].spindle.modes.phi, part.modes.phi)
         assert machine[axis].joint == part.joint
 

@@ -1,0 +1,148 @@
+"""identify: warm start, speed bands, one answer on any number of processes, and what is refused before the long work."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rcsa_ident.cli import app
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.io.identifications import machine_from_json
+from rcsa_ident.io.results import read_result
+from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.workflows.tip import tooltip
+from tests.cli import by_hand
+
+
+def run(*arguments, code=0):
+    result = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert result.exit_code == code, result.output + repr(result.exception)
+    return result
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory, small_campaign):
+    """A result of the small campaign, found without a start."""
+    path = tmp_path_factory.mktemp("first") / "RESULT.json"
+    run("identify", small_campaign, "--out", path, "--processes", 1)
+    return path
+
+
+def without_covariance(data):
+    for axis in data["axes"].values():
+        del axis["covariance"]
+    return data
+
+
+def failed(data):
+    return data | {"status": "failed", "axes": {}}
+
+
+def published(data):
+    return without_covariance(data) | {"method": "paper"}
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (without_covariance, ["axes.X", "no covariance (method default)"]),
+        (published, ["axes.X", "no covariance (method paper)", "a result of the default method"]),
+        (failed, ["axes", "the identification has failed"]),
+        (lambda data: {"seed": 1}, ["schema_version", "found nothing"]),
+        (lambda data: [], ["content", "an empty list"]),
+    ],
+)  # fmt: skip
+def test_a_start_that_is_none_is_refused_in_one_sentence(tmp_path, small_campaign, result_file, spoil, words):
+    start = tmp_path / "START.json"
+    start.write_text(json.dumps(spoil(json.loads(result_file.read_text(encoding="utf-8")))), encoding="utf-8")
+    out = tmp_path / "OUT.json"
+    result = run("identify", small_campaign, "--out", out, "--start", start, "--processes", 1, code=2)
+    for word in [str(start), *words]:
+        assert word in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--start", "{}/none.json"], "none.json: result: found no such file"),
+        (["--start", "{}"], "found a folder"),
+        (["--start", "{}/RESULT.json", "--method", "paper"], "--start: found --method paper"),
+        (["--speed-bands", "2", "--method", "paper"], "--speed-bands: found --method paper"),
+        (["--speed-bands", "4"], "at least 8 cuts with each tooling in each of 4 bands"),
+    ],
+)
+def test_options_that_do_not_go_together(tmp_path, small_campaign, result_file, options, words):
+    out = tmp_path / "OUT.json"
+    options = [option.format(tmp_path) for option in options]
+    result = run("identify", small_campaign, "--out", out, "--processes", 1, *options, code=2)
+    assert words in result.stderr
+    assert not out.exists()
+
+
+@pytest.fixture(scope="module")
+def warm(tmp_path_factory, small_campaign, first):
+    """The same cuts from that result on, and what was printed."""
+    path = tmp_path_factory.mktemp("warm") / "RESULT.json"
+    return path, run("identify", small_campaign, "--out", path, "--start", first, "--processes", 1).stdout
+
+
+def test_two_processes_write_the_same_bytes(tmp_path, small_campaign, first, warm):
+    run("identify", small_campaign, "--out", tmp_path / "two.json", "--start", first, "--processes", 2)
+    assert (tmp_path / "two.json").read_bytes() == warm[0].read_bytes()
+
+
+def test_a_warm_start_says_the_same_of_a_tip(small_campaign, first, warm):
+    assembly = read_campaign(small_campaign).toolings["S1-ER32"].assembly
+    omega = 2.0 * np.pi * np.linspace(600.0, 4000.0, 100)
+    again, cold = (tooltip(machine_from_json(read_result(path), ""), assembly, omega, False) for path in (warm[0], first))
+    for axis in (Dof.X, Dof.Y):
+        assert np.linalg.norm(again.tip(axis) - cold.tip(axis)) < 0.01 * np.linalg.norm(cold.tip(axis))
+    assert read_result(warm[0])["started_from"] == "RESULT.json"
+    assert "started_from" not in read_result(first)
+
+
+def test_notes_and_coefficients_are_printed_and_written(warm):
+    data, printed = read_result(warm[0]), warm[1]
+    assert "tangential coefficient: " in printed
+    assert "times the campaign's" in printed
+    assert "±" in printed
+    for note in data["notes"]:
+        assert f"note: {note}" in printed
+    mode = data["axes"]["X"]["modes"][0]
+    assert mode["natural_frequency_std_hz"] > 0.0
+    assert data["coefficients"]["tangential coefficient"]["std"] > 0.0
+
+
+def test_a_method_sees_the_cuts_of_its_band_alone(tmp_path, small_campaign, monkeypatch):
+    """The whole way through the command with a method that only counts, since the search itself has its own tests."""
+    from rcsa_ident.identification import default
+
+    seen = []
+
+    class Counting:
+        def __init__(self, start=None):
+            self.start = start
+
+        def run(self, data, seed, map, progress=None):
+            seen.append((data.cut_ids, data.speed_range, self.start))
+            return by_hand.identification()
+
+    monkeypatch.setattr(default, "DefaultMethod", Counting)
+    out = tmp_path / "R.json"
+    monkeypatch.setattr("rcsa_ident.workflows.speed_bands.FEWEST_CUTS", 4)
+    # the ids of the hand-made answer are not the campaign's: only the bands' part of the file is of interest
+    monkeypatch.setattr("rcsa_ident.io.identifications._delays", lambda *_: {})
+    run("identify", small_campaign, "--out", out, "--speed-bands", 2, "--processes", 1)
+    whole, *bands = seen
+    assert whole[2] is None
+    assert sorted(bands[0][0] + bands[1][0]) == sorted(whole[0])
+    assert bands[0][1][0] < whole[1][0] < bands[1][1][0]
+    assert all(set(start) == {Dof.X, Dof.Y} for _, _, start in bands)
+    data = read_result(out)
+    low, high = ([edge * np.pi / 30.0 for edge in band["speed_range_rpm"]] for band in data["speed_bands"])
+    assert low[1] == pytest.approx(high[0])

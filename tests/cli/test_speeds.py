@@ -1,0 +1,121 @@
+"""tooltip and lobes of machines that change with the spindle's speed, and the options that go with it."""
+
+from __future__ import annotations
+
+import inspect
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rcsa_ident.cli import app, lobes
+from rcsa_ident.io.curves import read_frf_csv, read_lobes_csv
+from rcsa_ident.io.identifications import machine_from_json, speed_band_to_json
+from rcsa_ident.io.results import read_result
+from rcsa_ident.workflows.tip import STIFFNESS_SPREAD, tooltip
+from tests.cli import by_hand
+
+RPM = 30.0 / np.pi
+SPEEDS = ("--speed-from", 6000, "--speed-to", 13000, "--speed-step", 500)
+
+
+def run(*arguments, code=0):
+    result = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert result.exit_code == code, result.output + repr(result.exception)
+    return result
+
+
+def tip(path, folder, *more):
+    run("tooltip", path, folder / "T1.toml", "--out", folder / "F.csv", "--from", 600, "--to", 2600, "--step", 10, *more)
+    return read_frf_csv(folder / "F.csv")
+
+
+def test_a_speed_gives_the_machine_at_that_speed(tmp_path, softening_file):
+    curves = tip(softening_file, tmp_path, "--speed", 6500)
+    machine = machine_from_json(read_result(softening_file), "")
+    assembly = by_hand.campaign(tmp_path).toolings["T1"].assembly
+    response = tooltip(machine, assembly, 2.0 * np.pi * curves.frequency, speed=6500.0 / RPM)
+    for axis in machine:
+        np.testing.assert_allclose(curves.values[axis.upper()], response.tip(axis), rtol=1e-10)
+        np.testing.assert_allclose(curves.bands[f"{axis.upper()}_re_std"], response.deviation[axis][0], rtol=1e-8)
+    middle = tip(softening_file, tmp_path)
+    assert np.linalg.norm(curves.values["X"] - middle.values["X"]) > 0.01 * np.linalg.norm(middle.values["X"])
+
+
+def test_a_machine_that_stays_says_the_same_at_every_speed(tmp_path, result_file):
+    one, two = tip(result_file, tmp_path), tip(result_file, tmp_path, "--speed", 50000)
+    np.testing.assert_array_equal(one.values["X"], two.values["X"])
+
+
+def test_speeds_beyond_the_campaigns_are_warned_of(tmp_path, softening_file):
+    known = f"from {600 * RPM:.0f} to {1400 * RPM:.0f} rev/min"
+    for arguments in (("tooltip", "--speed", 20000, "--step", 100), ("lobes", *SPEEDS, "--speed-to", 20000)):
+        command, *options = arguments
+        result = run(command, softening_file, tmp_path / "T1.toml", "--out", tmp_path / "O.csv", "--no-bands", *options)
+        assert known in result.stderr
+    result = run("lobes", softening_file, tmp_path / "T1.toml", "--out", tmp_path / "O.csv", "--no-bands", *SPEEDS)
+    assert "outside it stays" not in result.stderr
+
+
+def test_lobes_follow_the_machine_over_its_speeds(tmp_path, softening_file):
+    out = tmp_path / "L.csv"
+    run("lobes", softening_file, tmp_path / "T1.toml", "--out", out, *SPEEDS)
+    curves = read_lobes_csv(out)
+    assert list(curves.speed) == [*range(6000, 13001, 500)]
+    for rpm in (6000, 9500, 13000):
+        run("lobes", softening_file, tmp_path / "T1.toml", "--out", out, "--speed-from", rpm, "--speed-to", rpm)
+        alone = read_lobes_csv(out)
+        k = list(curves.speed).index(rpm)
+        assert curves.limit[k] == pytest.approx(alone.limit[0], rel=1e-9)
+    assert np.all(curves.extra["limit_depth_low_mm"] < curves.extra["limit_depth_high_mm"])
+
+
+def test_a_speed_band_answers_with_its_own_model(tmp_path, result_file):
+    data = json.loads(result_file.read_text(encoding="utf-8"))
+    other = by_hand.identification(softening=True)
+    data["speed_bands"] = [speed_band_to_json((600.0, 1000.0), by_hand.identification()), speed_band_to_json((1000.0, 1400.0), other)]
+    path = tmp_path / "BANDS.json"
+    path.write_text(json.dumps(data), encoding="utf-8")
+    whole = tip(path, tmp_path).values["X"]
+    np.testing.assert_array_equal(tip(path, tmp_path, "--speed", 7000).values["X"], whole)
+    assert np.linalg.norm(tip(path, tmp_path, "--speed", 13000).values["X"] - whole) > 0.01 * np.linalg.norm(whole)
+
+
+def test_a_stiffness_known_less_well_widens_the_bands(tmp_path, result_file):
+    exact, usual, ten = (tip(result_file, tmp_path, "--stiffness-spread", percent).bands["X_re_std"] for percent in (0.0, 0.05, 0.5))
+    own = [np.sqrt(wide**2 - exact**2) for wide in (usual, ten)]
+    assert np.linalg.norm(own[1]) == pytest.approx(10.0 * np.linalg.norm(own[0]), rel=0.03)
+    data = json.loads(result_file.read_text(encoding="utf-8"))
+    for axis in data["axes"].values():
+        axis["rivals"] = []
+    result_file.write_text(json.dumps(data), encoding="utf-8")
+    widths = []
+    for percent in (0, 5):
+        run("lobes", result_file, tmp_path / "T1.toml", "--out", tmp_path / "L.csv", *SPEEDS, "--stiffness-spread", percent)
+        extra = read_lobes_csv(tmp_path / "L.csv").extra
+        widths.append(np.mean(extra["limit_depth_high_mm"] - extra["limit_depth_low_mm"]))
+    assert widths[1] > 1.5 * widths[0]
+
+
+@pytest.mark.parametrize("command", [lobes.tooltip, lobes.lobes])
+def test_the_default_spread_is_that_of_the_physics(command):
+    assert inspect.signature(command).parameters["stiffness_spread"].default == 100.0 * STIFFNESS_SPREAD
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["tooltip", "--speed", "-5"], "--speed: found -5.0"),
+        (["tooltip", "--speed", "0"], "--speed: found 0.0"),
+        (["tooltip", "--speed", "nan"], "--speed: found nan"),
+        (["tooltip", "--stiffness-spread", "-1"], "--stiffness-spread: found -1.0, allowed is a number from 0 to 50 [%]"),
+        (["tooltip", "--stiffness-spread", "nan"], "--stiffness-spread"),
+        (["lobes", "--stiffness-spread", "51"], "--stiffness-spread"),
+    ],
+)
+def test_bad_speeds_and_spreads_are_refused(tmp_path, result_file, arguments, words):
+    command, *options = arguments
+    result = run(command, result_file, tmp_path / "T1.toml", "--out", tmp_path / "O.csv", *options, code=2)
+    assert words in result.stderr
+    assert not (tmp_path / "O.csv").exists()
