@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.doubts import doubts, notes
-from rcsa_ident.identification.final import AxisSearch, finish, ranked
+from rcsa_ident.identification.final import AxisSearch, Map, finish, ranked
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.order import GIVE_UP_SOON, Report, cut_weights, drop_modes, exchange_modes, model_error
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, parameter_names, unpack
@@ -22,7 +21,6 @@ from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.result import AxisResult, Identification, Status
 from rcsa_ident.identification.search import SearchSettings, explore
 
-Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 #: Told of axis, stage, cost, unknowns and their layout.
 Progress = Callable[[str, str, float, FloatArray, Layout], None]
 
@@ -88,7 +86,7 @@ class DefaultMethod:
             searched = [a.joined(b) for a, b in zip(searched, found, strict=True)] if searched else found
             if self.start is not None or any(s.confirmed for s in searched):
                 break
-        return _result(self, data, searched, seed, progress)
+        return _result(self, data, searched, seed, map, progress)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,10 +165,12 @@ def _from_other_axis(job: tuple[_Job, AxisSearch, AxisSearch]) -> AxisSearch:
 
 
 def _result(
-    method: DefaultMethod, data: IdentificationData, searched: list[AxisSearch], seed: int, progress: Progress | None
+    method: DefaultMethod, data: IdentificationData, searched: list[AxisSearch], seed: int, map: Map, progress: Progress | None
 ) -> Identification:
     trace = [entry for s in searched for entry in s.trace]
-    solution, misfit, chosen = finish(data.with_smooth_errors(SMOOTH_ERROR), method.priors, searched, _reporter("both", trace, progress))
+    solution, misfit, chosen = finish(
+        data.with_smooth_errors(SMOOTH_ERROR), method.priors, searched, _reporter("both", trace, progress), map
+    )
     evaluation, force = solution.evaluation, solution.layout.force
     assert evaluation.linear is not None
     covariance = WIDER**2 * np.linalg.inv(evaluation.hessian)

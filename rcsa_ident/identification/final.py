@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +16,7 @@ from rcsa_ident.identification.parameters import Layout, pack, unpack
 from rcsa_ident.identification.polish import Solution, polish
 from rcsa_ident.identification.priors import Priors
 
+Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 #: Relative range of speeds below which nothing is asked about a change with speed.
 LEAST_SPEED_RANGE = 0.05
 #: Modes per axis beyond what the evidence asks for.
@@ -67,7 +70,9 @@ def ranked(solutions: list[Solution], misfit: Misfit, trace: list[tuple[str, str
     return AxisSearch([solutions[i] for i in order], [values[i] for i in order], misfit.model_error[0], misfit.cut_weight, trace)
 
 
-def finish(data: IdentificationData, priors: Priors, searched: list[AxisSearch], report: Report) -> tuple[Solution, Misfit, Solution]:
+def finish(
+    data: IdentificationData, priors: Priors, searched: list[AxisSearch], report: Report, map: Map = map
+) -> tuple[Solution, Misfit, Solution]:
     """Return the solution of all axes together, the misfit whose minimum it is, and what the evidence alone would have chosen.
 
     Parameters
@@ -77,9 +82,10 @@ def finish(data: IdentificationData, priors: Priors, searched: list[AxisSearch],
     searched : list of AxisSearch
         One for each axis.
     report : callable
+    map : callable
+        The builtin, or a pool's.
     """
-    found, shares, weight = _together(data, priors, searched)
-    found, misfit = _settled(data, priors, found, shares, weight, report)
+    found, misfit = _settled(data, priors, _together(data, priors, searched, map), *_noise(searched), report)
     middle, half = data.speed_range
     if half > LEAST_SPEED_RANGE * middle:
         moving, other = _settled(data, priors, _start(data, found, True), misfit.model_error, misfit.cut_weight, report)
@@ -96,33 +102,42 @@ def finish(data: IdentificationData, priors: Priors, searched: list[AxisSearch],
     return *_settled(data, priors, found, misfit.model_error, misfit.cut_weight, report), chosen
 
 
-def _together(data: IdentificationData, priors: Priors, searched: list[AxisSearch]) -> tuple[Solution, tuple[float, ...], FloatArray]:
-    """Return the axes' answers polished together with one joint and one force, their model errors and the cuts' weights.
+def _together(data: IdentificationData, priors: Priors, searched: list[AxisSearch], map: Map) -> Solution:
+    """Return the axes' answers polished together with one joint and one force.
 
     Where each axis has found its own joint and its own force, what lies between them may end in another valley: from a few
     starts, until two have come to the same answer.
     """
-    summed = data.summed()
-    best = [s.solutions[0] for s in searched]
-    layout = Layout(tuple(s.layout.axes[0] for s in best), len(data.coefficient_spread))
-    shares = tuple(s.model_error for s in searched)
-    weight = np.min([s.cut_weight for s in searched], axis=0)
-    fine = Misfit(data, priors, shares, weight)
-    named = len(data.coefficient_names)
-    found: list[Solution] = []
-    for coarse, source in STARTS:
-        chosen = best if source is None else [best[source % len(best)]]
-        force = np.zeros(layout.coefficients)
-        force[:named] = np.mean([s.theta[s.layout.force][:named] for s in chosen], axis=0)
-        joint = np.mean([s.theta[s.layout.joint] for s in chosen], axis=0)
-        theta = np.concatenate([*(s.theta[s.layout.axis(0)] for s in best), joint, force])
-        rough = Misfit(summed, priors, tuple(max(f, coarse) for f in shares), weight)
-        start = polish(rough, theta, layout, best[0].evaluation.nuisance, 40, grid=32)
-        found.append(polish(fine, *_start(data, start, False), 60))
+    jobs = [(data, priors, searched, start) for start in STARTS]
+    found = list(map(_from_start, jobs[:2]))
+    for job in jobs[2:]:
         found.sort(key=lambda s: s.cost)
-        if len(found) > 1 and found[1].cost - found[0].cost < SAME_POLISH:
+        if found[1].cost - found[0].cost < SAME_POLISH:
             break
-    return found[0], shares, weight
+        found.append(_from_start(job))
+    return min(found, key=lambda s: s.cost)
+
+
+def _from_start(job: tuple[IdentificationData, Priors, list[AxisSearch], tuple[float, int | None]]) -> Solution:
+    """Polish all axes together, first roughly and with the flange's motion alone; joint and force are those of one axis or their mean."""
+    data, priors, searched, (coarse, source) = job
+    best = [s.solutions[0] for s in searched]
+    shares, weight = _noise(searched)
+    chosen = best if source is None else [best[source % len(best)]]
+    layout = Layout(tuple(s.layout.axes[0] for s in best), len(data.coefficient_spread))
+    force = np.zeros(layout.coefficients)
+    named = len(data.coefficient_names)
+    force[:named] = np.mean([s.theta[s.layout.force][:named] for s in chosen], axis=0)
+    joint = np.mean([s.theta[s.layout.joint] for s in chosen], axis=0)
+    theta = np.concatenate([*(s.theta[s.layout.axis(0)] for s in best), joint, force])
+    rough = Misfit(data.summed(), priors, tuple(max(f, coarse) for f in shares), weight)
+    start = polish(rough, theta, layout, best[0].evaluation.nuisance, 40, grid=32)
+    return polish(Misfit(data, priors, shares, weight), *_start(data, start, False), 60)
+
+
+def _noise(searched: list[AxisSearch]) -> tuple[tuple[float, ...], FloatArray]:
+    """Model error of each axis, and the cuts' weights, as the searches have learned them."""
+    return tuple(s.model_error for s in searched), np.min([s.cut_weight for s in searched], axis=0)
 
 
 def _settled(

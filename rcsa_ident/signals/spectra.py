@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import next_fast_len
-from scipy.signal import get_window
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals._kernels import order_signal, order_sums
+from rcsa_ident.signals.windows import hann
 
 #: Share of the programmed speed within which the true one is looked for.
 SPEED_SEARCH = 0.01
@@ -70,7 +70,7 @@ def refine_speed(samples: FloatArray, rate: float, nominal: float, orders: int =
         raise InputError("recording length", f"{n / rate:.4g} s", wanted)
     centred = samples - samples.mean(axis=0)
     length = next_fast_len(4 * n, real=True)
-    power = np.sum(np.abs(np.fft.rfft(centred * get_window("hann", n)[:, None], length, axis=0)) ** 2, axis=1)
+    power = np.sum(np.abs(np.fft.rfft(centred * hann(n)[:, None], length, axis=0)) ** 2, axis=1)
     step = 0.2 * rate / n / highest
     reach = np.ceil(search * nominal_hz / step)
     trial = nominal_hz + np.arange(-reach, reach + 1) * step
@@ -176,7 +176,7 @@ def segment_lines(samples: FloatArray, rate: float, omega: FloatArray, segments:
     """
     n = samples.shape[0]
     length = 2 * n // (segments + 1)
-    window = get_window("hann", length)
+    window = hann(length)
     window = 2.0 * window / window.sum()
     starts = [s * (n - length) // max(segments - 1, 1) for s in range(segments)]
     parts = []

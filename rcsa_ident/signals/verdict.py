@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import get_window
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, follow_speed, line_spectrum, refine_speed
+from rcsa_ident.signals.windows import hann
 
 #: Equal samples in a row that a live analogue channel does not produce.
 FROZEN_SAMPLES = 12
@@ -189,7 +189,7 @@ def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: 
         Where to look.
     """
     n = lines.rest.shape[0]
-    window = get_window("hann", n)
+    window = hann(n)
     amplitude = 2.0 * np.abs(np.fft.rfft(lines.rest[:, channels] * window[:, None], axis=0)) / window.sum()
     frequency = np.fft.rfftfreq(n, 1.0 / lines.rate)
     order = frequency * 2.0 * np.pi / lines.spindle_speed

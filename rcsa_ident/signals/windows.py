@@ -55,3 +55,8 @@ def _block_amplitudes(samples: FloatArray, blocks: int, step: float, teeth: int,
     side_by_side = np.ascontiguousarray(parts.transpose(1, 0, 2)).reshape(length, blocks * channels)
     power = np.abs(order_sums(side_by_side, step, highest)[teeth::teeth]) ** 2
     return np.sqrt(power.reshape(-1, blocks, channels).sum(axis=(0, 2)))
+
+
+def hann(n: int) -> FloatArray:
+    """Return the periodic Hann window, shape (n,); SciPy's takes half a second to import."""
+    return 0.5 - 0.5 * np.cos(2.0 * np.pi / n * np.arange(n))

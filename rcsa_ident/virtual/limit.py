@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.optimize
-import scipy.sparse.linalg
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
@@ -19,6 +19,8 @@ from rcsa_ident.virtual.reduction import Poles
 STEP = 5e-6
 #: Instants that are marched at once.
 _BLOCK = 16
+#: Tooth periods after which the growth is looked at, and as many more each time.
+_CHECK = 12
 #: Ratio of the depths at which the growth is looked at before a change of sign is refined.
 _SCAN = 1.12
 #: A peak of the growth (logarithm per tooth period) below zero that may reach it between the depths looked at.
@@ -201,12 +203,39 @@ class _Disturbance:
             end[:m], end[m:states] = real, imag
             return end
 
-        size = states + 2 * self.count
-        operator = scipy.sparse.linalg.LinearOperator((size, size), matvec=one_tooth, dtype=float)
-        start = np.random.default_rng(0).standard_normal(size)
-        values = scipy.sparse.linalg.eigs(operator, k=2, ncv=24, v0=start, tol=1e-7, return_eigenvectors=False)
-        largest = values[np.argmax(np.abs(values))]
+        largest = _largest_eigenvalue(one_tooth, states + 2 * self.count)
         return complex(largest.real, abs(largest.imag))
+
+
+def _largest_eigenvalue(apply: Callable[[FloatArray], FloatArray], size: int) -> complex:
+    """Arnoldi's method without restarts: what does not die within a tooth period spans far fewer dimensions than the path.
+
+    The Ritz value of largest magnitude is taken when its residual is below 1e-7 of it.
+    """
+    start = np.random.default_rng(0).standard_normal(size)
+    basis = np.empty((_CHECK + 1, size))
+    basis[0] = start / np.linalg.norm(start)
+    hessenberg = np.zeros((_CHECK + 1, _CHECK))
+    for k in range(size):
+        if k + 1 == basis.shape[0]:
+            values, vectors = np.linalg.eig(hessenberg[:k, :k])
+            best = int(np.argmax(np.abs(values)))
+            if abs(hessenberg[k, k - 1] * vectors[-1, best]) < 1e-7 * abs(values[best]):
+                return complex(values[best])
+            basis = np.concatenate([basis, np.empty((_CHECK, size))])
+            hessenberg = np.pad(hessenberg, ((0, _CHECK), (0, _CHECK)))
+        after = apply(basis[k])
+        # Gram-Schmidt, twice against rounding
+        for _ in range(2):
+            parts = basis[: k + 1] @ after
+            after = after - parts @ basis[: k + 1]
+            hessenberg[: k + 1, k] += parts
+        hessenberg[k + 1, k] = np.linalg.norm(after)
+        if hessenberg[k + 1, k] < 1e-14 * np.linalg.norm(hessenberg[: k + 1, k]):
+            break
+        basis[k + 1] = after / hessenberg[k + 1, k]
+    values = np.linalg.eigvals(hessenberg[: k + 1, : k + 1])
+    return complex(values[np.argmax(np.abs(values))])
 
 
 def directional_matrices(cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, count: int) -> FloatArray:
