@@ -1,6 +1,6 @@
 """``python -m benchmarks [--json] [claim ...]``: run the claims and print {claim, ours, peer, ratio, unit, accuracy}.
 
-``python -m benchmarks study --help`` and ``search_trace --help`` tell of the studies, which have options of their own.
+``python -m benchmarks study --help``, ``search_trace --help`` and ``lobes_truth --help`` tell of the studies, which have options of their own.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 #: Each is a module with ``run() -> list of rows``.
 CLAIMS = ("candidate", "lobes", "published_modes", "bad_input")
 #: Each is a module with ``main(arguments)``.
-STUDIES = ("study", "search_trace")
+STUDIES = ("study", "search_trace", "lobes_truth")
 
 
 def main() -> None:
