@@ -1,6 +1,6 @@
 """``python -m benchmarks [--json] [claim ...]``: run the claims and print {claim, ours, peer, ratio, unit, accuracy}.
 
-``python -m benchmarks study --help``, ``search_trace --help`` and ``lobes_truth --help`` tell of the studies, which have options of their own.
+``study --help``, ``search_trace --help`` and ``lobes_truth --help`` tell of the studies, which have options of their own.
 """
 
 from __future__ import annotations
