@@ -28,6 +28,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.errors import InputError
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.default import DefaultMethod
 from rcsa_ident.identification.misfit import Misfit
@@ -224,7 +225,11 @@ def perform(scratch: Path, machine: str, method: str, seed: int, seconds: float)
     yardstick = Yardstick(data, machine_of(scratch, machine), truth_folder(folder))
     points = []
     for took, cost, found in SEARCHES[method](data, seed, seconds).points:
-        found = found if isinstance(found[0], ModalModel) else machine_at(*found)
+        try:
+            found = found if isinstance(found[0], ModalModel) else machine_at(*found)
+        except InputError:
+            # early candidates may have a mode so damped that rounding leaves it no frequency: nothing to measure yet
+            continue
         points.append([float(f"{value:.4g}") for value in (took, cost, *yardstick.measure(*found))])
     return {"machine": machine, "method": method, "seed": seed, "points": points}
 
