@@ -1,7 +1,8 @@
 """Virtual machines drawn by chance: spindle, bearings, housing, joint, toolings, workpiece and damping all differ.
 
-The seeds of the study, `EVALUATION` and `DEVELOPMENT`, and the distributions below were fixed before the identification was tuned
-on any of these machines; the evaluation machines are for the final figures only. What the sensors add is that of
+The seeds of the study, `EVALUATION` and `DEVELOPMENT`, were fixed before the identification was tuned on any of these machines; the
+evaluation machines are for the final figures only. The distributions were settled after a look at all true receptances and at a first
+identification of the development machines: docs/study.md says what changed then. What the sensors add is that of
 ``data/machines/hpm.toml``.
 """
 
