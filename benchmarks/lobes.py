@@ -12,6 +12,7 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.directional import mean_directional_matrix
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
@@ -35,7 +36,7 @@ def run() -> list[dict[str, Any]]:
     tip = uncoupled_planes(response.coupled[Dof.X], response.coupled[Dof.Y])
 
     def ours() -> np.ndarray:
-        return stability_lobes(tip, tooling.cutter, coefficients, engagement, 0.0, speeds, 1.0).limit_depth
+        return stability_lobes(tip, MillingProcess(tooling.cutter, coefficients, engagement), speeds, 1.0).limit_depth
 
     alpha = mean_directional_matrix(tooling.cutter.teeth, engagement, coefficients)
 
@@ -58,7 +59,7 @@ def run() -> list[dict[str, Any]]:
         fresh = read_tooling(TOOLING)
         answer = tooltip(machine, fresh.assembly, omega, bands=False)
         both = uncoupled_planes(answer.coupled[Dof.X], answer.coupled[Dof.Y])
-        return stability_lobes(both, fresh.cutter, coefficients, engagement, 0.0, speeds, 1.0).limit_depth
+        return stability_lobes(both, MillingProcess(fresh.cutter, coefficients, engagement), speeds, 1.0).limit_depth
 
     rows.append(row("tooling file -> tooltip FRF (4000 frequencies) -> zero-order lobes", best_of(chain) * 1e3, None, "ms", "no peer"))
     return rows

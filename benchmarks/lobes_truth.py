@@ -26,6 +26,7 @@ from benchmarks.page import append_row, read_rows
 from benchmarks.study import Run, machine_of, perform
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.conditions import CuttingConditions
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
@@ -144,7 +145,7 @@ class Found:
 def asked(truth: Truth, speed: float, method: StabilityMethod) -> LobeConditions:
     """Return the question for one speed."""
     plan, known = truth.setup.plan, truth.setup.workpiece.coefficients
-    return LobeConditions(truth.tooling.cutter, known, plan.engagement, plan.feed_angle, np.array([speed]), DEEPEST, method)
+    return LobeConditions(MillingProcess(truth.tooling.cutter, known, plan.engagement, plan.feed_angle), np.array([speed]), DEEPEST, method)
 
 
 def compare(truth: Truth, found: Found, rng: np.random.Generator, cuts: int) -> dict[str, Any]:

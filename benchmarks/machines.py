@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.machines import MachineFile, read_machine
 from rcsa_ident.io.setups import read_tooling
@@ -122,7 +123,7 @@ def least_limit(machine: MachineFile) -> float:
         tip = measured_tip({axis: (true.frequency_hz, true.tip[:, i]) for i, axis in enumerate((Dof.X, Dof.Y))})
         speeds = np.linspace(0.99 * min(plan.spindle_speeds), 1.01 * max(plan.spindle_speeds), 2000)
         coefficients = machine.workpiece.coefficients
-        lobes = stability_lobes(tip, tooling.cutter, coefficients, plan.engagement, plan.feed_angle, speeds, 1.0)
+        lobes = stability_lobes(tip, MillingProcess(tooling.cutter, coefficients, plan.engagement, plan.feed_angle), speeds, 1.0)
         least = min(least, float(lobes.limit_depth.min()))
     return least
 

@@ -112,6 +112,7 @@ def _page(
     import numpy as np
 
     from rcsa_ident.cutting.conditions import Engagement
+    from rcsa_ident.cutting.process import MillingProcess
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.posterior import MachineAxis
     from rcsa_ident.machine.spindle import Spindle
@@ -125,7 +126,7 @@ def _page(
     response = tip_response(machine, tooling.assembly, frequency, bands=True)
     speeds = np.arange(SPEEDS[0], SPEEDS[1] + 0.5 * SPEEDS[2], SPEEDS[2]) * (np.pi / 30.0)
     coefficients = campaign.workpiece.coefficients
-    conditions = LobeConditions(tooling.cutter, coefficients, Engagement.from_immersion(0.5, "down"), 0.0, speeds, MAX_DEPTH)
+    conditions = LobeConditions(MillingProcess(tooling.cutter, coefficients, Engagement.from_immersion(0.5, "down")), speeds, MAX_DEPTH)
     over_speed = MachineOverSpeed(machine)
     if over_speed.speed_range is None:
         lobes, spread = tooling_lobes(response, conditions), lobe_bands(response, conditions)

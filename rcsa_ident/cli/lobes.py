@@ -138,6 +138,7 @@ def lobes(
     """Compute stability lobes of a tooling: on an identified machine, from a modal model or from tap tests."""
     import numpy as np
 
+    from rcsa_ident.cutting.process import MillingProcess
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.workflows.lobes import LobeConditions, best_speeds
 
@@ -153,10 +154,12 @@ def lobes(
     tooling = read_tooling(files[-1])
     result = None if own_tip else read_machine_over_speed(files[0])
     conditions = LobeConditions(
-        tooling.cutter,
-        coefficients(ktc_mpa, krc, None if result is None else (result[1], str(files[0]))),
-        engagement(immersion, strategy, entry_deg, exit_deg),
-        feed_angle(feed_direction),
+        MillingProcess(
+            tooling.cutter,
+            coefficients(ktc_mpa, krc, None if result is None else (result[1], str(files[0]))),
+            engagement(immersion, strategy, entry_deg, exit_deg),
+            feed_angle(feed_direction),
+        ),
         inclusive(speed_from, speed_to, speed_step, ("--speed-from", "--speed-to", "--speed-step"), "rev/min") * (np.pi / 30.0),
         max_depth_mm * 1e-3,
     )

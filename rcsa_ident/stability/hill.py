@@ -8,9 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability._kernels import receptance_at
@@ -67,10 +65,7 @@ class TipMotion:
 class PeriodicTeeth:
     """The directional coefficients' harmonics of tooth passing."""
 
-    cutter: Cutter
-    coefficients: CuttingCoefficients
-    engagement: Engagement
-    feed_angle: float
+    process: MillingProcess
     harmonics: int | None
 
     def lines(self, count: int, depth: float) -> ComplexArray:
@@ -80,19 +75,19 @@ class PeriodicTeeth:
         """
         r = np.arange(-count, count + 1)
         kept = np.abs(r) <= (count if self.harmonics is None else self.harmonics)
-        order = self.cutter.teeth * r
+        order = self.process.cutter.teeth * r
         q = np.array([-2, 0, 2])
-        kr = self.coefficients.radial_ratio
+        kr = self.process.coefficients.radial_ratio
         sc, ss, cc = np.array([0.25j, 0, -0.25j]), np.array([-0.25, 0.5, -0.25]), np.array([0.25, 0.5, 0.25])
         form = np.array([[-sc - kr * ss, -cc - kr * sc], [ss - kr * sc, sc - kr * cc]])
         # the integral of e^{i (q - m) phi} over the immersion
-        start, end = self.engagement.entry, self.engagement.exit
+        start, end = self.process.engagement.entry, self.process.engagement.exit
         n, half = q - order[:, None], 0.5 * (end - start)
         window = 2.0 * half * np.exp(0.5j * n * (start + end)) * np.sinc(n * half / np.pi)
-        lines = self.cutter.teeth / (2.0 * np.pi) * np.einsum("rq,ijq->rij", window, form)
-        lag = order * depth * np.tan(self.cutter.helix) / self.cutter.diameter
+        lines = self.process.cutter.teeth / (2.0 * np.pi) * np.einsum("rq,ijq->rij", window, form)
+        lag = order * depth * np.tan(self.process.cutter.helix) / self.process.cutter.diameter
         lines *= (kept * np.exp(-1j * lag) * np.sinc(lag / np.pi))[:, None, None]
-        c, s = np.cos(self.feed_angle), np.sin(self.feed_angle)
+        c, s = np.cos(self.process.feed_angle), np.sin(self.process.feed_angle)
         rotation = np.array([[c, -s], [s, c]])
         return rotation @ lines @ rotation.T
 
@@ -114,7 +109,7 @@ class Hill:
         self.every = np.arange(-count, count)
         self.nodes, size = self._nodes(self.every)
         # the largest eigenvalue that a harmonic may have by itself
-        self.strength = 2.0 * teeth.coefficients.tangential * float(np.linalg.norm(teeth.lines(0, 0.0)[0], 2)) * size
+        self.strength = 2.0 * teeth.process.coefficients.tangential * float(np.linalg.norm(teeth.lines(0, 0.0)[0], 2)) * size
         self.heard = self._stronger(_SILENT * self.strength.max())
         self.loud = self._stronger(_LOUD * self.strength.max())
 
@@ -124,7 +119,7 @@ class Hill:
         It is looked for with the loud harmonics and the helix of a depth that is guessed, and refined with all harmonics
         and its own helix; where the guess was far off, it is looked for again.
         """
-        slope = self.teeth.cutter.teeth * np.tan(self.teeth.cutter.helix) / self.teeth.cutter.diameter
+        slope = self.teeth.process.cutter.teeth * np.tan(self.teeth.process.cutter.helix) / self.teeth.process.cutter.diameter
         found: list[Limit] = []
         looked, best, lost = 0.0, None, None
         for _ in range(_LOOKS):
@@ -163,7 +158,7 @@ class Hill:
         lines = self.teeth.lines(h - 1, depth)
         toeplitz = lines[offset[:, None] - offset + h - 1]
         tip = self.tip.at(omega[:, None] + self.passing * offset)
-        tip *= (self.teeth.coefficients.tangential * (1.0 - np.exp(-2j * np.pi * omega / self.passing)))[:, None, None, None]
+        tip *= (self.teeth.process.coefficients.tangential * (1.0 - np.exp(-2j * np.pi * omega / self.passing)))[:, None, None, None]
         wide = toeplitz.transpose(1, 0, 2, 3).reshape(h, 2 * h, 2) @ tip
         return wide.transpose(0, 2, 1, 3).reshape(omega.size, 2 * h, 2 * h)
 
@@ -232,7 +227,7 @@ class Hill:
             back = scipy.linalg.lu_solve(factors, target, trans=2, check_finite=False)
             x, y, g = forth[:-1], back[:-1], forth[-1]
             by_depth = matrix
-            if self.teeth.cutter.helix > 0.0:
+            if self.teeth.process.cutter.helix > 0.0:
                 deeper = self.matrices(self.heard, np.array([place]), a + step_a)[0]
                 by_depth = matrix + a / step_a * (deeper - matrix)
             g_w = -np.vdot(y, a / step_w * (shifted - matrix) @ x)

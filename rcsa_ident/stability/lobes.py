@@ -7,9 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
@@ -22,26 +20,14 @@ _ZERO_ORDER = ZeroOrder()
 class StabilityMethod(Protocol):
     """A published way to the stability limit."""
 
-    def lobes(
-        self,
-        receptance: Receptance,
-        cutter: Cutter,
-        coefficients: CuttingCoefficients,
-        engagement: Engagement,
-        feed_angle: float,
-        speeds: FloatArray,
-        max_depth: float,
-    ) -> StabilityLobes:
+    def lobes(self, receptance: Receptance, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed; the arguments have been checked."""
         ...
 
 
 def stability_lobes(
     receptance: Receptance,
-    cutter: Cutter,
-    coefficients: CuttingCoefficients,
-    engagement: Engagement,
-    feed_angle: float,
+    process: MillingProcess,
     speeds: FloatArray,
     max_depth: float,
     method: StabilityMethod = _ZERO_ORDER,
@@ -53,11 +39,7 @@ def stability_lobes(
     receptance : Receptance
         Between ``tip.x`` and ``tip.y`` (machine axes) with their cross terms; `uncoupled_planes` makes one from two
         bending planes. Further coordinates are left aside.
-    cutter : Cutter
-    coefficients : CuttingCoefficients
-    engagement : Engagement
-    feed_angle : float [rad]
-        From +X towards +Y.
+    process : MillingProcess
     speeds : array, shape (n,) [rad/s]
         In any order.
     max_depth : float [m]
@@ -67,14 +49,12 @@ def stability_lobes(
     Raises
     ------
     InputError
-        If the tip's coordinates are missing, or a speed, angle or depth is not usable.
+        If the tip's coordinates are missing, or a speed or the depth is not usable.
     """
     speeds = np.atleast_1d(np.asarray(speeds, dtype=float))
     if speeds.ndim != 1 or speeds.size == 0 or not np.all(np.isfinite(speeds) & (speeds > 0.0)):
         raise InputError("speeds", speeds.tolist(), "one or more finite spindle speeds above 0 [rad/s]")
-    if not np.isfinite(feed_angle):
-        raise InputError("feed_angle", feed_angle, "a finite angle [rad]")
-    return method.lobes(receptance, cutter, coefficients, engagement, float(feed_angle), speeds, positive("max_depth", max_depth, "m"))
+    return method.lobes(receptance, process, speeds, positive("max_depth", max_depth, "m"))
 
 
 def uncoupled_planes(x: Receptance | None, y: Receptance | None) -> Receptance:

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.hill import Hill, PeriodicTeeth, TipMotion
@@ -46,21 +44,15 @@ class MultiFrequency:
         if self.harmonics is not None and not 0 <= self.harmonics <= 200:
             raise InputError("harmonics", self.harmonics, "None, or a whole number from 0 to 200")
 
-    def lobes(
-        self,
-        receptance: Receptance,
-        cutter: Cutter,
-        coefficients: CuttingCoefficients,
-        engagement: Engagement,
-        feed_angle: float,
-        speeds: FloatArray,
-        max_depth: float,
-    ) -> StabilityLobes:
+    def lobes(self, receptance: Receptance, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""
+        cutter = process.cutter
+        if process.speed_variation is not None:
+            raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
         if np.ptp(cutter.pitch) > 1e-9:
-            raise InputError("pitch", np.degrees(cutter.pitch).tolist(), "equal pitch: the zero-order method takes any")
+            raise InputError("pitch", np.degrees(cutter.pitch).tolist(), "equal pitch: zero-order and full-discretisation take any")
         tip = TipMotion.of(receptance)
-        teeth = PeriodicTeeth(cutter, coefficients, engagement, feed_angle, self.harmonics)
+        teeth = PeriodicTeeth(process, self.harmonics)
         limit = np.full(speeds.size, np.inf)
         chatter = np.full(speeds.size, np.nan)
         lobe = np.full(speeds.size, -1, dtype=np.intp)

@@ -7,10 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.directional import mean_directional_matrix
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability._kernels import envelope, largest_real_part, pitch_envelope
@@ -31,18 +29,12 @@ class ZeroOrder:
     speeds times frequencies.
     """
 
-    def lobes(
-        self,
-        receptance: Receptance,
-        cutter: Cutter,
-        coefficients: CuttingCoefficients,
-        engagement: Engagement,
-        feed_angle: float,
-        speeds: FloatArray,
-        max_depth: float,
-    ) -> StabilityLobes:
+    def lobes(self, receptance: Receptance, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the lower envelope of all lobes in the range of `speeds`."""
-        alpha = mean_directional_matrix(cutter.teeth, engagement, coefficients, feed_angle)
+        if process.speed_variation is not None:
+            raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
+        cutter, coefficients = process.cutter, process.coefficients
+        alpha = mean_directional_matrix(cutter.teeth, process.engagement, coefficients, process.feed_angle)
         omega, trace, determinant = _characteristic(receptance, alpha)
         order = np.argsort(speeds, kind="stable")
         ascending = np.ascontiguousarray(speeds[order])
@@ -68,7 +60,7 @@ class ZeroOrder:
             absolute_limit=1.0 / (2.0 * coefficients.tangential * strongest) if exists else float("inf"),
             absolute_frequency=place if exists else float("nan"),
             method="zero-order",
-            warnings=tuple(_doubts(cutter, engagement, receptance, place if exists else None)),
+            warnings=tuple(_doubts(process, receptance, place if exists else None)),
         )
 
 
@@ -87,7 +79,8 @@ def _characteristic(receptance: Receptance, alpha: FloatArray) -> tuple[FloatArr
     return np.ascontiguousarray(omega[kept]), np.ascontiguousarray(trace[kept]), np.ascontiguousarray(determinant[kept])
 
 
-def _doubts(cutter: Cutter, engagement: Engagement, receptance: Receptance, critical: float | None) -> list[str]:
+def _doubts(process: MillingProcess, receptance: Receptance, critical: float | None) -> list[str]:
+    cutter, engagement = process.cutter, process.engagement
     doubts = []
     in_cut = cutter.teeth * (engagement.exit - engagement.entry) / (2.0 * np.pi)
     if in_cut < FEWEST_TEETH_IN_CUT - 1e-9:
@@ -98,6 +91,8 @@ def _doubts(cutter: Cutter, engagement: Engagement, receptance: Receptance, crit
         )
     if np.ptp(cutter.runout) > 0.0:
         doubts.append("run-out is left out: the limit is that of equal teeth")
+    if process.damping is not None:
+        doubts.append("process damping is left out: the limit is too low at low speeds")
     if critical is not None:
         doubts += _band_doubts(receptance, critical)
     return doubts

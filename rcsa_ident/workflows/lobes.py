@@ -8,9 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import Receptance
@@ -33,28 +31,20 @@ class LobeConditions:
 
     Parameters
     ----------
-    cutter : Cutter
-    coefficients : CuttingCoefficients
-    engagement : Engagement
-    feed_angle : float [rad]
+    process : MillingProcess
     speeds : array, shape (n,) [rad/s]
     max_depth : float [m]
     method : StabilityMethod
     """
 
-    cutter: Cutter
-    coefficients: CuttingCoefficients
-    engagement: Engagement
-    feed_angle: float
+    process: MillingProcess
     speeds: FloatArray
     max_depth: float
     method: StabilityMethod = field(default_factory=ZeroOrder)
 
     def lobes(self, tip: Receptance) -> StabilityLobes:
         """Return the lobes for the tip's 2 x 2 receptance."""
-        return stability_lobes(
-            tip, self.cutter, self.coefficients, self.engagement, self.feed_angle, self.speeds, self.max_depth, self.method
-        )
+        return stability_lobes(tip, self.process, self.speeds, self.max_depth, self.method)
 
 
 def tooling_lobes(response: TooltipResponse, conditions: LobeConditions) -> StabilityLobes:

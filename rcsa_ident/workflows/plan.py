@@ -12,6 +12,7 @@ from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.force import force_and_slope
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.identification.data import prepare
@@ -289,10 +290,7 @@ def _candidates(
         if not seen.size:
             continue
         conditions = LobeConditions(
-            tooling.cutter,
-            coefficients,
-            allowed.engagement,
-            allowed.feed_angle,
+            MillingProcess(tooling.cutter, coefficients, allowed.engagement, allowed.feed_angle),
             np.outer(around, seen).ravel(),
             2.0 * allowed.margin * max(allowed.depths),
             allowed.method,

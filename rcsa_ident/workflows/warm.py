@@ -11,6 +11,7 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_and_slope
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
@@ -89,7 +90,7 @@ def _lobes() -> None:
     tip = modal_tip({Dof.X: normal_modes(np.array([5000.0]), np.array([0.05]), np.ones((1, 1)), (Coordinate("tip", Dof.X),))})
     speeds = np.linspace(800.0, 1000.0, 3)
     for cutter in (_CUTTER, Cutter(2, 0.012, 0.0, np.array([3.0, 2.0 * np.pi - 3.0]))):
-        LobeConditions(cutter, _COEFFICIENTS, _CONDITIONS.engagement, 0.0, speeds, 0.01).lobes(tip)
+        LobeConditions(MillingProcess(cutter, _COEFFICIENTS, _CONDITIONS.engagement), speeds, 0.01).lobes(tip)
 
 
 def _virtual_machine() -> None:

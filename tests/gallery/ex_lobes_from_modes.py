@@ -10,6 +10,7 @@ import numpy as np
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.stability.lobes import stability_lobes, uncoupled_planes
@@ -25,10 +26,7 @@ def direction(axis: str):  # type: ignore[no-untyped-def]
 
 LOBES = stability_lobes(
     uncoupled_planes(direction("x"), direction("y")),
-    Cutter(teeth=2, diameter=0.01),
-    CuttingCoefficients(6e8, 1.0 / 3.0),
-    Engagement.from_immersion(1.0, "up"),
-    feed_angle=0.0,
+    MillingProcess(Cutter(teeth=2, diameter=0.01), CuttingCoefficients(6e8, 1.0 / 3.0), Engagement.from_immersion(1.0, "up")),
     speeds=np.arange(5000.0, 25001.0, 50.0) * np.pi / 30.0,
     max_depth=5e-3,
 )

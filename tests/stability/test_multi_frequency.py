@@ -12,6 +12,7 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.directional import mean_directional_matrix
+from rcsa_ident.cutting.process import MillingProcess, SpeedVariation
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
@@ -58,7 +59,9 @@ def tip(modes, top=6000.0, step=2.0, turn=0.0):
 
 
 def lobes(modes, cutter, engagement, rpm, coefficients=COEFFICIENTS, feed_angle=0.0, method=MULTI, max_depth=30e-3, **band):
-    return stability_lobes(tip(modes, **band), cutter, coefficients, engagement, feed_angle, np.asarray(rpm) * RPM, max_depth, method)
+    return stability_lobes(
+        tip(modes, **band), MillingProcess(cutter, coefficients, engagement, feed_angle), np.asarray(rpm) * RPM, max_depth, method
+    )
 
 
 def multiplier(modes, cutter, engagement, rpm, depth, coefficients=COEFFICIENTS, intervals=200, slices=20):
@@ -144,7 +147,7 @@ def test_slow_twin(modes, cutter, engagement, rpm):
 def test_low_immersion_has_flip_lobes_that_zero_order_does_not_see():
     engagement, cutter = Engagement.from_immersion(0.05, "down"), Cutter(2, 0.012)
     found = lobes(ONE, cutter, engagement, [18000.0])
-    zero = stability_lobes(tip(ONE), cutter, COEFFICIENTS, engagement, 0.0, np.array([18000.0]) * RPM, 30e-3)
+    zero = stability_lobes(tip(ONE), MillingProcess(cutter, COEFFICIENTS, engagement), np.array([18000.0]) * RPM, 30e-3)
     assert found.limit_depth[0] < 0.3 * zero.limit_depth[0]
     assert found.chatter_frequency[0] == pytest.approx(1.5 * 2.0 * 18000.0 * RPM)
     assert any("low radial immersion" in w for w in zero.warnings)
@@ -157,7 +160,7 @@ def test_no_harmonics_is_zero_order(engagement, helix):
     rpm = np.linspace(4000.0, 20000.0, 12)
     cutter = Cutter(3, 0.012, helix)
     one = lobes(SKEWED, cutter, engagement, rpm, feed_angle=0.7, method=MultiFrequency(harmonics=0), turn=0.4)
-    two = stability_lobes(tip(SKEWED, turn=0.4), cutter, COEFFICIENTS, engagement, 0.7, rpm * RPM, 30e-3)
+    two = stability_lobes(tip(SKEWED, turn=0.4), MillingProcess(cutter, COEFFICIENTS, engagement, 0.7), rpm * RPM, 30e-3)
     np.testing.assert_allclose(one.limit_depth, two.limit_depth, rtol=1e-6)
     np.testing.assert_allclose(one.chatter_frequency, two.chatter_frequency, rtol=1e-6)
     np.testing.assert_array_equal(one.lobe, two.lobe)
@@ -178,14 +181,14 @@ def test_teeth_whose_coefficients_add_up_to_a_constant_need_no_harmonics():
     """Three or more equal teeth in a slot: the directional matrix does not vary, zero-order is exact."""
     rpm = np.linspace(5000.0, 20000.0, 9)
     one = lobes(SKEWED, Cutter(4, 0.012), SLOT, rpm, turn=0.3)
-    two = stability_lobes(tip(SKEWED, turn=0.3), Cutter(4, 0.012), COEFFICIENTS, SLOT, 0.0, rpm * RPM, 30e-3)
+    two = stability_lobes(tip(SKEWED, turn=0.3), MillingProcess(Cutter(4, 0.012), COEFFICIENTS, SLOT), rpm * RPM, 30e-3)
     np.testing.assert_allclose(one.limit_depth, two.limit_depth, rtol=1e-6)
 
 
 def test_a_helix_of_a_whole_pitch_leaves_the_mean():
     """Where the depth spreads each edge over a tooth pitch all harmonics of [alpha] vanish: zero-order is exact there."""
     rpm, engagement = np.array([15000.0]), Engagement.from_immersion(0.4, "down")
-    depth = stability_lobes(tip(TWO), Cutter(2, 0.012), COEFFICIENTS, engagement, 0.0, rpm * RPM, 30e-3).limit_depth[0]
+    depth = stability_lobes(tip(TWO), MillingProcess(Cutter(2, 0.012), COEFFICIENTS, engagement), rpm * RPM, 30e-3).limit_depth[0]
     helix = float(np.arctan(np.pi * 0.012 / (2.0 * depth)))
     assert lobes(TWO, Cutter(2, 0.012), engagement, rpm).limit_depth[0] != pytest.approx(depth, rel=5e-3)
     assert lobes(TWO, Cutter(2, 0.012, min(helix, 1.41)), engagement, rpm).limit_depth[0] == pytest.approx(depth, rel=2e-2)
@@ -197,7 +200,7 @@ def test_lines_of_the_directional_matrix(engagement):
     from rcsa_ident.stability.hill import PeriodicTeeth
 
     angle, depth = 0.4, 2e-3
-    straight = PeriodicTeeth(Cutter(3, 0.012), COEFFICIENTS, engagement, angle, None).lines(400, depth)
+    straight = PeriodicTeeth(MillingProcess(Cutter(3, 0.012), COEFFICIENTS, engagement, angle), None).lines(400, depth)
     np.testing.assert_allclose(straight[400], mean_directional_matrix(3, engagement, COEFFICIENTS, angle), atol=1e-14)
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, -s], [s, c]])
@@ -207,7 +210,7 @@ def test_lines_of_the_directional_matrix(engagement):
         exact = sum((turn @ naive.directional_matrix(p, COEFFICIENTS.radial_ratio) @ turn.T for p in inside), np.zeros((2, 2)))
         series = np.einsum("rij,r->ij", straight, np.exp(3j * phi * np.arange(-400, 401)))
         np.testing.assert_allclose(series, exact, atol=0.01)
-    helical = PeriodicTeeth(Cutter(3, 0.012, 0.6), COEFFICIENTS, engagement, angle, None).lines(20, depth)
+    helical = PeriodicTeeth(MillingProcess(Cutter(3, 0.012, 0.6), COEFFICIENTS, engagement, angle), None).lines(20, depth)
     lag = (np.arange(4000) + 0.5) / 4000 * 2.0 * depth * np.tan(0.6) / 0.012
     mean = np.exp(-3j * np.outer(np.arange(-20, 21), lag)).mean(axis=1)
     np.testing.assert_allclose(helical, straight[380:421] * mean[:, None, None], atol=1e-8)
@@ -260,7 +263,8 @@ def test_doubts_are_said():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"cutter": Cutter(2, 0.012, pitch=np.radians([170.0, 190.0]))}, "equal pitch"),
+        ({"process": MillingProcess(Cutter(2, 0.012, pitch=np.radians([170.0, 190.0])), COEFFICIENTS, SLOT)}, "equal pitch"),
+        ({"process": MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT, speed_variation=SpeedVariation(0.1, 0.1))}, "constant speed"),
         ({"receptance": Receptance(tip(TWO).omega[::-1], tip(TWO).values, TIP, TIP)}, "ascending"),
         ({"receptance": Receptance(tip(TWO).omega, tip(TWO).values * np.nan, TIP, TIP)}, "finite"),
         ({"receptance": Receptance(tip(TWO).omega, tip(TWO).values * 0.0, TIP, TIP)}, "flexible"),
@@ -268,9 +272,9 @@ def test_doubts_are_said():
     ],
 )
 def test_bad_input(change, words):
-    arguments = {"receptance": tip(TWO), "cutter": Cutter(2, 0.012), "coefficients": COEFFICIENTS, "engagement": SLOT}
+    arguments = {"receptance": tip(TWO), "process": MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT)}
     with pytest.raises(InputError, match=words):
-        stability_lobes(**{**arguments, **change}, feed_angle=0.0, speeds=[900.0], max_depth=1.0, method=MULTI)
+        stability_lobes(**{**arguments, **change}, speeds=[900.0], max_depth=1.0, method=MULTI)
 
 
 @pytest.mark.parametrize("harmonics", [-1, 201])

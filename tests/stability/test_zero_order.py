@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.process import MillingProcess, SpeedVariation
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
@@ -53,7 +54,7 @@ def test_published_minimum(name):
     depth, frequency = literature.ZERO_ORDER_MINIMUM[name]
     engagement = SLOT if name == "slot" else Engagement.from_immersion(0.5, "up")
     speeds = np.linspace(4000.0, 25000.0, 2000) * RPM
-    lobes = stability_lobes(tip(symmetric), Cutter(2, 0.012), COEFFICIENTS, engagement, 0.0, speeds, 1.0)
+    lobes = stability_lobes(tip(symmetric), MillingProcess(Cutter(2, 0.012), COEFFICIENTS, engagement), speeds, 1.0)
     assert lobes.absolute_limit == pytest.approx(depth, rel=2e-4)
     assert lobes.absolute_frequency == pytest.approx(2.0 * np.pi * frequency, rel=2e-5)
     assert lobes.limit_depth.min() == pytest.approx(depth, rel=1e-3)
@@ -62,7 +63,7 @@ def test_published_minimum(name):
 
 
 def test_published_slot_table():
-    lobes = stability_lobes(tip(symmetric), Cutter(2, 0.012), COEFFICIENTS, SLOT, 0.0, literature.ZERO_ORDER_SLOT_RPM * RPM, 1.0)
+    lobes = stability_lobes(tip(symmetric), MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT), literature.ZERO_ORDER_SLOT_RPM * RPM, 1.0)
     np.testing.assert_allclose(lobes.limit_depth * 1e3, literature.ZERO_ORDER_SLOT_LIMIT_MM, rtol=3e-3)
 
 
@@ -73,7 +74,7 @@ def test_slow_twin(model, engagement, pitch):
     cutter = Cutter(3, 0.012, pitch=pitch)
     alpha = naive.mean_directional_matrix(3, engagement.entry, engagement.exit, COEFFICIENTS.radial_ratio, 0.4, samples=4000)
     speeds = np.array([5300.0, 9000.0, 15700.0, 24000.0]) * RPM
-    lobes = stability_lobes(tip(model), cutter, COEFFICIENTS, engagement, 0.4, speeds, 1.0)
+    lobes = stability_lobes(tip(model), MillingProcess(cutter, COEFFICIENTS, engagement, 0.4), speeds, 1.0)
     for i, speed in enumerate(speeds):
         depth, frequency = naive.zero_order_limit(model, alpha, COEFFICIENTS.tangential, pitch, speed, BAND[::4])
         assert lobes.limit_depth[i] == pytest.approx(depth, rel=1e-3)
@@ -94,7 +95,7 @@ def test_nyquist(model):
     engagement = Engagement.from_immersion(0.6, "down")
     speeds = np.array([6000.0, 11000.0, 16000.0]) * RPM
     alpha = naive.mean_directional_matrix(3, engagement.entry, engagement.exit, COEFFICIENTS.radial_ratio, 0.0, samples=4000)
-    lobes = stability_lobes(tip(model), Cutter(3, 0.012), COEFFICIENTS, engagement, 0.0, speeds, 1.0)
+    lobes = stability_lobes(tip(model), MillingProcess(Cutter(3, 0.012), COEFFICIENTS, engagement), speeds, 1.0)
     for speed, limit in zip(speeds, lobes.limit_depth, strict=True):
         assert winding(model, alpha, 0.998 * limit, speed, 3) == 0
         assert winding(model, alpha, 1.002 * limit, speed, 3) <= -2
@@ -106,7 +107,10 @@ def test_feed_direction_does_not_matter_to_a_symmetric_structure(feed_angle, imm
     coefficients = CuttingCoefficients(6e8, ratio)
     engagement = Engagement.from_immersion(immersion, strategy)
     speeds = np.linspace(6000.0, 20000.0, 7) * RPM
-    one, two = (stability_lobes(tip(symmetric), Cutter(2, 0.012), coefficients, engagement, a, speeds, 10.0) for a in (0.0, feed_angle))
+    one, two = (
+        stability_lobes(tip(symmetric), MillingProcess(Cutter(2, 0.012), coefficients, engagement, a), speeds, 10.0)
+        for a in (0.0, feed_angle)
+    )
     np.testing.assert_allclose(one.limit_depth, two.limit_depth, rtol=1e-8)
     assert one.absolute_limit == pytest.approx(two.absolute_limit, rel=1e-8)
 
@@ -118,9 +122,9 @@ def test_machine_and_feed_turned_together(feed_angle, turn, immersion):
     rotation = np.array([[c, -s], [s, c]])
     engagement = Engagement.from_immersion(immersion, "down")
     speeds = np.linspace(6000.0, 20000.0, 7) * RPM
-    one = stability_lobes(tip(skewed), Cutter(3, 0.012), COEFFICIENTS, engagement, feed_angle, speeds, 10.0)
+    one = stability_lobes(tip(skewed), MillingProcess(Cutter(3, 0.012), COEFFICIENTS, engagement, feed_angle), speeds, 10.0)
     turned = tip(lambda w: rotation @ skewed(w) @ rotation.T)
-    two = stability_lobes(turned, Cutter(3, 0.012), COEFFICIENTS, engagement, feed_angle + turn, speeds, 10.0)
+    two = stability_lobes(turned, MillingProcess(Cutter(3, 0.012), COEFFICIENTS, engagement, feed_angle + turn), speeds, 10.0)
     np.testing.assert_allclose(one.limit_depth, two.limit_depth, rtol=1e-7)
 
 
@@ -129,7 +133,9 @@ def test_mirror_of_up_and_down(immersion):
     """Down-milling on a symmetric structure has the limits of up-milling: alpha's trace and determinant are the same."""
     speeds = np.linspace(6000.0, 20000.0, 30) * RPM
     up, down = (
-        stability_lobes(tip(symmetric), Cutter(2, 0.012), COEFFICIENTS, Engagement.from_immersion(immersion, s), 0.0, speeds, 10.0)
+        stability_lobes(
+            tip(symmetric), MillingProcess(Cutter(2, 0.012), COEFFICIENTS, Engagement.from_immersion(immersion, s)), speeds, 10.0
+        )
         for s in ("up", "down")
     )
     np.testing.assert_allclose(up.limit_depth, down.limit_depth, rtol=1e-9)
@@ -141,15 +147,15 @@ def test_interpolation_holds_a_tenth_of_a_percent():
     limits = []
     for step in (0.1, 2.0):
         band = 2.0 * np.pi * np.arange(600.3, 1400.0, step)
-        lobes = stability_lobes(tip(symmetric, band), Cutter(2, 0.012), COEFFICIENTS, SLOT, 0.0, speeds, 1.0)
+        lobes = stability_lobes(tip(symmetric, band), MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT), speeds, 1.0)
         limits.append(np.append(lobes.limit_depth, lobes.absolute_limit))
     np.testing.assert_allclose(limits[1], limits[0], rtol=1e-3)
 
 
 def test_speeds_in_any_order_and_beyond_the_depth():
     speeds = np.array([15000.0, 5000.0, 12500.0, 25000.0, 7500.0]) * RPM
-    mixed = stability_lobes(tip(symmetric), Cutter(2, 0.012), COEFFICIENTS, SLOT, 0.0, speeds, 0.13e-3)
-    ordered = stability_lobes(tip(symmetric), Cutter(2, 0.012), COEFFICIENTS, SLOT, 0.0, np.sort(speeds), 1.0)
+    mixed = stability_lobes(tip(symmetric), MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT), speeds, 0.13e-3)
+    ordered = stability_lobes(tip(symmetric), MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT), np.sort(speeds), 1.0)
     place = np.argsort(np.argsort(speeds))
     expected = np.where(ordered.limit_depth > 0.13e-3, np.inf, ordered.limit_depth)[place]
     np.testing.assert_array_equal(mixed.limit_depth, expected)
@@ -161,7 +167,7 @@ def test_speeds_in_any_order_and_beyond_the_depth():
 
 def test_lobe_numbers_count_waves():
     speeds = np.linspace(4000.0, 25000.0, 300) * RPM
-    lobes = stability_lobes(tip(symmetric), Cutter(2, 0.012), COEFFICIENTS, SLOT, 0.0, speeds, 1.0)
+    lobes = stability_lobes(tip(symmetric), MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT), speeds, 1.0)
     waves = lobes.chatter_frequency / (2.0 * speeds)
     assert np.all((lobes.lobe <= waves) & (waves < lobes.lobe + 1))
 
@@ -169,26 +175,26 @@ def test_lobe_numbers_count_waves():
 def test_one_flexible_direction():
     w = BAND
     x = Receptance(w, resonance(w, 922.0, 0.011, 0.03993)[:, None, None], TIP[:1], TIP[:1])
-    lobes = stability_lobes(uncoupled_planes(x, None), Cutter(2, 0.012), COEFFICIENTS, SLOT, 0.0, np.array([900.0]), 1.0)
+    lobes = stability_lobes(uncoupled_planes(x, None), MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT), np.array([900.0]), 1.0)
     # one real equation: a = 1 / (2 K alpha_xx Re G), at the most negative real part since alpha_xx < 0 here
     alpha_xx = naive.mean_directional_matrix(2, 0.0, np.pi, 1.0 / 3.0, 0.0, samples=2000)[0, 0]
     fine = resonance(2.0 * np.pi * np.arange(900.0, 960.0, 0.001), 922.0, 0.011, 0.03993).real
     assert lobes.absolute_limit == pytest.approx(1.0 / (2.0 * 6e8 * np.max(alpha_xx * fine)), rel=1e-4)
     assert stability_lobes(
-        uncoupled_planes(None, uncoupled_planes(x, None)), Cutter(2, 0.012), COEFFICIENTS, SLOT, 0.0, [900.0], 1.0
+        uncoupled_planes(None, uncoupled_planes(x, None)), MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT), [900.0], 1.0
     ).stable[0]
 
 
 def test_doubts_are_told():
     thin = Engagement.from_immersion(0.1, "down")
-    lobes = stability_lobes(tip(symmetric), Cutter(2, 0.012), COEFFICIENTS, thin, 0.0, [900.0], 1.0)
+    lobes = stability_lobes(tip(symmetric), MillingProcess(Cutter(2, 0.012), COEFFICIENTS, thin), [900.0], 1.0)
     assert any("low radial immersion" in w and "flip" in w for w in lobes.warnings)
     edge = tip(symmetric, BAND[: np.searchsorted(BAND, 2.0 * np.pi * 910.0)])
-    assert any("edge" in w for w in stability_lobes(edge, Cutter(2, 0.012), COEFFICIENTS, SLOT, 0.0, [900.0], 1.0).warnings)
+    assert any("edge" in w for w in stability_lobes(edge, MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT), [900.0], 1.0).warnings)
     coarse = tip(symmetric, 2.0 * np.pi * np.arange(400.0, 2000.0, 20.0))
-    assert any("coarse" in w for w in stability_lobes(coarse, Cutter(2, 0.012), COEFFICIENTS, SLOT, 0.0, [900.0], 1.0).warnings)
+    assert any("coarse" in w for w in stability_lobes(coarse, MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT), [900.0], 1.0).warnings)
     run_out = Cutter(2, 0.012, runout=np.array([0.0, 1e-5]))
-    assert any("run-out" in w for w in stability_lobes(tip(symmetric), run_out, COEFFICIENTS, SLOT, 0.0, [900.0], 1.0).warnings)
+    assert any("run-out" in w for w in stability_lobes(tip(symmetric), MillingProcess(run_out, COEFFICIENTS, SLOT), [900.0], 1.0).warnings)
 
 
 @pytest.mark.parametrize(
@@ -197,7 +203,7 @@ def test_doubts_are_told():
         ({"speeds": [0.0]}, "spindle speeds above 0"),
         ({"speeds": []}, "one or more"),
         ({"max_depth": 0.0}, "max_depth"),
-        ({"feed_angle": np.nan}, "feed_angle"),
+        ({"process": MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT, speed_variation=SpeedVariation(0.1, 0.1))}, "constant speed"),
         ({"receptance": Receptance(BAND, symmetric(BAND)[:, :1, :1], TIP[:1], TIP[:1])}, "tip.y"),
         ({"receptance": Receptance(BAND[::-1], symmetric(BAND), TIP, TIP)}, "ascending"),
         ({"receptance": Receptance(BAND, symmetric(BAND) * np.nan, TIP, TIP)}, "finite"),
@@ -206,10 +212,7 @@ def test_doubts_are_told():
 def test_bad_input(change, words):
     arguments = {
         "receptance": tip(symmetric),
-        "cutter": Cutter(2, 0.012),
-        "coefficients": COEFFICIENTS,
-        "engagement": SLOT,
-        "feed_angle": 0.0,
+        "process": MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT),
         "speeds": [900.0],
         "max_depth": 1.0,
     }
@@ -230,7 +233,7 @@ def test_a_real_face_mill():
     half = Engagement.from_immersion(0.5, "down")
     speeds = np.linspace(5000.0, 20000.0, 2000) * RPM
     coefficients = CuttingCoefficients(1319.4e6, 788.8 / 1319.4)
-    lobes = stability_lobes(uncoupled_planes(*planes), Cutter(2, 0.03175), coefficients, half, 0.0, speeds, 1.0)
+    lobes = stability_lobes(uncoupled_planes(*planes), MillingProcess(Cutter(2, 0.03175), coefficients, half), speeds, 1.0)
     assert lobes.absolute_limit == pytest.approx(1.015e-3, rel=1e-3)
     assert lobes.absolute_frequency / (2.0 * np.pi) == pytest.approx(1441.0, abs=1.0)
     assert lobes.limit_depth.min() == pytest.approx(1.015e-3, rel=2e-3)

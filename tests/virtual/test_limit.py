@@ -11,6 +11,7 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.directional import mean_directional_matrix
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
@@ -140,7 +141,7 @@ def test_frequency_domain_agrees_on_the_full_machine(dynamics, tooling, rpm, eng
     rows = [[str(c) for c in dynamics.coordinates].index(str(c)) for c in tip]
     receptance = Receptance(band, dynamics.response(band)[:, rows], tip, tip)
     speed = np.array([conditions.spindle_speed])
-    found = stability_lobes(receptance, tooling.cutter, ALUMINIUM, engagement, feed_angle, speed, 0.05, MultiFrequency())
+    found = stability_lobes(receptance, MillingProcess(tooling.cutter, ALUMINIUM, engagement, feed_angle), speed, 0.05, MultiFrequency())
     limit = found.limit_depth[0]
     true = true_limit(dynamics, tooling.cutter, conditions, ALUMINIUM, (0.4 * limit, 2.0 * limit), 2e-4)
     assert limit == pytest.approx(true.depth, rel=1.5e-3)
@@ -170,7 +171,9 @@ def test_an_island_between_the_depths_looked_at():
     band = 2.0 * np.pi * np.arange(2.0, 6000.0, 2.0)
     tip = (Coordinate.parse("tip.x"), Coordinate.parse("tip.y"))
     receptance = Receptance(band, published(1).response(band)[:, :2], tip, tip)
-    lobes = stability_lobes(receptance, cutter, STEEL, conditions.engagement, 0.0, [conditions.spindle_speed], 0.05, MultiFrequency())
+    lobes = stability_lobes(
+        receptance, MillingProcess(cutter, STEEL, conditions.engagement), [conditions.spindle_speed], 0.05, MultiFrequency()
+    )
     assert lobes.limit_depth[0] == pytest.approx(2.9343e-3, rel=1e-3)
 
 

@@ -9,6 +9,7 @@ import scipy.stats
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
@@ -95,7 +96,10 @@ def posterior_of_scale(deviation):
 
 def asked(method, speeds=(600.0, 800.0, 1100.0)):
     return LobeConditions(
-        Cutter(2, 0.012), CuttingCoefficients(9e8, 0.3), Engagement.from_immersion(0.5, "down"), 0.3, np.array(speeds), 0.1, method
+        MillingProcess(Cutter(2, 0.012), CuttingCoefficients(9e8, 0.3), Engagement.from_immersion(0.5, "down"), 0.3),
+        np.array(speeds),
+        0.1,
+        method,
     )
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.design import Volume
@@ -74,7 +75,9 @@ def test_every_cut_is_stable_by_the_lobes_and_some_that_are_not_were_there(plann
         depths = np.array([c.conditions.axial_depth for c in own])
         response = tooltip(machine_of(), tooling.assembly, omega, bands=False)
         for factor in (0.99, 1.0, 1.01):
-            lobes = tooling_lobes(response, LobeConditions(tooling.cutter, COEFFICIENTS, ALLOWED.engagement, 0.0, factor * speeds, 0.01))
+            lobes = tooling_lobes(
+                response, LobeConditions(MillingProcess(tooling.cutter, COEFFICIENTS, ALLOWED.engagement), factor * speeds, 0.01)
+            )
             assert np.all(lobes.limit_depth >= 1.499 * depths)
 
 

@@ -10,6 +10,7 @@ import pytest
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.posterior import MachineAxis
 from rcsa_ident.machine.spindle import Spindle
@@ -34,7 +35,9 @@ def assembly(tmp_path):
 
 
 def conditions(speeds):
-    return LobeConditions(Cutter(4, 0.012), CuttingCoefficients(9e8, 0.26), Engagement(0.5 * np.pi, np.pi), 0.0, np.array(speeds), 0.05)
+    return LobeConditions(
+        MillingProcess(Cutter(4, 0.012), CuttingCoefficients(9e8, 0.26), Engagement(0.5 * np.pi, np.pi)), np.array(speeds), 0.05
+    )
 
 
 def test_a_machine_that_stays_has_the_lobes_of_one_response(assembly):

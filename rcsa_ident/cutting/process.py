@@ -1,0 +1,109 @@
+"""What cuts what, and how: everything about a milling cut but its speed and its depth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.errors import InputError, non_negative, positive
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessDamping:
+    """The flank rubs on the wave that it leaves: a viscous force, the indentation model for small waves (Ahmadi & Ismail 2012).
+
+    A width b of edge that moves into the workpiece with the velocity u feels F_r = K_sp w^2 b u / (4 v), v its cutting speed, and
+    the friction mu F_r against the cut.
+
+    Parameters
+    ----------
+    indentation : float [N/m^3]
+        K_sp, force per displaced volume: 1e14 for aluminium, 4e13 for steel.
+    wear_land : float [m]
+        w, width of the flat behind the edge.
+    friction : float [-]
+        mu.
+    """
+
+    indentation: float
+    wear_land: float
+    friction: float = 0.3
+
+    def __post_init__(self) -> None:
+        positive("indentation", self.indentation, "N/m^3")
+        positive("wear_land", self.wear_land, "m")
+        if not 0.0 <= non_negative("friction", self.friction) <= 2.0:
+            raise InputError("friction", self.friction, "a coefficient from 0 to 2")
+
+    @property
+    def strength(self) -> float:
+        """K_sp w^2 / 4: viscous damping per width of edge, times the cutting speed [N/m]."""
+        return 0.25 * self.indentation * self.wear_land**2
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedVariation:
+    """A spindle whose speed swings about its mean: Omega(t) = Omega_0 (1 + amplitude sin(ratio Omega_0 t)).
+
+    Parameters
+    ----------
+    amplitude : float [-]
+        RVA, above 0 and below 0.9.
+    ratio : float [-]
+        RVF, swings per revolution.
+    """
+
+    amplitude: float
+    ratio: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.amplitude < 0.9:
+            raise InputError("amplitude", self.amplitude, "a share of the mean speed above 0 and below 0.9")
+        if not 0.001 <= self.ratio <= 10.0:
+            raise InputError("ratio", self.ratio, "swings per revolution, 0.001 to 10")
+
+
+@dataclass(frozen=True, slots=True)
+class MillingProcess:
+    """What cuts what, and how.
+
+    Parameters
+    ----------
+    cutter : Cutter
+    coefficients : CuttingCoefficients
+    engagement : Engagement
+    feed_angle : float [rad], default 0
+        Direction of the feed in the machine's X-Y plane, from +X towards +Y.
+    feed_per_tooth : float or None [m]
+        Matters to stability only with run-out: it decides which teeth cut, and what they regenerate.
+    damping : ProcessDamping or None
+    speed_variation : SpeedVariation or None
+    """
+
+    cutter: Cutter
+    coefficients: CuttingCoefficients
+    engagement: Engagement
+    feed_angle: float = 0.0
+    feed_per_tooth: float | None = None
+    damping: ProcessDamping | None = None
+    speed_variation: SpeedVariation | None = None
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.feed_angle):
+            raise InputError("feed_angle", self.feed_angle, "a finite angle [rad]")
+        if self.feed_per_tooth is not None:
+            positive("feed_per_tooth", self.feed_per_tooth, "m")
+
+    @property
+    def machine_from_feed(self) -> np.ndarray:
+        """Rotation from (feed, normal) to machine (X, Y), shape (2, 2)."""
+        c, s = np.cos(self.feed_angle), np.sin(self.feed_angle)
+        return np.array([[c, -s], [s, c]])
+
+    def conditions(self, speed: float, depth: float) -> CuttingConditions:
+        """Return the cut at a speed [rad/s] and a depth [m]; without a feed it is 0."""
+        return CuttingConditions(speed, depth, self.feed_per_tooth or 0.0, self.engagement, self.feed_angle)
