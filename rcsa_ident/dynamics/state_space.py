@@ -1,0 +1,128 @@
+"""Linear systems in state space: in continuous time or sampled, and in real modal form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.errors import InputError, positive
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StateSpace:
+    """x' = A x + B u (or x[k+1] where sampled), y = C x + D u.
+
+    Parameters
+    ----------
+    A : array, shape (n, n)
+    B : array, shape (n, i)
+    C : array, shape (o, n)
+    D : array, shape (o, i)
+    step : float [s]
+        Of the samples; 0 in continuous time.
+
+    Examples
+    --------
+    >>> lag = StateSpace([[-2.0]], [[2.0]], [[1.0]], [[0.0]])
+    >>> lag.sampled(0.1).pole.real.round(4).tolist()
+    [0.8187]
+    """
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: FloatArray
+    step: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("A", "B", "C", "D"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        n, inputs, outputs = len(self.A), self.B.shape[-1], len(self.C)
+        for name, shape in (("A", (n, n)), ("B", (n, inputs)), ("C", (outputs, n)), ("D", (outputs, inputs))):
+            if getattr(self, name).shape != shape:
+                raise InputError(f"state space {name}", getattr(self, name).shape, f"shape {shape}")
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return self.A.shape[0]
+
+    @property
+    def pole(self) -> ComplexArray:
+        """Eigenvalues of A, shape (n,) [rad/s], or [-] where sampled."""
+        return np.linalg.eigvals(self.A).astype(complex)
+
+    @property
+    def stable(self) -> bool:
+        """Whether every free motion dies out."""
+        return bool(np.all(np.abs(self.pole) < 1.0) if self.step else np.all(self.pole.real < 0.0))
+
+    def response(self, omega: FloatArray) -> ComplexArray:
+        """Return outputs per input over frequency, shape (n, o, i).
+
+        Parameters
+        ----------
+        omega : array, shape (n,) [rad/s]
+        """
+        omega = np.asarray(omega, dtype=float)
+        point = np.exp(1j * omega * self.step) if self.step else 1j * omega
+        return self.C @ np.linalg.solve(point[:, None, None] * np.eye(self.order) - self.A, self.B) + self.D
+
+    def sampled(self, step: float, hold: str = "first-order") -> StateSpace:
+        """Return the system between samples, exact for an input that is constant or linear between them.
+
+        Parameters
+        ----------
+        step : float [s]
+        hold : str
+            ``zero-order``: the input keeps its last sample. ``first-order``: it runs straight from one sample to the next; the
+            state is then x[k] less the part that the sample u[k] itself has caused, and D is not 0 even where the system's is.
+        """
+        if self.step:
+            raise InputError("step", f"{self.step:g} s", "0: a system in continuous time")
+        step = positive("step", step, "s")
+        n, inputs = self.B.shape
+        # e^{M} of the chained system u' = v / step, v' = 0 holds the integrals of both holds
+        chain = np.zeros((n + 2 * inputs,) * 2)
+        chain[:n, :n], chain[:n, n : n + inputs] = self.A * step, self.B * step
+        chain[n : n + inputs, n + inputs :] = np.eye(inputs)
+        moved = scipy.linalg.expm(chain)
+        decay, kept, ramp = moved[:n, :n], moved[:n, n : n + inputs], moved[:n, n + inputs :]
+        if hold == "zero-order":
+            return StateSpace(decay, kept, self.C, self.D, step)
+        if hold == "first-order":
+            return StateSpace(decay, decay @ ramp + kept - ramp, self.C, self.D + self.C @ ramp, step)
+        raise InputError("hold", hold, "zero-order or first-order")
+
+    def modal(self) -> StateSpace:
+        """Return the same system with A in blocks of one (real pole) or two (pair of poles) states.
+
+        Raises
+        ------
+        InputError
+            If poles coincide so closely that their states cannot be told apart.
+        """
+        values, right = np.linalg.eig(self.A)
+        keep = values.imag >= 0.0
+        values, right = values[keep], right[:, keep]
+        columns = [part for value, shape in zip(values, right.T, strict=True) for part in _real_columns(value, shape)]
+        basis = np.stack(columns, axis=1) if columns else np.zeros((0, 0))
+        if basis.shape[1] != self.order or (self.order and np.linalg.cond(basis) > 1e12):
+            raise InputError("poles", values.tolist(), "poles that differ")
+        return StateSpace(np.linalg.solve(basis, self.A @ basis), np.linalg.solve(basis, self.B), self.C @ basis, self.D, self.step)
+
+    def to_control(self) -> Any:
+        """Return the system as python-control's ``StateSpace``, for its plots, its transfer functions and its design methods."""
+        import control
+
+        return control.ss(self.A, self.B, self.C, self.D, self.step) if self.step else control.ss(self.A, self.B, self.C, self.D)
+
+
+def _real_columns(value: complex, shape: ComplexArray) -> tuple[FloatArray, ...]:
+    if value.imag == 0.0:
+        return (shape.real,)
+    return shape.real, -shape.imag
