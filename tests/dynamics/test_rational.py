@@ -92,7 +92,7 @@ def test_mirrored_poles_fit_what_a_stable_function_can():
     pole = 300.0 + 8000.0j
     values = 1.0 / (1j * OMEGA - pole) + 1.0 / (1j * OMEGA - pole.conjugate())
     fit = rational_fit(OMEGA, values, order=2)
-    assert fit.pole[0].real < 0.0
+    assert -2000.0 < fit.pole[0].real < -30.0
     assert fit.pole[0].imag == pytest.approx(8000.0, rel=0.1)
 
 
