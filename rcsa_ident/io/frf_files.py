@@ -1,0 +1,327 @@
+"""Tap-test FRFs: FRF.csv, universal files, CutPro- and MetalMAX-style text columns; all become receptances in m/N.
+
+Universal files are read by `rcsa_ident.io.uff`: a file of one's own needs no extra package.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.curves import FREQUENCY, read_frf_csv
+from rcsa_ident.io.files import MEGABYTE, read_bytes
+from rcsa_ident.io.keys import listed
+from rcsa_ident.io.uff import (
+    ACCELERATION,
+    DISPLACEMENT,
+    EXCITATION_FORCE,
+    FRF,
+    KINDS,
+    REACTION_FORCE,
+    VELOCITY,
+    UffAxis,
+    UffFunction,
+    read_uff,
+    write_uff,
+)
+
+_STANDARD_GRAVITY = 9.80665
+_INCH = 0.0254
+#: A unit: how many SI units it is, and how many times it was differentiated by time.
+MOTIONS = {
+    "m": (1.0, 0), "cm": (1e-2, 0), "mm": (1e-3, 0), "um": (1e-6, 0), "micron": (1e-6, 0), "nm": (1e-9, 0), "in": (_INCH, 0),
+    "m/s": (1.0, 1), "mm/s": (1e-3, 1), "in/s": (_INCH, 1),
+    "m/s2": (1.0, 2), "mm/s2": (1e-3, 2), "g": (_STANDARD_GRAVITY, 2), "in/s2": (_INCH, 2),
+}  # fmt: skip
+FORCES = {"n": 1.0, "kn": 1e3, "lbf": 4.4482216152605, "lb": 4.4482216152605}
+UNITS_ALLOWED = "motion over force, as m/N, um/N, mm/N, in/lbf, m/s/N, m/s^2/N, g/N"
+_KINDS = {DISPLACEMENT: 0, VELOCITY: 1, ACCELERATION: 2}
+_LARGEST = 128 * MEGABYTE
+#: Lines of names and remarks in front of the numbers of a text file.
+_MOST_HEADER = 200
+
+
+class TapTest(NamedTuple):
+    """A receptance from a file.
+
+    Parameters
+    ----------
+    frequency : array, shape (n,) [Hz]
+    values : complex array, shape (n,) [m/N]
+    response, force : str
+        Axis X or Y (Z, or empty, where the file says so).
+    record : int
+        Number in the file, from 1.
+    point : str
+        What the file calls the two places, as ``1 / 1``.
+    where : str
+        File and line.
+    """
+
+    frequency: FloatArray
+    values: ComplexArray
+    response: str
+    force: str
+    record: int
+    point: str
+    where: str
+
+
+class Source(NamedTuple):
+    """A file to take a tip's FRFs from.
+
+    Parameters
+    ----------
+    path : Path
+    pair : (str, str) or None
+        Axes of response and force; None takes what the file names.
+    record : int or None
+        Number in the file, from 1.
+    """
+
+    path: Path
+    pair: tuple[str, str] | None = None
+    record: int | None = None
+
+
+def read_tap_tests(sources: Sequence[Source], units: str | None = None) -> dict[tuple[str, str], tuple[FloatArray, ComplexArray]]:
+    """Return the tip's FRFs: frequency [Hz] and receptance [m/N] for each pair of axes (response, force).
+
+    Parameters
+    ----------
+    sources : sequence of Source
+    units : str or None
+        Of universal files and text columns, whatever they say themselves; None believes them, and takes m/N where a text says nothing.
+
+    Raises
+    ------
+    InputError
+        Names the file and the line or the record.
+    """
+    found: dict[tuple[str, str], tuple[FloatArray, ComplexArray]] = {}
+    for source in sources:
+        for pair, test in _wanted(read_frfs(source.path, units), source).items():
+            if pair in found:
+                raise InputError("tap tests", f"{pair_name(pair)} twice", "each FRF once", str(source.path))
+            found[pair] = test.frequency, test.values
+    return found
+
+
+def pair_name(pair: tuple[str, str]) -> str:
+    """Return what a user calls an FRF: X of a direct one, XY where the force acts in Y."""
+    return pair[0] if pair[0] == pair[1] else "".join(pair)
+
+
+def read_frfs(path: str | Path, units: str | None = None) -> list[TapTest]:
+    """Return all FRFs of a file as receptances, whichever of the formats it has; its content decides, not its suffix."""
+    scale = None if units is None else parse_units(units, "--frf-units")
+    head = read_bytes(path, "FRF", _LARGEST)[:20000]
+    first = next((line.strip() for line in head.splitlines() if line.strip()), b"")
+    if first == b"-1":
+        return _from_uff(path, scale)
+    if FREQUENCY.encode() in head:
+        if units is not None and scale != (1.0, 0):
+            raise InputError("--frf-units", units, "m/N or nothing for an FRF.csv", str(path))
+        return _from_csv(path)
+    return _from_columns(path, scale)
+
+
+def parse_units(text: str, field: str = "unit", where: str = "") -> tuple[float, int]:
+    """Return SI units per unit and the number of time derivatives of a motion over a force."""
+    plain = _plain(text)
+    for place in (i for i, sign in enumerate(plain) if sign == "/"):
+        motion, force = MOTIONS.get(plain[:place]), FORCES.get(plain[place + 1 :])
+        if motion is not None and force is not None:
+            return motion[0] / force, motion[1]
+    raise InputError(field, text, UNITS_ALLOWED, where)
+
+
+def _plain(text: str) -> str:
+    plain = re.sub(r"[\s()\[\]^]|\*\*", "", text).replace("²", "2").replace("µ", "u").replace("μ", "u").lower()
+    return plain.replace("s*s", "s2").replace("sec", "s").replace("inch", "in")
+
+
+def _receptance(frequency: FloatArray, values: ComplexArray, scale: tuple[float, int], where: str) -> tuple[FloatArray, ComplexArray]:
+    """Receptance of a mobility or an accelerance; at 0 Hz those say nothing of it, so the line goes."""
+    if np.any(np.diff(frequency) <= 0.0) or frequency[0] < 0.0:
+        raise InputError("frequencies", "frequencies that do not rise", "frequencies from 0 that rise [Hz]", where)
+    if not scale[1]:
+        return frequency, values * scale[0]
+    kept = frequency > 0.0
+    return frequency[kept], values[kept] * scale[0] / (2j * np.pi * frequency[kept]) ** scale[1]
+
+
+def _wanted(tests: list[TapTest], source: Source) -> dict[tuple[str, str], TapTest]:
+    path = str(source.path)
+    if source.record is not None:
+        tests = [test for test in tests if test.record == source.record]
+        if not tests:
+            raise InputError("--frf", f"record {source.record}", "the number of an FRF of the file, from 1", path)
+    named = [test for test in tests if test.response in ("X", "Y") and test.force in ("X", "Y")]
+    if source.pair is None:
+        if not named:
+            raise InputError("--frf", "a file that names no axis", "X=FILE, Y=FILE (or XY=FILE: response in X, force in Y)", path)
+        return {
+            pair: _only([t for t in named if (t.response, t.force) == pair], pair, path) for pair in {(t.response, t.force) for t in named}
+        }
+    own = [test for test in named if (test.response, test.force) == source.pair]
+    # a file that names no axes holds the one that was asked for
+    silent = [test for test in tests if not test.response and not test.force]
+    if not own and not silent:
+        known = listed([f"{t.record}: {t.response}{t.force}" for t in tests])
+        raise InputError("--frf", f"no FRF {pair_name(source.pair)}", f"axes that the file holds ({known})", path)
+    return {source.pair: _only(own or silent, source.pair, path)}
+
+
+def _only(tests: list[TapTest], pair: tuple[str, str], path: str) -> TapTest:
+    if len(tests) == 1:
+        return tests[0]
+    # a tip is hit where it is measured
+    driving = [test for test in tests if len(set(test.point.split(" / "))) == 1]
+    if len(driving) == 1:
+        return driving[0]
+    records = listed([f"{t.record} ({t.point})" for t in driving or tests])
+    name = pair_name(pair)
+    raise InputError("--frf", f"{len(tests)} FRFs {name}", f"one of them, chosen as {name}={path}#RECORD: {records}", path)
+
+
+def _from_csv(path: str | Path) -> list[TapTest]:
+    curves = read_frf_csv(path)
+    found = [
+        TapTest(curves.frequency, values, axis, axis, i, "tip / tip", str(path))
+        for i, (axis, values) in enumerate(curves.values.items(), 1)
+    ]
+    for response, force in (("X", "Y"), ("Y", "X")):
+        parts = [curves.bands.get(f"{response}{force}_{part}") for part in ("re", "im")]
+        if parts[0] is not None and parts[1] is not None:
+            values = parts[0] + 1j * parts[1]
+            if not np.all(np.isfinite(values)):
+                raise InputError(f"column {response}{force}_re", "no finite number", "finite numbers", str(path))
+            found.append(TapTest(curves.frequency, values, response, force, len(found) + 1, "tip / tip", str(path)))
+    return found
+
+
+def _from_uff(path: str | Path, scale: tuple[float, int] | None) -> list[TapTest]:
+    functions = read_uff(path)
+    found = []
+    for i, function in enumerate(functions, start=1):
+        if function.kind != FRF:
+            continue
+        if not np.iscomplexobj(function.values):
+            raise InputError("dataset 58", "an FRF of real numbers", "complex numbers (data type 5 or 6)", function.where)
+        sign = 1.0 if function.response[1] * function.reference[1] >= 0 else -1.0
+        own = scale if scale is not None else _scale_of(function)
+        frequency, values = _receptance(function.abscissa, sign * function.values, own, function.where)
+        place = f"{function.response[0]} / {function.reference[0]}"
+        found.append(TapTest(frequency, values, _axis(function.response), _axis(function.reference), i, place, function.where))
+    if not found:
+        kinds = listed(list(dict.fromkeys(KINDS.get(f.kind, f"type {f.kind}") for f in functions)))
+        raise InputError("universal file", f"functions of another kind ({kinds})", "frequency response functions (type 4)", str(path))
+    return found
+
+
+def _axis(place: tuple[int, int]) -> str:
+    direction = abs(place[1])
+    return "" if direction == 0 else "XYZ"[direction - 1] if direction <= 3 else "rotation"
+
+
+def _scale_of(function: UffFunction) -> tuple[float, int]:
+    """Unit of an FRF as its header says: by the labels, else by the data types in the file's system of units."""
+    labels = [label for label in (function.ordinate.unit, function.denominator.unit) if label]
+    # some write the whole unit beside the numerator
+    for text in ("/".join(labels), labels[0] if labels else ""):
+        try:
+            return parse_units(text)
+        except InputError:
+            continue
+    length, force = function.factors
+    order = _KINDS.get(function.ordinate.kind)
+    motion = MOTIONS.get(_plain(function.ordinate.unit)) if function.ordinate.unit else None
+    if motion is None and not function.ordinate.unit and order is not None:
+        motion = 1.0 / length, order
+    newton = FORCES.get(_plain(function.denominator.unit)) if function.denominator.unit else None
+    if newton is None and not function.denominator.unit and function.denominator.kind in (EXCITATION_FORCE, REACTION_FORCE):
+        newton = 1.0 / force
+    if motion is None or newton is None:
+        types = f"data types {function.ordinate.kind} and {function.denominator.kind}, labels {' and '.join(labels) or 'none'}"
+        raise InputError("unit of the FRF", types, f"{UNITS_ALLOWED}; say it with --frf-units", function.where)
+    return motion[0] / newton, motion[1]
+
+
+def _from_columns(path: str | Path, scale: tuple[float, int] | None) -> list[TapTest]:
+    where = str(path)
+    raw = read_bytes(path, "FRF", _LARGEST)
+    if b"\0" in raw:
+        raise InputError("FRF", "binary data", "an FRF.csv, a universal file, or text columns frequency, real, imaginary", where)
+    text = raw.decode("utf-8-sig", errors="replace")
+    lines = text.splitlines()
+    comma = "," in text and "." not in text and any(sign in text for sign in "\t;")
+    split = re.compile(r"[\s;]+" if comma else r"[\s;,]+")
+    rows: list[list[float]] = []
+    names = ""
+    for number, line in enumerate(lines, start=1):
+        cells = split.split((line.replace(",", ".") if comma else line).strip())
+        if cells == [""]:
+            continue
+        values = [_as_float(cell) for cell in cells[:3]]
+        if len(values) == 3 and None not in values:
+            rows.append([v for v in values if v is not None])
+            names += "" if len(cells) == 3 or len(rows) > 1 else " ".join(cells[3:])
+        elif rows or number > _MOST_HEADER:
+            raise InputError("FRF", line.strip() or "nothing", "three numbers: frequency [Hz], real, imaginary", f"{where} line {number}")
+        else:
+            names += f" {line.strip()}"
+    if len(rows) < 2:
+        raise InputError("FRF", f"{len(rows)} lines of numbers", "two or more of frequency [Hz], real, imaginary", where)
+    table = np.array(rows)
+    if not np.all(np.isfinite(table)):
+        raise InputError("FRF", "numbers that are not finite", "finite numbers", where)
+    frequency, values_ = _receptance(table[:, 0], table[:, 1] + 1j * table[:, 2], scale or _unit_in(names), where)
+    return [TapTest(frequency, values_, "", "", 1, "", where)]
+
+
+def _as_float(text: str) -> float | None:
+    try:
+        return None if "_" in text else float(text)
+    except ValueError:
+        return None
+
+
+def _unit_in(names: str) -> tuple[float, int]:
+    """The first unit of a motion over a force among the names of a text file, m/N without one."""
+    for word in re.split(r"[\s,;]+", names):
+        try:
+            return parse_units(word)
+        except InputError:
+            continue
+    return 1.0, 0
+
+
+def write_frfs_uff(
+    path: str | Path, frequency_hz: FloatArray, values: Mapping[tuple[str, str], ComplexArray], title: str = "", binary: bool = False
+) -> None:
+    """Write receptances [m/N] as frequency response functions of a universal file.
+
+    Parameters
+    ----------
+    values : mapping of (response, force) to complex array, shape (n,)
+        Each named by axis, and by a node in front where there are several: ``("1X", "1X")``.
+    """
+    functions = [
+        UffFunction(
+            FRF, frequency_hz, array, _place(response), _place(force), ordinate=UffAxis(DISPLACEMENT, "m"),
+            denominator=UffAxis(EXCITATION_FORCE, "N"), title=f"{title} {response} / {force}".strip(),
+        )
+        for (response, force), array in values.items()
+    ]  # fmt: skip
+    write_uff(path, functions, binary)
+
+
+def _place(name: str) -> tuple[int, int]:
+    return int(name[:-1] or 1), "XYZ".index(name[-1]) + 1

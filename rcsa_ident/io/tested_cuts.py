@@ -1,0 +1,44 @@
+"""CUTS.csv: cuts that were tried, and what was seen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.delimited import read_table
+from rcsa_ident.io.keys import listed
+from rcsa_ident.stability.tested import TestedCuts, Verdict
+
+COLUMNS = ("spindle_speed_rpm", "axial_depth_mm", "verdict")
+_RPM = np.pi / 30.0
+
+
+def read_tested_cuts(path: str | Path) -> TestedCuts:
+    """Return the cuts of a table with the columns `COLUMNS`; further columns are left aside.
+
+    Raises
+    ------
+    InputError
+        Names the file and the line.
+    """
+    table = read_table(path, "tested cuts")
+    for name in COLUMNS:
+        if table.header.count(name) != 1:
+            found = f"only {listed(table.header)}" if name not in table.header else "two columns of that name"
+            raise InputError(f"column {name}", found, f"columns {', '.join(COLUMNS)}", table.where)
+    speed, depth = table.columns(COLUMNS[:2])
+    for name, values, unit in zip(COLUMNS, (speed, depth), ("rev/min", "mm"), strict=False):
+        wrong = np.flatnonzero(~(np.isfinite(values) & (values > 0.0)))
+        if wrong.size:
+            row = int(wrong[0])
+            raise InputError(f"column {name}", f"{values[row]:g}", f"a finite number above 0 [{unit}]", table.at(row))
+    place = table.header.index(COLUMNS[2])
+    verdicts = []
+    for row, line in enumerate(table.lines):
+        text = line.split(table.delimiter)[place].strip()
+        if text.lower() not in list(Verdict):
+            raise InputError(f"column {COLUMNS[2]}", text or "nothing", f"one of {', '.join(Verdict)}", table.at(row))
+        verdicts.append(Verdict(text.lower()))
+    return TestedCuts(speed * _RPM, depth * 1e-3, tuple(verdicts))

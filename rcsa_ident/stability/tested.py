@@ -1,0 +1,103 @@
+"""Cuts that were tried, beside what the lobes said of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.errors import InputError
+
+
+class Verdict(StrEnum):
+    """What was observed at a cut."""
+
+    STABLE = "stable"
+    CHATTER = "chatter"
+    MARGINAL = "marginal"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TestedCuts:
+    """Cuts with their verdicts.
+
+    Parameters
+    ----------
+    spindle_speed : array, shape (n,) [rad/s]
+    axial_depth : array, shape (n,) [m]
+    verdict : tuple of Verdict, length n
+    """
+
+    __test__ = False  # a noun, though pytest looks for such names
+
+    spindle_speed: FloatArray
+    axial_depth: FloatArray
+    verdict: tuple[Verdict, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "spindle_speed", frozen(self.spindle_speed))
+        object.__setattr__(self, "axial_depth", frozen(self.axial_depth))
+        shape = (len(self.verdict),)
+        for name in ("spindle_speed", "axial_depth"):
+            values = getattr(self, name)
+            if values.shape != shape or not np.all(np.isfinite(values) & (values > 0.0)):
+                raise InputError(name, values.shape, f"{shape[0]} finite numbers above 0")
+
+    def seen(self, verdict: Verdict) -> NDArray[np.bool_]:
+        """True where the cut was seen so, shape (n,)."""
+        return np.array([each is verdict for each in self.verdict], dtype=bool)
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """How many cuts the limit tells right: predicted by observed.
+
+    Parameters
+    ----------
+    stable_stable, chatter_chatter : int
+        Told right; the first word is the prediction, the second what was seen.
+    stable_chatter : int
+        Chatter that nobody expected.
+    chatter_stable : int
+        Stable cuts that were not expected.
+    stable_marginal, chatter_marginal : int
+        Marginal cuts are told apart and belong to neither.
+    """
+
+    stable_stable: int
+    stable_chatter: int
+    chatter_stable: int
+    chatter_chatter: int
+    stable_marginal: int = 0
+    chatter_marginal: int = 0
+
+    @property
+    def decided(self) -> int:
+        """Cuts that were seen to be stable or to chatter."""
+        return self.stable_stable + self.stable_chatter + self.chatter_stable + self.chatter_chatter
+
+    @property
+    def share_right(self) -> float:
+        """Share of the decided cuts that were told right, NaN without any."""
+        return (self.stable_stable + self.chatter_chatter) / self.decided if self.decided else float("nan")
+
+
+def tally(cuts: TestedCuts, limit_depth: FloatArray) -> Tally:
+    """Return how many cuts lie on the side of the limit where they were seen.
+
+    Parameters
+    ----------
+    limit_depth : array, shape (n,) [m]
+        The first loss of stability at each cut's own speed; a cut at the limit or below it is predicted to be stable.
+    """
+    limit = np.asarray(limit_depth, dtype=float)
+    if limit.shape != cuts.axial_depth.shape or np.any(np.isnan(limit)):
+        raise InputError("limit_depth", limit.shape, f"a limit for each of the {cuts.axial_depth.size} cuts")
+    stable = cuts.axial_depth <= limit
+    seen = {verdict: cuts.seen(verdict) for verdict in Verdict}
+    counts = [int(np.sum(side & seen[verdict])) for verdict in (Verdict.STABLE, Verdict.CHATTER) for side in (stable, ~stable)]
+    marginal = [int(np.sum(side & seen[Verdict.MARGINAL])) for side in (stable, ~stable)]
+    return Tally(counts[0], counts[2], counts[1], counts[3], *marginal)
