@@ -9,7 +9,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 
 #: What `force_and_slope` varies, in its order.
@@ -204,7 +204,8 @@ def runout_force_lines(
     for j in range(cutter.teeth):
         moved, offset = _chip_bounds(j, feed, cutter.runout)
         tooth = np.zeros((orders.size, 2), dtype=complex)
-        for start, end, a, b in _chip_pieces(moved, offset, conditions.engagement.entry, conditions.engagement.exit):
+        for start, end, k in _chip_pieces(moved, offset, conditions.engagement):
+            a, b = moved[k], offset[k]
             window = _exponential_integral(q[None, :] - orders[:, None], start, end) / (2.0 * np.pi)
             tooth += window @ (a * per_feed + b * per_depth + edge)
         lines += np.exp(1j * orders * cutter.tooth_angle[j])[:, None] * tooth
@@ -217,8 +218,22 @@ def _chip_bounds(j: int, feed: FloatArray, runout: FloatArray) -> tuple[FloatArr
     return np.cumsum(feed[ahead]), runout[j] - runout[(ahead + 1) % feed.size]
 
 
-def _chip_pieces(moved: FloatArray, offset: FloatArray, entry: float, exit_: float) -> list[tuple[float, float, float, float]]:
-    """Angles between which the chip is one a sin(phi) + b, with a and b; only where it is positive."""
+def regenerations(cutter: Cutter, feed_per_tooth: float, engagement: Engagement) -> list[tuple[int, float, float, int]]:
+    """Return which surface each tooth cuts into, with run-out: (tooth, start angle [rad], end angle [rad], teeth back).
+
+    A tooth cuts what the tooth so many teeth back left; where it is not named it cuts nothing.
+    """
+    feed = feed_per_tooth * cutter.teeth * cutter.pitch / (2.0 * np.pi)
+    found = []
+    for j in range(cutter.teeth):
+        moved, offset = _chip_bounds(j, feed, cutter.runout)
+        found += [(j, start, end, k + 1) for start, end, k in _chip_pieces(moved, offset, engagement)]
+    return found
+
+
+def _chip_pieces(moved: FloatArray, offset: FloatArray, engagement: Engagement) -> list[tuple[float, float, int]]:
+    """Angles between which the chip is one a sin(phi) + b, with its place; only where it is positive."""
+    entry, exit_ = engagement.entry, engagement.exit
     meet = [-b / a for a, b in zip(moved, offset, strict=True) if a > 0.0]
     for i in range(moved.size):
         steeper = moved[:i] != moved[i]
@@ -231,5 +246,5 @@ def _chip_pieces(moved: FloatArray, offset: FloatArray, entry: float, exit_: flo
         chips = moved * np.sin(0.5 * (start + end)) + offset
         k = int(np.argmin(chips))
         if chips[k] > 0.0:
-            pieces.append((start, end, float(moved[k]), float(offset[k])))
+            pieces.append((start, end, k))
     return pieces

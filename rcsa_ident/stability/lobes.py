@@ -11,6 +11,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.zero_order import ZeroOrder
 
@@ -20,13 +21,13 @@ _ZERO_ORDER = ZeroOrder()
 class StabilityMethod(Protocol):
     """A published way to the stability limit."""
 
-    def lobes(self, receptance: Receptance, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
+    def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed; the arguments have been checked."""
         ...
 
 
 def stability_lobes(
-    receptance: Receptance,
+    tip: Receptance | TipModes,
     process: MillingProcess,
     speeds: FloatArray,
     max_depth: float,
@@ -36,9 +37,9 @@ def stability_lobes(
 
     Parameters
     ----------
-    receptance : Receptance
-        Between ``tip.x`` and ``tip.y`` (machine axes) with their cross terms; `uncoupled_planes` makes one from two
-        bending planes. Further coordinates are left aside.
+    tip : Receptance or TipModes
+        Between ``tip.x`` and ``tip.y`` (machine axes) with their cross terms; `uncoupled_planes` makes a receptance from two
+        bending planes. Further coordinates are left aside. Methods that march through time need modes, the others take both.
     process : MillingProcess
     speeds : array, shape (n,) [rad/s]
         In any order.
@@ -54,7 +55,7 @@ def stability_lobes(
     speeds = np.atleast_1d(np.asarray(speeds, dtype=float))
     if speeds.ndim != 1 or speeds.size == 0 or not np.all(np.isfinite(speeds) & (speeds > 0.0)):
         raise InputError("speeds", speeds.tolist(), "one or more finite spindle speeds above 0 [rad/s]")
-    return method.lobes(receptance, process, speeds, positive("max_depth", max_depth, "m"))
+    return method.lobes(tip, process, speeds, positive("max_depth", max_depth, "m"))
 
 
 def uncoupled_planes(x: Receptance | None, y: Receptance | None) -> Receptance:

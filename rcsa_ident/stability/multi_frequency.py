@@ -11,6 +11,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.hill import Hill, PeriodicTeeth, TipMotion
+from rcsa_ident.stability.modes import TipModes, receptance_of
 from rcsa_ident.stability.result import StabilityLobes
 
 #: Share of the peak that the receptance may still have at the top of its band: 15 % there changed limits by 0.1 %, 57 % by 6 %.
@@ -44,14 +45,14 @@ class MultiFrequency:
         if self.harmonics is not None and not 0 <= self.harmonics <= 200:
             raise InputError("harmonics", self.harmonics, "None, or a whole number from 0 to 200")
 
-    def lobes(self, receptance: Receptance, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
+    def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""
         cutter = process.cutter
         if process.speed_variation is not None:
             raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
         if np.ptp(cutter.pitch) > 1e-9:
             raise InputError("pitch", np.degrees(cutter.pitch).tolist(), "equal pitch: zero-order and full-discretisation take any")
-        tip = TipMotion.of(receptance)
+        motion = TipMotion.of(receptance_of(tip))
         teeth = PeriodicTeeth(process, self.harmonics)
         limit = np.full(speeds.size, np.inf)
         chatter = np.full(speeds.size, np.nan)
@@ -59,14 +60,14 @@ class MultiFrequency:
         lost = 0
         for i, speed in enumerate(speeds):
             passing = cutter.teeth * float(speed)
-            found = Hill(tip, teeth, passing).limit(max_depth)
+            found = Hill(motion, teeth, passing).limit(max_depth)
             if found is None:
                 continue
             limit[i] = found.depth
             chatter[i] = np.nan if found.chatter is None else found.chatter
             lobe[i] = -1 if found.chatter is None else int(found.chatter / passing)
             lost += found.chatter is None
-        doubts = _doubts(tip, chatter)
+        doubts = _doubts(motion, chatter)
         if np.ptp(cutter.runout) > 0.0:
             doubts.append("run-out is left out: the limit is that of equal teeth")
         if lost:

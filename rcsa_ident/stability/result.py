@@ -32,6 +32,8 @@ class StabilityLobes:
         What computed it.
     warnings : tuple of str
         Why the answer may be wrong; empty where nothing is known against it.
+    flip : array of bool, shape (n,), default all False
+        Where stability is lost by period doubling (an eigenvalue of -1 per tooth period); elsewhere the vibration is quasi-periodic.
     """
 
     spindle_speed: FloatArray
@@ -42,12 +44,15 @@ class StabilityLobes:
     absolute_frequency: float
     method: str
     warnings: tuple[str, ...] = ()
+    flip: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         for name in ("spindle_speed", "limit_depth", "chatter_frequency"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
         object.__setattr__(self, "lobe", frozen(self.lobe, np.intp))
-        for name in ("limit_depth", "chatter_frequency", "lobe"):
+        flip = np.zeros(self.spindle_speed.shape, dtype=bool) if self.flip is None else self.flip
+        object.__setattr__(self, "flip", frozen(flip, np.bool_))
+        for name in ("limit_depth", "chatter_frequency", "lobe", "flip"):
             shape = getattr(self, name).shape
             if shape != self.spindle_speed.shape:
                 raise InputError(name, shape, f"the speeds' shape, {self.spindle_speed.shape}")

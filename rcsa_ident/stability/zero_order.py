@@ -12,6 +12,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability._kernels import envelope, largest_real_part, pitch_envelope
+from rcsa_ident.stability.modes import TipModes, receptance_of
 from rcsa_ident.stability.result import StabilityLobes
 
 #: Teeth in the cut, on average, below which the mean directional matrix no longer tells the whole story.
@@ -29,11 +30,12 @@ class ZeroOrder:
     speeds times frequencies.
     """
 
-    def lobes(self, receptance: Receptance, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
+    def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the lower envelope of all lobes in the range of `speeds`."""
         if process.speed_variation is not None:
             raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
         cutter, coefficients = process.cutter, process.coefficients
+        receptance = receptance_of(tip)
         alpha = mean_directional_matrix(cutter.teeth, process.engagement, coefficients, process.feed_angle)
         omega, trace, determinant = _characteristic(receptance, alpha)
         order = np.argsort(speeds, kind="stable")

@@ -265,14 +265,14 @@ def test_doubts_are_said():
     [
         ({"process": MillingProcess(Cutter(2, 0.012, pitch=np.radians([170.0, 190.0])), COEFFICIENTS, SLOT)}, "equal pitch"),
         ({"process": MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT, speed_variation=SpeedVariation(0.1, 0.1))}, "constant speed"),
-        ({"receptance": Receptance(tip(TWO).omega[::-1], tip(TWO).values, TIP, TIP)}, "ascending"),
-        ({"receptance": Receptance(tip(TWO).omega, tip(TWO).values * np.nan, TIP, TIP)}, "finite"),
-        ({"receptance": Receptance(tip(TWO).omega, tip(TWO).values * 0.0, TIP, TIP)}, "flexible"),
-        ({"receptance": Receptance(tip(TWO).omega, tip(TWO).values[:, :1, :1], TIP[:1], TIP[:1])}, "tip.y"),
+        ({"tip": Receptance(tip(TWO).omega[::-1], tip(TWO).values, TIP, TIP)}, "ascending"),
+        ({"tip": Receptance(tip(TWO).omega, tip(TWO).values * np.nan, TIP, TIP)}, "finite"),
+        ({"tip": Receptance(tip(TWO).omega, tip(TWO).values * 0.0, TIP, TIP)}, "flexible"),
+        ({"tip": Receptance(tip(TWO).omega, tip(TWO).values[:, :1, :1], TIP[:1], TIP[:1])}, "tip.y"),
     ],
 )
 def test_bad_input(change, words):
-    arguments = {"receptance": tip(TWO), "process": MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT)}
+    arguments = {"tip": tip(TWO), "process": MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT)}
     with pytest.raises(InputError, match=words):
         stability_lobes(**{**arguments, **change}, speeds=[900.0], max_depth=1.0, method=MULTI)
 

@@ -204,14 +204,14 @@ def test_doubts_are_told():
         ({"speeds": []}, "one or more"),
         ({"max_depth": 0.0}, "max_depth"),
         ({"process": MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT, speed_variation=SpeedVariation(0.1, 0.1))}, "constant speed"),
-        ({"receptance": Receptance(BAND, symmetric(BAND)[:, :1, :1], TIP[:1], TIP[:1])}, "tip.y"),
-        ({"receptance": Receptance(BAND[::-1], symmetric(BAND), TIP, TIP)}, "ascending"),
-        ({"receptance": Receptance(BAND, symmetric(BAND) * np.nan, TIP, TIP)}, "finite"),
+        ({"tip": Receptance(BAND, symmetric(BAND)[:, :1, :1], TIP[:1], TIP[:1])}, "tip.y"),
+        ({"tip": Receptance(BAND[::-1], symmetric(BAND), TIP, TIP)}, "ascending"),
+        ({"tip": Receptance(BAND, symmetric(BAND) * np.nan, TIP, TIP)}, "finite"),
     ],
 )
 def test_bad_input(change, words):
     arguments = {
-        "receptance": tip(symmetric),
+        "tip": tip(symmetric),
         "process": MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT),
         "speeds": [900.0],
         "max_depth": 1.0,

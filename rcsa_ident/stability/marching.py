@@ -1,0 +1,136 @@
+"""Limits from multipliers: the first loss of stability at each speed, with a step that an estimate of the error chose."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.errors import InputError
+from rcsa_ident.stability.first_loss import first_loss
+from rcsa_ident.stability.period_map import Multiplier, PeriodMap
+from rcsa_ident.stability.result import StabilityLobes
+
+#: Share of the strongest mode's peak below which a mode does not decide on the length of a step.
+_WEAK = 0.02
+#: Nodes per period of the highest mode that counts, with polynomials of high degree and as many more with those of low degree;
+#: steps, where coefficients stand still.
+_NODES, _LOW_DEGREE, _STEPS = 6.0, 6.0, 24.0
+#: How much coarser the steps are for a first look.
+_COARSER = 1.6
+#: How much finer the step is by which the error is told, and how often the search is repeated with it.
+_FINER, _REPEATS = 1.6, 5
+
+
+def check_resolution(intervals: int | None, tolerance: float) -> None:
+    """Raise `InputError` where one of them is not usable."""
+    if intervals is not None and not 1 <= intervals <= 5000:
+        raise InputError("intervals", intervals, "None, or a whole number from 1 to 5000")
+    if not 1e-8 <= tolerance <= 0.1:
+        raise InputError("tolerance", tolerance, "a share from 1e-8 to 0.1")
+
+
+class Growth:
+    """Logarithm of the multiplier per tooth period over the depth, at one speed and step; remembers where it started."""
+
+    def __init__(self, cut: PeriodMap, speed: float, step: float) -> None:
+        self.cut, self.speed, self.step = cut, speed, step
+        self.start: ComplexArray | None = None
+        self.teeth = cut.period * cut.process.cutter.teeth / (2.0 * np.pi)
+
+    def __call__(self, depth: float) -> float:
+        found = self.cut.multiplier(self.speed, depth, self.step, self.start)
+        self.start = found.vector
+        return float(np.log(max(abs(found.value), 1e-300))) / self.teeth
+
+
+def longest_steps(cut: PeriodMap) -> tuple[float, float]:
+    """Lengths of steps to look for a limit and to find it [s]."""
+    strength = cut.modes.strength
+    wave = 2.0 * np.pi / float(np.max(np.abs(cut.pole)[strength >= _WEAK * strength.max()]))
+    degree = cut.table.shape[1] - 1
+    fine = wave / _STEPS if cut.frozen else degree * wave / (_NODES * (1.0 + _LOW_DEGREE / degree**2))
+    return _COARSER * fine, fine
+
+
+def surely_stable(cut: PeriodMap) -> float:
+    """A depth at which nothing can grow: the gain round the loop is below one at every frequency."""
+    c = cut.process.coefficients
+    teeth = max(1.0, np.ceil((cut.process.engagement.exit - cut.process.engagement.entry) / float(np.min(cut.process.cutter.pitch))))
+    return 0.9 / (2.0 * teeth * c.tangential * float(np.hypot(1.0, c.radial_ratio)) * cut.modes.largest)
+
+
+def marched_lobes(
+    cut: PeriodMap, speeds: FloatArray, max_depth: float, intervals: int | None, tolerance: float, method: str
+) -> StabilityLobes:
+    """Return the lobes of a cut by its multipliers: the first loss of stability at each speed, and how the tool vibrates there."""
+    limit = np.full(speeds.size, np.inf)
+    chatter = np.full(speeds.size, np.nan)
+    lobe, flip = np.full(speeds.size, -1, dtype=np.intp), np.zeros(speeds.size, dtype=bool)
+    low, lost = surely_stable(cut), 0
+    for i, speed in enumerate(speeds):
+        depth, step, good = _limit(cut, float(speed), low, max_depth, intervals, tolerance)
+        lost += not good
+        if depth is None:
+            continue
+        found = cut.multiplier(float(speed), depth, step, waves=True)
+        limit[i], chatter[i] = depth, dominant(found)
+        lobe[i] = int(chatter[i] / (speed * cut.process.cutter.teeth))
+        flip[i] = abs(np.angle(found.value)) > np.pi - 1e-3
+    doubts = [f"at {lost} of {speeds.size} speeds the limit is not converged to {100.0 * tolerance:g} %"] if lost else []
+    return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), method, tuple(doubts), flip)
+
+
+def dominant(found: Multiplier) -> float:
+    """The frequency at which the tip vibrates most [rad/s]."""
+    return float(found.omega[np.argmax(found.motion)])
+
+
+def _limit(
+    cut: PeriodMap, speed: float, low: float, max_depth: float, intervals: int | None, tolerance: float
+) -> tuple[float | None, float, bool]:
+    """The limit, the step that it was found with, and whether a finer one agrees."""
+    tooth = 2.0 * np.pi / (cut.process.cutter.teeth * speed)
+    if intervals is not None:
+        step = tooth / intervals
+        return first_loss(Growth(cut, speed, step), low, max_depth, 1e-3 * tolerance), step, True
+    # a search that is a little too deep and a little coarse, then the limit from where it ended
+    coarse, step = longest_steps(cut)
+    depth = first_loss(Growth(cut, speed, coarse), low, 1.1 * max_depth, 10.0 * tolerance)
+    if depth is None:
+        return None, step, True
+    for _ in range(_REPEATS):
+        growth = Growth(cut, speed, step)
+        found = _polished(growth, depth, tolerance)
+        if found is None:
+            # not there with the finer step: looked for again
+            depth = first_loss(growth, low, 1.1 * max_depth, tolerance)
+            if depth is None:
+                return None, step, True
+            found = depth, (growth(1.01 * depth) - growth(0.99 * depth)) / (0.02 * depth)
+        depth, slope = found
+        step /= _FINER
+        finer = Growth(cut, speed, step)
+        finer.start = growth.start
+        # what a step that is shorter by the same share again and again would add, too
+        change = finer(depth) / slope / (1.0 - _FINER**-cut.order)
+        if abs(change) < 0.5 * tolerance * depth:
+            depth -= change
+            return (depth if depth <= max_depth else None), step, True
+    return (depth if depth <= max_depth else None), step, False
+
+
+def _polished(growth: Growth, depth: float, tolerance: float) -> tuple[float, float] | None:
+    """The root next to a depth by the secant method, with the slope there; None if it leaves the neighbourhood."""
+    a, b = depth, depth * (1.0 + 0.01)
+    at_a, at_b = growth(a), growth(b)
+    for _ in range(12):
+        slope = (at_b - at_a) / (b - a)
+        if not slope > 0.0:
+            return None
+        c = b - at_b / slope
+        if not 0.7 * depth < c < 1.4 * depth:
+            return None
+        if abs(c - b) < 0.2 * tolerance * depth:
+            return c, slope
+        a, at_a, b, at_b = b, at_b, c, growth(c)
+    return None

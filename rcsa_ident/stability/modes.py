@@ -1,0 +1,143 @@
+"""The tip's motion as modes: what the methods that march through time need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.dynamics._kernels import pole_sum
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.errors import InputError
+
+#: Lines per half-power bandwidth of the least damped mode, and the most there may be.
+LINES_PER_BANDWIDTH = 10.0
+MOST_LINES = 200_000
+TIP = (Coordinate("tip", Dof.X), Coordinate("tip", Dof.Y))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TipModes:
+    """The tip's 2 x 2 receptance as sum of poles: H = sum_k outputs_k inputs_k / (i w - pole_k) + its mirror + constant.
+
+    Parameters
+    ----------
+    pole : complex array, shape (m,) [rad/s]
+        One of each conjugate pair; a real pole stands with half its residue.
+    outputs : complex array, shape (2, m)
+    inputs : complex array, shape (m, 2)
+        Machine axes X and Y.
+    constant : array, shape (2, 2) [m/N]
+        Of the modes beyond the band.
+    heights : array, shape (k,) [m], default none
+        Distances from the tip along the edge, ascending.
+    shape : array, shape (k, m) [-], default none
+        How each mode moves there, over its motion at the tip; straight lines in between, constant beyond the first and the last.
+        Such modes have real directions, and no constant stands beside them.
+    """
+
+    pole: ComplexArray
+    outputs: ComplexArray
+    inputs: ComplexArray
+    constant: FloatArray
+    heights: FloatArray | None = None
+    shape: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("pole", "outputs", "inputs"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.complex128))
+        object.__setattr__(self, "constant", frozen(self.constant))
+        m = self.pole.size
+        wanted = {"pole": (m,), "outputs": (2, m), "inputs": (m, 2), "constant": (2, 2)}
+        for name, size in wanted.items():
+            if getattr(self, name).shape != size:
+                raise InputError(name, getattr(self, name).shape, f"shape {size}")
+            if not np.all(np.isfinite(getattr(self, name))):
+                raise InputError(name, "values that are not finite", "finite values")
+        if m == 0 or not np.any(self.outputs) or not np.any(self.inputs):
+            raise InputError("tip modes", "none that moves the tip", "at least one flexible direction")
+        if not np.all(self.pole.real < 0.0):
+            raise InputError("pole", self.pole.tolist(), "damped modes: negative real parts [rad/s]")
+        if (self.heights is None) != (self.shape is None):
+            raise InputError("heights and shape", "one of them", "both, or neither")
+        if self.heights is not None and self.shape is not None:
+            object.__setattr__(self, "heights", frozen(self.heights))
+            object.__setattr__(self, "shape", frozen(self.shape))
+            if self.heights.ndim != 1 or self.heights.size == 0 or np.any(np.diff(self.heights) <= 0.0):
+                raise InputError("heights", self.heights.tolist(), "one or more distances from the tip, ascending [m]")
+            if self.shape.shape != (self.heights.size, m):
+                raise InputError("shape", self.shape.shape, f"shape {(self.heights.size, m)}: heights, modes")
+            if np.any(self.constant):
+                raise InputError("constant", "not zero", "zero beside modes that have a shape along the edge")
+
+    @classmethod
+    def of(cls, models: Mapping[Dof, ModalModel]) -> TipModes:
+        """Return the modes of planes that do not feel each other; a direction that is missing is rigid.
+
+        Parameters
+        ----------
+        models : mapping of Dof to ModalModel
+            With ``tip.x`` and ``tip.y``.
+        """
+        poles, outputs, constant = [], [], np.zeros((2, 2))
+        for axis, model in models.items():
+            place = model.coordinates.index(Coordinate("tip", axis))
+            row = int(axis is Dof.Y)
+            out = np.zeros((2, model.omega_n.size), dtype=complex)
+            out[row] = model.phi[:, place]
+            poles.append(model.pole)
+            outputs.append(out)
+            constant[row, row] = model.residual[place, place]
+        if not poles:
+            raise InputError("tip modes", "none", "at least one flexible direction")
+        both = np.concatenate(outputs, axis=1)
+        return cls(np.concatenate(poles), both, both.T, constant)
+
+    @property
+    def strength(self) -> FloatArray:
+        """Size of each mode's own peak, shape (m,) [m/N]."""
+        return np.linalg.norm(self.outputs, axis=0) * np.linalg.norm(self.inputs, axis=1) / -self.pole.real
+
+    def at(self, omega: FloatArray) -> ComplexArray:
+        """Return the 2 x 2 receptances, shape (n, 2, 2) [m/N]."""
+        residues = np.einsum("pk,kq->kpq", self.outputs, self.inputs).reshape(-1, 4)
+        values = pole_sum(frozen(omega), np.concatenate([self.pole, self.pole.conj()]), np.concatenate([residues, residues.conj()]))
+        return values.reshape(-1, 2, 2) + self.constant
+
+    def receptance(self) -> Receptance:
+        """Return the receptance at frequencies that resolve the sharpest mode, from 0.1 to 2 times the modes' own."""
+        frequency = np.abs(self.pole)
+        waves = np.abs(self.pole.imag) > 0.0
+        step = float(np.min(-2.0 * self.pole.real[waves], initial=np.inf)) / LINES_PER_BANDWIDTH
+        low, high = 0.1 * float(frequency.min()), 2.0 * float(frequency.max())
+        step = min(step, (high - low) / 100.0)
+        if (high - low) / step > MOST_LINES:
+            sharpest = float(np.min(-self.pole.real / frequency))
+            raise InputError("damping_ratio", sharpest, f"modes that {MOST_LINES} frequencies resolve")
+        omega = np.linspace(low, high, int((high - low) / step) + 2)
+        return Receptance(omega, self.at(omega), TIP, TIP)
+
+    @property
+    def largest(self) -> float:
+        """The largest gain of the receptance, from its modes' neighbourhoods [m/N]."""
+        places = np.abs(self.pole.imag)[:, None] - self.pole.real[:, None] * np.linspace(-1.5, 1.5, 13)
+        places = np.concatenate([places.ravel(), [0.0]])
+        return float(np.max(np.linalg.norm(self.at(np.maximum(places, 0.0)), 2, axis=(1, 2))))
+
+
+def modes_of(tip: Receptance | TipModes, method: str) -> TipModes:
+    """Return the modes that a method marches with."""
+    if isinstance(tip, TipModes):
+        return tip
+    raise InputError(
+        "tip", f"a receptance at {tip.omega.size} frequencies", f"modes for {method}: a rational fit of the receptance gives them"
+    )
+
+
+def receptance_of(tip: Receptance | TipModes) -> Receptance:
+    """Return the receptance that a method in the frequency domain takes."""
+    return tip.receptance() if isinstance(tip, TipModes) else tip
