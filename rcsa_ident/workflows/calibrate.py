@@ -1,0 +1,242 @@
+"""Cutting coefficients from a campaign whose recordings hold forces: mean forces over the feed, or the whole signal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.cutting.calibration import ForceCalibration, calibrate_mean_force, mean_force_matrix
+from rcsa_ident.cutting.conditions import CuttingConditions
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.signal_fit import Dynamometer, ForceRecord, SignalCalibration, calibrate_signal
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError
+from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.signals._kernels import order_sums
+from rcsa_ident.signals.recording import Quantity, Recording
+from rcsa_ident.signals.spectra import line_spectrum, refine_speed
+from rcsa_ident.signals.verdict import chatter
+from rcsa_ident.signals.windows import hann, steady_part
+
+#: Highest line of the full-signal fit [Hz]: below the resonance of most dynamometers.
+MAX_FREQUENCY = 2000.0
+#: Fewest revolutions of a usable record, and most blocks that it is divided into.
+LEAST_REVOLUTIONS, MOST_BLOCKS = 16.0, 24
+#: Largest share of lost samples; they are bridged by straight lines.
+LOST_SHARE = 1e-3
+ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredForce:
+    """What one recording says about the cutting force.
+
+    Parameters
+    ----------
+    cut_id : str
+    record : ForceRecord
+        Lines of the forces along X and Y.
+    mean : array, shape (2,) or (3,) [N]
+        Over whole revolutions, the air cut's subtracted: X, Y and along the axis where that is measured.
+    mean_std : array, like `mean` [N]
+    duration : float [s]
+        Of the steady part.
+    """
+
+    cut_id: str
+    record: ForceRecord
+    mean: FloatArray
+    mean_std: FloatArray
+    duration: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibrated:
+    """A campaign's coefficients.
+
+    Parameters
+    ----------
+    forces : ForceCalibration
+    signal : SignalCalibration or None
+        With the method of that name.
+    used : tuple of MeasuredForce
+    left_out : tuple of (cut id, reason)
+    notes : tuple of str
+    """
+
+    forces: ForceCalibration
+    signal: SignalCalibration | None
+    used: tuple[MeasuredForce, ...]
+    left_out: tuple[tuple[str, str], ...]
+    notes: tuple[str, ...]
+
+    def mean_force_model(self, measured: MeasuredForce) -> FloatArray:
+        """Return what the coefficients say of a cut's mean force, shape (3,) [N]."""
+        row = mean_force_matrix(measured.record.cutter, measured.record.conditions)
+        known = [self.forces.of(name)[0] for name in ("K_tc", "K_rc", "K_te", "K_re", "K_ac", "K_ae")]
+        return np.asarray(row @ np.array(known))
+
+
+def measure_force(
+    cut_id: str,
+    clamping: str,
+    recording: Recording,
+    air: Recording | None,
+    cutter: Cutter,
+    conditions: CuttingConditions,
+    max_frequency: float = MAX_FREQUENCY,
+) -> MeasuredForce:
+    """Return lines and mean of the force in the steady part of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        With force sensors along X and Y, and along the axis (Z) where there is one.
+    air : Recording or None
+        The same without cutting: where zero is.
+    max_frequency : float [Hz]
+
+    Raises
+    ------
+    InputError
+        A force sensor is missing, or the record has no steady part.
+    """
+    samples, sensors = _forces(recording, cut_id)
+    if np.any(np.isnan(samples)):
+        samples = _bridged(samples, cut_id)
+    rate = recording.rate
+    programmed = conditions.spindle_speed
+    least = LEAST_REVOLUTIONS * 2.0 * np.pi / programmed * rate
+    if samples.shape[0] < least:
+        raise InputError("recording", f"{samples.shape[0] / rate:.3g} s", f"at least {LEAST_REVOLUTIONS:.0f} revolutions", cut_id)
+    transverse = samples[:, :2]
+    rough = refine_speed(transverse, rate, programmed)
+    part = steady_part(transverse, rate, rough, cutter.teeth)
+    if part.stop - part.start < least:
+        raise InputError("recording", "no steady cut", f"at least {LEAST_REVOLUTIONS:.0f} revolutions of steady cutting", cut_id)
+    inside = samples[part]
+    speed = rough if part == slice(0, samples.shape[0]) else refine_speed(inside[:, :2], rate, rough)
+    spectrum = line_spectrum(inside, rate, speed, max_frequency)
+    forced = np.abs(spectrum.amplitude[cutter.teeth :: cutter.teeth, :2]).max(axis=0)
+    if chatter(spectrum, [0, 1], forced, (0.5 * cutter.teeth * speed / (2.0 * np.pi), max_frequency)) is not None:
+        power = np.sum(np.abs(np.fft.rfft(spectrum.rest[:, :2] * hann(inside.shape[0])[:, None], axis=0)) ** 2, axis=1)
+        raise InputError("recording", f"chatter at {np.argmax(power) * rate / inside.shape[0]:.0f} Hz", "a stable cut", cut_id)
+    omega = np.arange(spectrum.amplitude.shape[0]) * speed
+    undo = np.stack([1.0 / sensor.response(omega) for sensor in sensors], axis=1)
+    blocks = _block_deviations(spectrum.rest, rate, speed, omega.size) * undo[None]
+    variance = np.maximum(spectrum.variance, 1e-300) * np.abs(undo) ** 2
+    lines = spectrum.amplitude * undo
+    zero = np.zeros(samples.shape[1])
+    if air is not None:
+        still, _ = _forces(air, cut_id)
+        if still.shape[1] != samples.shape[1]:
+            raise InputError("sensors", "other forces in the air cut", "the same sensors for a cut and its air cut", cut_id)
+        zero = np.nanmean(still, axis=0)
+    lines[0] -= zero
+    record = ForceRecord(cutter, replace(conditions, spindle_speed=speed), clamping, lines[:, :2], variance[:, :2], blocks[:, :, :2])
+    return MeasuredForce(cut_id, record, lines[0].real, np.sqrt(variance[0]), inside.shape[0] / rate)
+
+
+def _forces(recording: Recording, cut_id: str) -> tuple[FloatArray, list]:
+    found = [recording.channel(Quantity.FORCE, axis) for axis in (Dof.X, Dof.Y, Dof.Z)]
+    missing = [axis.upper() for axis, f in zip((Dof.X, Dof.Y), found, strict=False) if f is None]
+    if missing:
+        raise InputError("sensors", f"no force along {' and '.join(missing)}", 'sensors with quantity = "force" for X and Y', cut_id)
+    kept = [f for f in found if f is not None]
+    return np.stack([f[1] for f in kept], axis=1), [f[0] for f in kept]
+
+
+def _bridged(samples: FloatArray, cut_id: str) -> FloatArray:
+    """Straight lines over lost samples, as long as they are few."""
+    lost = np.isnan(samples)
+    if lost.mean() > LOST_SHARE:
+        raise InputError("recording", f"{100.0 * lost.mean():.1f} % of the samples are lost", f"at most {100.0 * LOST_SHARE:g} %", cut_id)
+    time = np.arange(samples.shape[0])
+    columns = [np.interp(time, time[~gone], column[~gone]) for column, gone in zip(samples.T, lost.T, strict=True)]
+    return np.stack(columns, axis=1)
+
+
+def _block_deviations(rest: FloatArray, rate: float, speed: float, orders: int) -> FloatArray:
+    """Lines of what is left of the record in blocks of whole revolutions, phases from the record's start; shape (b, orders, c)."""
+    n, step = rest.shape[0], speed / rate
+    turns = int(n * step / (2.0 * np.pi))
+    each = max(turns // MOST_BLOCKS, 1)
+    count = turns // each
+    order = np.arange(orders)
+    blocks = []
+    for b in range(count):
+        start = round(b * each * 2.0 * np.pi / step)
+        stop = min(round((b + 1) * each * 2.0 * np.pi / step), n)
+        sums = order_sums(np.ascontiguousarray(rest[start:stop]), step, orders - 1) * (2.0 / (stop - start))
+        sums[0] *= 0.5
+        middle = start + 0.5 * (stop - start - 1)
+        blocks.append(sums * np.exp(-1j * order * step * middle)[:, None])
+    return np.array(blocks)
+
+
+def calibrate(
+    campaign: Campaign,
+    read: ReadCut,
+    signal: bool = False,
+    max_frequency: float = MAX_FREQUENCY,
+    dynamometer: Dynamometer | None = None,
+    free_helix: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Calibrated:
+    """Return the cutting coefficients of a campaign of cuts at several feeds.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        With force sensors; its workpiece's coefficients are not used.
+    read : callable
+        Given a cut, returns its recordings. A recording that cannot be used is left out with its reason.
+    signal : bool
+        Fit the whole signal; else mean forces.
+    max_frequency : float [Hz]
+        Highest line of the signal's fit.
+    dynamometer : Dynamometer, optional
+        What to find of the sensor, with the signal's fit.
+    free_helix : bool
+    """
+    used, left_out = [], []
+    for done, cut in enumerate(campaign.cuts, start=1):
+        cutter = campaign.toolings[cut.tooling].cutter
+        try:
+            used.append(measure_force(cut.id, cut.tooling, *read(cut), cutter, cut.conditions, max_frequency))
+        except InputError as error:
+            left_out.append((cut.id, str(error)))
+        if progress is not None:
+            progress(done, len(campaign.cuts))
+    if not used:
+        raise InputError("cuts", f"none of {len(campaign.cuts)} usable ({left_out[0][1]})", "recordings of the cutting force")
+    notes = [] if any(cut.air is not None for cut in campaign.cuts) else ["no air cuts: zero is taken from the sensors as it is"]
+    if not signal:
+        return Calibrated(_mean(used), None, tuple(used), tuple(left_out), tuple(notes))
+    found = calibrate_signal([m.record for m in used], dynamometer, free_helix)
+    return Calibrated(_with_axial(found, used), found, tuple(used), tuple(left_out), tuple(notes))
+
+
+def _mean(used: Sequence[MeasuredForce]) -> ForceCalibration:
+    count = min(m.mean.size for m in used)
+    return calibrate_mean_force([(m.record.cutter, m.record.conditions) for m in used], np.array([m.mean[:count] for m in used]))
+
+
+def _with_axial(found: SignalCalibration, used: Sequence[MeasuredForce]) -> ForceCalibration:
+    """The signal's coefficients, with the axial ones from the mean forces where these are measured."""
+    if min(m.mean.size for m in used) < 3:
+        return found.forces
+    mean, forces = _mean(used), found.forces
+    covariance = np.zeros((6, 6))
+    covariance[:4, :4], covariance[4:, 4:] = forces.covariance, mean.covariance[4:, 4:]
+    return replace(
+        forces,
+        names=mean.names,
+        value=np.concatenate([forces.value, mean.value[4:]]),
+        covariance=covariance,
+        half_width=np.concatenate([forces.half_width, mean.half_width[4:]]),
+        notes=(*forces.notes, "axial coefficients from mean forces"),
+    )
