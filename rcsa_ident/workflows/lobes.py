@@ -70,7 +70,7 @@ def lobe_bands(
     (array, array), shape (n,) each [m]
         Infinite where the cut is stable up to the depth that was asked for.
     """
-    limits = _drawn_limits(response, conditions, draws, seed)
+    limits = drawn_limits(response, conditions, draws, seed)
     if limits is None:
         return None
     # an infinite limit has its rank like any other, but can't be interpolated
@@ -104,12 +104,15 @@ def stability_probability(
     depths = depths[:, None] if depths.ndim == 1 else depths
     if not np.all((depths > 0.0) & (depths <= conditions.max_depth)):
         raise InputError("depths", depths.ravel().tolist(), f"above 0 and up to {conditions.max_depth:g} m")
-    limits = _drawn_limits(response, conditions, draws, seed)
+    limits = drawn_limits(response, conditions, draws, seed)
     return None if limits is None else np.mean(limits[:, None, :] > depths, axis=0)
 
 
-def _drawn_limits(response: TooltipResponse, conditions: LobeConditions, draws: int, seed: int) -> FloatArray | None:
-    """Limits of machines drawn from the posterior, shape (draws, n), or None without one."""
+def drawn_limits(response: TooltipResponse, conditions: LobeConditions, draws: int, seed: int) -> FloatArray | None:
+    """Return the limits of machines drawn from the posterior, shape (draws, n) [m], or None without one.
+
+    The same seed draws the same machines, whatever the speeds are.
+    """
     if draws < 2 or any(axis not in response.spread for axis in response.coupled):
         return None
     rng = np.random.default_rng(seed)
@@ -138,17 +141,35 @@ def best_speeds(lobes: StabilityLobes, count: int = 3) -> list[tuple[float, floa
     list of (float, float) [rad/s, m]
         Peaks of the limit; the middle of a range that is stable up to the depth that was asked for, with an infinite limit.
     """
-    order = np.argsort(lobes.spindle_speed)
-    speed, limit = lobes.spindle_speed[order], lobes.limit_depth[order]
+    return peaks(lobes.spindle_speed, lobes.limit_depth, count)
+
+
+def peaks(speed: FloatArray, level: FloatArray, count: int = 3) -> list[tuple[float, float]]:
+    """Return the speeds at which a level is highest, one for each pocket, the best first.
+
+    Parameters
+    ----------
+    speed, level : array, shape (n,)
+        In any order; an infinite level is one, too.
+    count : int
+        At most so many.
+
+    Returns
+    -------
+    list of (float, float)
+        Speed and level of the peaks; the middle of a plateau.
+    """
+    order = np.argsort(speed)
+    speed, limit = np.asarray(speed)[order], np.asarray(level)[order]
     edges = np.flatnonzero(np.concatenate([[True], limit[1:] != limit[:-1]]))
     ends = np.concatenate([edges[1:], [limit.size]]) - 1
     level = limit[edges]
     outside = np.concatenate([[-np.inf], level, [-np.inf]])
-    peaks = [k for k in range(level.size) if level[k] > outside[k] and level[k] > outside[k + 2]]
+    tops = [k for k in range(level.size) if level[k] > outside[k] and level[k] > outside[k + 2]]
     width = speed[ends] - speed[edges]
-    peaks.sort(key=lambda k: (-level[k], -width[k]))
+    tops.sort(key=lambda k: (-level[k], -width[k]))
     chosen: list[int] = []
-    for k in peaks:
+    for k in tops:
         # an infinite limit and its neighbour are pockets of their own: something finite lies between them
         if all(np.min(level[min(k, c) : max(k, c) + 1]) < POCKET * level[k] for c in chosen):
             chosen.append(k)
@@ -175,19 +196,37 @@ def modal_tip(models: Mapping[Dof, ModalModel]) -> Receptance:
     return uncoupled_planes(planes.get(Dof.X), planes.get(Dof.Y))
 
 
-def measured_tip(curves: Mapping[Dof, tuple[FloatArray, ComplexArray]]) -> Receptance:
+def measured_tip(
+    curves: Mapping[Dof, tuple[FloatArray, ComplexArray]], cross: Mapping[tuple[Dof, Dof], tuple[FloatArray, ComplexArray]] | None = None
+) -> Receptance:
     """Return the tip's 2 x 2 receptance of measured FRFs.
 
     Parameters
     ----------
     curves : mapping of Dof to (frequency [Hz], values [m/N])
         A direction that is missing is rigid.
+    cross : mapping of (response, force) to (frequency [Hz], values [m/N]), optional
+        Of two directions that are both there; one of the two stands for the other, too, as Maxwell's reciprocity has it.
     """
     planes = {}
     for axis, (frequency, values) in curves.items():
         tip = (Coordinate("tip", axis),)
         planes[axis] = Receptance(2.0 * np.pi * frequency, np.asarray(values)[:, None, None], tip, tip)
-    return uncoupled_planes(planes.get(Dof.X), planes.get(Dof.Y))
+    both = uncoupled_planes(planes.get(Dof.X), planes.get(Dof.Y))
+    if not cross:
+        return both
+    missing = [axis for axis in (Dof.X, Dof.Y) if axis not in planes]
+    if missing:
+        raise InputError("cross FRF", f"one without an FRF in {missing[0].upper()}", "FRFs in both directions beside it")
+    full = both.values.copy()
+    places = {Dof.X: 0, Dof.Y: 1}
+    for (response, force), (frequency, values) in cross.items():
+        if not np.array_equal(2.0 * np.pi * frequency, both.omega):
+            raise InputError("cross FRF", f"{np.size(frequency)} frequencies", f"the {both.omega.size} frequencies of the direct FRFs")
+        full[:, places[response], places[force]] = values
+        if (force, response) not in cross:
+            full[:, places[force], places[response]] = values
+    return Receptance(both.omega, full, both.rows, both.cols)
 
 
 def band_warning(lobes: StabilityLobes, band_hz: tuple[float, float]) -> str | None:

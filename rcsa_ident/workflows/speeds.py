@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -86,34 +86,50 @@ def lobes_over_speed(
     -------
     StabilityLobes, and (array, array) [m] or None as from `lobe_bands`
     """
-    speeds = conditions.speeds
     order: list[np.ndarray] = []
     found: list[StabilityLobes] = []
     edges: list[tuple[FloatArray, FloatArray] | None] = []
-    for own, indices in _by_machine(machine, speeds):
-        response = _Response(own, assembly, omega, speeds[indices], bands, stiffness_spread)
-        for block in _blocks(own, speeds[indices]):
-            here = replace(conditions, speeds=speeds[indices[block]])
-            tip = response.at(speeds[indices[block]])
-            order.append(indices[block])
-            found.append(tooling_lobes(tip, here))
-            edges.append(lobe_bands(tip, here) if bands else None)
+    for places, tip in responses_over_speed(machine, assembly, omega, conditions.speeds, bands, stiffness_spread):
+        here = replace(conditions, speeds=conditions.speeds[places])
+        order.append(places)
+        found.append(tooling_lobes(tip, here))
+        edges.append(lobe_bands(tip, here) if bands else None)
     back = np.argsort(np.concatenate(order))
-    lowest = min(found, key=lambda lobes: lobes.absolute_limit)
-    joined = StabilityLobes(
-        np.concatenate([f.spindle_speed for f in found])[back],
-        np.concatenate([f.limit_depth for f in found])[back],
-        np.concatenate([f.chatter_frequency for f in found])[back],
-        np.concatenate([f.lobe for f in found])[back],
-        lowest.absolute_limit,
-        lowest.absolute_frequency,
-        found[0].method,
-        tuple(dict.fromkeys(warning for f in found for warning in f.warnings)),
-    )
+    joined = joined_lobes(found, order)
     known = [edge for edge in edges if edge is not None]
     if len(known) < len(edges):
         return joined, None
     return joined, (np.concatenate([low for low, _ in known])[back], np.concatenate([high for _, high in known])[back])
+
+
+def responses_over_speed(
+    machine: MachineOverSpeed, assembly: ToolAssembly, omega: FloatArray, speeds: FloatArray, bands: bool, stiffness_spread: float
+) -> Iterator[tuple[np.ndarray, TooltipResponse]]:
+    """Yield the tip's response for each block of speeds that share one, beside the places of these speeds.
+
+    Every speed is in one block; the spread of all blocks has the same directions, where the same machine answers.
+    """
+    for own, indices in _by_machine(machine, speeds):
+        response = _Response(own, assembly, omega, speeds[indices], bands, stiffness_spread)
+        for block in _blocks(own, speeds[indices]):
+            yield indices[block], response.at(speeds[indices[block]])
+
+
+def joined_lobes(parts: Sequence[StabilityLobes], places: Sequence[np.ndarray]) -> StabilityLobes:
+    """Return the lobes of all blocks as one, each speed back in its place."""
+    back = np.argsort(np.concatenate(places))
+    lowest = min(parts, key=lambda lobes: lobes.absolute_limit)
+    return StabilityLobes(
+        np.concatenate([p.spindle_speed for p in parts])[back],
+        np.concatenate([p.limit_depth for p in parts])[back],
+        np.concatenate([p.chatter_frequency for p in parts])[back],
+        np.concatenate([p.lobe for p in parts])[back],
+        lowest.absolute_limit,
+        lowest.absolute_frequency,
+        parts[0].method,
+        tuple(dict.fromkeys(warning for p in parts for warning in p.warnings)),
+        np.concatenate([p.flip for p in parts])[back],
+    )
 
 
 def _by_machine(machine: MachineOverSpeed, speeds: FloatArray) -> list[tuple[Machine, np.ndarray]]:

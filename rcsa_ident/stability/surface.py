@@ -1,0 +1,168 @@
+"""Surface location error: where a stable, vibrating tool leaves the wall."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.force import force_lines, runout_force_lines
+from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.errors import InputError, positive
+
+#: Most multiples of the spindle frequency; where the band holds more of them, the rest is left out.
+MOST_ORDERS = 4000
+#: Share of the sum of all orders that the upper quarter of them may have before something is said.
+_LEFT = 0.02
+
+
+class Wall(StrEnum):
+    """Which wall: the one where teeth enter (up-milling) or the one where they leave (down-milling)."""
+
+    ENTRY = "entry"
+    EXIT = "exit"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurfaceError:
+    """How far the wall lies from where a rigid tool would leave it; positive where material is left, negative where too much is gone.
+
+    Parameters
+    ----------
+    spindle_speed : array, shape (n,) [rad/s]
+    height : array, shape (h,) [m]
+        Above the tip.
+    error : array, shape (n, h) [m]
+    wall : Wall
+    warnings : tuple of str
+    """
+
+    spindle_speed: FloatArray
+    height: FloatArray
+    error: FloatArray
+    wall: Wall
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("spindle_speed", "height", "error"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        if self.error.shape != (self.spindle_speed.size, self.height.size):
+            raise InputError("error", self.error.shape, f"shape {(self.spindle_speed.size, self.height.size)}: speeds, heights")
+
+    @property
+    def largest(self) -> FloatArray:
+        """The error that is largest in size, with its sign, shape (n,) [m]."""
+        place = np.argmax(np.abs(self.error), axis=1)
+        return self.error[np.arange(self.error.shape[0]), place]
+
+    @property
+    def mean(self) -> FloatArray:
+        """Mean over the height, shape (n,) [m]."""
+        return self.error.mean(axis=1)
+
+
+def surface_location_error(
+    receptance: Receptance, process: MillingProcess, speeds: FloatArray, depth: float, wall: Wall | None = None, heights: int = 33
+) -> SurfaceError:
+    """Return the surface location error of stable cuts over spindle speed.
+
+    Parameters
+    ----------
+    receptance : Receptance
+        Between ``tip.x`` and ``tip.y`` (machine axes).
+    process : MillingProcess
+        With a feed per tooth.
+    speeds : array, shape (n,) [rad/s]
+    depth : float [m]
+    wall : Wall or None
+        None takes the wall that the engagement has; of a slot's two the one where teeth leave.
+    heights : int
+        Points over the depth; a straight edge has the same error at all of them.
+
+    Notes
+    -----
+    A stable cut of equal teeth repeats itself from tooth to tooth, so that what one leaves is what the next would have left:
+    regeneration drops out and the tip moves as x(t) = Re sum_m G(i m Omega) F_m e^{i m Omega t} with the force lines F_m of a
+    rigid tool (Schmitz & Ziegert, Precision Engineering 23 (1999) 51; Mann, Young, Schmitz & Dilley, J. Manuf. Sci. Eng. 127 (2005) 446). A
+    point of the wall is made by the edge that stands there, at immersion 0 (entry) or pi (exit): at height z that is at
+    Omega t = phi_wall - psi_j + 2 z tan(helix) / D. Of unequal teeth the one that cuts deepest leaves the wall.
+    """
+    if process.feed_per_tooth is None:
+        raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: the force grows with it")
+    depth = positive("depth", depth, "m")
+    if heights < 1:
+        raise InputError("heights", heights, "1 or more")
+    side = _wall(process.engagement, wall)
+    cutter = process.cutter
+    speeds = np.atleast_1d(np.asarray(speeds, dtype=float))
+    height = np.linspace(0.0, depth, heights)
+    # angle of tooth 1 when tooth j makes the wall at a height, shape (teeth, heights)
+    angle = (np.pi if side is Wall.EXIT else 0.0) - cutter.tooth_angle[:, None] + 2.0 * height * np.tan(cutter.helix) / cutter.diameter
+    outward = 1.0 if side is Wall.EXIT else -1.0
+    normal = process.machine_from_feed[:, 1]
+    tip = _Tip(receptance)
+    error = np.empty((speeds.size, heights))
+    tail = 0.0
+    for i, speed in enumerate(speeds.tolist()):
+        orders = np.arange(min(int(tip.omega[-1] / speed), MOST_ORDERS) + 1)
+        lines = runout_force_lines if np.ptp(cutter.runout) > 0.0 else force_lines
+        force = lines(cutter, process.conditions(speed, depth), process.coefficients, orders)
+        line = np.einsum("m,mrc,rc->r", normal, tip.at(orders * speed).transpose(1, 0, 2), force)
+        moved = np.einsum("r,rjz->jz", line, np.exp(1j * orders[:, None, None] * angle)).real
+        error[i] = np.min(outward * moved - cutter.runout[:, None], axis=0)
+        size = np.abs(line)
+        tail = max(tail, float(size[3 * size.size // 4 :].sum() / max(size.sum(), 1e-300)))
+    return SurfaceError(speeds, height, error, side, tuple(_doubts(process, tip, speeds, tail)))
+
+
+class _Tip:
+    """The tip's receptance between its lines, from 0 Hz."""
+
+    def __init__(self, receptance: Receptance) -> None:
+        names = ("tip.x", "tip.y")
+        self.omega = receptance.omega
+        self.values = np.stack([np.stack([receptance.between(a, b) for b in names], axis=1) for a in names], axis=1)
+        if self.omega.size < 2 or np.any(np.diff(self.omega) <= 0.0):
+            raise InputError("tip receptance frequencies", f"{self.omega.size} frequencies", "two or more, ascending")
+
+    def at(self, omega: FloatArray) -> ComplexArray:
+        """Straight lines between the given frequencies, shape (k, 2, 2); below the first its real part, at 0 a real compliance."""
+        flat = self.values.reshape(self.omega.size, 4)
+        found = np.stack(
+            [np.interp(omega, self.omega, flat[:, k].real) + 1j * np.interp(omega, self.omega, flat[:, k].imag) for k in range(4)], axis=1
+        )
+        found[omega < self.omega[0]] = flat[0].real
+        found[omega == 0.0] = flat[0].real
+        return found.reshape(-1, 2, 2)
+
+
+def _wall(engagement: Engagement, wanted: Wall | None) -> Wall:
+    there = [Wall.EXIT] if engagement.exit > np.pi - 1e-6 else []
+    there += [Wall.ENTRY] if engagement.entry < 1e-6 else []
+    if not there:
+        degrees = f"{np.degrees(engagement.entry):g} to {np.degrees(engagement.exit):g} degrees"
+        raise InputError("engagement", degrees, "one that begins at 0 or ends at 180 degrees: only there a wall is left")
+    if wanted is not None and wanted not in there:
+        raise InputError("wall", str(wanted), f"one of {', '.join(there)}: the engagement leaves no other")
+    return wanted or there[0]
+
+
+def _doubts(process: MillingProcess, tip: _Tip, speeds: FloatArray, tail: float) -> list[str]:
+    doubts = []
+    cutter = process.cutter
+    first, last = (w / (2.0 * np.pi) for w in (tip.omega[0], tip.omega[-1]))
+    if first > 0.0:
+        doubts.append(f"surface error: the receptance begins at {first:.0f} Hz; below it, and for the mean force, its first value is taken")
+    if tail > _LEFT:
+        doubts.append(
+            f"surface error: the receptance ends at {last:.0f} Hz, where the tip still follows the force: the error may be percents off"
+        )
+    if not cutter.equally_spaced:
+        doubts.append("surface error: teeth are not alike; what their vibrations leave to each other is left out")
+    if process.speed_variation is not None:
+        doubts.append("surface error: that of a constant speed")
+    return doubts
