@@ -1,0 +1,313 @@
+"""The force observer: gap and fixture acceleration in, tip force out, axis by axis, live or from a record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError
+from rcsa_ident.observer.force_model import ForceModel, augmented
+from rcsa_ident.observer.kalman import FilterState, KalmanFilter, kalman_filter
+from rcsa_ident.observer.transfer_function import CORNER, SampledModes, TransferFunction, acceleration_filter, high_pass
+
+#: What a spindle order below the band may change in a second, in displacement [m]: run-out that is not believed.
+_ORDER_WANDER = 1e-7
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunOut:
+    """What a turning spindle shows without cutting: lines of the air cut, turned to lie under the record.
+
+    Parameters
+    ----------
+    spindle_speed : float [rad/s]
+    order : array, shape (o,)
+        Multiples of the spindle's frequency.
+    gap, acceleration : complex arrays, shape (o,) [m], [m/s^2]
+        Signal = Re sum line e^{i order Omega t}, t from the record's first sample.
+    """
+
+    spindle_speed: float
+    order: FloatArray
+    gap: ComplexArray
+    acceleration: ComplexArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "order", frozen(self.order))
+        for name in ("gap", "acceleration"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.complex128))
+
+    def signals(self, first: int, count: int, step: float) -> tuple[FloatArray, FloatArray]:
+        """Return gap and acceleration at `count` samples from the `first`, shape (count,) each."""
+        turn = np.remainder(np.arange(first, first + count) * (self.spindle_speed * step / (2.0 * np.pi)), 1.0)
+        gap, acceleration = np.zeros(count), np.zeros(count)
+        for order, g, a in zip(self.order, self.gap, self.acceleration, strict=True):
+            wave = np.exp(2j * np.pi * order * turn)
+            gap += (g * wave).real
+            acceleration += (a * wave).real
+        return gap, acceleration
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisObserver:
+    """One axis of the observer.
+
+    Parameters
+    ----------
+    axis : Dof
+    transfer : TransferFunction
+        Tip force to the flange's displacement as the sensor shows it.
+    corner : float [rad/s]
+        Of the high-pass that gap and fixture's motion share.
+    gap_filter, acceleration_filter : SampledModes
+        The latter None without an accelerometer: the gap is then taken for the flange's motion.
+    kalman : KalmanFilter
+    run_out : RunOut or None
+    """
+
+    axis: Dof
+    transfer: TransferFunction
+    corner: float
+    gap_filter: SampledModes
+    acceleration_filter: SampledModes | None
+    kalman: KalmanFilter
+    run_out: RunOut | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AxisState:
+    """Where one axis of a stream stands: the first gap sample (its mean is not observable), both filters, the Kalman filter."""
+
+    offset: float
+    gap: FloatArray
+    acceleration: FloatArray
+    filter: FilterState
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObserverState:
+    """Where a stream stands.
+
+    Parameters
+    ----------
+    count : int
+        Samples seen.
+    axes : tuple of AxisState
+    """
+
+    count: int
+    axes: tuple[AxisState, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceBlock:
+    """Estimates at some samples.
+
+    Parameters
+    ----------
+    force : array, shape (n, a) [N]
+        Without its mean: below the band the displacement says nothing of the force.
+    walking : array, shape (n, a) [N]
+        The part that no oscillator holds; all of it with a random walk alone.
+    innovation : array, shape (n, a) [m]
+        Measured less predicted displacement.
+    """
+
+    force: FloatArray
+    walking: FloatArray
+    innovation: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceEstimate:
+    """Forces of a whole record.
+
+    Parameters
+    ----------
+    axes : tuple of Dof
+    step : float [s]
+    force : array, shape (n, a) [N]
+    standard_deviation : array, shape (n, a) [N]
+        From sensor noise and the force model, raised where the innovations scatter more than they should.
+    consistency : array, shape (a,) [-]
+        Scatter of the innovations over the expected; 1 where model, noise and force agree.
+    """
+
+    axes: tuple[Dof, ...]
+    step: float
+    force: FloatArray
+    standard_deviation: FloatArray
+    consistency: FloatArray
+
+    @property
+    def time(self) -> FloatArray:
+        """From the first sample, shape (n,) [s]."""
+        return np.arange(self.force.shape[0]) * self.step
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceObserver:
+    """Tip forces from the flange's vibration; `run` is a scan of `step`, in blocks of any size with the same result.
+
+    Parameters
+    ----------
+    axes : tuple of AxisObserver
+    """
+
+    axes: tuple[AxisObserver, ...]
+
+    @property
+    def step_time(self) -> float:
+        """Of the samples [s]."""
+        return self.axes[0].transfer.step
+
+    def init(self) -> ObserverState:
+        """Return the state before the first sample."""
+        states = []
+        for each in self.axes:
+            shaken = np.zeros((2, 0)) if each.acceleration_filter is None else each.acceleration_filter.init()
+            states.append(AxisState(np.nan, each.gap_filter.init(), shaken, each.kalman.init()))
+        return ObserverState(0, tuple(states))
+
+    def step(self, state: ObserverState, gap: FloatArray, acceleration: FloatArray | None = None) -> tuple[ObserverState, ForceBlock]:
+        """Return the state and the estimates after one sample of each axis, shape (a,)."""
+        return self.run(state, np.asarray(gap)[None], None if acceleration is None else np.asarray(acceleration)[None])
+
+    def run(self, state: ObserverState, gap: FloatArray, acceleration: FloatArray | None = None) -> tuple[ObserverState, ForceBlock]:
+        """Return the state after a block of samples and the estimates at them.
+
+        Parameters
+        ----------
+        state : ObserverState
+        gap : array, shape (n, a) [m]
+            As the displacement sensors show it, in the order of `axes`.
+        acceleration : array, shape (n, a) [m/s^2], optional
+            Of the sensors' fixture.
+        """
+        gap = np.asarray(gap, dtype=float)
+        if gap.ndim != 2 or gap.shape[1] != len(self.axes) or (acceleration is not None and np.shape(acceleration) != gap.shape):
+            raise InputError("samples", np.shape(gap), f"one column for each of {len(self.axes)} axes, accelerations alike")
+        if not np.all(np.isfinite(gap)) or (acceleration is not None and not np.all(np.isfinite(acceleration))):
+            raise InputError("samples", "a lost sample", "finite numbers")
+        states, results = [], []
+        for i, each in enumerate(self.axes):
+            after, measured = _displacement(
+                each, state.axes[i], state.count, gap[:, i], None if acceleration is None else acceleration[:, i]
+            )
+            filter_state, result = each.kalman.run(after.filter, measured)
+            states.append(replace(after, filter=filter_state))
+            results.append(result)
+        joined = np.stack(results, axis=1) if gap.shape[0] else np.zeros((0, len(self.axes), 3))
+        return ObserverState(state.count + gap.shape[0], tuple(states)), ForceBlock(*(joined[:, :, c] for c in range(3)))
+
+    def observe(self, gap: FloatArray, acceleration: FloatArray | None = None, smooth: bool = False) -> ForceEstimate:
+        """Return the forces of a whole record.
+
+        Parameters
+        ----------
+        smooth : bool
+            Each sample given all others; else given those before it, as live.
+        """
+        block = self.run(self.init(), gap, acceleration)[1]
+        n = block.force.shape[0]
+        force, deviation, consistency = np.array(block.force), np.empty_like(block.force), np.ones(len(self.axes))
+        for i, each in enumerate(self.axes):
+            if smooth:
+                force[:, i] = each.kalman.smooth(np.stack([block.force[:, i], block.walking[:, i], block.innovation[:, i]], axis=1))
+            settled = block.innovation[min(each.kalman.gain.shape[0] - 1, n // 2) :, i]
+            consistency[i] = float(np.sqrt(np.mean(settled**2) / each.kalman.variance[-1])) if settled.size else 1.0
+            deviation[:, i] = each.kalman.standard_deviation(n, smooth) * max(consistency[i], 1.0)
+        return ForceEstimate(tuple(each.axis for each in self.axes), self.step_time, frozen(force), frozen(deviation), frozen(consistency))
+
+
+def axis_observer(
+    axis: Dof,
+    transfer: TransferFunction,
+    force: ForceModel,
+    noise: float,
+    *,
+    acceleration_noise: float = 0.0,
+    accelerometer: bool = True,
+    sensor_ratio: tuple[FloatArray, ComplexArray] | None = None,
+    run_out: RunOut | None = None,
+    spindle_speed: float = 0.0,
+    unmodelled: float = 0.0,
+    longest_settling: int | None = None,
+) -> AxisObserver:
+    """Return one axis of an observer.
+
+    Parameters
+    ----------
+    axis : Dof
+    transfer : TransferFunction
+    force : ForceModel
+        `RandomWalk` or `TeethResonators`.
+    noise : float [m]
+        Standard deviation of a displacement sample.
+    acceleration_noise : float [m/s^2]
+        Standard deviation of an acceleration sample; 0: as if the integrated acceleration were without noise (the paper's).
+    accelerometer : bool
+        Whether the fixture's acceleration is measured.
+    sensor_ratio : (omega, ratio), optional
+        Response of the displacement sensor over the accelerometer's.
+    run_out : RunOut, optional
+        Taken out of the signals.
+    spindle_speed : float [rad/s]
+        Its orders below the band are taken for disturbance; 0: none.
+    unmodelled : float [N]
+        Process noise.
+    """
+    step, band = transfer.step, transfer.band
+    corner = CORNER * band[0]
+    passing = None
+    if accelerometer:
+        omega, ratio = (None, None) if sensor_ratio is None else sensor_ratio
+        passing = acceleration_filter(corner, step, band, ratio, omega)
+    below = spindle_speed * np.arange(1.0, np.ceil(band[0] / spindle_speed - 1e-9)) if spindle_speed > 0.0 else np.zeros(0)
+    # orders under the high-pass's corner are gone already
+    below = below[below > corner]
+    model = augmented(
+        transfer.behind_high_pass(corner),
+        force,
+        noise,
+        unmodelled=unmodelled,
+        acceleration=passing,
+        acceleration_noise=acceleration_noise,
+        disturbance=below,
+        disturbance_intensity=_ORDER_WANDER,
+    )
+    kalman = kalman_filter(model) if longest_settling is None else kalman_filter(model, longest_settling)
+    return AxisObserver(axis, transfer, corner, high_pass(corner, step), passing, kalman, run_out)
+
+
+def force_observer(axes: Sequence[AxisObserver]) -> ForceObserver:
+    """Return the observer of some axes, all sampled alike."""
+    if not axes or len({each.transfer.step for each in axes}) > 1:
+        raise InputError("axes", len(axes), "one or more with the same sampling rate")
+    return ForceObserver(tuple(axes))
+
+
+def _displacement(
+    observer: AxisObserver, state: AxisState, first: int, gap: FloatArray, acceleration: FloatArray | None
+) -> tuple[AxisState, FloatArray]:
+    """High-passed absolute displacement of the flange, run-out taken out, and the filters' new states."""
+    if observer.run_out is not None:
+        still, shaken = observer.run_out.signals(first, gap.size, observer.transfer.step)
+        gap = gap - still
+        acceleration = None if acceleration is None else acceleration - shaken
+    offset = state.offset
+    if not np.isfinite(offset) and gap.size:
+        # the mean is not observable: without it the high-pass has less to forget
+        offset = float(gap[0])
+    passed, measured = observer.gap_filter.run(state.gap, gap - offset)
+    shaken_state = state.acceleration
+    if observer.acceleration_filter is not None:
+        if acceleration is None:
+            raise InputError("acceleration", "none", "the fixture's acceleration, which this observer was made for")
+        shaken_state, more = observer.acceleration_filter.run(state.acceleration, acceleration)
+        measured = measured + more
+    return AxisState(offset, passed, shaken_state, state.filter), measured

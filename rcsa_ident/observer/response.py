@@ -1,0 +1,119 @@
+"""The observer seen from the force: its frequency response, the compensated one, usable band and delay."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.observer.force import AxisObserver
+
+#: Deviation of the compensated response [dB] that a usable band allows.
+FLAT = 1.0
+#: Samples that stand for the whole future of a smoother's response.
+_FAR = 2048
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObserverFRF:
+    """Frequency response of one axis' observer in the steady state.
+
+    Parameters
+    ----------
+    omega : array, shape (n,) [rad/s]
+    observer : complex array, shape (n,) [N/m]
+        Measured displacement to force.
+    compensated : complex array, shape (n,) [-]
+        Times the machine's response from tip force to displacement: 1 where the observer is right.
+    line : array, shape (j,) [rad/s]
+        Where the force of a steady cut has its lines.
+    at_line : complex array, shape (j,) [-]
+        The compensated response there.
+    """
+
+    omega: FloatArray
+    observer: ComplexArray
+    compensated: ComplexArray
+    line: FloatArray
+    at_line: ComplexArray
+
+    @property
+    def level(self) -> FloatArray:
+        """Magnitude of the compensated response, shape (n,) [dB]."""
+        return decibel(self.compensated)
+
+    def flatness(self, band: tuple[float, float]) -> float:
+        """Return the largest deviation from 0 dB in a band [dB]."""
+        inside = (self.omega >= band[0]) & (self.omega <= band[1])
+        return float(np.max(np.abs(self.level[inside]))) if inside.any() else np.nan
+
+    def usable(self, start: float, at_lines: bool = False, within: float = FLAT) -> tuple[float, float]:
+        """Return the band around or above `start` in which the compensated magnitude stays within 1 dB [rad/s]; NaN where there is none.
+
+        Parameters
+        ----------
+        at_lines : bool
+            Look only where a steady cut has force: an oscillator is right at its own frequency.
+        """
+        omega, level = (self.line, decibel(self.at_line)) if at_lines else (self.omega, self.level)
+        good, above = np.abs(level) <= within, np.flatnonzero(omega >= start * (1.0 - 1e-9))
+        if above.size == 0 or not good[above[0]]:
+            return np.nan, np.nan
+        first = last = int(above[0])
+        while first > 0 and good[first - 1]:
+            first -= 1
+        while last + 1 < omega.size and good[last + 1]:
+            last += 1
+        return float(omega[first]), float(omega[last])
+
+    def delay(self, band: tuple[float, float]) -> float:
+        """Return by how much the estimate lags the force: minus the phase's mean slope over a band [s].
+
+        Oscillators do not lag: for them look at `phase_at_lines`.
+        """
+        inside = (self.omega >= band[0]) & (self.omega <= band[1])
+        phase = np.unwrap(np.angle(self.compensated[inside]))
+        return float(-np.polyfit(self.omega[inside], phase, 1)[0])
+
+    @property
+    def phase_at_lines(self) -> FloatArray:
+        """Phase of the compensated response at the lines, shape (j,) [rad]."""
+        return np.angle(self.at_line)
+
+
+def decibel(values: ComplexArray) -> FloatArray:
+    """Return 20 log10 |values|."""
+    return 20.0 * np.log10(np.maximum(np.abs(values), 1e-300))
+
+
+def observer_response(
+    observer: AxisObserver,
+    omega: FloatArray,
+    machine: ComplexArray,
+    line: Sequence[float] | FloatArray = (),
+    machine_at_line: Sequence[complex] | ComplexArray = (),
+    smoothed: bool = False,
+) -> ObserverFRF:
+    """Return the observer's frequency response and its product with the machine's.
+
+    Parameters
+    ----------
+    observer : AxisObserver
+    omega : array, shape (n,) [rad/s]
+    machine : complex array, shape (n,) [m/N]
+        From tip force to the flange's displacement as the sensor shows it: the true one where it is known, else the identified.
+    line, machine_at_line : arrays, shape (j,)
+        The same at the force's lines.
+    smoothed : bool
+        Given all samples instead of those before.
+    """
+    line = frozen(line)
+    lag = _FAR if smoothed else 0
+    values = [
+        (observer.kalman.response(w, lag)[0] * observer.gap_filter.response(w), np.asarray(h))
+        for w, h in ((np.asarray(omega, dtype=float), machine), (line, machine_at_line))
+    ]
+    (own, there), (own_line, there_line) = values
+    return ObserverFRF(frozen(omega), own, own * there, line, own_line * there_line)
