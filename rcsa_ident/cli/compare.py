@@ -1,0 +1,155 @@
+"""compare: a hammer test beside the identified machine."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cli.lobes import ResultFile, ToolingFile
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rcsa_ident.workflows.compare import ResponseComparison
+
+_TITLES = {
+    "tip": "C11, tool tip",
+    "cross": "C31, tip to flange",
+    "spindle": "C33, spindle flange with tooling",
+    "flange": "B33, spindle flange alone",
+}
+
+
+@answers
+def compare(
+    result: ResultFile,
+    tooling: ToolingFile,
+    hammer: Annotated[
+        list[str],
+        typer.Option(
+            help="FRF file of a hammer test (CSV, UFF 58, text columns), or PLACE=FILE with PLACE tip (default), cross (force at the tip, "
+            "response at the spindle's flange), spindle (at the flange, tooling clamped) or flange (no tooling). May be given again.",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[Path | None, typer.Option(help="Figure to write (png, svg, pdf).", show_default=False)] = None,
+    speed: Annotated[
+        float | None, typer.Option(help="Spindle speed, rev/min; default: the middle of the campaign's.", show_default=False)
+    ] = None,
+    real_imaginary: Annotated[
+        bool, typer.Option("--real-imaginary", help="Real and imaginary part in place of magnitude and phase.")
+    ] = False,
+    json_: Json = False,
+) -> None:
+    """Show a hammer test of the idle machine beside the dynamics identified in process."""
+    import numpy as np
+
+    from rcsa_ident.cli.lobes import read_machine_over_speed
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.errors import InputError, positive
+    from rcsa_ident.io.hammer import labelled, read_hammer
+    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.workflows.compare import Place
+    from rcsa_ident.workflows.compare import compare as run
+
+    if out is not None:
+        writable(out)
+    tests: dict[tuple[Place, Dof], Any] = {}
+    for text in hammer:
+        place, path = labelled(text, Place.TIP, [str(p) for p in Place])
+        for axis, (frequency, values) in read_hammer(path, place).values.items():
+            key = (Place(place), Dof(axis.lower()))
+            if key in tests:
+                raise InputError("--hammer", f"two tests {place} {axis}", "one for each place and axis", str(path))
+            tests[key] = (2.0 * np.pi * np.asarray(frequency), values)
+    machine, data = read_machine_over_speed(result)
+    omega = None if speed is None else positive("--speed", speed, "rev/min") * math.pi / 30.0
+    band = data["band_hz"][0] * 2.0 * math.pi, data["band_hz"][1] * 2.0 * math.pi
+    stages = Stages(quiet=json_)
+    with stages.stage("comparison"):
+        found = run(machine.at(omega), tests, read_tooling(tooling).assembly, band, omega)
+    if out is not None:
+        _draw(found, out, (data["band_hz"][0], data["band_hz"][1]), real_imaginary)
+    if json_:
+        emit({"responses": [_row(each) for each in found], "seconds": stages.seconds, "out": None if out is None else str(out)})
+        return
+    _show(found)
+    for each in found:
+        if not each.modes:
+            warn(f"{_TITLES[each.place]}, {each.axis.upper()}: no peak in the identified band")
+    if out is not None:
+        say(f"written: {out}")
+
+
+def _draw(found: Sequence[ResponseComparison], out: Path, band: tuple[float, float], real_imaginary: bool) -> None:
+    import numpy as np
+
+    from rcsa_ident.report.comparison import FrfPair, frf_comparison, save
+
+    hertz = 1.0 / (2.0 * np.pi)
+    pairs = [
+        FrfPair(
+            f"{_TITLES[each.place]}, {each.axis.upper()}",
+            each.axis.upper(),
+            each.omega * hertz,
+            each.identified,
+            each.omega * hertz,
+            each.hammer,
+            each.deviation,
+            [(h.frequency * hertz, None if i is None else i.frequency * hertz) for h, i in each.modes],
+            (each.band_frac[0] * hertz, each.band_frac[1]),
+        )
+        for each in found
+    ]
+    save(frf_comparison(pairs, band_hz=band, real_and_imaginary=real_imaginary), out)
+
+
+def _row(each: ResponseComparison) -> dict[str, Any]:
+    hertz = 1.0 / (2.0 * math.pi)
+    modes = []
+    for h, i in each.modes:
+        row = {"hammer_hz": h.frequency * hertz, "hammer_damping": h.damping, "hammer_peak_m_per_n": h.compliance}
+        if i is not None:
+            row |= {"identified_hz": i.frequency * hertz, "identified_damping": i.damping, "identified_peak_m_per_n": i.compliance}
+        modes.append(row)
+    return {"place": str(each.place), "axis": each.axis.upper(), "frac": each.frac, "relative_difference": each.error, "modes": modes}
+
+
+def _show(found: Sequence[ResponseComparison]) -> None:
+    from rich.table import Table
+
+    from rcsa_ident.cli.tables import console
+
+    heads = (
+        "response",
+        "hammer\nHz",
+        "in process\nHz",
+        "change\n%",
+        "damping\n%",
+        "in process\n%",
+        "peak\nµm/N",
+        "in process\nµm/N",
+        "stiffness\nchange %",
+    )
+    table = Table(*heads, title="peaks of the idle machine (hammer) and in process (identified)", title_justify="left")
+    for column in table.columns[1:]:
+        column.justify = "right"
+    for each in found:
+        name = f"{each.place} {each.axis.upper()}"
+        for h, i in each.modes:
+            left = (f"{h.frequency / (2 * math.pi):.1f}", f"{100 * h.damping:.2f}", f"{1e6 * h.compliance:.4f}")
+            if i is None:
+                table.add_row(name, left[0], "–", "", left[1], "", left[2], "", "")
+                continue
+            right = (f"{i.frequency / (2 * math.pi):.1f}", f"{100 * i.damping:.2f}", f"{1e6 * i.compliance:.4f}")
+            change = f"{100 * (i.frequency / h.frequency - 1):+.2f}"
+            stiffness = f"{100 * (h.compliance / i.compliance - 1):+.1f}"
+            table.add_row(name, left[0], right[0], change, left[1], right[1], left[2], right[2], stiffness)
+    out = console()
+    out.print(table)
+    for each in found:
+        out.print(f"{each.place} {each.axis.upper()}: FRAC {each.frac:.3f}, difference {100 * each.error:.1f} % of the hammer's")

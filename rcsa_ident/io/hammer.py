@@ -1,0 +1,123 @@
+"""Hammer tests as the commands name them, and toolings that carry a calibrated contact."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.files import read_bytes, write_text
+from rcsa_ident.io.frf_files import read_frfs
+from rcsa_ident.io.keys import listed
+from rcsa_ident.io.setups import LARGEST_SETUP, read_tooling
+from rcsa_ident.tool_holder.geometry import Contact
+
+#: Direction by direction of a file that names none.
+_AXES = ("X", "Y")
+
+
+class HammerFile(NamedTuple):
+    """The direct receptances of one file.
+
+    Parameters
+    ----------
+    label : str
+        What stood in front of the file's name, or the default.
+    path : Path
+    values : dict of axis to (array, complex array), shapes (n,) [Hz] and (n,) [m/N]
+    """
+
+    label: str
+    path: Path
+    values: dict[str, tuple[FloatArray, ComplexArray]]
+
+
+def labelled(text: str, default: str, known: Collection[str] = ()) -> tuple[str, Path]:
+    """Return label and path of ``LABEL=FILE`` or ``FILE``.
+
+    Parameters
+    ----------
+    known : collection of str
+        Labels that are allowed; empty allows any.
+    """
+    before, sign, after = text.partition("=")
+    # a name with = in it is a file if such a file is there
+    if not sign or Path(text).is_file():
+        return default, Path(text)
+    if known and before not in known:
+        raise InputError("label", before, f"one of {', '.join(known)}, then = and the file", text)
+    return before, Path(after)
+
+
+def read_hammer(path: str | Path, label: str = "tip") -> HammerFile:
+    """Return the receptances of a hammer test whose response and force have the same direction.
+
+    A file of one function without directions (text columns) holds for both axes only if its name ends in x or y; such a file
+    has that axis.
+
+    Raises
+    ------
+    InputError
+        The file holds no such function, or several of one axis.
+    """
+    path = Path(path)
+    found: dict[str, tuple[FloatArray, ComplexArray]] = {}
+    tests = read_frfs(path)
+    for test in tests:
+        axis = test.response or (path.stem[-1:].upper() if len(tests) == 1 else "")
+        if test.response != test.force or axis not in _AXES:
+            continue
+        if axis in found:
+            raise InputError("FRF", f"two functions {axis} over {axis}", "one for each axis", str(path))
+        found[axis] = (test.frequency, test.values)
+    if not found:
+        names = listed([f"{t.response or '?'}/{t.force or '?'}" for t in tests])
+        raise InputError("FRF", names, "X over X, Y over Y, or one function in a file whose name ends in x or y", str(path))
+    return HammerFile(label, path, found)
+
+
+def write_calibrated_tooling(source: str | Path, target: str | Path, contact: Contact, remarks: Sequence[str] = ()) -> None:
+    """Write a tooling file again with another contact; everything else stays as it was written, comments included.
+
+    Raises
+    ------
+    InputError
+        The contact stands in the file in a way that cannot be replaced line by line.
+    """
+    text = read_bytes(source, "tooling", LARGEST_SETUP).decode("utf-8-sig")
+    values = {
+        "translational_stiffness": ("N/m per m", contact.translational_stiffness),
+        "rotational_stiffness": ("N m/rad per m", contact.rotational_stiffness),
+        "translational_damping": ("N s/m per m", contact.translational_damping),
+        "rotational_damping": ("N m s/rad per m", contact.rotational_damping),
+    }
+    block = ["[contact]", *(f"# {' '.join(remark.split())}" for remark in remarks)]
+    block += [f"{key} = {value:.6g}  # {unit}" for key, (unit, value) in values.items()]
+    lines = text.splitlines()
+    start = next((i for i, line in enumerate(lines) if re.match(r"\s*\[\s*contact\s*\]", line)), None)
+    if start is None:
+        lines += ["", *block]
+    else:
+        end = next((i for i in range(start + 1, len(lines)) if re.match(r"\s*\[", lines[i])), len(lines))
+        # what stands in front of the next table belongs to it
+        while end > start + 1 and (not lines[end - 1].strip() or lines[end - 1].lstrip().startswith("#")) and end < len(lines):
+            end -= 1
+        lines[start:end] = block
+    before = Path(target).read_bytes() if Path(target).is_file() else None
+    write_text(target, "\n".join(lines) + "\n")
+    try:
+        read = read_tooling(target).assembly
+        complete = read.contact is not None and all(
+            abs(getattr(read.contact, key) - value) <= 1e-5 * value for key, (_, value) in values.items()
+        )
+    except InputError:
+        complete = False
+    if not complete:
+        if before is None:
+            Path(target).unlink(missing_ok=True)
+        else:
+            Path(target).write_bytes(before)
+        raise InputError("contact", "a table written in another way", "a table [contact] with one key a line, or none", str(source))

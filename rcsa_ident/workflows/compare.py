@@ -1,0 +1,243 @@
+"""Idle against in process: a hammer test's receptances beside the identified ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import pairwise
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.coupling.rcsa import couple
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.posterior import MachineAxis, spread
+from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.workflows.tip import turned_plane
+
+#: Modes farther apart than this share of their frequency are not the same one.
+MATCH = 0.12
+#: A peak that rises by less above its flanks is none: decades of magnitude; and its least share of the highest one.
+_PROMINENCE, _LEAST_PEAK = 0.05, 0.02
+#: Width of the bands in which the FRAC is taken [Hz].
+FRAC_BAND = 250.0
+
+
+class Place(StrEnum):
+    """Where force and response of a hammer test stand.
+
+    ``tip``: both at the tool's tip (C11); ``cross``: force at the tip, response at the spindle's flange (C31); ``spindle``: both at the
+    spindle's flange with the tooling clamped (C33); ``flange``: the same without a tooling (B33).
+    """
+
+    TIP = "tip"
+    CROSS = "cross"
+    SPINDLE = "spindle"
+    FLANGE = "flange"
+
+
+@dataclass(frozen=True, slots=True)
+class LocalMode:
+    """A peak of a receptance, fitted by one mode in its neighbourhood.
+
+    Parameters
+    ----------
+    frequency : float [rad/s]
+        Natural frequency.
+    damping : float [-]
+    compliance : float [m/N]
+        Height of the peak; its inverse is the dynamic stiffness.
+    """
+
+    frequency: float
+    damping: float
+    compliance: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResponseComparison:
+    """One response, twice.
+
+    Parameters
+    ----------
+    place : Place
+    axis : Dof
+    omega : array, shape (n,) [rad/s]
+        The hammer test's, within the band where the machine was identified.
+    hammer, identified : complex arrays, shape (n,) [m/N]
+    deviation : (array, array) or None
+        Standard deviations of the identified real and imaginary part.
+    frac : float [-]
+        Over the whole band.
+    error : float [-]
+        ||identified - hammer|| / ||hammer||.
+    modes : tuple of (LocalMode, LocalMode or None)
+        Of the hammer test, and the identified one that belongs to it.
+    band_frac : (array, array)
+        Middles of bands [rad/s], FRAC in each.
+    """
+
+    place: Place
+    axis: Dof
+    omega: FloatArray
+    hammer: ComplexArray
+    identified: ComplexArray
+    deviation: tuple[FloatArray, FloatArray] | None
+    frac: float
+    error: float
+    modes: tuple[tuple[LocalMode, LocalMode | None], ...]
+    band_frac: tuple[FloatArray, FloatArray]
+
+
+def compare(
+    machine: Mapping[Dof, MachineAxis],
+    tests: Mapping[tuple[Place, Dof], tuple[FloatArray, ComplexArray]],
+    assembly: ToolAssembly | None = None,
+    band: tuple[float, float] | None = None,
+    speed: float | None = None,
+    bands: bool = True,
+) -> list[ResponseComparison]:
+    """Return each hammer test beside what the identified machine says of the same response.
+
+    Parameters
+    ----------
+    machine : mapping of Dof to MachineAxis
+    tests : mapping of (Place, Dof) to (array, complex array), shapes (n,) [rad/s] and (n,) [m/N]
+    assembly : ToolAssembly or None
+        Of all places but the bare flange.
+    band : (float, float), optional [rad/s]
+        Where the machine is known; frequencies outside are left out.
+    speed : float or None [rad/s]
+        For a machine that changes with it; by default the middle of the campaign's.
+    bands : bool
+        Also the posterior's standard deviations.
+    """
+    found = []
+    for (place, axis), (omega, values) in tests.items():
+        if axis not in machine:
+            raise InputError("hammer test", axis.upper(), f"an identified axis: {', '.join(a.upper() for a in machine)}")
+        if place is not Place.FLANGE and assembly is None:
+            raise InputError("hammer test", place, "the tooling that was clamped, or a test of the bare flange")
+        low, high = band or (0.0, np.inf)
+        inside = (omega >= low) & (omega <= high) & (omega > 0.0)
+        if np.sum(inside) < 8:
+            raise InputError("hammer test", f"{np.sum(inside)} frequencies in the identified band", "eight at least")
+        omega, values = omega[inside], np.asarray(values)[inside]
+        found.append(_one(machine[axis], place, axis, omega, values, assembly, speed, bands))
+    return found
+
+
+def _one(
+    part: MachineAxis,
+    place: Place,
+    axis: Dof,
+    omega: FloatArray,
+    hammer: ComplexArray,
+    assembly: ToolAssembly | None,
+    speed: float | None,
+    bands: bool,
+) -> ResponseComparison:
+    holder = None
+    if assembly is not None and place is not Place.FLANGE:
+        plane = tool_holder_receptance(assembly, omega)
+        holder = plane if axis is Dof.X else turned_plane(plane)
+    points = {Place.TIP: ("tip", "tip"), Place.CROSS: ("spindle", "tip"), Place.SPINDLE: ("spindle", "spindle")}
+
+    def response(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
+        flange = modes.receptance(omega)
+        if holder is None:
+            return flange["flange", "flange"][:, 0, 0]
+        return couple(holder, flange, joint)[points[place]][:, 0, 0]
+
+    identified = response(*part.at(axis, speed))
+    deviation = None
+    if bands and part.posterior is not None:
+        changes = spread(part.posterior, axis, response, speed)
+        deviation = np.sqrt(np.sum(changes.real**2, axis=0)), np.sqrt(np.sum(changes.imag**2, axis=0))
+    modes = matched(local_modes(omega, hammer), local_modes(omega, identified))
+    error = float(np.linalg.norm(identified - hammer) / np.linalg.norm(hammer))
+    return ResponseComparison(
+        place, axis, omega, hammer, identified, deviation, frac(hammer, identified), error, modes, _band_frac(omega, hammer, identified)
+    )
+
+
+def frac(one: ComplexArray, other: ComplexArray) -> float:
+    """Return the frequency response assurance criterion |a^H b|^2 / (a^H a b^H b): 1 for the same shape, whatever its scale [-]."""
+    top = np.abs(np.vdot(one, other)) ** 2
+    return float(top / max(float(np.vdot(one, one).real * np.vdot(other, other).real), 1e-300))
+
+
+def _band_frac(omega: FloatArray, one: ComplexArray, other: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    width = 2.0 * np.pi * FRAC_BAND
+    count = max(round((omega[-1] - omega[0]) / width), 1)
+    edges = np.linspace(omega[0], omega[-1], count + 1)
+    rows = []
+    for k, (low, high) in enumerate(pairwise(edges)):
+        inside = (omega >= low) & ((omega < high) | (k == count - 1))
+        if np.sum(inside) >= 3:
+            rows.append((0.5 * (low + high), frac(one[inside], other[inside])))
+    return np.array([r[0] for r in rows]), np.array([r[1] for r in rows])
+
+
+def local_modes(omega: FloatArray, values: ComplexArray) -> list[LocalMode]:
+    """Return the peaks of a receptance, each with the mode that fits it best in its neighbourhood, by frequency.
+
+    Around a peak h (w0^2 - w^2 + i w c) = A + R w^2 is linear in w0^2, c and the complex A and R: what lies farther away is
+    in R. A fit without positive damping or with a frequency off the peak is no mode.
+    """
+    from scipy.signal import find_peaks, savgol_filter
+
+    size = np.abs(values)
+    smooth = np.exp(savgol_filter(np.log(np.maximum(size, 1e-300)), 5, 2)) if size.size > 5 else size
+    peaks, _ = find_peaks(np.log10(smooth), prominence=_PROMINENCE)
+    found = []
+    for k in peaks:
+        if smooth[k] < _LEAST_PEAK * smooth.max():
+            continue
+        mode = _fitted(omega, values, int(k), smooth)
+        if mode is not None:
+            found.append(mode)
+    return found
+
+
+def _fitted(omega: FloatArray, values: ComplexArray, k: int, size: FloatArray) -> LocalMode | None:
+    """One mode through the points around a peak that are above half of it, seven at least."""
+    low, high = k, k
+    while low > 0 and (size[low - 1] > 0.5 * size[k] or k - low < 3) and size[low - 1] <= 1.05 * size[k]:
+        low -= 1
+    while high < size.size - 1 and (size[high + 1] > 0.5 * size[k] or high - k < 3) and size[high + 1] <= 1.05 * size[k]:
+        high += 1
+    x, h = omega[low : high + 1] / omega[k], values[low : high + 1] / size[k]
+    if x.size < 5:
+        return None
+    zero = np.zeros(x.size)
+    one = np.ones(x.size)
+    real = np.stack([h.real, -x * h.imag, -one, zero, -(x**2), zero], axis=1)
+    imaginary = np.stack([h.imag, x * h.real, zero, -one, zero, -(x**2)], axis=1)
+    design = np.concatenate([real, imaginary])
+    target = np.concatenate([x**2 * h.real, x**2 * h.imag])
+    unit = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
+    solution = np.linalg.lstsq(design / unit, target)[0] / unit
+    square, loss = solution[0], solution[1]
+    if square <= 0.0 or loss <= 0.0 or abs(np.sqrt(square) - 1.0) > 0.1:
+        return None
+    natural = float(np.sqrt(square))
+    return LocalMode(natural * float(omega[k]), float(loss / (2.0 * natural)), float(np.abs(values[k])))
+
+
+def matched(first: list[LocalMode], second: list[LocalMode]) -> tuple[tuple[LocalMode, LocalMode | None], ...]:
+    """Return each mode of the first with the one of the second that is nearest in frequency, the highest peaks choosing first."""
+    free = list(second)
+    partner: dict[int, LocalMode] = {}
+    for i in sorted(range(len(first)), key=lambda i: -first[i].compliance):
+        near = [m for m in free if abs(m.frequency / first[i].frequency - 1.0) < MATCH]
+        if near:
+            best = min(near, key=lambda m: abs(m.frequency - first[i].frequency))
+            partner[i] = best
+            free.remove(best)
+    return tuple((mode, partner.get(i)) for i, mode in enumerate(first))
