@@ -10,8 +10,8 @@ a window opens or closes split the period into elements, elements into steps of 
 polynomial through Gauss-Lobatto nodes, and its response is exact.
 
 `plan` holds the scalars: PERIOD, SPACING (angles), SPEED, DEPTH, LAG (angle per height), KT, KR, CT, CR (stiffness and damping per
-depth, the latter times the cutting speed), RADIUS, SWING, SWINGS (amplitude and ratio of a varying speed), STEP, FROZEN, TOLERANCE,
-then the delays (angles). `table` holds the nodes, their weights, and row by row the Lagrange polynomials' coefficients of s^k.
+depth, the latter times the cutting speed), RADIUS, SWING, SWINGS (amplitude and ratio of a varying speed), STEP, FROZEN, TOLERANCE, WAVES (whether the vector's
+forces are wanted), then the delays (angles). `table` holds the nodes, their weights, and row by row the Lagrange polynomials' coefficients of s^k.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ import math
 import numba
 import numpy as np
 
-PERIOD, SPACING, SPEED, DEPTH, LAG, KT, KR, CT, CR, RADIUS, SWING, SWINGS, STEP, FROZEN, TOLERANCE, DELAYS = range(16)
+PERIOD, SPACING, SPEED, DEPTH, LAG, KT, KR, CT, CR, RADIUS, SWING, SWINGS, STEP, FROZEN, TOLERANCE, WAVES, DELAYS = range(17)
 _NARROW = 1e-7
 #: Krylov vectors between two looks at the eigenvalues, at least and at most; all of them at most.
-_FIRST, _EVERY, _MOST = 10, 4, 240
+_FIRST, _EVERY, _MOST = 8, 3, 240
 
 
 @numba.njit(cache=True)
@@ -567,7 +567,7 @@ def multiplier(pole, outputs, inputs, constant, rows, shapes, plan, table, start
     -------
     complex, float, int : eigenvalue, its residual as a share of it, Krylov vectors
     vector (complex) : state and motion that it belongs to
-    force, angle, time : at the points, of that vector
+    force (complex), elements, time : at the points, of that vector
     """
     q, m, r = table.shape[1] - 1, pole.size, outputs.shape[0]
     frozen = plan[FROZEN] > 0.0
@@ -622,7 +622,7 @@ def multiplier(pole, outputs, inputs, constant, rows, shapes, plan, table, start
     for i in range(used):
         vector += ritz[i] * basis[i]
     waves = np.zeros((points, r), dtype=np.complex128)
-    for part in range(2):
+    for part in range(2 if plan[WAVES] > 0.0 else 0):
         along = vector.real if part == 0 else vector.imag
         state[:] = along[:m] + 1j * along[m : 2 * m]
         motion[kept:points] = np.ascontiguousarray(along[2 * m :]).reshape(points - kept, r)

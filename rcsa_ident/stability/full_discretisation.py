@@ -10,7 +10,7 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.marching import check_resolution, marched_lobes
 from rcsa_ident.stability.modes import TipModes, modes_of
-from rcsa_ident.stability.period_map import EntryProfile, PeriodMap
+from rcsa_ident.stability.period_map import EngagementProfile, PeriodMap
 from rcsa_ident.stability.result import StabilityLobes
 
 
@@ -32,14 +32,14 @@ class FullDiscretisation:
     degree : int, default 6
     tolerance : float, default 3e-3
         Of the limit depth, relative, where `intervals` is None.
-    entries : callable or None
-        Entry angles along the edge by depth, as a deflected tool has them: see `deformation`.
+    engagements : callable or None
+        Engagement along the edge by speed and depth, as a deflected tool has it: `deformation.deflected_engagement`.
     """
 
     intervals: int | None = None
     degree: int = 6
     tolerance: float = 3e-3
-    entries: EntryProfile | None = None
+    engagements: EngagementProfile | None = None
 
     def __post_init__(self) -> None:
         check_resolution(self.intervals, self.tolerance)
@@ -48,7 +48,7 @@ class FullDiscretisation:
 
     def cut(self, tip: Receptance | TipModes, process: MillingProcess) -> PeriodMap:
         """Return the cut's map of a period."""
-        return PeriodMap(modes_of(tip, "full-discretisation"), process, self.degree, entries=self.entries)
+        return PeriodMap(modes_of(tip, "full-discretisation"), process, self.degree, engagements=self.engagements)
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""

@@ -7,16 +7,16 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.first_loss import first_loss
-from rcsa_ident.stability.period_map import Multiplier, PeriodMap
+from rcsa_ident.stability.period_map import RESIDUAL, Multiplier, PeriodMap
 from rcsa_ident.stability.result import StabilityLobes
 
 #: Share of the strongest mode's peak below which a mode does not decide on the length of a step.
 _WEAK = 0.02
 #: Nodes per period of the highest mode that counts, with polynomials of high degree and as many more with those of low degree;
 #: steps, where coefficients stand still.
-_NODES, _LOW_DEGREE, _STEPS = 6.0, 6.0, 24.0
-#: How much coarser the steps are for a first look.
-_COARSER = 1.6
+_NODES, _LOW_DEGREE, _STEPS = 9.0, 4.0, 24.0
+#: Residual of the multiplier for a first look.
+ROUGH = 1e-4
 #: How much finer the step is by which the error is told, and how often the search is repeated with it.
 _FINER, _REPEATS = 1.6, 5
 
@@ -32,24 +32,25 @@ def check_resolution(intervals: int | None, tolerance: float) -> None:
 class Growth:
     """Logarithm of the multiplier per tooth period over the depth, at one speed and step; remembers where it started."""
 
-    def __init__(self, cut: PeriodMap, speed: float, step: float) -> None:
-        self.cut, self.speed, self.step = cut, speed, step
+    def __init__(self, cut: PeriodMap, speed: float, step: float, residual: float = RESIDUAL) -> None:
+        self.cut, self.speed, self.step, self.residual = cut, speed, step, residual
         self.start: ComplexArray | None = None
+        self.calls = 0
         self.teeth = cut.period * cut.process.cutter.teeth / (2.0 * np.pi)
 
     def __call__(self, depth: float) -> float:
-        found = self.cut.multiplier(self.speed, depth, self.step, self.start)
+        self.calls += 1
+        found = self.cut.multiplier(self.speed, depth, self.step, self.start, residual=self.residual)
         self.start = found.vector
         return float(np.log(max(abs(found.value), 1e-300))) / self.teeth
 
 
-def longest_steps(cut: PeriodMap) -> tuple[float, float]:
-    """Lengths of steps to look for a limit and to find it [s]."""
+def longest_step(cut: PeriodMap) -> float:
+    """Length of a step that is good to some thousandths of the limit [s]."""
     strength = cut.modes.strength
     wave = 2.0 * np.pi / float(np.max(np.abs(cut.pole)[strength >= _WEAK * strength.max()]))
     degree = cut.table.shape[1] - 1
-    fine = wave / _STEPS if cut.frozen else degree * wave / (_NODES * (1.0 + _LOW_DEGREE / degree**2))
-    return _COARSER * fine, fine
+    return wave / _STEPS if cut.frozen else degree * wave / (_NODES * (1.0 + _LOW_DEGREE / degree**2))
 
 
 def surely_stable(cut: PeriodMap) -> float:
@@ -93,9 +94,9 @@ def _limit(
     if intervals is not None:
         step = tooth / intervals
         return first_loss(Growth(cut, speed, step), low, max_depth, 1e-3 * tolerance), step, True
-    # a search that is a little too deep and a little coarse, then the limit from where it ended
-    coarse, step = longest_steps(cut)
-    depth = first_loss(Growth(cut, speed, coarse), low, 1.1 * max_depth, 10.0 * tolerance)
+    # a search that is a little too deep and a little rough, then the limit from where it ended
+    step = longest_step(cut)
+    depth = first_loss(Growth(cut, speed, step, ROUGH), low, 1.1 * max_depth, 10.0 * tolerance)
     if depth is None:
         return None, step, True
     for _ in range(_REPEATS):

@@ -16,14 +16,14 @@ from rcsa_ident.stability import _period_kernels as kernels
 from rcsa_ident.stability.modes import TipModes
 
 #: Residual of the multiplier, as a share of it.
-_RESIDUAL = 1e-6
+RESIDUAL = 1e-6
 #: Most swings of a varying speed after which the teeth have to stand as they did.
 _SWINGS = 60
 #: Slices of the edge per metre where modes have a shape along it.
 SLICES = 6000.0
 
-#: Depth [m] to rows of (upper share, lower share, entry angle): where along the edge the teeth enter.
-EntryProfile = Callable[[float], FloatArray]
+#: Speed [rad/s] and depth [m] to rows of (upper share, lower share, start, end): between which angles each part of the edge cuts.
+EngagementProfile = Callable[[float, float], FloatArray]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,14 +64,14 @@ class PeriodMap:
         Of the polynomials for the force within a step.
     frozen : bool
         Constant coefficients within a step, and what was there a delay ago on a straight line.
-    entries : callable or None
-        Entry angles along the edge, by depth; the process's own by default.
+    engagements : callable or None
+        Engagement along the edge, by speed and depth; the process's own by default.
     """
 
     def __init__(
-        self, modes: TipModes, process: MillingProcess, degree: int, frozen: bool = False, entries: EntryProfile | None = None
+        self, modes: TipModes, process: MillingProcess, degree: int, frozen: bool = False, engagements: EngagementProfile | None = None
     ) -> None:
-        self.modes, self.process, self.frozen, self.entries = modes, process, frozen, entries
+        self.modes, self.process, self.frozen, self.engagements = modes, process, frozen, engagements
         cutter = process.cutter
         self.table = lobatto(degree)
         #: By which power of the step the error falls.
@@ -80,7 +80,7 @@ class PeriodMap:
         uneven = bool(np.ptp(cutter.runout) > 0.0)
         if uneven and process.feed_per_tooth is None:
             raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: with run-out it decides which teeth cut")
-        if uneven and entries is not None:
+        if uneven and engagements is not None:
             raise InputError("runout", cutter.runout.tolist(), "equal teeth beside a deflected tool")
         # (offset, start, end, delay) of the teeth that differ
         entry, leave = process.engagement.entry, process.engagement.exit
@@ -123,7 +123,15 @@ class PeriodMap:
         """Seconds of a period."""
         return self.period / speed
 
-    def multiplier(self, speed: float, depth: float, step: float, start: ComplexArray | None = None, waves: bool = False) -> Multiplier:
+    def multiplier(
+        self,
+        speed: float,
+        depth: float,
+        step: float,
+        start: ComplexArray | None = None,
+        waves: bool = False,
+        residual: float = RESIDUAL,
+    ) -> Multiplier:
         """Return the multiplier of largest magnitude.
 
         Parameters
@@ -136,9 +144,11 @@ class PeriodMap:
             Vector of a similar cut.
         waves : bool
             Also look at the frequencies of the vibration.
+        residual : float
+            Of the eigenvalue, as a share of it, at which the search for it ends.
         """
         process = self.process
-        rows, shapes = self._rows(depth)
+        rows, shapes = self._rows(speed, depth)
         c, d, v = process.coefficients, process.damping, process.speed_variation
         plan = np.zeros(kernels.DELAYS + self.delays.size)
         plan[: kernels.DELAYS] = (
@@ -156,40 +166,41 @@ class PeriodMap:
             0.0 if v is None else v.ratio,
             step,
             float(self.frozen),
-            _RESIDUAL,
+            residual,
+            float(waves),
         )
         plan[kernels.DELAYS :] = self.delays
         first = np.zeros(0) if start is None else start.real
-        value, residual, _, vector, force, places, time = kernels.multiplier(
+        value, left, _, vector, force, places, time = kernels.multiplier(
             self.pole, self.outputs, self.inputs, self.constant, rows, shapes, plan, self.table, first
         )
         value = complex(value)
         if value.imag < 0.0:
             value, vector, force = value.conjugate(), vector.conj(), force.conj()
         omega, motion = self._waves(value, speed, force, places, time) if waves else (np.zeros(0), np.zeros(0))
-        return Multiplier(value, self.duration(speed), vector, omega, motion, float(residual))
+        return Multiplier(value, self.duration(speed), vector, omega, motion, float(left))
 
-    def _rows(self, depth: float) -> tuple[FloatArray, FloatArray]:
+    def _rows(self, speed: float, depth: float) -> tuple[FloatArray, FloatArray]:
         """Windows and the directions that they push in, as the kernels want them."""
         if self._straight is not None:
             return self._straight
         rows, shapes = [], []
         for offset, start, end, delay in self.windows:
-            for upper, lower, entry in self._slices(depth, start):
-                rows.append((offset, entry, end, upper, lower, delay))
+            for upper, lower, opens, closes in self._slices(speed, depth, start, end):
+                rows.append((offset, opens, closes, upper, lower, delay))
                 shapes.append(self.rotation @ self._directions(0.5 * (upper + lower) * depth))
         found = np.array(rows), np.array(shapes)
-        if self.entries is None and self.modes.shape is None:
+        if self.engagements is None and self.modes.shape is None:
             self._straight = found
         return found
 
-    def _slices(self, depth: float, start: float) -> FloatArray:
-        if self.entries is not None:
-            return self.entries(depth)
+    def _slices(self, speed: float, depth: float, start: float, end: float) -> FloatArray:
+        if self.engagements is not None:
+            return self.engagements(speed, depth)
         if self.modes.shape is None:
-            return np.array([[0.0, 1.0, start]])
+            return np.array([[0.0, 1.0, start, end]])
         edges = np.linspace(0.0, 1.0, max(2, int(np.ceil(SLICES * depth))) + 1)
-        return np.stack([edges[:-1], edges[1:], np.full(edges.size - 1, start)], axis=1)
+        return np.stack([edges[:-1], edges[1:], np.full(edges.size - 1, start), np.full(edges.size - 1, end)], axis=1)
 
     def _directions(self, height: float) -> FloatArray:
         if self.modes.shape is None or self.modes.heights is None:
