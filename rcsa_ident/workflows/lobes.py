@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,18 +11,23 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.rational import tip_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import StabilityMethod, stability_lobes, uncoupled_planes
+from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.tip import TooltipResponse
 
 #: Two peaks are one pocket unless the limit between them falls below this share of the lower one.
 POCKET = 0.85
-#: Lines per half-power bandwidth of the least damped mode, and the most there may be.
-LINES_PER_BANDWIDTH = 10.0
-MOST_LINES = 200_000
+#: Methods that march through time: they take modes.
+MARCHING = (SemiDiscretisation, FullDiscretisation)
+#: What a fit of a receptance may be beside it, root mean square.
+FIT_TOLERANCE = 2e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,9 +47,23 @@ class LobeConditions:
     max_depth: float
     method: StabilityMethod = field(default_factory=ZeroOrder)
 
-    def lobes(self, tip: Receptance) -> StabilityLobes:
-        """Return the lobes for the tip's 2 x 2 receptance."""
-        return stability_lobes(tip, self.process, self.speeds, self.max_depth, self.method)
+    def lobes(self, tip: Receptance | TipModes) -> StabilityLobes:
+        """Return the lobes for the tip's 2 x 2 receptance or modes; a method that needs modes gets those of a fit, and says so."""
+        if isinstance(tip, TipModes) or not isinstance(self.method, MARCHING):
+            return stability_lobes(tip, self.process, self.speeds, self.max_depth, self.method)
+        modes, error = fitted_modes(tip)
+        found = stability_lobes(modes, self.process, self.speeds, self.max_depth, self.method)
+        told = f"the receptance was fitted with {modes.pole.size} modes, {max(100.0 * error, 0.01):.2g} % or less beside it"
+        return replace(found, warnings=(*found.warnings, told))
+
+
+def fitted_modes(tip: Receptance) -> tuple[TipModes, float]:
+    """Return the modes of a rational fit of the tip's receptance, and how far it is beside it: the norm of what is left, as a share."""
+    found = tip_modes(tip, tolerance=FIT_TOLERANCE)
+    modes = TipModes(found.pole, found.outputs, found.inputs, found.constant)
+    kept = tip.omega > 0.0
+    left = modes.at(tip.omega[kept]) - tip.values[kept]
+    return modes, float(np.linalg.norm(left) / np.linalg.norm(tip.values[kept]))
 
 
 def tooling_lobes(response: TooltipResponse, conditions: LobeConditions) -> StabilityLobes:
@@ -184,16 +203,7 @@ def modal_tip(models: Mapping[Dof, ModalModel]) -> Receptance:
     models : mapping of Dof to ModalModel
         With ``tip.x``, ``tip.y``; a direction that is missing is rigid.
     """
-    frequency = np.concatenate([m.omega_n for m in models.values()])
-    step = min(float(np.min(2.0 * m.zeta * m.omega_n)) for m in models.values()) / LINES_PER_BANDWIDTH
-    low, high = 0.1 * float(frequency.min()), 2.0 * float(frequency.max())
-    count = (high - low) / step
-    if count > MOST_LINES:
-        sharpest = min(float(m.zeta.min()) for m in models.values())
-        raise InputError("damping_ratio", sharpest, f"modes that {MOST_LINES} frequencies resolve")
-    omega = np.linspace(low, high, int(count) + 2)
-    planes = {axis: model.receptance(omega) for axis, model in models.items()}
-    return uncoupled_planes(planes.get(Dof.X), planes.get(Dof.Y))
+    return TipModes.of(models).receptance()
 
 
 def measured_tip(

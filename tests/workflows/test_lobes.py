@@ -14,6 +14,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.stability.lobes import uncoupled_planes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.zero_order import ZeroOrder
@@ -22,6 +23,7 @@ from rcsa_ident.workflows.lobes import (
     band_warning,
     best_speeds,
     lobe_bands,
+    measured_tip,
     modal_tip,
     stability_probability,
     tooling_lobes,
@@ -141,3 +143,34 @@ def test_without_a_posterior_nothing_is_probable():
 def test_depths_that_can_not_be_asked_for(depths):
     with pytest.raises(InputError, match="depths"):
         stability_probability(posterior_of_scale(0.1), asked(ZeroOrder()), np.array(depths))
+
+
+def test_cross_receptances_of_a_tap_test():
+    """A machine whose planes are turned by 30 degrees, measured along X and Y with its cross term, is that machine."""
+    frequency = np.arange(200.0, 2000.0, 2.0)
+    omega = 2.0 * np.pi * frequency
+    planes = [
+        (2 * np.pi * f) ** 2 / k / ((2 * np.pi * f) ** 2 - omega**2 + 0.06j * 2 * np.pi * f * omega)
+        for f, k in ((700.0, 8e6), (800.0, 4e6))
+    ]
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    turn = np.array([[c, -s], [s, c]])
+    full = np.einsum("ip,pn,jp->nij", turn, np.array(planes), turn)
+    curves = {Dof.X: (frequency, full[:, 0, 0]), Dof.Y: (frequency, full[:, 1, 1])}
+    cross = {(Dof.X, Dof.Y): (frequency, full[:, 0, 1])}
+    tip = measured_tip(curves, cross)
+    np.testing.assert_allclose(tip.values, full, rtol=1e-12)
+    # the same cut with its feed turned along with the machine
+    straight = uncoupled_planes(
+        *(Receptance(omega, h[:, None, None], *[(Coordinate("tip", d),)] * 2) for d, h in zip((Dof.X, Dof.Y), planes, strict=True))
+    )
+    here = asked(ZeroOrder())
+    process = here.process
+    turned = MillingProcess(process.cutter, process.coefficients, process.engagement, process.feed_angle + np.pi / 6)
+    np.testing.assert_allclose(LobeConditions(turned, here.speeds, 0.1).lobes(tip).limit_depth, here.lobes(straight).limit_depth, rtol=1e-9)
+    both = measured_tip(curves, {**cross, (Dof.Y, Dof.X): (frequency, 2.0 * full[:, 1, 0])})
+    np.testing.assert_allclose(both.values[:, 1, 0], 2.0 * full[:, 1, 0])
+    with pytest.raises(InputError, match="cross FRF: found one without an FRF in Y"):
+        measured_tip({Dof.X: curves[Dof.X]}, cross)
+    with pytest.raises(InputError, match="cross FRF: found 5 frequencies"):
+        measured_tip(curves, {(Dof.X, Dof.Y): (frequency[:5], full[:5, 0, 1])})

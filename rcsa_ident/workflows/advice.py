@@ -1,0 +1,274 @@
+"""What a machinist asks of stability lobes: which speed for a depth, how to remove most, how far a planned cut is from chatter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.cutting.power import SpindleDrive, spindle_load
+from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.errors import InputError, positive
+from rcsa_ident.workflows.limits import Limits, robust
+from rcsa_ident.workflows.lobes import peaks
+
+
+class Bound(StrEnum):
+    """What ends the depth at a speed."""
+
+    CHATTER = "chatter"
+    POWER = "power"
+    TORQUE = "torque"
+    SPEED = "speed"
+    DEPTH = "depth"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UsableDepths:
+    """How deep one may cut at each speed, and what stands against more.
+
+    Parameters
+    ----------
+    spindle_speed : array, shape (n,) [rad/s]
+        Rising.
+    stable : array, shape (n,) [m]
+        By stability alone, with the tolerance of the speed and the probability that were asked for.
+    by_power, by_torque : array, shape (n,) [m]
+        By what the spindle has, up to the largest depth.
+    depth : array, shape (n,) [m]
+        The smallest of them; 0 beyond the spindle's highest speed.
+    bound : tuple of Bound, length n
+    removal_rate : array, shape (n,) [m^3/s]
+        At that depth.
+    """
+
+    spindle_speed: FloatArray
+    stable: FloatArray
+    by_power: FloatArray
+    by_torque: FloatArray
+    depth: FloatArray
+    bound: tuple[Bound, ...]
+    removal_rate: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("spindle_speed", "stable", "by_power", "by_torque", "depth", "removal_rate"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def between(self, low: float, high: float) -> UsableDepths:
+        """Return what is known of a range of speeds [rad/s]."""
+        inside = (self.spindle_speed >= low * (1.0 - 1e-9)) & (self.spindle_speed <= high * (1.0 + 1e-9))
+        names = ("spindle_speed", "stable", "by_power", "by_torque", "depth", "removal_rate")
+        arrays = {name: getattr(self, name)[inside] for name in names}
+        return UsableDepths(**arrays, bound=tuple(b for b, there in zip(self.bound, inside, strict=True) if there))
+
+
+def usable_depths(
+    limits: Limits, process: MillingProcess, drive: SpindleDrive, tolerance: float = 0.0, probability: float = 0.95, margin: float = 0.0
+) -> UsableDepths:
+    """Return how deep one may cut at each speed.
+
+    Parameters
+    ----------
+    limits : Limits
+    process : MillingProcess
+        With its feed per tooth: power, torque and removal rate grow with it.
+    drive : SpindleDrive
+    tolerance : float
+        The limit counts that is the lowest within this share of the speed.
+    probability : float
+        That the cut is stable, where machines were drawn.
+    margin : float
+        Share of the stable depth that is kept as a reserve.
+    """
+    if process.feed_per_tooth is None:
+        raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]")
+    if not 0.0 <= margin < 1.0:
+        raise InputError("margin", margin, "a share from 0 to below 1")
+    speed = limits.lobes.spindle_speed
+    stable = (1.0 - margin) * robust(speed, limits.trusted(probability), tolerance)
+    # both grow in proportion to the depth
+    load = spindle_load(process.cutter, process.conditions(1.0, 1.0), process.coefficients)
+    by_torque = np.minimum(drive.torque_at(speed) / load.torque, limits.max_depth)
+    by_power = np.minimum(drive.power_at(speed) / (load.torque * speed), limits.max_depth)
+    table = np.stack([stable, by_power, by_torque])
+    depth = table.min(axis=0)
+    which = table.argmin(axis=0)
+    names = (Bound.CHATTER, Bound.POWER, Bound.TORQUE)
+    whole = (1.0 - margin) * limits.max_depth * (1.0 - 1e-12)
+    bound = [
+        Bound.SPEED if d == 0.0 else Bound.DEPTH if d >= whole else names[k] for d, k in zip(depth.tolist(), which.tolist(), strict=True)
+    ]
+    return UsableDepths(speed, stable, by_power, by_torque, depth, tuple(bound), depth * load.removal_rate * speed)
+
+
+@dataclass(frozen=True, slots=True)
+class OperatingPoint:
+    """A cut that one may make.
+
+    Parameters
+    ----------
+    spindle_speed : float [rad/s]
+    depth : float [m]
+    bound : Bound
+        What stands against more depth.
+    removal_rate : float [m^3/s]
+    power : float [W]
+    torque : float [N m]
+    """
+
+    spindle_speed: float
+    depth: float
+    bound: Bound
+    removal_rate: float
+    power: float
+    torque: float
+
+
+def highest_removal(usable: UsableDepths, process: MillingProcess, count: int = 3) -> list[OperatingPoint]:
+    """Return the cuts that remove most, one for each pocket, the best first."""
+    found = []
+    for speed, _ in peaks(usable.spindle_speed, usable.removal_rate, count):
+        place = int(np.argmin(np.abs(usable.spindle_speed - speed)))
+        at, depth = float(usable.spindle_speed[place]), float(usable.depth[place])
+        if depth > 0.0:
+            load = spindle_load(process.cutter, process.conditions(at, depth), process.coefficients)
+            found.append(OperatingPoint(at, depth, usable.bound[place], load.removal_rate, load.power, load.torque))
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedWindow:
+    """Speeds at which a depth is allowed.
+
+    Parameters
+    ----------
+    low, high : float [rad/s]
+    best : float [rad/s]
+        Where most is allowed; the middle where that is so at several.
+    allowed : float [m]
+        What is allowed there.
+    """
+
+    low: float
+    high: float
+    best: float
+    allowed: float
+
+    @property
+    def width(self) -> float:
+        """Width over the middle."""
+        return (self.high - self.low) / (0.5 * (self.high + self.low))
+
+
+def speed_windows(usable: UsableDepths, depth: float) -> list[SpeedWindow]:
+    """Return the ranges of speed in which a depth is allowed, the one with the most reserve first; ends by straight lines."""
+    depth = positive("depth", depth, "m")
+    speed, allowed = usable.spindle_speed, usable.depth
+    good = allowed >= depth
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
+    found = []
+    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        low = _crossing(speed, allowed, first - 1, depth) if first > 0 else float(speed[0])
+        high = _crossing(speed, allowed, end - 1, depth) if end < speed.size else float(speed[-1])
+        top = float(allowed[first:end].max())
+        best = first + np.flatnonzero(allowed[first:end] >= top * (1.0 - 1e-12))
+        found.append(SpeedWindow(low, high, 0.5 * float(speed[best[0]] + speed[best[-1]]), top))
+    return sorted(found, key=lambda w: (-w.allowed, -w.width))
+
+
+def _crossing(speed: FloatArray, level: FloatArray, place: int, value: float) -> float:
+    """Where the line from `place` to the next meets a value."""
+    a, b = float(level[place]), float(level[place + 1])
+    return float(speed[place] + (value - a) / (b - a) * (speed[place + 1] - speed[place]))
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedCut:
+    """How a cut stands that somebody wants to make.
+
+    Parameters
+    ----------
+    spindle_speed : float [rad/s]
+    depth : float [m]
+    limit : float [m]
+        Infinite where it is stable up to the depth that was asked for.
+    robust_limit : float [m]
+        The lowest within the tolerance of the speed and with the probability that were asked for.
+    chatter_frequency : float [rad/s]
+        Of the vibration at the limit; NaN without one.
+    slower, faster : float or None [rad/s]
+        The nearest speeds at which the same depth is on the other side of the limit; None if the range holds none.
+    probability : float or None
+        That it is stable, where machines were drawn.
+    load : float
+        Share of the power or of the torque that it takes, the larger of both; 0 without known limits.
+    power : float [W]
+    torque : float [N m]
+    removal_rate : float [m^3/s]
+    """
+
+    spindle_speed: float
+    depth: float
+    limit: float
+    robust_limit: float
+    chatter_frequency: float
+    slower: float | None
+    faster: float | None
+    probability: float | None
+    load: float
+    power: float
+    torque: float
+    removal_rate: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether the machine as it was identified allows it."""
+        return self.depth <= self.limit
+
+    @property
+    def margin(self) -> float:
+        """Share of the cut's depth by which the limit lies above it; negative above the limit."""
+        return self.limit / self.depth - 1.0
+
+
+def planned_cut(
+    limits: Limits,
+    process: MillingProcess,
+    drive: SpindleDrive,
+    speed: float,
+    depth: float,
+    tolerance: float = 0.0,
+    probability: float = 0.95,
+) -> PlannedCut:
+    """Return how a cut stands; its speed is one of those of the limits (`widened` puts it among them)."""
+    depth = positive("depth", depth, "m")
+    speeds = limits.lobes.spindle_speed
+    place = int(np.argmin(np.abs(speeds - positive("speed", speed, "rad/s"))))
+    if abs(speeds[place] - speed) > 1e-6 * speed or depth > limits.max_depth:
+        raise InputError("planned cut", f"{speed:g} rad/s and {depth:g} m", f"a speed of the limits and at most {limits.max_depth:g} m")
+    nominal = limits.nominal
+    other = (nominal >= depth) != (nominal[place] >= depth)
+    below, above = np.flatnonzero(other[:place]), np.flatnonzero(other[place + 1 :])
+    slower = _crossing(speeds, nominal, int(below[-1]), depth) if below.size else None
+    faster = _crossing(speeds, nominal, place + int(above[0]), depth) if above.size else None
+    load = spindle_load(process.cutter, process.conditions(speed, depth), process.coefficients)
+    power, torque = drive.power_at(speeds[place : place + 1])[0], drive.torque_at(speeds[place : place + 1])[0]
+    with np.errstate(divide="ignore"):
+        share = float(np.max(np.array([load.power, load.torque]) / np.array([power, torque])))
+    lowest = robust(speeds, limits.trusted(probability), tolerance)[place]
+    return PlannedCut(
+        float(speeds[place]),
+        depth,
+        float(limits.lobes.limit_depth[place]),
+        float(lowest),
+        float(limits.lobes.chatter_frequency[place]),
+        slower,
+        faster,
+        limits.probability(place, depth),
+        share,
+        load.power,
+        load.torque,
+        load.removal_rate,
+    )
