@@ -69,18 +69,15 @@ class ObserverFRF:
         return float(omega[first]), float(omega[last])
 
     def delay(self, band: tuple[float, float]) -> float:
-        """Return by how much the estimate lags the force: minus the phase's mean slope over a band [s].
-
-        Oscillators do not lag: for them look at `phase_at_lines`.
-        """
+        """Return by how much the estimate lags the force: minus the phase's mean slope over a band [s]."""
         inside = (self.omega >= band[0]) & (self.omega <= band[1])
         phase = np.unwrap(np.angle(self.compensated[inside]))
         return float(-np.polyfit(self.omega[inside], phase, 1)[0])
 
     @property
-    def phase_at_lines(self) -> FloatArray:
-        """Phase of the compensated response at the lines, shape (j,) [rad]."""
-        return np.angle(self.at_line)
+    def delay_at_lines(self) -> float:
+        """The same from the phases at the lines, which is all that a steady cut feels [s]."""
+        return float(-np.sum(np.unwrap(np.angle(self.at_line)) * self.line) / np.sum(self.line**2))
 
 
 def decibel(values: ComplexArray) -> FloatArray:

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar, Protocol
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.observer.force_model import RandomWalk, TeethResonators
+from rcsa_ident.observer.force_model import ForceModel, RandomWalk, TeethResonators
 from rcsa_ident.observer.transfer_function import TransferFunction
 
-#: Signal power over noise power at which a smoothed estimate keeps all but 1 dB of the force: g / (1 + g) = 10^(-1/20).
-ONE_DECIBEL = 1.0 / (10.0**0.05 - 1.0)
+#: Signal power over noise power at which a smoothed estimate keeps all but 0.1 dB of the force, s / (1 + s) = 10^(-0.1/20): what a
+#: live one loses beside that is mostly delay.
+MARGIN = 1.0 / (10.0**0.005 - 1.0)
 #: Time in which an oscillator follows a change, in revolutions.
 RESPONSE_TURNS = 0.5
 #: The paper's walk does not forget; behind a high-pass it must, and this share of the band's lower end is nearly never.
-BASELINE_LEAK = 0.05
+BASELINE_LEAK = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +56,7 @@ class Tuning:
         Notes
         -----
         A walk of intensity q has the spectrum q^2 / w^2, the displacement's noise r^2 dt. The smoothed estimate has the gain
-        s / (s + 1) with s = |C31|^2 q^2 / (w^2 r^2 dt), and q is the least with which that is -1 dB or better.
+        s / (s + 1) with s = |C31|^2 q^2 / (w^2 r^2 dt), and q is the least with which that is -0.1 dB or better.
         """
         low, high = transfer.band[0], min(self.bandwidth, transfer.band[1])
         if high <= low:
@@ -62,7 +64,7 @@ class Tuning:
             raise InputError("bandwidth", found, f"above the lower end of the band, {low / (2.0 * np.pi):.0f} Hz")
         omega = np.linspace(low, high, 200)
         quiet = self._noise(transfer, omega)
-        return RandomWalk(float(np.max(omega * quiet) * np.sqrt(ONE_DECIBEL)), BASELINE_LEAK * low if leak is None else leak)
+        return RandomWalk(float(np.max(omega * quiet) * np.sqrt(MARGIN)), BASELINE_LEAK * low if leak is None else leak)
 
     def resonators(self, transfer: TransferFunction, omega: FloatArray) -> TeethResonators:
         """Return oscillators at the given frequencies beside a walk of the band's own memory.
@@ -105,3 +107,54 @@ def harmonics(spindle_speed: float, teeth: int, band: tuple[float, float], run_o
     """
     step = positive("spindle speed", spindle_speed, "rad/s") * (1 if run_out else teeth)
     return step * np.arange(np.ceil(band[0] / step - 1e-9), np.floor(band[1] / step + 1e-9) + 1.0)
+
+
+class ObserverMethod(Protocol):
+    """Which force model an observer has; an object that carries its settings."""
+
+    def force_model(self, tuning: Tuning, transfer: TransferFunction, spindle_speed: float, teeth: int) -> ForceModel:
+        """Return the force model of one axis."""
+        ...
+
+    @property
+    def colours_noise(self) -> bool:
+        """Whether the integrated acceleration's noise and the orders below the band are modelled."""
+        ...
+
+    @property
+    def response_turns(self) -> float:
+        """Revolutions in which it follows a change of the cut."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Resonators:
+    """Oscillators at the harmonics of the teeth beside a random walk: no lag in a steady cut.
+
+    Parameters
+    ----------
+    run_out : bool
+        Also at the spindle's other orders, on which an eccentric cutter cuts.
+    response_turns : float
+        Revolutions in which an oscillator follows a change of the cut.
+    """
+
+    run_out: bool = True
+    response_turns: float = RESPONSE_TURNS
+    colours_noise: ClassVar[bool] = True
+
+    def force_model(self, tuning: Tuning, transfer: TransferFunction, spindle_speed: float, teeth: int) -> TeethResonators:
+        """Return the oscillators in the transfer function's band."""
+        return tuning.resonators(transfer, harmonics(spindle_speed, teeth, transfer.band, self.run_out))
+
+
+@dataclass(frozen=True, slots=True)
+class PaperWalk:
+    """The paper's random walk and white measurement noise: lags by the machine's own delay."""
+
+    colours_noise: ClassVar[bool] = False
+    response_turns: ClassVar[float] = RESPONSE_TURNS
+
+    def force_model(self, tuning: Tuning, transfer: TransferFunction, spindle_speed: float, teeth: int) -> RandomWalk:
+        """Return the walk."""
+        return tuning.random_walk(transfer)

@@ -1,0 +1,348 @@
+"""Cutting forces of a recording on an identified machine: everything from the channels to newtons with their bands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.coupling.rcsa import SPINDLE, couple
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.posterior import MachineAxis, spread
+from rcsa_ident.observer.force import AxisObserver, ForceEstimate, ForceObserver, RunOut, axis_observer, force_observer
+from rcsa_ident.observer.response import ObserverFRF, observer_response
+from rcsa_ident.observer.transfer_function import HIGHEST, transfer_function
+from rcsa_ident.observer.tuning import ObserverMethod, Resonators, Tuning, harmonics
+from rcsa_ident.signals.alignment import angle_to_air
+from rcsa_ident.signals.measurement import NO_AIR
+from rcsa_ident.signals.recording import Quantity, Recording
+from rcsa_ident.signals.spectra import line_spectrum
+from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
+from rcsa_ident.signals.verdict import raw_faults, speed_faults
+from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.workflows.speeds import MachineOverSpeed
+from rcsa_ident.workflows.tip import tooltip, turned_plane
+
+#: The band begins this much below the lowest identified line: a model is as good a little beyond its last point.
+BELOW = 0.7
+#: Step of the receptances that the transfer function is fitted to [Hz].
+STEP_HZ = 5.0
+#: An air cut's line is taken out where its power stands this far above its variance.
+VISIBLE = 9.0
+#: A standard deviation of the angle between cut and air cut above which taking out run-out does more harm than good [rad].
+LOOSE_ANGLE = 0.1
+METHOD = Resonators()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MonitoredCut:
+    """Forces of a recording and what they rest on.
+
+    Parameters
+    ----------
+    estimate : ForceEstimate
+    observer : ForceObserver
+        As it was made for this machine, tooling, sensors and speed: ready to stream.
+    spindle_speed : float [rad/s]
+        From the record.
+    teeth : int
+    band : two floats [rad/s]
+        In which forces are estimated.
+    response : mapping of Dof to ObserverFRF
+        Compensated with the identified machine.
+    model_error : mapping of Dof to float [N]
+        Standard deviation of the force that the machine's posterior leaves; part of the estimate's bands.
+    noise : mapping of Dof to float [m]
+        Standard deviation of a displacement sample, found between the record's lines.
+    notes : tuple of str
+        What the user should know.
+    """
+
+    estimate: ForceEstimate
+    observer: ForceObserver
+    spindle_speed: float
+    teeth: int
+    band: tuple[float, float]
+    response: Mapping[Dof, ObserverFRF]
+    model_error: Mapping[Dof, float]
+    noise: Mapping[Dof, float]
+    notes: tuple[str, ...] = field(default=())
+
+
+def observe(
+    machine: MachineOverSpeed,
+    assembly: ToolAssembly,
+    teeth: int,
+    cut: Recording,
+    air: Recording | None,
+    identified: tuple[float, float],
+    programmed: float | None = None,
+    method: ObserverMethod = METHOD,
+    bandwidth: float | None = None,
+    smooth: bool = False,
+) -> MonitoredCut:
+    """Return the forces of one recording.
+
+    Parameters
+    ----------
+    machine : MachineOverSpeed
+        Identified.
+    assembly : ToolAssembly
+        Of the tooling that was cut with; it need not be one of the identification's.
+    teeth : int
+    cut, air : Recording
+        The air cut, where there is one, with the same clamping and speed: its run-out is taken out.
+    identified : two floats [rad/s]
+        Band of the identification.
+    programmed : float [rad/s], optional
+        Spindle speed, to 1 %; by default from the trigger.
+    method : ObserverMethod
+        `Resonators` or `PaperWalk`.
+    bandwidth : float [rad/s], optional
+        Up to which the observer shall follow the force; by default the end of the identified band.
+    smooth : bool
+        Every sample given the whole record, without lag; else as it would be live.
+
+    Raises
+    ------
+    InputError
+        If the recording has lost samples, no displacement, no speed or no steady part.
+    """
+    faults = (*raw_faults(cut), *(f"air cut: {fault}" for fault in (raw_faults(air) if air is not None else ())))
+    if faults:
+        raise InputError("recording", "; ".join(faults), "a record without lost, frozen or clipped samples")
+    axes = tuple(axis for axis in measured_axes(cut) if axis in machine.whole)
+    if not axes:
+        raise InputError("sensors", "no displacement along an identified axis", "a displacement sensor for X or Y")
+    programmed = trigger_speed(cut) if programmed is None else programmed
+    top = min(identified[1], HIGHEST * 2.0 * np.pi * cut.rate)
+    steady = _steady(cut, axes, programmed, top, teeth)
+    speed = steady.spindle_speed
+    notes = list(speed_faults(steady.displacement, steady.lines, programmed))
+    band = _band(identified, top, speed, teeth, notes)
+    run_out = _run_out(steady, air, axes, programmed, top, teeth, notes)
+    known = machine.speed_range
+    if known is not None and not known[0] * (1.0 - 1e-9) <= speed <= known[1] * (1.0 + 1e-9):
+        low, high = (each * 30.0 / np.pi for each in known)
+        notes.append(f"the machine was identified from {low:.0f} to {high:.0f} rev/min, the record has {speed * 30.0 / np.pi:.0f}")
+    omega = 2.0 * np.pi * np.arange(max(0.25 * band[0] / (2.0 * np.pi), STEP_HZ), 1.3 * band[1] / (2.0 * np.pi), STEP_HZ)
+    coupled = tooltip(machine.at(speed), assembly, omega, bands=False, speed=speed).coupled
+    tuning = {axis: Tuning(_noise(steady, i), bandwidth or band[1], _response_time(method, speed)) for i, axis in enumerate(axes)}
+    observers = []
+    for i, axis in enumerate(axes):
+        cross = coupled[axis][SPINDLE, "tip"][:, 0, 0]
+        observers.append(_axis(steady, axis, i, omega, cross, band, tuning[axis], method, speed, teeth, run_out))
+    observer = force_observer(observers)
+    estimate = observer.observe(*_signals(cut, axes), smooth=smooth)
+    if not method.colours_noise:
+        estimate = replace(estimate, force=_above(estimate.force, band[0], estimate.step))
+    errors = {axis: _model_error(machine.at(speed)[axis], axis, assembly, estimate, i, band, speed) for i, axis in enumerate(axes)}
+    response = {each.axis: _response(each, steady, omega, coupled[each.axis][SPINDLE, "tip"][:, 0, 0], speed, smooth) for each in observers}
+    return MonitoredCut(
+        _widened(estimate, [errors[axis] for axis in axes]),
+        observer,
+        speed,
+        teeth,
+        band,
+        response,
+        errors,
+        {axis: each.noise_floor for axis, each in tuning.items()},
+        tuple(notes),
+    )
+
+
+def trigger_speed(recording: Recording) -> float:
+    """Return the spindle's mean speed from a recording's trigger [rad/s].
+
+    Raises
+    ------
+    InputError
+        Without a trigger, or with fewer than three edges.
+    """
+    found = recording.channel(Quantity.TRIGGER)
+    if found is None:
+        raise InputError("--speed-rpm", "none, and no trigger in the recording", "the programmed spindle speed [rev/min]")
+    sensor, signal = found
+    high = signal > 0.5 * (np.nanmin(signal) + np.nanmax(signal))
+    edges = np.flatnonzero(high[1:] & ~high[:-1])
+    if edges.size < 3:
+        raise InputError("trigger", f"{edges.size} rising edges", "three or more, or the programmed spindle speed with --speed-rpm")
+    # the median shrugs off a stray or a lost edge
+    return float(2.0 * np.pi * recording.rate / np.median(np.diff(edges)) / sensor.pulses_per_revolution)
+
+
+def _steady(recording: Recording, axes: tuple[Dof, ...], programmed: float, top: float, teeth: int) -> SteadyRecord:
+    steady = steady_record(recording, axes, programmed, top / (2.0 * np.pi), teeth)
+    if isinstance(steady, str):
+        raise InputError("recording", steady, "a steady record of the programmed speed")
+    return steady
+
+
+def _band(identified: tuple[float, float], top: float, speed: float, teeth: int, notes: list[str]) -> tuple[float, float]:
+    """Where forces are estimated, and what that leaves out."""
+    hz = 2.0 * np.pi
+    low = BELOW * identified[0]
+    if low >= 0.9 * top:
+        raise InputError("band", f"{low / hz:.0f} to {top / hz:.0f} Hz", "one that the sampling rate can hold")
+    fundamental = speed * teeth
+    if fundamental < low:
+        share = f"harmonics below {low / hz:.0f} Hz are left out"
+        notes.append(f"the tooth-passing frequency, {fundamental / hz:.0f} Hz, lies below what the identified model is good for: {share}")
+    elif fundamental < identified[0]:
+        notes.append(
+            f"the tooth-passing frequency, {fundamental / hz:.0f} Hz, lies below the identified band, which begins at "
+            f"{identified[0] / hz:.0f} Hz: its share of the force rests on the model beyond its data"
+        )
+    return low, top
+
+
+def _run_out(
+    cut: SteadyRecord, air: Recording | None, axes: tuple[Dof, ...], programmed: float, top: float, teeth: int, notes: list[str]
+) -> tuple[FloatArray, ComplexArray] | None:
+    """Orders and the air cut's lines of the cut's columns, turned to lie under it, shapes (o,) and (o, c)."""
+    if air is None:
+        notes.append(NO_AIR)
+        return None
+    still = _steady(air, axes, programmed, 1.02 * top, 1)
+    angle, std = angle_to_air(cut, still, teeth)
+    if std > LOOSE_ANGLE:
+        notes.append(f"the angle between cut and air cut is known to {np.degrees(std):.0f}° only: run-out is left in")
+        return None
+    count = min(cut.highest_order, still.highest_order)
+    order = np.arange(1, count + 1)
+    lines, noise = still.lines.amplitude[1 : count + 1], still.lines.variance[1 : count + 1]
+    places = [_place(still, kind) for kind in _kinds(cut)]
+    lines, noise = lines[:, places], noise[:, places]
+    shown = np.abs(lines) ** 2 > VISIBLE * noise
+    turned = np.where(shown, lines, 0.0) * np.exp(1j * order * angle)[:, None]
+    keep = shown.any(axis=1)
+    return order[keep].astype(float), turned[keep]
+
+
+def _kinds(steady: SteadyRecord) -> list[tuple[Quantity, Dof | None]]:
+    sensors = [steady.recording.sensors[c] for c in steady.columns]
+    return [(sensor.quantity, sensor.axis) for sensor in sensors]
+
+
+def _place(steady: SteadyRecord, kind: tuple[Quantity, Dof | None]) -> int:
+    kinds = _kinds(steady)
+    if kind not in kinds:
+        raise InputError("sensors", f"no {kind[0]} {kind[1]} in the air cut", "the same sensors for a cut and its air cut")
+    return kinds.index(kind)
+
+
+def _noise(steady: SteadyRecord, column: int) -> float:
+    """Standard deviation of a channel's sample, from the quieter half of what stands between the lines."""
+    count = steady.part.stop - steady.part.start
+    floor = np.sort(steady.lines.variance[1:, column])
+    return float(np.sqrt(max(np.median(floor[: max(floor.size // 2, 1)]), 1e-300) * count / 2.0))
+
+
+def _response_time(method: ObserverMethod, speed: float) -> float:
+    return float(method.response_turns * 2.0 * np.pi / speed)
+
+
+def _axis(
+    steady: SteadyRecord,
+    axis: Dof,
+    column: int,
+    omega: FloatArray,
+    cross: ComplexArray,
+    band: tuple[float, float],
+    tuning: Tuning,
+    method: ObserverMethod,
+    speed: float,
+    teeth: int,
+    run_out: tuple[FloatArray, ComplexArray] | None,
+) -> AxisObserver:
+    """The observer of one axis."""
+    recording = steady.recording
+    shown, fixture = recording.channel(Quantity.DISPLACEMENT, axis), recording.channel(Quantity.ACCELERATION, axis)
+    assert shown is not None
+    gap_response = shown[0].response(omega)
+    transfer = transfer_function(omega, cross, 1.0 / recording.rate, band, gap_response)
+    kinds = _kinds(steady)
+    place = None if fixture is None else kinds.index((Quantity.ACCELERATION, axis))
+    turned = None
+    if run_out is not None:
+        order, lines = run_out
+        turned = RunOut(speed, order, lines[:, column], np.zeros(order.size) if place is None else lines[:, place])
+    colours = method.colours_noise
+    return axis_observer(
+        axis,
+        transfer,
+        method.force_model(tuning, transfer, speed, teeth),
+        tuning.noise_floor,
+        acceleration_noise=_noise(steady, place) if place is not None and colours else 0.0,
+        accelerometer=place is not None,
+        sensor_ratio=None if fixture is None else (omega, gap_response / fixture[0].response(omega)),
+        run_out=turned,
+        spindle_speed=speed if colours else 0.0,
+    )
+
+
+def _response(
+    observer: AxisObserver, steady: SteadyRecord, omega: FloatArray, cross: ComplexArray, speed: float, smooth: bool
+) -> ObserverFRF:
+    """The observer's responses, compensated with the identified machine."""
+    shown = steady.recording.channel(Quantity.DISPLACEMENT, observer.axis)
+    assert shown is not None
+    lines = harmonics(speed, 1, observer.transfer.band)
+    at_line = np.interp(lines, omega, cross.real) + 1j * np.interp(lines, omega, cross.imag)
+    machine, machine_at_line = cross * shown[0].response(omega), at_line * shown[0].response(lines)
+    return observer_response(observer, omega, machine, lines, machine_at_line, smoothed=smooth)
+
+
+def _signals(recording: Recording, axes: tuple[Dof, ...]) -> tuple[FloatArray, FloatArray | None]:
+    """Gap and acceleration of the axes, shape (n, a) each; an axis without accelerometer has zeros, and no use for them."""
+    gap, acceleration = [], []
+    for axis in axes:
+        shown, fixture = recording.channel(Quantity.DISPLACEMENT, axis), recording.channel(Quantity.ACCELERATION, axis)
+        assert shown is not None
+        gap.append(shown[1])
+        acceleration.append(np.zeros_like(shown[1]) if fixture is None else fixture[1])
+    return np.stack(gap, axis=1), np.stack(acceleration, axis=1)
+
+
+def _model_error(
+    part: MachineAxis, axis: Dof, assembly: ToolAssembly, estimate: ForceEstimate, column: int, band: tuple[float, float], speed: float
+) -> float:
+    """Standard deviation of the force that the machine's posterior leaves [N]: the force's lines, each with its C31's."""
+    if part.posterior is None:
+        return 0.0
+    rate, force = 1.0 / estimate.step, estimate.force[:, column : column + 1]
+    # the second half: a live estimate has settled by then
+    amplitude = line_spectrum(force[force.size // 2 :], rate, speed, band[1] / (2.0 * np.pi)).amplitude[:, 0]
+    order = np.arange(amplitude.size)
+    order = order[(order * speed >= band[0]) & (order * speed <= band[1])]
+    power = np.abs(amplitude[order]) ** 2
+    omega = order * speed
+    plane = tool_holder_receptance(assembly, omega)
+    plane = plane if axis is Dof.X else turned_plane(plane)
+
+    def cross(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
+        return couple(plane, modes.receptance(omega), joint)[SPINDLE, "tip"][:, 0, 0]
+
+    changes = spread(part.posterior, axis, cross, speed)
+    middle = cross(*part.at(axis, speed))
+    relative = np.sum(np.abs(changes / middle) ** 2, axis=0)
+    return float(np.sqrt(0.5 * np.sum(power * relative)))
+
+
+def _above(force: FloatArray, low: float, step: float) -> FloatArray:
+    """Forces without what lies below the band: the paper's walk puts the sensors' drift and integrated noise there."""
+    from scipy.signal import butter, sosfiltfilt
+
+    sections = butter(4, 0.5 * low / (2.0 * np.pi), "highpass", fs=1.0 / step, output="sos")
+    return frozen(sosfiltfilt(sections, force, axis=0))
+
+
+def _widened(estimate: ForceEstimate, errors: list[float]) -> ForceEstimate:
+    """The estimate with the machine's own uncertainty in its bands."""
+    return replace(estimate, standard_deviation=frozen(np.hypot(estimate.standard_deviation, np.array(errors))))
