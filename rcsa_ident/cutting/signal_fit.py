@@ -196,7 +196,7 @@ class _Problem:
                 clamping = (p - self.ecc.start) // 2
                 if p < self.ecc.stop and self.clampings[clamping] != self.records[k].clamping:
                     continue
-                step = 1e-8 if p < self.ecc.stop else 1e-5
+                step = 1e-9 if p < self.ecc.stop else 1e-6
                 moved = theta.copy()
                 moved[p] += step
                 own[:, p] = self.part(k, (self.columns(k, moved) @ theta[:4] - lines) / step, data=False)

@@ -115,7 +115,9 @@ def _cubic(grid: FloatArray, values: ComplexArray, omega: FloatArray) -> tuple[C
     x, y = grid[places], values[places]
     weights = np.stack([_lagrange(x, omega, members) for members in ((0, 1, 2, 3), (0, 1, 2), (1, 2, 3))])
     cubic, early, late = np.einsum("snk,nkij->snij", weights, y)
-    return cubic, np.abs(early - late)
+    # at a measured frequency nothing is interpolated, also at the ends, which only one of the parabolas reaches
+    between = np.all(x != omega[:, None], axis=1)
+    return cubic, np.where(between[:, None, None], np.abs(early - late), 0.0)
 
 
 def _lagrange(x: FloatArray, at: FloatArray, members: tuple[int, ...]) -> FloatArray:
