@@ -11,6 +11,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.stability.period_map import EngagementProfile
 
 #: Nodes per metre of depth, and at least so many.
 _NODES, _FEWEST = 20_000.0, 12
@@ -166,8 +167,8 @@ def _bending(height: FloatArray, deflection: ToolDeflection) -> FloatArray:
     return short**2 * (3.0 * long - short) / (6.0 * deflection.bending_stiffness)
 
 
-def deflected_engagement(process: MillingProcess, deflection: ToolDeflection, slices_per_metre: float = 6000.0):  # type: ignore[no-untyped-def]
-    """Return a callable for `FullDiscretisation(engagements=...)`: speed and depth to rows of (upper share, lower share, start, end)."""
+def deflected_engagement(process: MillingProcess, deflection: ToolDeflection, slices_per_metre: float = 6000.0) -> EngagementProfile:
+    """Return the engagement along the edge of a deflected tool, for `FullDiscretisation(engagements=...)`."""
 
     @lru_cache(maxsize=4096)
     def rows(speed: float, depth: float) -> FloatArray:

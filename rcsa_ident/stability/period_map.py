@@ -12,7 +12,8 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.force import regenerations
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError
-from rcsa_ident.stability import _period_kernels as kernels
+from rcsa_ident.stability import _cut_kernels as kernels
+from rcsa_ident.stability import _period_kernels
 from rcsa_ident.stability.modes import TipModes
 
 #: Residual of the multiplier, as a share of it.
@@ -99,7 +100,7 @@ class PeriodMap:
             raise InputError("runout", cutter.runout.tolist(), "teeth that cut at all with this feed")
         self.delays = np.unique(np.round([w[3] for w in windows], 12))
         self.windows = [(o, s, e, int(np.argmin(np.abs(self.delays - d)))) for o, s, e, d in windows]
-        self.period = _common_period(process, self.spacing)
+        self.period = common_period(process, self.spacing)
         # a direction that does not move needs no place in the equations
         self.rotation = process.machine_from_feed.T
         if modes.shape is None:
@@ -166,18 +167,17 @@ class PeriodMap:
             0.0 if v is None else v.ratio,
             step,
             float(self.frozen),
-            residual,
-            float(waves),
         )
         plan[kernels.DELAYS :] = self.delays
+        cut = kernels.lay_out(rows, shapes, plan, self.table)
         first = np.zeros(0) if start is None else start.real
-        value, left, _, vector, force, places, time = kernels.multiplier(
-            self.pole, self.outputs, self.inputs, self.constant, rows, shapes, plan, self.table, first
+        value, left, _, vector, force = _period_kernels.multiplier(
+            self.pole, self.outputs, self.inputs, self.constant, cut, self.table, self.frozen, residual, waves, first
         )
         value = complex(value)
         if value.imag < 0.0:
             value, vector, force = value.conjugate(), vector.conj(), force.conj()
-        omega, motion = self._waves(value, speed, force, places, time) if waves else (np.zeros(0), np.zeros(0))
+        omega, motion = self._waves(value, speed, force, cut[0], cut[-1]) if waves else (np.zeros(0), np.zeros(0))
         return Multiplier(value, self.duration(speed), vector, omega, motion, float(left))
 
     def _rows(self, speed: float, depth: float) -> tuple[FloatArray, FloatArray]:
@@ -230,7 +230,7 @@ class PeriodMap:
         return np.abs(omega), np.linalg.norm(motion @ self.directions.T, axis=1)
 
 
-def _common_period(process: MillingProcess, spacing: float) -> float:
+def common_period(process: MillingProcess, spacing: float) -> float:
     """The rotation after which teeth and speed are as they were."""
     if process.speed_variation is None:
         return spacing

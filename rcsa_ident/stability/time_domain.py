@@ -1,0 +1,331 @@
+"""Stability by simulation: teeth that leave the cut, run-out, helix, a flank that rubs one way only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.errors import InputError, positive
+from rcsa_ident.stability import _time_kernels as kernels
+from rcsa_ident.stability.first_loss import first_loss
+from rcsa_ident.stability.modes import TipModes, modes_of
+from rcsa_ident.stability.period_map import common_period
+from rcsa_ident.stability.result import StabilityLobes
+
+#: Steps per wave of the highest mode that counts, and per tooth period at least.
+_STEPS, _FEWEST = 40.0, 60
+#: A mode counts whose own peak reaches this share of the strongest one's.
+_WEAK = 0.02
+#: Slices of the edge per angle that it lags over the depth [1/rad], at least one.
+_SLICES = 12.0
+#: Feed per tooth where none is given [m]; how far a cut is pushed off its steady state, and where it counts as chatter, as shares of it.
+_FEED, _PUSH, _CHATTER = 1e-4, 1e-6, 0.02
+#: Share of the periods that are left to what dies away faster.
+_FASTER = 0.25
+#: States that the search for a steady state looks back to, and how many periods it may take.
+_MEMORY, _MOST = 25, 120
+#: A disturbance that has fallen to this share of the push is gone.
+_GONE = 1e-5
+#: Steps of the ladder of depths.
+_RATIO = 1.2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MillingHistory:
+    """A simulated cut.
+
+    Parameters
+    ----------
+    time : array, shape (n,) [s]
+    angle : array, shape (n,) [rad]
+        Immersion of tooth 1 at the tip, growing.
+    tip, velocity, force : arrays, shape (n, 2) [m], [m/s], [N]
+        Machine axes.
+    """
+
+    time: FloatArray
+    angle: FloatArray
+    tip: FloatArray
+    velocity: FloatArray
+    force: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("time", "angle", "tip", "velocity", "force"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+
+@dataclass(frozen=True, slots=True)
+class TimeDomain:
+    """Regenerative time-domain simulation with a Poincare test, the method that decides disputes.
+
+    Two cuts run side by side, one of them a little pushed, and are looked at once per period (a tooth's, a revolution's where teeth
+    differ, a swing's of a varying speed): what their states differ by grows or dies away. The limit is where it does neither. Teeth
+    leave the cut, with run-out for longer; a worn flank rubs only while it moves into the material, twice as much as the equivalent
+    viscous force of the other methods, half of the time.
+
+    Parameters
+    ----------
+    periods : int, default 150
+        Most tooth periods that a depth is simulated for: near the limit a growth below about 1 / periods is not told from none.
+    tolerance : float, default 3e-3
+        Of the limit depth, relative, for the search; the growth's own error comes on top.
+    contact_loss : bool, default True
+        False lets a tooth cut where it would without vibration, and makes the rubbing viscous: the linear equations of the other
+        methods. Where teeth differ or the speed swings, the forced vibration alone can lift teeth out, and the limit moves by tens
+        of percents.
+    """
+
+    periods: int = 150
+    tolerance: float = 3e-3
+    contact_loss: bool = True
+
+    def __post_init__(self) -> None:
+        if not 20 <= self.periods <= 100_000:
+            raise InputError("periods", self.periods, "a whole number from 20 to 100000")
+        if not 1e-6 <= self.tolerance <= 0.1:
+            raise InputError("tolerance", self.tolerance, "a share from 1e-6 to 0.1")
+
+    def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
+        """Return the limit at each speed by itself."""
+        modes = modes_of(tip, "time-domain")
+        limit = np.full(speeds.size, np.inf)
+        chatter, lobe = np.full(speeds.size, np.nan), np.full(speeds.size, -1, dtype=np.intp)
+        flip = np.zeros(speeds.size, dtype=bool)
+        low = surely_stable_depth(modes, process)
+        for i, speed in enumerate(speeds):
+            cut = _Cut(modes, process, float(speed), self.contact_loss)
+            depth = first_loss(lambda d, cut=cut: cut.growth(d, self.periods), low, max_depth, self.tolerance, _RATIO)  # type: ignore[misc]
+            if depth is None:
+                continue
+            limit[i] = depth
+            chatter[i], flip[i] = cut.vibration(depth, self.periods)
+            lobe[i] = int(chatter[i] / (speed * process.cutter.teeth))
+        return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), "time-domain", (), flip)
+
+
+def milling_history(
+    tip: Receptance | TipModes, process: MillingProcess, speed: float, depth: float, revolutions: float, push: float = 0.0
+) -> MillingHistory:
+    """Simulate a cut that starts in the steady state of equal teeth.
+
+    Parameters
+    ----------
+    tip : TipModes
+    process : MillingProcess
+        With its feed per tooth.
+    speed : float [rad/s]
+    depth : float [m]
+    revolutions : float
+    push : float [m]
+        Off the steady state.
+    """
+    if process.feed_per_tooth is None:
+        raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m] of the cut to simulate")
+    cut = _Cut(modes_of(tip, "time-domain"), process, positive("speed", speed, "rad/s"), leaves=True)
+    run = cut.begin(positive("depth", depth, "m")).pushed(push)
+    samples = run.march(int(np.ceil(positive("revolutions", revolutions) * cut.per_turn)))
+    back = process.machine_from_feed.T
+    angle = cut.step * (cut.per_turn + np.arange(samples.shape[0]))
+    return MillingHistory(cut.time(angle), angle, samples[:, :2] @ back, samples[:, 2:4] @ back, samples[:, 4:] @ back)
+
+
+def surely_stable_depth(modes: TipModes, process: MillingProcess) -> float:
+    """A depth at which nothing can grow: the gain round the loop is below one at every frequency [m]."""
+    c = process.coefficients
+    teeth = max(1.0, np.ceil((process.engagement.exit - process.engagement.entry) / float(np.min(process.cutter.pitch))))
+    return float(0.9 / (2.0 * teeth * c.tangential * np.hypot(1.0, c.radial_ratio) * modes.largest))
+
+
+@dataclass(slots=True, eq=False)
+class _Run:
+    """A simulation that goes on."""
+
+    cut: _Cut
+    plan: FloatArray
+    lag: FloatArray
+    state: ComplexArray
+    force: FloatArray
+    past: FloatArray
+    number: int
+
+    def pushed(self, push: float) -> _Run:
+        """Return a copy whose modes are pushed aside by about `push` [m] at the tip."""
+        aside = push * np.exp(1j * np.arange(self.state.size))
+        return _Run(self.cut, self.plan, self.lag, self.state + aside, self.force.copy(), self.past.copy(), self.number)
+
+    def settle(self, tolerance: float) -> bool:
+        """Go to the state that a period repeats, stable or not: Anderson's acceleration of one period after the other.
+
+        Returns whether a period changes it by less than `tolerance` [m].
+        """
+        states: list[FloatArray] = []
+        changes: list[FloatArray] = []
+        x = self.vector
+        for _ in range(_MOST):
+            self.march(self.cut.per_period)
+            after = self.vector
+            change = after - x
+            if np.max(np.abs(change[-self.past.size :])) < tolerance:
+                return True
+            states.append(after)
+            changes.append(change)
+            del states[:-_MEMORY], changes[:-_MEMORY]
+            x = after
+            if len(states) > 1:
+                bent = np.array(changes[1:]) - np.array(changes[:-1])
+                weight = np.linalg.lstsq(bent.T, change, rcond=1e-12)[0]
+                x = after - weight @ (np.array(states[1:]) - np.array(states[:-1]))
+            self.vector = x
+        return False
+
+    @property
+    def vector(self) -> FloatArray:
+        """State, force and past as one vector, the past from the newest on; scaled to displacements."""
+        order = (self.number - 1 - np.arange(self.past.shape[0])) % self.past.shape[0]
+        return np.concatenate([self.state.real, self.state.imag, self.force * self.cut.softness, self.past[order].ravel()])
+
+    @vector.setter
+    def vector(self, values: FloatArray) -> None:
+        m = self.state.size
+        order = (self.number - 1 - np.arange(self.past.shape[0])) % self.past.shape[0]
+        self.state[:] = values[:m] + 1j * values[m : 2 * m]
+        self.force[:] = values[2 * m : 2 * m + 2] / self.cut.softness
+        self.past[order] = values[2 * m + 2 :].reshape(-1, 2)
+
+    def march(self, count: int) -> FloatArray:
+        """Return tip, velocity and force of the next steps, feed and normal, shape (count, 6)."""
+        samples = np.empty((count, 6))
+        c = self.cut
+        kernels.simulate(
+            c.pole, c.outputs, c.inputs, c.constant, c.teeth, self.lag, self.plan, self.state, self.force, self.past, self.number, samples
+        )
+        self.number += count
+        return samples
+
+
+class _Cut:
+    """A speed, with the steps that it is simulated in."""
+
+    def __init__(self, modes: TipModes, process: MillingProcess, speed: float, leaves: bool) -> None:
+        self.process, self.speed, self.leaves = process, speed, leaves
+        self.feed = process.feed_per_tooth or _FEED
+        if process.feed_per_tooth is None and np.ptp(process.cutter.runout) > 0.0:
+            raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: with run-out it decides which teeth cut")
+        turn = process.machine_from_feed
+        self.pole = modes.pole.copy()
+        self.outputs = np.ascontiguousarray(turn.T @ modes.outputs)
+        self.inputs = np.ascontiguousarray(modes.inputs @ turn)
+        self.constant = turn.T @ modes.constant @ turn
+        cutter, teeth = process.cutter, process.cutter.teeth
+        # modes scaled so that each moves the tip alike
+        size = np.linalg.norm(self.outputs, axis=0)
+        size[size == 0.0] = 1.0
+        self.outputs, self.inputs, self.softness = self.outputs / size, self.inputs * size[:, None], modes.largest
+        strength = modes.strength
+        self.highest = float(np.max(np.abs(modes.pole)[strength >= _WEAK * strength.max()]))
+        slowest = speed * (1.0 - (process.speed_variation.amplitude if process.speed_variation else 0.0))
+        tooth = max(_FEWEST, int(np.ceil(_STEPS * self.highest / (teeth * slowest))))
+        #: Steps per revolution and their angle; pitches are whole numbers of steps where the teeth are equally spaced.
+        self.per_turn, self.step = tooth * teeth, 2.0 * np.pi / (tooth * teeth)
+        period = common_period(process, float(cutter.pitch[0]) if cutter.equally_spaced else 2.0 * np.pi)
+        self.per_period = max(1, round(period / self.step))
+        self.tooth_periods = self.per_period / tooth
+        self.teeth = np.empty((teeth, 2 + 3 * teeth))
+        for j in range(teeth):
+            ahead = (j + 1 + np.arange(teeth)) % teeth
+            back = np.cumsum(np.roll(cutter.pitch, -j))
+            pieces = np.stack([back / self.step, self.feed * teeth * back / (2.0 * np.pi), cutter.runout[ahead]], axis=1)
+            # a delay of a whole number of steps is one, in spite of rounding
+            whole = np.abs(pieces[:, 0] - np.round(pieces[:, 0])) < 1e-9 * pieces[:, 0]
+            pieces[whole, 0] = np.round(pieces[whole, 0])
+            self.teeth[j] = np.concatenate([[cutter.tooth_angle[j], cutter.runout[j]], pieces.ravel()])
+
+    def time(self, angle: FloatArray) -> FloatArray:
+        """Seconds from the rotation of 0 on."""
+        v = self.process.speed_variation
+        if v is None:
+            return angle / self.speed
+        swing = v.ratio * self.speed
+        dense = np.linspace(0.0, 1.05 * float(angle[-1]) / (self.speed * (1.0 - v.amplitude)), 4 * angle.size)
+        return np.interp(angle, self.speed * (dense + v.amplitude / swing * (1.0 - np.cos(swing * dense))), dense)
+
+    def begin(self, depth: float) -> _Run:
+        """Return a cut in the steady state of equal teeth, where nothing regenerates."""
+        process = self.process
+        c, d, v = process.coefficients, process.damping, process.speed_variation
+        whole = 2.0 * depth * np.tan(process.cutter.helix) / process.cutter.diameter
+        slices = max(1, int(np.ceil(_SLICES * whole)))
+        plan = np.zeros(kernels.COUNT)
+        plan[:] = (
+            self.step,
+            self.speed,
+            c.tangential,
+            c.tangential * c.radial_ratio,
+            c.tangential_edge,
+            c.radial_edge,
+            process.engagement.entry,
+            process.engagement.exit,
+            0.0 if d is None else (2.0 if self.leaves else 1.0) * d.strength,
+            0.0 if d is None else d.friction,
+            0.5 * process.cutter.diameter,
+            depth / slices,
+            0.0 if v is None else v.amplitude,
+            0.0 if v is None else v.ratio,
+            float(self.leaves),
+            0.0,
+        )
+        lag = whole * (np.arange(slices) + 0.5) / slices
+        run = _Run(self, plan, lag, np.zeros_like(self.pole), np.zeros(2), np.zeros((self.per_turn + 2, 2)), 0)
+        # from rest through one period of a force that knows no vibration: what is left decides on the state that repeats itself
+        turns = int(np.ceil(self.per_turn / self.per_period))
+        run.march(self.per_period)
+        duration = float(np.diff(self.time(self.step * np.array([0.0, self.per_period])))[0])
+        run.state /= 1.0 - np.exp(self.pole * duration)
+        run.march(turns * self.per_period)
+        plan[kernels.REGENERATE] = 1.0
+        return run
+
+    def growth(self, depth: float, periods: int) -> float:
+        """Return the logarithm of the growth of a disturbance per tooth period."""
+        sizes, _ = self._disturbance(depth, periods)
+        logs = np.log(np.maximum(sizes, 1e-300))
+        if logs.size < 6:
+            # chatter, or peace, at once
+            return float((logs[-1] - logs[0]) / max(logs.size - 1, 1)) / self.tooth_periods
+        # the first part is left to what dies away faster; a line through the rest
+        first = int(_FASTER * logs.size)
+        return float(np.polyfit(np.arange(first, logs.size), logs[first:], 1)[0]) / self.tooth_periods
+
+    def vibration(self, depth: float, periods: int) -> tuple[float, bool]:
+        """Return the frequency of the disturbance [rad/s], and whether it comes back the other way round each period."""
+        sizes, path = self._disturbance(depth, periods)
+        first = int(_FASTER * sizes.size)
+        rate = np.polyfit(np.arange(first, sizes.size), np.log(np.maximum(sizes[first:], 1e-300)), 1)[0] / self.per_period
+        path = path[first * self.per_period :]
+        window = np.exp(-rate * np.arange(path.shape[0])) * np.hanning(path.shape[0])
+        lines = np.linalg.norm(np.fft.rfft(path * window[:, None], 4 * path.shape[0], axis=0), axis=1)
+        turns = float(np.argmax(lines)) / (4 * path.shape[0]) * self.per_period
+        flip = abs(turns % 1.0 - 0.5) < 0.5 / max(sizes.size - first, 1)
+        return turns * 2.0 * np.pi / (self.per_period * self.step) * self.speed, bool(flip)
+
+    def _disturbance(self, depth: float, periods: int) -> tuple[FloatArray, FloatArray]:
+        """What two cuts side by side, one of them pushed, differ by: the state's size after each period, and the tip's path."""
+        push = _PUSH * self.feed
+        still = self.begin(depth)
+        if not self.process.cutter.equally_spaced or self.process.speed_variation is not None:
+            # teeth that differ do not start in their steady state
+            still.settle(1e-3 * push)
+        pushed = still.pushed(push)
+        scale = np.array([1.0, 1.0, 1.0 / self.highest, 1.0 / self.highest])
+        sizes, paths = [], []
+        for _ in range(max(8, int(np.ceil(periods / self.tooth_periods)))):
+            change = pushed.march(self.per_period) - still.march(self.per_period)
+            paths.append(change[:, :2])
+            sizes.append(float(np.linalg.norm(change[-1, :4] * scale)))
+            if not _GONE * push < sizes[-1] < _CHATTER * self.feed:
+                break
+        return np.array(sizes), np.concatenate(paths)
