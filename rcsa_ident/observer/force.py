@@ -134,7 +134,8 @@ class ForceEstimate:
     standard_deviation : array, shape (n, a) [N]
         From sensor noise and the force model, raised where the innovations scatter more than they should.
     consistency : array, shape (a,) [-]
-        Scatter of the innovations over the expected; 1 where model, noise and force agree.
+        Scatter of the innovations in the band over the expected; 1 where model, noise and force agree, more where they are too
+        sure of themselves.
     """
 
     axes: tuple[Dof, ...]
@@ -219,7 +220,7 @@ class ForceObserver:
             if smooth:
                 force[:, i] = each.kalman.smooth(np.stack([block.force[:, i], block.walking[:, i], block.innovation[:, i]], axis=1))
             settled = block.innovation[min(each.kalman.gain.shape[0] - 1, n // 2) :, i]
-            consistency[i] = float(np.sqrt(np.mean(settled**2) / each.kalman.variance[-1])) if settled.size else 1.0
+            consistency[i] = _scatter(settled, each)
             deviation[:, i] = each.kalman.standard_deviation(n, smooth) * max(consistency[i], 1.0)
         return ForceEstimate(tuple(each.axis for each in self.axes), self.step_time, frozen(force), frozen(deviation), frozen(consistency))
 
@@ -289,6 +290,19 @@ def force_observer(axes: Sequence[AxisObserver]) -> ForceObserver:
     if not axes or len({each.transfer.step for each in axes}) > 1:
         raise InputError("axes", len(axes), "one or more with the same sampling rate")
     return ForceObserver(tuple(axes))
+
+
+def _scatter(innovation: FloatArray, observer: AxisObserver) -> float:
+    """Standard deviation of innovations in the observer's band over that of white noise of the filter's own variance."""
+    n = innovation.size
+    frequency = np.fft.rfftfreq(n, observer.transfer.step) * 2.0 * np.pi if n else np.zeros(0)
+    inside = (frequency >= observer.transfer.band[0]) & (frequency <= observer.transfer.band[1])
+    if not inside.any():
+        return 1.0
+    # a taper keeps the lines above the band where they are
+    taper = np.hanning(n + 2)[1:-1]
+    power = np.abs(np.fft.rfft(innovation * taper)[inside]) ** 2
+    return float(np.sqrt(np.mean(power) / (np.sum(taper**2) * observer.kalman.variance[-1])))
 
 
 def _displacement(

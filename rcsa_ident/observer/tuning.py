@@ -19,6 +19,8 @@ MARGIN = 1.0 / (10.0**0.005 - 1.0)
 RESPONSE_TURNS = 0.5
 #: The paper's walk does not forget; behind a high-pass it must, and this share of the band's lower end is nearly never.
 BASELINE_LEAK = 0.1
+#: Intensity of the walk beside oscillators over that of a walk that has to follow everything.
+BESIDE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,8 @@ class Tuning:
         if omega.size == 0:
             found = "none"
             raise InputError("harmonics in the band", found, f"some between {low / (2 * np.pi):.0f} and {high / (2 * np.pi):.0f} Hz")
-        walk = self.random_walk(transfer, low)
+        alone = self.random_walk(transfer, low)
+        walk = RandomWalk(BESIDE * alone.intensity, low)
         beside = (walk.intensity / omega) ** 2 + self._noise(transfer, omega) ** 2
         return TeethResonators(walk, omega, np.sqrt(2.0 * beside) / self.response_time)
 

@@ -10,6 +10,8 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import SPINDLE, couple
+from rcsa_ident.cutting.conditions import CuttingConditions
+from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
@@ -18,6 +20,7 @@ from rcsa_ident.observer.force import AxisObserver, ForceEstimate, ForceObserver
 from rcsa_ident.observer.response import ObserverFRF, observer_response
 from rcsa_ident.observer.transfer_function import HIGHEST, transfer_function
 from rcsa_ident.observer.tuning import ObserverMethod, Resonators, Tuning, harmonics
+from rcsa_ident.observer.wear import WearIndicators, wear_indicators
 from rcsa_ident.signals.alignment import angle_to_air
 from rcsa_ident.signals.measurement import NO_AIR
 from rcsa_ident.signals.recording import Quantity, Recording
@@ -346,3 +349,21 @@ def _above(force: FloatArray, low: float, step: float) -> FloatArray:
 def _widened(estimate: ForceEstimate, errors: list[float]) -> ForceEstimate:
     """The estimate with the machine's own uncertainty in its bands."""
     return replace(estimate, standard_deviation=frozen(np.hypot(estimate.standard_deviation, np.array(errors))))
+
+
+def wear_of(found: MonitoredCut, cutter: Cutter, conditions: CuttingConditions) -> WearIndicators:
+    """Return the cutting coefficients of each revolution of a monitored cut.
+
+    Parameters
+    ----------
+    found : MonitoredCut
+        With both axes.
+    cutter : Cutter
+    conditions : CuttingConditions
+        Depth, feed and immersion of the cut; the speed is the record's own.
+    """
+    estimate = found.estimate
+    columns = [estimate.axes.index(axis) for axis in (Dof.X, Dof.Y)]
+    settled = min(max(each.kalman.gain.shape[0] for each in found.observer.axes), estimate.force.shape[0] // 2)
+    own = replace(conditions, spindle_speed=found.spindle_speed)
+    return wear_indicators(estimate.force[:, columns], estimate.step, cutter, own, found.band, first=settled)

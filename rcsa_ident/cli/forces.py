@@ -1,0 +1,215 @@
+"""forces: cutting forces of a recording, and what they say of the tool's wear."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cli.conditions import Strategy
+from rcsa_ident.errors import InputError, positive
+
+if TYPE_CHECKING:
+    from rcsa_ident.machining_setup import Tooling
+    from rcsa_ident.observer.wear import WearIndicators
+    from rcsa_ident.workflows.monitor import MonitoredCut
+
+_RPM = 30.0 / math.pi
+
+
+class ObserverName(StrEnum):
+    """Observers by name."""
+
+    resonators = "resonators"
+    random_walk = "random-walk"
+
+
+@answers
+def forces(
+    result: Annotated[Path, typer.Argument(help="RESULT.json of an identification.", show_default=False)],
+    tooling: Annotated[Path, typer.Argument(help="TOOLING.toml that was cut with.", show_default=False)],
+    recording: Annotated[Path, typer.Argument(help="Recording of the cut; channels as in the campaign.", show_default=False)],
+    out: Annotated[Path, typer.Option(help="FORCES.csv to write, N.", show_default=False)],
+    air: Annotated[
+        Path | None, typer.Option(help="Recording of an air cut at the same speed: its run-out is taken out.", show_default=False)
+    ] = None,
+    speed_rpm: Annotated[
+        float | None, typer.Option(help="Programmed spindle speed, rev/min; default: from the trigger.", show_default=False)
+    ] = None,
+    observer: Annotated[
+        ObserverName, typer.Option(help="Oscillators at the harmonics of the teeth, or the paper's random walk.")
+    ] = ObserverName.resonators,
+    bandwidth_hz: Annotated[
+        float | None,
+        typer.Option(help="Up to where the observer follows the force, Hz; default: end of the identified band.", show_default=False),
+    ] = None,
+    smooth: Annotated[bool, typer.Option(help="Each sample given the whole record, instead of as it would be live.")] = False,
+    plot: Annotated[Path | None, typer.Option(help="Picture of the forces and of the observer's response.", show_default=False)] = None,
+    sampling_rate_hz: Annotated[float | None, typer.Option(help="Of a recording that carries no rate, Hz.", show_default=False)] = None,
+    wear: Annotated[
+        Path | None,
+        typer.Option(help="Cutting coefficients of each revolution; needs --axial-depth-mm and --feed-mm.", show_default=False),
+    ] = None,
+    axial_depth_mm: Annotated[float | None, typer.Option(help="Axial depth, mm, for --wear.", show_default=False)] = None,
+    feed_mm: Annotated[float | None, typer.Option(help="Feed per tooth, mm, for --wear.", show_default=False)] = None,
+    immersion: Annotated[float, typer.Option(help="Radial depth over diameter, for --wear.")] = 0.5,
+    strategy: Annotated[Strategy, typer.Option(help="Up or down milling, for --wear.")] = Strategy.down,
+    feed_direction: Annotated[str, typer.Option(help="+X -X +Y -Y, or degrees from +X, for --wear.")] = "+X",
+    json_: Json = False,
+) -> None:
+    """Estimate the cutting forces of a recording from the flange's vibration."""
+    from rcsa_ident.cli.lobes import read_machine_over_speed
+    from rcsa_ident.io.forces import sensors_of_result, write_forces_csv
+    from rcsa_ident.io.recordings import read_recording
+    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.observer.tuning import PaperWalk, Resonators
+    from rcsa_ident.workflows.monitor import observe
+
+    for path, option in ((out, "--out"), (plot, "--plot"), (wear, "--wear")):
+        if path is not None:
+            writable(path, option)
+    if plot is not None and plot.suffix.lower() not in (".png", ".svg", ".pdf"):
+        raise InputError("--plot", f"suffix '{plot.suffix}'", "one of .png, .svg, .pdf", str(plot))
+    if wear is not None and (axial_depth_mm is None or feed_mm is None):
+        raise InputError("--wear", "no depth or no feed", "--axial-depth-mm and --feed-mm beside it")
+    programmed = None if speed_rpm is None else positive("--speed-rpm", speed_rpm, "rev/min") / _RPM
+    bandwidth = None if bandwidth_hz is None else 2.0 * math.pi * positive("--bandwidth-hz", bandwidth_hz, "Hz")
+    rate = None if sampling_rate_hz is None else positive("--sampling-rate-hz", sampling_rate_hz, "Hz")
+    machine, data = read_machine_over_speed(result)
+    setup, sensors = read_tooling(tooling), sensors_of_result(data, str(result))
+    stages = Stages(quiet=json_)
+    with stages.stage("recordings"):
+        cut = read_recording(recording, sensors, rate)
+        still = None if air is None else read_recording(air, sensors, rate)
+    method = Resonators() if observer is ObserverName.resonators else PaperWalk()
+    with stages.stage("forces"):
+        low, high = (2.0 * math.pi * f for f in data["band_hz"])
+        try:
+            found = observe(machine, setup.assembly, setup.cutter.teeth, cut, still, (low, high), programmed, method, bandwidth, smooth)
+        except InputError as error:
+            raise error if error.where else error.at(str(recording)) from None
+    estimate = found.estimate
+    write_forces_csv(
+        out,
+        estimate.time,
+        {axis.upper(): estimate.force[:, i] for i, axis in enumerate(estimate.axes)},
+        {axis.upper(): estimate.standard_deviation[:, i] for i, axis in enumerate(estimate.axes)},
+    )
+    if plot is not None:
+        _draw(plot, found)
+    worn = None
+    if wear is not None:
+        worn = _wear(wear, found, setup, (axial_depth_mm or 0.0, feed_mm or 0.0), immersion, strategy, feed_direction)
+    summary = _summary(found, str(observer), smooth)
+    if json_:
+        emit(summary | {"wear": worn, "seconds": stages.seconds, "out": str(out)})
+        return
+    for axis, row in summary["axes"].items():
+        lines = row["usable_at_lines_hz"]
+        flat = "none" if lines[0] is None else f"{lines[0]:.0f} to {lines[1]:.0f} Hz"
+        say(
+            f"{axis}: rms {row['rms_n']:.1f} N, peaks {row['lowest_n']:.0f} to {row['highest_n']:.0f} N, ± {row['std_n']:.2g} N; "
+            f"within 1 dB at the spindle's orders: {flat}; delay {1e6 * row['delay_s']:.0f} µs"
+        )
+    for note in found.notes:
+        warn(note)
+    low_hz, high_hz = summary["band_hz"]
+    say(f"forces without their mean, {low_hz:.0f} to {high_hz:.0f} Hz, {summary['spindle_speed_rpm']:.2f} rev/min")
+    for name, row in (worn or {}).get("coefficients", {}).items():
+        trend = f"{row['trend_per_s']:+.2g} ± {row['trend_std_per_s']:.1g} a second"
+        say(f"{name}: {row['mean']:.4g} ± {row['std']:.2g} {row['unit']}, {trend}")
+    if worn and not worn["separable"]:
+        warn("the harmonics in the band do not tell the coefficients from each other: only their sum means something")
+    say(f"written: {out} ({estimate.force.shape[0]} samples, {stages.seconds['forces']:.2f} s)")
+
+
+def _summary(found: MonitoredCut, observer: str, smooth: bool) -> dict[str, Any]:
+    """What a machine wants to know of the forces without reading the curve."""
+    import numpy as np
+
+    estimate, axes = found.estimate, {}
+    settled = slice(min(estimate.force.shape[0] // 4, 4096), None)
+    for i, axis in enumerate(estimate.axes):
+        force, response = estimate.force[settled, i], found.response[axis]
+        hz = [float(w) / (2.0 * math.pi) if w == w else None for w in response.usable(float(response.line[0]), at_lines=True)]
+        anywhere = [float(w) / (2.0 * math.pi) if w == w else None for w in response.usable(1.3 * found.band[0])]
+        axes[axis.upper()] = {
+            "rms_n": float(np.std(force)),
+            "lowest_n": float(force.min()),
+            "highest_n": float(force.max()),
+            "std_n": float(np.median(estimate.standard_deviation[settled, i])),
+            "model_std_n": found.model_error[axis],
+            "innovation_over_expected": float(estimate.consistency[i]),
+            "usable_at_lines_hz": hz,
+            "usable_hz": anywhere,
+            "delay_s": response.delay_at_lines,
+            "order": found.observer.axes[i].transfer.order,
+            "sensor_noise_m": found.noise[axis],
+        }
+    return {
+        "observer": observer,
+        "smoothed": smooth,
+        "mean_force": "removed: the sensors do not show it",
+        "spindle_speed_rpm": found.spindle_speed * _RPM,
+        "band_hz": [w / (2.0 * math.pi) for w in found.band],
+        "samples": int(estimate.force.shape[0]),
+        "axes": axes,
+        "warnings": list(found.notes),
+    }
+
+
+def _draw(path: Path, found: MonitoredCut) -> None:
+    """Both figures, one file: forces, and beside it (its name with -observer) the responses."""
+    from rcsa_ident.report.forces import force_history, observer_frf
+
+    force_history(found.estimate, found.spindle_speed).savefig(path, dpi=150)
+    observer_frf(found.response, found.band).savefig(path.with_stem(path.stem + "-observer"), dpi=150)
+
+
+def _wear(
+    path: Path, found: MonitoredCut, setup: Tooling, cut_mm: tuple[float, float], immersion: float, strategy: Strategy, feed_direction: str
+) -> dict[str, Any]:
+    """Write the coefficients of each revolution and return their summary."""
+    import numpy as np
+
+    from rcsa_ident.cli.conditions import engagement, feed_angle
+    from rcsa_ident.cutting.conditions import CuttingConditions
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.io.files import write_text
+    from rcsa_ident.workflows.monitor import wear_of
+
+    if set(found.estimate.axes) != {Dof.X, Dof.Y}:
+        raise InputError("--wear", f"axis {', '.join(found.estimate.axes)}", "forces of both axes, X and Y")
+    depth, feed = (positive(name, value, "mm") for name, value in zip(("--axial-depth-mm", "--feed-mm"), cut_mm, strict=True))
+    angles = engagement(immersion, strategy, None, None)
+    conditions = CuttingConditions(found.spindle_speed, depth * 1e-3, feed * 1e-3, angles, feed_angle(feed_direction))
+    worn = wear_of(found, setup.cutter, conditions)
+    write_text(path, _wear_table(worn))
+    slope, slope_std = worn.trend()
+    units = [("MPa", 1e-6) if name.endswith("c") else ("N/mm", 1e-3) for name in worn.names]
+    rows = {}
+    for c, (name, (unit, factor)) in enumerate(zip(worn.names, units, strict=True)):
+        rows[name] = {
+            "mean": float(np.mean(worn.coefficient[:, c])) * factor,
+            "std": float(np.median(worn.standard_deviation[:, c])) * factor,
+            "trend_per_s": float(slope[c]) * factor,
+            "trend_std_per_s": float(slope_std[c]) * factor,
+            "unit": unit,
+        }
+    return {"coefficients": rows, "separable": worn.separable, "misfit": worn.misfit, "out": str(path)}
+
+
+def _wear_table(worn: WearIndicators) -> str:
+    """Columns: time, then of each coefficient its value, standard deviation, and both as a slow walk."""
+    header, columns = ["time_s"], [worn.time]
+    for c, name in enumerate(worn.names):
+        unit, factor = ("mpa", 1e-6) if name.endswith("c") else ("n_per_mm", 1e-3)
+        parts = (worn.coefficient, worn.standard_deviation, worn.tracked, worn.tracked_deviation)
+        header += [f"{name}{kind}_{unit}" for kind in ("", "_std", "_tracked", "_tracked_std")]
+        columns += [part[:, c] * factor for part in parts]
+    rows = [",".join(map(str, row)) for row in zip(*(column.tolist() for column in columns), strict=True)]
+    return "\n".join([",".join(header), *rows]) + "\n"

@@ -1,0 +1,79 @@
+"""FORCES.csv: estimated forces over time, and the sensors that a result file remembers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.delimited import read_table
+from rcsa_ident.io.files import write_text
+from rcsa_ident.io.keys import Table, listed
+from rcsa_ident.io.setups import _sensor
+from rcsa_ident.signals.recording import Sensor
+
+TIME = "time_s"
+AXES = ("X", "Y")
+
+
+def write_forces_csv(path: str | Path, time: ArrayLike, force: Mapping[str, ArrayLike], deviation: Mapping[str, ArrayLike]) -> None:
+    """Write forces [N] of axes X, Y or both over time [s], standard deviations in further columns; numbers read back exactly.
+
+    Parameters
+    ----------
+    time : array, shape (n,)
+        Rising.
+    force, deviation : mappings of axis to array, shape (n,)
+    """
+    where = str(path)
+    names = [axis for axis in AXES if axis in force]
+    if not names or set(force) - set(AXES) or set(deviation) - set(force):
+        raise InputError("axes", ", ".join([*force, *deviation]) or "none", "X, Y or both, standard deviations of the same axes", where)
+    columns = {TIME: np.asarray(time, dtype=float)}
+    columns |= {f"F{axis.lower()}_n": np.asarray(force[axis], dtype=float) for axis in names}
+    columns |= {f"F{axis.lower()}_std_n": np.asarray(deviation[axis], dtype=float) for axis in names if axis in deviation}
+    count = columns[TIME].shape
+    for name, values in columns.items():
+        if values.shape != count or len(count) != 1 or count[0] == 0 or not np.all(np.isfinite(values)):
+            raise InputError(f"column {name}", f"shape {values.shape}, or not finite", "finite numbers, as many as times", where)
+    rows = [",".join(columns), *(",".join(map(str, row)) for row in zip(*(v.tolist() for v in columns.values()), strict=True))]
+    write_text(path, "\n".join(rows) + "\n")
+
+
+def read_forces_csv(path: str | Path) -> tuple[FloatArray, dict[str, FloatArray], dict[str, FloatArray]]:
+    """Return time [s], forces [N] and standard deviations [N] of FORCES.csv, by axis."""
+    table = read_table(path, "forces")
+    axes = [axis for axis in AXES if f"F{axis.lower()}_n" in table.header]
+    if TIME not in table.header or not axes:
+        raise InputError("columns", listed(table.header), f"{TIME} and Fx_n, Fy_n or both", str(path))
+    stds = [axis for axis in axes if f"F{axis.lower()}_std_n" in table.header]
+    wanted = [TIME, *(f"F{axis.lower()}_n" for axis in axes), *(f"F{axis.lower()}_std_n" for axis in stds)]
+    found = dict(zip(wanted, table.columns(wanted), strict=True))
+    for name, values in found.items():
+        bad = ~np.isfinite(values)
+        if bad.any():
+            raise InputError(f"column {name}", "no finite number", "a finite number", table.at(int(np.argmax(bad))))
+    forces = {axis: found[f"F{axis.lower()}_n"] for axis in axes}
+    return found[TIME], forces, {axis: found[f"F{axis.lower()}_std_n"] for axis in stds}
+
+
+def sensors_of_result(data: Mapping[str, Any], where: str) -> tuple[Sensor, ...]:
+    """Return the sensors of the campaign that a result came from.
+
+    Parameters
+    ----------
+    data : mapping
+        As `read_result` returns it.
+    where : str
+        The file, for the messages.
+    """
+    tables = Table(data, where).named_tables("sensors")
+    sensors = tuple(_sensor(name, table.data, where) for name, table in tables.items())
+    if not sensors:
+        raise InputError("sensors", "none", "at least one sensor", where)
+    return sensors
