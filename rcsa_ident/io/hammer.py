@@ -95,7 +95,7 @@ def write_calibrated_tooling(source: str | Path, target: str | Path, contact: Co
         "rotational_damping": ("N m s/rad per m", contact.rotational_damping),
     }
     block = ["[contact]", *(f"# {' '.join(remark.split())}" for remark in remarks)]
-    block += [f"{key} = {value:.6g}  # {unit}" for key, (unit, value) in values.items()]
+    block += [f"{key} = {value:.8g}  # {unit}" for key, (unit, value) in values.items()]
     lines = text.splitlines()
     start = next((i for i, line in enumerate(lines) if re.match(r"\s*\[\s*contact\s*\]", line)), None)
     if start is None:

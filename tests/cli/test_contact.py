@@ -1,0 +1,73 @@
+"""contact: tap tests in, a calibrated tooling out."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from rcsa_ident.io.curves import write_frf_csv
+from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.tool_holder.geometry import Contact
+from tests.cli.measurements import run
+from tests.oracles import analytic
+from tests.workflows.conftest import TOOLING
+
+TRUE = Contact(1.2e10, 1.5e6, 6e4, 25.0)
+
+
+@pytest.fixture
+def taps(tmp_path):
+    """Two stickouts of one tool, tapped at the tip, free: exact beams with noise."""
+    rng = np.random.default_rng(1)
+    frequency = np.arange(100.0, 6000.0, 20.0)
+    for name, stickout in (("T1", 60.0), ("LONG", 85.0)):
+        text = TOOLING.replace("stickout_mm = 60.0", f"stickout_mm = {stickout}").replace("length_mm = 100.0", "length_mm = 130.0")
+        (tmp_path / f"{name}.toml").write_text(text)
+        a = read_tooling(tmp_path / f"{name}.toml").assembly
+        tool, holder = (
+            [
+                analytic.Beam(
+                    s.length, s.diameter, s.inner_diameter, s.material.youngs_modulus, s.material.density, s.material.poisson, 0.003
+                )
+                for s in part
+            ]
+            for part in (a.tool, a.holder)
+        )
+        contact = (TRUE.translational_stiffness, TRUE.rotational_stiffness, TRUE.translational_damping, TRUE.rotational_damping)
+        h = analytic.assembly_receptance(tool, holder, a.insertion, contact, 2.0 * np.pi * frequency)[:, 0, 0]
+        h = h + 0.01 * np.abs(h) * (rng.normal(size=h.size) + 1j * rng.normal(size=h.size))
+        write_frf_csv(tmp_path / f"{name}.csv", frequency, {"X": h})
+    return tmp_path
+
+
+def test_calibrated_tooling_and_figure(taps):
+    out, plot = taps / "C.toml", taps / "contact.png"
+    arguments = ("contact", taps / "T1.toml", "--tap", taps / "T1.csv", "--tap", f"{taps / 'LONG.toml'}={taps / 'LONG.csv'}")
+    text = run(*arguments, "--out", out, "--plot", plot).output
+    assert "translational stiffness" in text
+    read = read_tooling(out).assembly
+    assert read.contact.translational_stiffness == pytest.approx(TRUE.translational_stiffness, rel=0.03)
+    assert read.contact.rotational_stiffness == pytest.approx(TRUE.rotational_stiffness, rel=0.03)
+    assert read.contact.rotational_damping == pytest.approx(TRUE.rotational_damping, rel=0.1)
+    assert read.tool == read_tooling(taps / "T1.toml").assembly.tool
+    assert plot.read_bytes().startswith(b"\x89PNG")
+    assert "# from 2 tap tests, stickouts 60, 85 mm" in out.read_text()
+    answer = json.loads(run(*arguments, "--out", out, "--json").output)
+    assert answer["contact"]["translational_stiffness"]["told"]
+    assert set(answer["misfit"]) == {"T1.csv", "LONG.csv"}
+
+
+def test_a_band_that_does_not_tell_it(taps):
+    result = run("contact", taps / "T1.toml", "--tap", taps / "T1.csv", "--out", taps / "C.toml", "--to", 1200, code=3)
+    assert "hardly tell" in result.output.replace("\n", " ")
+    assert (taps / "C.toml").exists()
+
+
+def test_what_is_refused(taps):
+    assert (
+        "0 to 50"
+        in run("contact", taps / "T1.toml", "--tap", taps / "T1.csv", "--out", taps / "C.toml", "--gain-spread", 90, code=2).output
+    )
+    assert "no such file" in run("contact", taps / "T1.toml", "--tap", taps / "none.csv", "--out", taps / "C.toml", code=2).output
