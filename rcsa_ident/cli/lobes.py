@@ -3,45 +3,34 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
-from enum import StrEnum
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rcsa_ident.cli.common import Json, Stages, answers, emit, inclusive, say, warn, writable
-from rcsa_ident.cli.conditions import Strategy, coefficients, engagement, feed_angle, tip_of
+from rcsa_ident.cli.conditions import process_of, speeds_of, subjects_of, warn_outside
+from rcsa_ident.cli.options import Bands, CutOptions, SpeedOptions, StiffnessSpread, TipOptions, takes_groups
 from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.cli.conditions import Subject
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.posterior import MachineAxis
+    from rcsa_ident.report.lobes import Tested
     from rcsa_ident.stability.result import StabilityLobes
+    from rcsa_ident.stability.surface import SurfaceError
     from rcsa_ident.workflows.lobes import LobeConditions
     from rcsa_ident.workflows.speeds import MachineOverSpeed
     from rcsa_ident.workflows.tip import TooltipResponse
 
-#: Lower end of the receptances that lobes are computed from, and their step [Hz].
-LOWEST, STEP = 100.0, 1.0
-
 ResultFile = Annotated[Path, typer.Argument(help="RESULT.json of an identification.", show_default=False)]
 ToolingFile = Annotated[Path, typer.Argument(help="TOOLING.toml; it need not have been cut with.", show_default=False)]
-Bands = Annotated[bool, typer.Option(help="Add columns with what the records leave open.")]
-
-
-StiffnessSpread = Annotated[
-    float, typer.Option(help="How well the tool-holder's stiffness is known, %: part of the bands. 1 for a modulus from a handbook.")
-]
-
-
-class LobeMethod(StrEnum):
-    """Stability methods by name."""
-
-    zero_order = "zero-order"
+Plot = Annotated[Path | None, typer.Option(metavar="FILE.png|svg", help="Draw a figure.", show_default=False)]
 
 
 @answers
@@ -65,7 +54,6 @@ def tooltip(
     json_: Json = False,
 ) -> None:
     """Predict the tooltip FRF of any tooling on the identified machine."""
-    import numpy as np
 
     from rcsa_ident.errors import positive
     from rcsa_ident.io.setups import read_tooling
@@ -80,7 +68,10 @@ def tooltip(
     if to is not None and to > 1.001 * data["band_hz"][1]:
         warn(f"the machine was identified up to {data['band_hz'][1]:.0f} Hz; above that the FRF is extrapolated")
     if omega is not None:
-        _warn_outside(machine, np.array([omega]))
+        known = machine.speed_range
+        if known is not None and not known[0] * (1.0 - 1e-9) <= omega <= known[1] * (1.0 + 1e-9):
+            low, high = (each * 30.0 / math.pi for each in known)
+            warn(f"the machine was identified from {low:.0f} to {high:.0f} rev/min; outside it stays what it is at the nearest of them")
     stages = Stages(quiet=json_)
     with stages.stage("tooltip"):
         response = tip_response(machine.at(omega), assembly, frequency, bands, omega, share)
@@ -103,98 +94,105 @@ def tooltip(
 
 
 @answers
+@takes_groups
 def lobes(
     files: Annotated[
         list[Path],
         typer.Argument(metavar="[RESULT.json] TOOLING.toml", help="With --modes or --frf the tooling alone.", show_default=False),
     ],
     out: Annotated[Path, typer.Option(help="LOBES.csv to write.", show_default=False)],
-    modes: Annotated[
-        Path | None, typer.Option(help="MODES.toml: a modal model of the tip instead of a result.", show_default=False)
+    tip: TipOptions,
+    cut: CutOptions,
+    speeds: SpeedOptions,
+    tests: Annotated[
+        Path | None,
+        typer.Option(
+            help="CUTS.csv: tested cuts (spindle_speed_rpm, axial_depth_mm, verdict stable|chatter|marginal).", show_default=False
+        ),
     ] = None,
-    frf: Annotated[
-        list[str] | None, typer.Option(metavar="[X=]FRF.csv", help="Tap-test FRF instead of a result; once an axis.", show_default=False)
+    surface_depth_mm: Annotated[
+        float | None,
+        typer.Option(
+            help="Also the surface location error of stable cuts at this depth, mm; with --feed-per-tooth-mm.", show_default=False
+        ),
     ] = None,
-    immersion: Annotated[float, typer.Option(help="Radial depth over diameter, up to 1 (a slot).")] = 0.5,
-    strategy: Annotated[Strategy, typer.Option(help="Up or down milling.")] = Strategy.down,
-    entry_deg: Annotated[
-        float | None, typer.Option(help="Entry angle from the normal direction, instead of --immersion.", show_default=False)
-    ] = None,
-    exit_deg: Annotated[float | None, typer.Option(help="Exit angle.", show_default=False)] = None,
-    feed_direction: Annotated[str, typer.Option(help="+X -X +Y -Y, or degrees from +X.")] = "+X",
-    speed_from: Annotated[float, typer.Option(help="Lowest spindle speed, rev/min.")] = 4000.0,
-    speed_to: Annotated[float, typer.Option(help="Highest spindle speed, rev/min.")] = 20000.0,
-    speed_step: Annotated[float, typer.Option(help="Speed step, rev/min.")] = 50.0,
-    max_depth_mm: Annotated[float, typer.Option(help="Depths beyond it are not of interest, mm.")] = 10.0,
-    ktc_mpa: Annotated[
-        float | None, typer.Option(help="Tangential coefficient, MPa; default: the result's workpiece.", show_default=False)
-    ] = None,
-    krc: Annotated[float | None, typer.Option(help="Radial ratio; default: the result's workpiece.", show_default=False)] = None,
-    method: Annotated[LobeMethod, typer.Option(help="How the limit is found.")] = LobeMethod.zero_order,
+    plot: Plot = None,
     bands: Bands = True,
     stiffness_spread: StiffnessSpread = 0.05,
     json_: Json = False,
 ) -> None:
     """Compute stability lobes of a tooling: on an identified machine, from a modal model or from tap tests."""
-    import numpy as np
-
-    from rcsa_ident.cutting.process import MillingProcess
-    from rcsa_ident.io.setups import read_tooling
-    from rcsa_ident.workflows.lobes import LobeConditions, best_speeds
+    from rcsa_ident.workflows.lobes import best_speeds
 
     writable(out)
-    own_tip = modes is not None or bool(frf)
-    if modes is not None and frf:
-        raise InputError("--modes and --frf", "both", "one of them")
-    if len(files) != (1 if own_tip else 2):
-        wanted = (
-            "TOOLING.toml alone with --modes or --frf" if own_tip else "RESULT.json TOOLING.toml (or --modes or --frf and TOOLING.toml)"
-        )
-        raise InputError("files", f"{len(files)} files", wanted)
-    tooling = read_tooling(files[-1])
-    result = None if own_tip else read_machine_over_speed(files[0])
-    conditions = LobeConditions(
-        MillingProcess(
-            tooling.cutter,
-            coefficients(ktc_mpa, krc, None if result is None else (result[1], str(files[0]))),
-            engagement(immersion, strategy, entry_deg, exit_deg),
-            feed_angle(feed_direction),
-        ),
-        inclusive(speed_from, speed_to, speed_step, ("--speed-from", "--speed-to", "--speed-step"), "rev/min") * (np.pi / 30.0),
-        max_depth_mm * 1e-3,
-    )
+    check_plot(plot)
+    (subject,) = subjects_of(files, tip, stiffness_spread)
+    process = process_of(cut, speeds, subject)
+    conditions = speeds_of(speeds, process)
+    if surface_depth_mm is not None and process.feed_per_tooth is None:
+        raise InputError("--surface-depth-mm", surface_depth_mm, "given together with --feed-per-tooth-mm")
+    warn_outside(subject, conditions.speeds)
     stages = Stages(quiet=json_)
     with stages.stage("lobes"):
-        if result is None:
-            found, spread, doubts = conditions.lobes(tip_of(modes, frf or [])), None, list[str]()
-        else:
-            found, spread, doubts = machine_lobes(*result, tooling.assembly, conditions, bands, _share(stiffness_spread))
-    write_lobes(out, found, spread)
+        limits = subject.limits(conditions, bands)
+        found, doubts = limits.lobes, subject.doubts(limits)
+        tested = None if tests is None else tested_cuts(tests, subject, conditions)
+        surface = None if surface_depth_mm is None else subject.surface(process, found.spindle_speed, surface_depth_mm * 1e-3)
+    doubts += [] if surface is None else list(surface.warnings)
+    write_lobes(out, found, limits.band, surface)
     best = best_speeds(found)
+    if plot is not None:
+        from rcsa_ident.report.lobes import save_figure, stability_figure
+
+        save_figure(stability_figure(found, conditions.max_depth, limits.band, best, tested=tested, surface=surface), str(plot))
     if json_:
-        emit(lobes_summary(found, best) | {"warnings": [*found.warnings, *doubts], "seconds": stages.seconds, "out": str(out)})
+        summary = lobes_summary(found, best) | (
+            {} if tested is None else {"tested": asdict(tested.tally) | {"share_right": tested.tally.share_right}}
+        )
+        emit(summary | {"warnings": doubts, "seconds": stages.seconds, "out": str(out)} | ({} if plot is None else {"plot": str(plot)}))
         return
-    from rcsa_ident.cli.tables import show_lobes
+    from rcsa_ident.cli.tables import show_lobes, show_tally
 
     show_lobes(found, best, conditions.max_depth)
-    for doubt in (*found.warnings, *doubts):
+    if tested is not None:
+        show_tally(tested.tally)
+    for doubt in doubts:
         warn(doubt)
+    if plot is not None:
+        say(f"drawn: {plot}")
     say(f"written: {out} ({found.spindle_speed.size} speeds, {stages.seconds['lobes']:.2f} s)")
+
+
+def check_plot(path: Path | None) -> None:
+    """Refuse a figure that can not be written before the work, not after it."""
+    if path is None:
+        return
+    if path.suffix.lower() not in (".png", ".svg"):
+        raise InputError("--plot", f"suffix '{path.suffix}'", "a file that ends in .png or .svg", str(path))
+    writable(path, "--plot")
+
+
+def tested_cuts(path: Path, subject: Subject, conditions: LobeConditions) -> Tested:
+    """Return tested cuts with what the lobes say of them, each at its own speed."""
+    import numpy as np
+
+    from rcsa_ident.io.tested_cuts import read_tested_cuts
+    from rcsa_ident.report.lobes import Tested
+    from rcsa_ident.stability.tested import tally
+
+    cuts = read_tested_cuts(path)
+    own = replace(
+        conditions, speeds=np.unique(cuts.spindle_speed), max_depth=max(conditions.max_depth, 1.01 * float(cuts.axial_depth.max()))
+    )
+    limits = subject.limits(own, False)
+    places = np.searchsorted(limits.lobes.spindle_speed, cuts.spindle_speed)
+    return Tested(cuts, tally(cuts, limits.lobes.limit_depth[places]))
 
 
 def _share(percent: float) -> float:
     if not 0.0 <= percent <= 50.0:
         raise InputError("--stiffness-spread", percent, "a number from 0 to 50 [%]")
     return percent / 100.0
-
-
-def _warn_outside(machine: MachineOverSpeed, speeds: FloatArray) -> None:
-    """Say where a machine that changes with speed is asked for speeds that it was not cut at."""
-    known = machine.speed_range
-    # the last digit of a speed that was written in rev/min is nobody's wish
-    if known is not None and (speeds.min() < known[0] * (1.0 - 1e-9) or speeds.max() > known[1] * (1.0 + 1e-9)):
-        low, high = (speed * 30.0 / math.pi for speed in known)
-        warn(f"the machine was identified from {low:.0f} to {high:.0f} rev/min; outside it stays what it is at the nearest of them")
 
 
 def read_machine(path: Path) -> tuple[dict[Dof, MachineAxis], dict[str, Any]]:
@@ -264,38 +262,27 @@ def peaks_of(frequency: FloatArray, response: TooltipResponse) -> dict[Dof, Any]
     return peaks
 
 
-def machine_lobes(
-    machine: MachineOverSpeed, data: dict[str, Any], assembly: Any, conditions: LobeConditions, bands: bool, stiffness_spread: float
-) -> tuple[StabilityLobes, tuple[FloatArray, FloatArray] | None, list[str]]:
-    """Return the lobes on an identified machine, their band and what speaks against them."""
-    import numpy as np
-
-    from rcsa_ident.workflows.lobes import band_warning
-    from rcsa_ident.workflows.speeds import lobes_over_speed
-
-    low, high = data["band_hz"]
-    _warn_outside(machine, conditions.speeds)
-    omega = 2.0 * np.pi * np.arange(min(LOWEST, low), high + 0.5 * STEP, STEP)
-    found, spread = lobes_over_speed(machine, assembly, omega, conditions, bands, stiffness_spread)
-    doubt = band_warning(found, (low, high))
-    return found, spread, [doubt] if doubt else []
-
-
-def write_lobes(path: Path, found: StabilityLobes, spread: tuple[FloatArray, FloatArray] | None) -> None:
+def write_lobes(
+    path: Path, found: StabilityLobes, spread: tuple[FloatArray, FloatArray] | None, surface: SurfaceError | None = None
+) -> None:
     """Write LOBES.csv; the band's columns are empty where even its edge is beyond the largest depth."""
     import numpy as np
 
     from rcsa_ident.io.curves import write_lobes_csv
 
     extra = {} if spread is None else {"limit_depth_low_mm": spread[0] * 1e3, "limit_depth_high_mm": spread[1] * 1e3}
+    assert found.flip is not None
+    extra["flip"] = np.where(found.stable, np.nan, found.flip.astype(float))
+    if surface is not None:
+        extra |= {"surface_error_um": surface.largest * 1e6, "surface_error_mean_um": surface.mean * 1e6}
     lobe = np.where(found.lobe < 0, np.nan, found.lobe.astype(float))
     chatter = found.chatter_frequency / (2.0 * np.pi)
     # rad/s and back leaves a last digit that nobody asked for
     speed = np.round(found.spindle_speed * (30.0 / np.pi), 9)
-    write_lobes_csv(path, speed, found.limit_depth * 1e3, chatter, lobe, extra)
+    write_lobes_csv(path, speed, found.limit_depth * 1e3, chatter, lobe, extra, whole=("flip",))
 
 
-def lobes_summary(found: StabilityLobes, best: list[tuple[float, float]]) -> dict[str, Any]:
+def lobes_summary(found: StabilityLobes, best: Sequence[tuple[float, float]]) -> dict[str, Any]:
     """Return what a machine wants to know of lobes without reading the curve."""
     rpm = 30.0 / math.pi
     return {
@@ -303,4 +290,5 @@ def lobes_summary(found: StabilityLobes, best: list[tuple[float, float]]) -> dic
         "absolute_limit_mm": found.absolute_limit * 1e3,
         "absolute_frequency_hz": found.absolute_frequency / (2.0 * math.pi),
         "best_speeds": [{"spindle_speed_rpm": s * rpm, "limit_depth_mm": d * 1e3} for s, d in best],
+        "flip_speeds": 0 if found.flip is None else int(found.flip.sum()),
     }

@@ -13,6 +13,8 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.report.rows import RecordingRow, coefficient_rows, mode_rows, two_digits
 from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.tested import Tally
+from rcsa_ident.workflows.advice import OperatingPoint, PlannedCut, SpeedWindow
 
 _RPM = 9.549296585513721
 _COLOURS = {"converged": "green", "suspect": "yellow", "failed": "red"}
@@ -96,6 +98,84 @@ def show_lobes(lobes: StabilityLobes, best: Sequence[tuple[float, float]], max_d
     for speed, depth in best:
         table.add_row(f"{speed * _RPM:.0f}", f"{1e3 * depth:.2f}" if depth < float("inf") else f"more than {1e3 * max_depth:g}")
     out.print(table)
+
+
+def show_tally(tally: Tally) -> None:
+    """Print how many tested cuts the lobes tell right: the four cases, and the marginal ones apart."""
+    table = Table("predicted", "seen\nstable", "seen\nchatter", "marginal", title="tested cuts", title_justify="left")
+    for column in table.columns[1:]:
+        column.justify = "right"
+    table.add_row("stable", f"[green]{tally.stable_stable}[/]", f"[red]{tally.stable_chatter}[/]", str(tally.stable_marginal))
+    table.add_row("chatter", f"[yellow]{tally.chatter_stable}[/]", f"[green]{tally.chatter_chatter}[/]", str(tally.chatter_marginal))
+    out = console()
+    out.print(table)
+    if tally.decided:
+        out.print(f"told right: {tally.stable_stable + tally.chatter_chatter} of {tally.decided}, {100.0 * tally.share_right:.1f} %")
+
+
+def _table(*columns: str, title: str) -> Table:
+    table = Table(*columns, title=title, title_justify="left")
+    for column in table.columns:
+        column.justify = "right"
+    return table
+
+
+def show_points(points: Sequence[OperatingPoint]) -> None:
+    """Print the cuts that remove most."""
+    heads = ("spindle speed\nrev/min", "depth\nmm", "removal\ncm³/min", "power\nkW", "torque\nN m", "more is\nended by")
+    table = _table(*heads, title="highest removal rate")
+    for p in points:
+        numbers = (f"{p.spindle_speed * _RPM:.0f}", f"{1e3 * p.depth:.2f}", f"{6e7 * p.removal_rate:.0f}", f"{1e-3 * p.power:.2f}")
+        table.add_row(*numbers, f"{p.torque:.1f}", str(p.bound))
+    console().print(table)
+
+
+def show_windows(windows: Sequence[SpeedWindow], depth_mm: float, name: str) -> None:
+    """Print the speeds at which a depth is allowed."""
+    out = console()
+    about = f"{escape(name)}: " if name else ""
+    if not windows:
+        out.print(f"{about}{depth_mm:g} mm is allowed at no speed of the range")
+        return
+    heads = ("best at\nrev/min", "from\nrev/min", "to\nrev/min", "allowed there\nmm")
+    table = _table(*heads, title=f"{about}speeds for a depth of {depth_mm:g} mm")
+    for w in windows[:8]:
+        table.add_row(*(f"{speed * _RPM:.0f}" for speed in (w.best, w.low, w.high)), f"{1e3 * w.allowed:.2f}")
+    out.print(table)
+
+
+def show_planned(cuts: Sequence[PlannedCut], name: str) -> None:
+    """Print how planned cuts stand."""
+    out = console()
+    for cut in cuts:
+        about = f"{escape(name)}: " if name else ""
+        verdict = "[green]stable[/]" if cut.stable else "[red]chatter[/]"
+        limit = f"limit {1e3 * cut.limit:.2f} mm, margin {100.0 * cut.margin:+.0f} %" if cut.limit < float("inf") else "no limit in reach"
+        words = [f"{about}{cut.spindle_speed * _RPM:.0f} rev/min, {1e3 * cut.depth:.2f} mm: {verdict}, {limit}"]
+        if cut.probability is not None:
+            words.append(f"stable with a probability of {100.0 * cut.probability:.0f} %")
+        words.append(f"{1e3 * cut.robust_limit:.2f} mm with tolerance and probability")
+        near = [f"{speed * _RPM:.0f} rev/min" for speed in (cut.slower, cut.faster) if speed is not None]
+        if near:
+            words.append(f"{'chatter begins at' if cut.stable else 'the nearest stable speeds are'} {' and '.join(near)}")
+        words.append(
+            f"{1e-3 * cut.power:.2f} kW, {cut.torque:.1f} N m" + (f" ({100.0 * cut.load:.0f} % of the spindle)" if cut.load else "")
+        )
+        out.print("; ".join(words), soft_wrap=True)
+
+
+def show_comparison(rows: Sequence[tuple[str, float, Sequence[OperatingPoint]]]) -> None:
+    """Print the lowest limit [m] and the best cut of several toolings."""
+    heads = ("tooling", "lowest limit\nmm", "best at\nrev/min", "depth\nmm", "removal\ncm³/min", "more is\nended by")
+    table = _table(*heads, title="comparison")
+    table.columns[0].justify = "left"
+    for name, lowest, points in rows:
+        cells = ["", "", "", ""]
+        if points:
+            p = points[0]
+            cells = [f"{p.spindle_speed * _RPM:.0f}", f"{1e3 * p.depth:.2f}", f"{6e7 * p.removal_rate:.0f}", str(p.bound)]
+        table.add_row(escape(name), f"{1e3 * lowest:.3f}", *cells)
+    console().print(table)
 
 
 def show_peaks(rows: Mapping[Dof, tuple[float, float, float, float]]) -> None:

@@ -110,6 +110,7 @@ def write_lobes_csv(
     chatter_hz: ArrayLike,
     lobe: ArrayLike,
     extra: Mapping[str, ArrayLike] | None = None,
+    whole: Sequence[str] = (),
 ) -> None:
     """Write stability lobes; limit, chatter frequency and lobe are empty where the limit is NaN or infinite.
 
@@ -118,6 +119,8 @@ def write_lobes_csv(
     speed_rpm, limit_mm, chatter_hz, lobe : array, shape (n,)
         A chatter frequency or lobe that is not known is NaN; so are stable places in `extra`.
     extra : mapping of column name to array, shape (n,), optional
+    whole : sequence of str
+        Columns of `extra` that hold whole numbers.
     """
     columns = {name: np.array(v, dtype=float) for name, v in zip(LOBES, (speed_rpm, limit_mm, chatter_hz, lobe), strict=True)}
     for name in LOBES[:3]:
@@ -131,7 +134,22 @@ def write_lobes_csv(
     lobes = columns["lobe"][np.isfinite(columns["lobe"])]
     if np.any(lobes != np.rint(lobes)):
         raise InputError("lobe", float(lobes[lobes != np.rint(lobes)][0]), "whole numbers", str(path))
-    _write(path, columns, extra or {}, finite=[LOBES[0]], whole=["lobe"])
+    _write(path, columns, extra or {}, finite=[LOBES[0]], whole=["lobe", *whole])
+
+
+def write_speed_csv(path: str | Path, speed_rpm: ArrayLike, columns: Mapping[str, ArrayLike]) -> None:
+    """Write columns over spindle speed; a number that is not finite is an empty cell.
+
+    Parameters
+    ----------
+    speed_rpm : array, shape (n,)
+        Above 0.
+    columns : mapping of column name to array, shape (n,)
+    """
+    speed = np.asarray(speed_rpm, dtype=float)
+    if not np.all(speed > 0.0):
+        raise InputError(LOBES[0], float(speed[~(speed > 0.0)][0]), "a number above 0", str(path))
+    _write(path, {LOBES[0]: speed}, columns, finite=[LOBES[0]])
 
 
 def read_lobes_csv(path: str | Path) -> LobeCurves:

@@ -175,7 +175,7 @@ def _wanted(tests: list[TapTest], source: Source) -> dict[tuple[str, str], TapTe
     silent = [test for test in tests if not test.response and not test.force]
     if not own and not silent:
         known = listed([f"{t.record}: {t.response}{t.force}" for t in tests])
-        raise InputError("--frf", f"no FRF {pair_name(source.pair)}", f"axes that the file holds ({known})", path)
+        raise InputError("--frf", f"no FRF of axis {pair_name(source.pair)}", f"axes that the file holds ({known})", path)
     return {source.pair: _only(own or silent, source.pair, path)}
 
 

@@ -19,7 +19,6 @@ from matplotlib.ticker import MaxNLocator
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification.result import AxisResult, Identification
-from rcsa_ident.stability.result import StabilityLobes
 
 #: Distinct for colour-blind readers, too (Okabe & Ito), and dark enough on white.
 COLOURS = {"X": "#0072B2", "Y": "#C8501A"}
@@ -34,7 +33,6 @@ STAGES = {
     "generation": ("best of each generation", "#0072B2"),
 }
 _TRUTH = "#1f2933"
-_RPM = 30.0 / np.pi
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "font.family": "sans-serif",
@@ -247,62 +245,3 @@ def _shade_outside(ax: Axes, frequency: FloatArray, band_hz: tuple[float, float]
     for start, end in () if band_hz is None else ((frequency[0], band_hz[0]), (band_hz[1], frequency[-1])):
         if start < end:
             ax.axvspan(start, end, color="#52606d", alpha=0.10, lw=0, label="outside the identified band")
-
-
-def stability_figure(
-    lobes: StabilityLobes,
-    max_depth: float,
-    band: tuple[FloatArray, FloatArray] | None = None,
-    best: Sequence[tuple[float, float]] = (),
-    true_limit: FloatArray | None = None,
-) -> Figure:
-    """Limit depth over spindle speed, the chatter frequency below, the best speeds marked.
-
-    Parameters
-    ----------
-    lobes : StabilityLobes
-    max_depth : float [m]
-        That was asked for; the cut is stable up to it where the limit is infinite.
-    band : (low, high) [m]
-    best : sequence of (speed [rad/s], depth [m])
-    true_limit : array, shape (n,) [m]
-        Where it is known.
-    """
-    figure, grid = _grid(2, 1, 4.6, (2.2, 1.0), sharey="none")
-    top, bottom = grid[:, 0]
-    speed = lobes.spindle_speed * _RPM
-    limit = 1e3 * np.minimum(lobes.limit_depth, max_depth)
-    finite = limit[np.isfinite(lobes.limit_depth)]
-    ceiling = 1e3 * max_depth if finite.size < limit.size else min(1e3 * max_depth, 1.25 * float(np.max(limit)))
-    with mpl.rc_context(_STYLE):
-        top.fill_between(speed, 0.0, limit, color="#009E73", alpha=0.13, lw=0)
-        top.fill_between(speed, limit, ceiling, color="#C8501A", alpha=0.10, lw=0)
-        if band is not None:
-            low, high = (1e3 * np.minimum(edge, max_depth) for edge in band)
-            top.fill_between(speed, low, high, color=COLOURS["X"], alpha=0.35, lw=0, label="95 % of what the records leave open")
-        top.plot(speed, limit, color=COLOURS["X"], label="stability limit")
-        if true_limit is not None:
-            top.plot(speed, 1e3 * np.minimum(true_limit, max_depth), "--", color=_TRUTH, lw=1.1, label="from the true FRF")
-        if np.isfinite(lobes.absolute_limit) and lobes.absolute_limit < max_depth:
-            label = f"stable at any speed: {1e3 * lobes.absolute_limit:.2f} mm"
-            top.axhline(1e3 * lobes.absolute_limit, color="#52606d", ls=":", lw=1.2, label=label)
-        for i, (best_speed, depth) in enumerate(best):
-            x, y = best_speed * _RPM, 1e3 * min(depth, max_depth)
-            top.plot(x, y, "v", color="#00704f", ms=8.0, label="best speeds" if i == 0 else None)
-            text = f"{x:.0f} rev/min\n{y:.2f} mm" if depth <= max_depth else f"{x:.0f} rev/min"
-            top.annotate(text, (x, y), xytext=(0, 7), textcoords="offset points", ha="center", fontsize=8.5, color="#00704f")
-        top.text(0.008, 0.97, "chatter", transform=top.transAxes, va="top", color="#a33f12", fontsize=9.5, style="italic")
-        top.text(0.008, 0.03, "stable", transform=top.transAxes, va="bottom", color="#00704f", fontsize=9.5, style="italic")
-        top.set_ylim(0.0, ceiling)
-        top.set_ylabel("axial depth [mm]")
-        figure.legend(*top.get_legend_handles_labels(), loc="outside upper center", ncols=5, fontsize=9.0, frameon=False)
-        order = np.argsort(speed)
-        chatter = lobes.chatter_frequency[order] / (2.0 * np.pi)
-        # another lobe or another mode: no line between them
-        jumps = np.abs(np.diff(chatter, prepend=chatter[0])) > 0.03 * chatter
-        chatter[jumps] = np.nan
-        bottom.plot(speed[order], chatter, color="#52606d")
-        bottom.set_ylabel("chatter [Hz]")
-        bottom.set_xlabel("spindle speed [rev/min]")
-        bottom.set_xlim(np.min(speed), np.max(speed))
-    return figure

@@ -16,6 +16,7 @@ from rcsa_ident.identification.parameters import JOINT
 from rcsa_ident.identification.result import AxisResult, Identification
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.report import figures
+from rcsa_ident.report.lobes import stability_figure
 from rcsa_ident.report.rows import coefficient_rows, mode_rows, peak_row, recording_rows, two_digits
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.result import StabilityLobes
@@ -176,7 +177,7 @@ def _tooling(number: int, page: ToolingPage) -> dict[str, Any]:
         "tip": figures.svg(figures.tooltip_frf(page.frequency, page.tip, page.deviation, page.truth, page.band_hz), f"tip{number}"),
         "lobes": ""
         if lobes is None
-        else figures.svg(figures.stability_figure(lobes, page.max_depth, page.band, page.best, page.true_limit), f"lobes{number}"),
+        else figures.svg(stability_figure(lobes, page.max_depth, page.band, page.best, page.true_limit), f"lobes{number}"),
         "best": [{"rpm": s * _RPM, "mm": d * 1e3 if np.isfinite(d) else None} for s, d in page.best],
         "anywhere": None if lobes is None or not np.isfinite(lobes.absolute_limit) else lobes.absolute_limit * 1e3,
         "critical": None if lobes is None or not np.isfinite(lobes.absolute_frequency) else lobes.absolute_frequency / (2.0 * np.pi),

@@ -59,6 +59,16 @@ class Limits:
         """The limit of the machine as it was identified, up to the depth that was asked for, shape (n,) [m]."""
         return np.minimum(self.lobes.limit_depth, self.max_depth)
 
+    @property
+    def band(self) -> tuple[FloatArray, FloatArray] | None:
+        """Depths between which 95 % of the drawn limits lie, shape (n,) each [m], infinite beyond what was asked for; None without them."""
+        if self.drawn is None:
+            return None
+        limits = np.where(self.drawn > self.max_depth, np.inf, self.drawn)
+        # an infinite limit has its rank like any other, but can't be interpolated
+        low, high = np.quantile(limits, (0.025, 0.975), axis=0, method="nearest")
+        return low, high
+
     def trusted(self, probability: float) -> FloatArray:
         """Return the depth up to which at least this share of the drawn machines is stable, shape (n,) [m]; 1 is what all have in common.
 

@@ -11,7 +11,6 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.dynamics.rational import tip_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
@@ -21,13 +20,12 @@ from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.tip import TooltipResponse
+from rcsa_ident.workflows.tip_fit import fitted_modes
 
 #: Two peaks are one pocket unless the limit between them falls below this share of the lower one.
 POCKET = 0.85
 #: Methods that march through time: they take modes.
 MARCHING = (SemiDiscretisation, FullDiscretisation)
-#: What a fit of a receptance may be beside it, root mean square.
-FIT_TOLERANCE = 2e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,17 +51,9 @@ class LobeConditions:
             return stability_lobes(tip, self.process, self.speeds, self.max_depth, self.method)
         modes, error = fitted_modes(tip)
         found = stability_lobes(modes, self.process, self.speeds, self.max_depth, self.method)
-        told = f"the receptance was fitted with {modes.pole.size} modes, {max(100.0 * error, 0.01):.2g} % or less beside it"
+        share = f"{100.0 * error:.2g}" if error > 1e-4 else "less than 0.01"
+        told = f"the receptance was fitted with {modes.pole.size} modes, {share} % beside it"
         return replace(found, warnings=(*found.warnings, told))
-
-
-def fitted_modes(tip: Receptance) -> tuple[TipModes, float]:
-    """Return the modes of a rational fit of the tip's receptance, and how far it is beside it: the norm of what is left, as a share."""
-    found = tip_modes(tip, tolerance=FIT_TOLERANCE)
-    modes = TipModes(found.pole, found.outputs, found.inputs, found.constant)
-    kept = tip.omega > 0.0
-    left = modes.at(tip.omega[kept]) - tip.values[kept]
-    return modes, float(np.linalg.norm(left) / np.linalg.norm(tip.values[kept]))
 
 
 def tooling_lobes(response: TooltipResponse, conditions: LobeConditions) -> StabilityLobes:
@@ -204,6 +194,14 @@ def modal_tip(models: Mapping[Dof, ModalModel]) -> Receptance:
         With ``tip.x``, ``tip.y``; a direction that is missing is rigid.
     """
     return TipModes.of(models).receptance()
+
+
+def from_rest(modes: TipModes) -> Receptance:
+    """Return the receptance of modes from 0 Hz to four times the highest, at frequencies that resolve the sharpest."""
+    fine = modes.receptance().omega
+    omega = np.arange(0.0, 2.0 * fine[-1], fine[1] - fine[0])
+    tip = (Coordinate("tip", Dof.X), Coordinate("tip", Dof.Y))
+    return Receptance(omega, modes.at(omega), tip, tip)
 
 
 def measured_tip(

@@ -135,7 +135,7 @@ def test_the_tip_is_hit_where_it_is_measured(tmp_path):
     assert [t.record for t in read_frfs(path)] == [2, 3, 4, 5, 6]
     with pytest.raises(InputError, match="record 1, allowed is the number of an FRF"):
         read_tap_tests([Source(path, None, 1)])
-    with pytest.raises(InputError, match="no FRF YX, allowed is axes that the file holds"):
+    with pytest.raises(InputError, match="no FRF of axis YX, allowed is axes that the file holds"):
         read_tap_tests([Source(path, ("Y", "X"))])
     with pytest.raises(InputError, match="X twice"):
         read_tap_tests([Source(path), Source(path, ("X", "X"))])

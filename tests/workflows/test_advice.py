@@ -24,9 +24,10 @@ from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.advice import Bound, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.workflows.limits import Limits, machine_limits, machine_surface, robust, tip_limits, widened
-from rcsa_ident.workflows.lobes import LobeConditions, fitted_modes, lobe_bands, tooling_lobes
+from rcsa_ident.workflows.lobes import LobeConditions, lobe_bands, tooling_lobes
 from rcsa_ident.workflows.speeds import MachineOverSpeed, lobes_over_speed
 from rcsa_ident.workflows.tip import MachineAxis, tooltip
+from rcsa_ident.workflows.tip_fit import fitted_modes
 from tests.cli import by_hand
 
 PROCESS = MillingProcess(Cutter(4, 12e-3), CuttingCoefficients(900e6, 0.3), Engagement(0.0, np.pi), feed_per_tooth=1e-4)
