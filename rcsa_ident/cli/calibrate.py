@@ -207,13 +207,16 @@ def materials(
     table = Table("material", "K_tc\nMPa", "± %", "k_rc", "± %", "K_te\nN/mm", "K_re\nN/mm", "source")
     for column in table.columns[1:7]:
         column.justify = "right"
+    sources = list(dict.fromkeys(m.source for m in chosen))
     for m in chosen:
         c = m.coefficients
         edges = [f"{1e-3 * e:.3g}" if e > 0.0 else "" for e in (c.tangential_edge, c.radial_edge)]
         spreads = [f"{100.0 * s:.0f}" for s in (c.tangential_spread, c.ratio_spread)]
         values = (f"{1e-6 * c.tangential:.0f}", spreads[0], f"{c.radial_ratio:.2f}", spreads[1], *edges)
-        table.add_row(escape(m.name), *values, escape(m.source))
+        table.add_row(escape(m.name), *values, str(sources.index(m.source) + 1))
     console().print(table)
+    for number, source in enumerate(sources, start=1):
+        say(f"{number}: {escape(source)}")
     if name is not None:
         for m in chosen:
             say(escape(f"{m.condition}. {m.notes}"))

@@ -80,7 +80,7 @@ def compare(
     _show(found)
     for each in found:
         if not each.modes:
-            warn(f"{_TITLES[each.place]}, {each.axis.upper()}: no peak in the identified band")
+            warn(f"{_TITLES[each.place]}, {each.axis.upper()}: no mode in the identified band")
     if out is not None:
         say(f"written: {out}")
 
@@ -124,31 +124,20 @@ def _show(found: Sequence[ResponseComparison]) -> None:
 
     from rcsa_ident.cli.tables import console
 
-    heads = (
-        "response",
-        "hammer\nHz",
-        "in process\nHz",
-        "change\n%",
-        "damping\n%",
-        "in process\n%",
-        "peak\nµm/N",
-        "in process\nµm/N",
-        "stiffness\nchange %",
-    )
-    table = Table(*heads, title="peaks of the idle machine (hammer) and in process (identified)", title_justify="left")
+    heads = ("response", "hammer\nHz", "change\n%", "damping\n%", "in process\n%", "|H|\nµm/N", "stiffness\n%")
+    table = Table(*heads, title="modes of the idle machine (hammer), and how they differ in process (identified)", title_justify="left")
     for column in table.columns[1:]:
         column.justify = "right"
     for each in found:
-        name = f"{each.place} {each.axis.upper()}"
         for h, i in each.modes:
-            left = (f"{h.frequency / (2 * math.pi):.1f}", f"{100 * h.damping:.2f}", f"{1e6 * h.compliance:.4f}")
+            left = (f"{each.place} {each.axis.upper()}", f"{h.frequency / (2 * math.pi):.1f}")
+            damping, size = f"{100 * h.damping:.2f}", f"{1e6 * h.compliance:.3g}"
             if i is None:
-                table.add_row(name, left[0], "–", "", left[1], "", left[2], "", "")
+                table.add_row(*left, "not found", damping, "", size, "")
                 continue
-            right = (f"{i.frequency / (2 * math.pi):.1f}", f"{100 * i.damping:.2f}", f"{1e6 * i.compliance:.4f}")
             change = f"{100 * (i.frequency / h.frequency - 1):+.2f}"
             stiffness = f"{100 * (h.compliance / i.compliance - 1):+.1f}"
-            table.add_row(name, left[0], right[0], change, left[1], right[1], left[2], right[2], stiffness)
+            table.add_row(*left, change, damping, f"{100 * i.damping:.2f}", size, stiffness)
     out = console()
     out.print(table)
     for each in found:

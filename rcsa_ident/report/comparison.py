@@ -123,8 +123,10 @@ def frf_comparison(
         for column, pair in zip(grid.T, pairs, strict=True):
             views = _views(real_and_imaginary)
             for ax, view in zip(column, views, strict=False):
-                ax.plot(pair.hammer_frequency, view(pair.hammer), color=_HAMMER, lw=1.3, ls=(0, (4, 1.5)), label=names[0])
-                ax.plot(pair.frequency, view(pair.identified), color=COLOURS[pair.colour], lw=1.6, label=names[1])
+                # the dashes on top, so that both are seen where they agree
+                style = {"ls": (0, (4, 2.5)), "zorder": 3}
+                ax.plot(pair.hammer_frequency, view(pair.hammer), color=_HAMMER, lw=1.1, label=names[0], **style)
+                ax.plot(pair.frequency, view(pair.identified), color=COLOURS[pair.colour], lw=2.0, label=names[1])
                 if band_hz is not None:
                     _shade(ax, band_hz, (pair.hammer_frequency, pair.frequency))
             _band(column, pair, real_and_imaginary)

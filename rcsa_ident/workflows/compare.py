@@ -14,16 +14,20 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.rational import rational_fit
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.posterior import MachineAxis, spread
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.workflows.contact import neighbour_noise
 from rcsa_ident.workflows.tip import turned_plane
 
 #: Modes farther apart than this share of their frequency are not the same one.
 MATCH = 0.12
-#: A peak that rises by less above its flanks is none: decades of magnitude; and its least share of the highest one.
-_PROMINENCE, _LEAST_PEAK = 0.05, 0.02
+#: A mode makes up at least this share of the receptance at its frequency, and is at least so high against the highest value.
+LEAST_SHARE, _LEAST_PEAK = 0.2, 0.02
+#: Damping ratio above which a pole is background; share of a receptance that no fit needs to resolve.
+MOST_DAMPING, LEAST_NOISE = 0.25, 2e-3
 #: Width of the bands in which the FRAC is taken [Hz].
 FRAC_BAND = 250.0
 
@@ -43,7 +47,7 @@ class Place(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class LocalMode:
-    """A peak of a receptance, fitted by one mode in its neighbourhood.
+    """A mode that shows in a receptance.
 
     Parameters
     ----------
@@ -51,7 +55,7 @@ class LocalMode:
         Natural frequency.
     damping : float [-]
     compliance : float [m/N]
-        Height of the peak; its inverse is the dynamic stiffness.
+        Of the whole receptance there; its inverse is the dynamic stiffness.
     """
 
     frequency: float
@@ -159,7 +163,9 @@ def _one(
     if bands and part.posterior is not None:
         changes = spread(part.posterior, axis, response, speed)
         deviation = np.sqrt(np.sum(changes.real**2, axis=0)), np.sqrt(np.sum(changes.imag**2, axis=0))
-    modes = matched(local_modes(omega, hammer), local_modes(omega, identified))
+    # both at the hammer's noise, so that both fits resolve alike
+    noise = neighbour_noise(hammer)
+    modes = matched(local_modes(omega, hammer, noise), local_modes(omega, identified, noise))
     error = float(np.linalg.norm(identified - hammer) / np.linalg.norm(hammer))
     return ResponseComparison(
         place, axis, omega, hammer, identified, deviation, frac(hammer, identified), error, modes, _band_frac(omega, hammer, identified)
@@ -184,50 +190,30 @@ def _band_frac(omega: FloatArray, one: ComplexArray, other: ComplexArray) -> tup
     return np.array([r[0] for r in rows]), np.array([r[1] for r in rows])
 
 
-def local_modes(omega: FloatArray, values: ComplexArray) -> list[LocalMode]:
-    """Return the peaks of a receptance, each with the mode that fits it best in its neighbourhood, by frequency.
+def local_modes(omega: FloatArray, values: ComplexArray, noise: FloatArray | None = None) -> list[LocalMode]:
+    """Return the modes that show in a receptance, by frequency.
 
-    Around a peak h (w0^2 - w^2 + i w c) = A + R w^2 is linear in w0^2, c and the complex A and R: what lies farther away is
-    in R. A fit without positive damping or with a frequency off the peak is no mode.
+    A rational function is fitted (`dynamics.rational`); of its poles those count that lie in the band, oscillate, and make up a
+    visible share of the receptance where they stand.
+
+    Parameters
+    ----------
+    noise : array, shape (n,), optional [m/N]
+        Standard deviation of the real and of the imaginary part each; by default from neighbouring frequencies.
     """
-    from scipy.signal import find_peaks, savgol_filter
-
-    size = np.abs(values)
-    smooth = np.exp(savgol_filter(np.log(np.maximum(size, 1e-300)), 5, 2)) if size.size > 5 else size
-    peaks, _ = find_peaks(np.log10(smooth), prominence=_PROMINENCE)
+    noise = np.maximum(neighbour_noise(values) if noise is None else noise, LEAST_NOISE * np.abs(values))
+    fit = rational_fit(omega, values, noise=noise)
     found = []
-    for k in peaks:
-        if smooth[k] < _LEAST_PEAK * smooth.max():
+    for pole, residue in zip(fit.pole, fit.residue[:, 0, 0], strict=True):
+        natural = float(np.abs(pole))
+        damping = float(-pole.real / natural)
+        if not omega[0] < natural < omega[-1] or damping > MOST_DAMPING:
             continue
-        mode = _fitted(omega, values, int(k), smooth)
-        if mode is not None:
-            found.append(mode)
-    return found
-
-
-def _fitted(omega: FloatArray, values: ComplexArray, k: int, size: FloatArray) -> LocalMode | None:
-    """One mode through the points around a peak that are above half of it, seven at least."""
-    low, high = k, k
-    while low > 0 and (size[low - 1] > 0.5 * size[k] or k - low < 3) and size[low - 1] <= 1.05 * size[k]:
-        low -= 1
-    while high < size.size - 1 and (size[high + 1] > 0.5 * size[k] or high - k < 3) and size[high + 1] <= 1.05 * size[k]:
-        high += 1
-    x, h = omega[low : high + 1] / omega[k], values[low : high + 1] / size[k]
-    if x.size < 5:
-        return None
-    zero = np.zeros(x.size)
-    one = np.ones(x.size)
-    real = np.stack([h.real, -x * h.imag, -one, zero, -(x**2), zero], axis=1)
-    imaginary = np.stack([h.imag, x * h.real, zero, -one, zero, -(x**2)], axis=1)
-    design = np.concatenate([real, imaginary])
-    target = np.concatenate([x**2 * h.real, x**2 * h.imag])
-    unit = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
-    solution = np.linalg.lstsq(design / unit, target)[0] / unit
-    square, loss = solution[0], solution[1]
-    if square <= 0.0 or loss <= 0.0 or abs(np.sqrt(square) - 1.0) > 0.1:
-        return None
-    natural = float(np.sqrt(square))
-    return LocalMode(natural * float(omega[k]), float(loss / (2.0 * natural)), float(np.abs(values[k])))
+        size = float(np.abs(fit.response(np.array([natural]))[0, 0, 0]))
+        own = float(np.abs(residue / pole.real))
+        if own > LEAST_SHARE * size and own > _LEAST_PEAK * float(np.abs(values).max()):
+            found.append(LocalMode(natural, damping, size))
+    return sorted(found, key=lambda m: m.frequency)
 
 
 def matched(first: list[LocalMode], second: list[LocalMode]) -> tuple[tuple[LocalMode, LocalMode | None], ...]:

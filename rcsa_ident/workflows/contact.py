@@ -71,7 +71,7 @@ class TapTest:
             raise InputError("tap test", f"{omega.shape} and {values.shape}", "values at frequencies above 0 that rise", self.name)
         if not np.all(np.isfinite(values)) or np.any(values == 0.0):
             raise InputError("tap test", "zero or no number", "a receptance above 0 at every frequency [m/N]", self.name)
-        std = _noise(values) if self.std is None else frozen(np.broadcast_to(self.std, values.shape))
+        std = neighbour_noise(values) if self.std is None else frozen(np.broadcast_to(self.std, values.shape))
         low, high = self.band or (0.0, np.inf)
         kept = (omega >= low) & (omega <= high)
         if np.sum(kept) < 8:
@@ -194,8 +194,11 @@ def _scaled(segments: tuple[BeamSegment, ...], factor: float) -> tuple[BeamSegme
     return tuple(replace(s, material=replace(s.material, youngs_modulus=s.material.youngs_modulus * factor)) for s in segments)
 
 
-def _noise(values: ComplexArray) -> FloatArray:
-    """Standard deviation of each part from third differences, by the median of a window so that a resonance does not count as noise."""
+def neighbour_noise(values: ComplexArray) -> FloatArray:
+    """Return the standard deviation of each part from third differences over frequency, shape (n,).
+
+    The median of a window, so that a resonance does not count as noise.
+    """
     if values.size < 8:
         return np.full(values.size, 0.01 * float(np.median(np.abs(values))))
     # a third difference of white noise has 20 times its variance, and a median of |z|^2 is ln 2 of the mean
