@@ -12,8 +12,8 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.errors import InputError, non_negative, positive
 from rcsa_ident.observer.transfer_function import SampledModes
 
-#: Standard deviation of every force mode before the first sample: more than a tooth brings [N].
-FIRST_FORCE = 300.0
+#: Standard deviation of every force mode before the first sample, more than a tooth brings [N], and of a disturbance's [m].
+FIRST_FORCE, FIRST_DISTURBANCE = 300.0, 1e-6
 
 
 class ForceModel(Protocol):
@@ -146,6 +146,8 @@ class AugmentedModel:
         spread = np.maximum(self.drive, 10.0 * self.common)
         spread[:plants] = 0.0
         spread[plants : plants + forces] = FIRST_FORCE
+        later = np.arange(spread.size) >= plants + forces
+        spread[later & (self.drive > 0.0)] = FIRST_DISTURBANCE
         return np.diag((np.repeat(spread, 2) ** 2)[self.live])
 
 
