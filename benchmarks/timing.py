@@ -25,3 +25,10 @@ def best_of(call: Callable[[], Any], repeats: int = 7, seconds: float = 0.2) -> 
             call()
         best = min(best, (time.perf_counter() - start) / count)
     return best
+
+
+def once(call: Callable[[], Any]) -> float:
+    """Return the time of a single call that takes seconds [s]."""
+    start = time.perf_counter()
+    call()
+    return time.perf_counter() - start

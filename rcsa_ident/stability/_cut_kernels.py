@@ -193,7 +193,10 @@ def coefficients(rows, shapes, plan, places, points, table):
 
 @numba.njit(cache=True)
 def lookups(plan, places, points, angle, time, table):
-    """Where the points find what the tool did a delay ago: first point of a step (+ points, if in this period) and the weights there."""
+    """Where the points find what the tool did a delay ago: first point of a step (+ points, if in this period) and the weights there.
+
+    Where the first weight is 1 the point itself.
+    """
     q, count = table.shape[1] - 1, plan.size - DELAYS
     where = np.zeros((points, count), dtype=np.int64)
     weight = np.zeros((points, count, q + 1))
@@ -227,6 +230,12 @@ def lookups(plan, places, points, angle, time, table):
                     if i != j:
                         value *= (x - table[0, i]) / (table[0, j] - table[0, i])
                 weight[p, d, j] = value
+            # mostly a point stands there already: it alone counts
+            best = np.argmax(weight[p, d])
+            if abs(weight[p, d, best] - 1.0) < 1e-9:
+                where[p, d] += best
+                weight[p, d] = 0.0
+                weight[p, d, 0] = 1.0
     return where, weight
 
 

@@ -169,12 +169,26 @@ def prepare(pole, outputs, inputs, constant, stiffness, damping, places, frozen,
 
 
 @numba.njit(cache=True)
+def _earlier(motion, where, weight, point, delay, row):
+    """What the tool did a delay before a point."""
+    place = where[point, delay]
+    if weight[point, delay, 0] == 1.0:
+        return motion[place, row]
+    value = 0.0
+    for i in range(weight.shape[2]):
+        value += weight[point, delay, i] * motion[place + i, row]
+    return value
+
+
+@numba.njit(cache=True)
 def march(state, motion, force, pole, outputs, constant, stiffness, damping, places, frozen, table, where, weight, prepared):
     """Move by one period. `motion` (2 n, r) holds y at all points, the last period's first; `force` (n, r) and the rest is written."""
     decay, drive, seen, echo, first, later, total = prepared
     q, m, r = table.shape[1] - 1, state.size, constant.shape[0]
     points, delays = damping.shape[0], stiffness.shape[1]
-    free, right, pull = np.empty((2, q, r)), np.empty(q * r), np.empty(r)
+    free, right, pull = np.zeros((2, q, r)), np.empty(q * r), np.empty(r)
+    # velocities matter only to process damping
+    kinds = 2 if np.any(damping) else 1
     for e in range(places.shape[0]):
         if places[e, 3] < 0:
             for k in range(m):
@@ -192,9 +206,7 @@ def march(state, motion, force, pole, outputs, constant, stiffness, damping, pla
                         free[1, 0, a] += (pole[k] * y).real
                 for d in range(delays):
                     for b in range(r):
-                        value = 0.0
-                        for i in range(q + 1):
-                            value += weight[start, d, i] * motion[where[start, d] + i, b]
+                        value = _earlier(motion, where, weight, start, d, b)
                         for a in range(r):
                             pull[a] -= stiffness[start, d, a, b] * value
                 for a in range(r):
@@ -213,33 +225,30 @@ def march(state, motion, force, pole, outputs, constant, stiffness, damping, pla
             for j in range(q):
                 node = start if frozen else start + j + 1
                 for a in range(r):
-                    y, v = 0.0, 0.0
-                    for k in range(m):
-                        p = state[k]
-                        y += seen[e, 0, j, a, k].real * p.real - seen[e, 0, j, a, k].imag * p.imag
-                        v += seen[e, 1, j, a, k].real * p.real - seen[e, 1, j, a, k].imag * p.imag
-                    for b in range(r):
-                        y += echo[e, 0, j, 0, a, b] * force[start, b]
-                        v += echo[e, 1, j, 0, a, b] * force[start, b]
-                    free[0, j, a], free[1, j, a], right[j * r + a] = y, v, 0.0
+                    right[j * r + a] = 0.0
+                    for kind in range(kinds):
+                        y = 0.0
+                        for k in range(m):
+                            y += seen[e, kind, j, a, k].real * state[k].real - seen[e, kind, j, a, k].imag * state[k].imag
+                        for b in range(r):
+                            y += echo[e, kind, j, 0, a, b] * force[start, b]
+                        free[kind, j, a] = y
                 for d in range(delays):
                     for b in range(r):
                         if frozen:
                             # what was there a delay ago changes linearly over the step
-                            begin, end = 0.0, 0.0
-                            for i in range(q + 1):
-                                begin += weight[start, d, i] * motion[where[start, d] + i, b]
-                                end += weight[start + q, d, i] * motion[where[start + q, d] + i, b]
+                            begin = _earlier(motion, where, weight, start, d, b)
+                            end = _earlier(motion, where, weight, start + q, d, b)
                             value = begin + table[0, j + 1] * (end - begin)
                         else:
-                            value = 0.0
-                            for i in range(q + 1):
-                                value += weight[node, d, i] * motion[where[node, d] + i, b]
+                            value = _earlier(motion, where, weight, node, d, b)
                         for a in range(r):
                             right[j * r + a] -= stiffness[node, d, a, b] * value
                 for a in range(r):
                     for b in range(r):
-                        right[j * r + a] += total[node, a, b] * free[0, j, b] + damping[node, a, b] * free[1, j, b]
+                        right[j * r + a] += total[node, a, b] * free[0, j, b]
+                        if kinds == 2:
+                            right[j * r + a] += damping[node, a, b] * free[1, j, b]
             for j in range(q):
                 for a in range(r):
                     value = 0.0
@@ -333,6 +342,31 @@ def largest_of_hessenberg(hessenberg):
     return value, vector[:, 0]
 
 
+@numba.njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def orthogonalised(basis, count, vector, parts):
+    """Take the parts along the first `count` rows of `basis` out of `vector`, in place; they are added to `parts`. Returns its length."""
+    size = vector.size
+    length = 0.0
+    for k in range(size):
+        length += vector[k] * vector[k]
+    for _ in range(3):
+        before = length
+        for i in range(count):
+            part = 0.0
+            for k in range(size):
+                part += basis[i, k] * vector[k]
+            for k in range(size):
+                vector[k] -= part * basis[i, k]
+            parts[i] += part
+        length = 0.0
+        for k in range(size):
+            length += vector[k] * vector[k]
+        # once more where most of it was taken out: what is left would be rounding
+        if length > 0.1 * before:
+            break
+    return math.sqrt(length)
+
+
 @numba.njit(cache=True)
 def multiplier(pole, outputs, inputs, constant, cut, table, frozen, tolerance, waves, start):
     """The period map's eigenvalue of largest magnitude by Arnoldi's method without restarts.
@@ -385,13 +419,7 @@ def multiplier(pole, outputs, inputs, constant, cut, table, frozen, tolerance, w
         after = basis[n + 1]
         after[:m], after[m : 2 * m] = state.real, state.imag
         after[2 * m :] = motion[points + kept :].reshape((points - kept) * r)
-        for _ in range(2):
-            # Gram-Schmidt, twice against rounding
-            for i in range(n + 1):
-                part = np.dot(basis[i], after)
-                after -= part * basis[i]
-                hessenberg[i, n] += part
-        length = np.sqrt(np.sum(after**2))
+        length = orthogonalised(basis, n + 1, after, hessenberg[:, n])
         hessenberg[n + 1, n] = length
         used = n + 1
         ends = used == most or length < 1e-14 * np.sqrt(np.sum(hessenberg[:used, n] ** 2))

@@ -132,13 +132,14 @@ def stability_map(
         blocks = [(i, k, j, m) for i, k in _parts(speeds.size) for j, m in _parts(depths.size)]
         while blocks:
             i, k, j, m = blocks.pop()
-            corners = np.array([[at(i, j), at(i, m)], [at(k, j), at(k, m)]])
-            small = k - i <= 1 and m - j <= 1
-            least, span = np.min(np.abs(corners)), np.ptp(corners)
-            if small or (abs(np.sum(np.sign(corners))) == 4 and least > _NEAR * span):
-                s, t = np.arange(k - i + 1) / max(k - i, 1), np.arange(m - j + 1) / max(m - j, 1)
-                growth[i : k + 1, j : m + 1] = np.outer(1 - s, 1 - t) * corners[0, 0] + np.outer(1 - s, t) * corners[0, 1]
-                growth[i : k + 1, j : m + 1] += np.outer(s, 1 - t) * corners[1, 0] + np.outer(s, t) * corners[1, 1]
+            corners = at(i, j), at(i, m), at(k, j), at(k, m)
+            if k - i <= 1 and m - j <= 1:
+                continue
+            low, high = min(corners), max(corners)
+            if low * high > 0.0 and min(abs(low), abs(high)) > _NEAR * (high - low):
+                s, t = np.linspace(0.0, 1.0, k - i + 1)[:, None], np.linspace(0.0, 1.0, m - j + 1)
+                one, two = corners[0] + t * (corners[1] - corners[0]), corners[2] + t * (corners[3] - corners[2])
+                growth[i : k + 1, j : m + 1] = one + s * (two - one)
                 continue
             first = [(i, (i + k) // 2), ((i + k) // 2, k)] if k - i > 1 else [(i, k)]
             second = [(j, (j + m) // 2), ((j + m) // 2, m)] if m - j > 1 else [(j, m)]
@@ -191,6 +192,10 @@ def _crossing(growth: Growth, low: float, high: float, guess: float, tolerance: 
     below, above = max(guess - width, low), min(guess + width, high)
     ends = growth(below), growth(above)
     if ends[0] * ends[1] >= 0.0:
+        if growth(low) * growth(high) >= 0.0:
+            # only a rough look saw it: one of the grid's points lies on the boundary, within what a rough look may be off
+            root = low if abs(growth(low)) < abs(growth(high)) else high
+            return root, (growth(high) - growth(low)) / (high - low)
         root = float(scipy.optimize.brentq(growth, low, high, xtol=0.5 * tolerance * low, rtol=1e-12))
         below, above = 0.999 * root, 1.001 * root
         ends = growth(below), growth(above)
