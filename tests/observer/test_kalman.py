@@ -197,7 +197,7 @@ def test_superposition(factor, seed):
     st.floats(1.0, 1e4),
     st.floats(0.1, 300.0),
     st.lists(st.floats(20.0, 3000.0), min_size=1, max_size=4, unique=True),
-    st.floats(1e-9, 1e-6),
+    st.floats(1e-8, 1e-6),
 )
 def test_the_errors_dynamics_are_stable_and_the_riccati_equation_holds(intensity, leak, omega, noise):
     omega = np.array(sorted(omega))

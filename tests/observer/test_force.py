@@ -1,0 +1,188 @@
+"""The force observer on a virtual machine's record at 12 000 rev/min, with dynamics fitted at the flange, not the true ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.observer import relative_error, true_response
+from rcsa_ident.errors import InputError
+from rcsa_ident.observer.force import RunOut, force_observer
+from rcsa_ident.observer.tuning import PaperWalk, Resonators, Tuning, harmonics
+from rcsa_ident.workflows.monitor import observe
+from tests.observer.flange_machine import BAND, flange_machine, paper_cut
+
+RATE = 25600.0
+PROGRAMMED = 12000.0 * np.pi / 30.0
+
+
+def monitored(method, smooth=False, air=True, cut=None):
+    made = paper_cut()
+    record, still = cut or made.cut, made.air if air else None
+    return observe(flange_machine(), made.tooling.assembly, 2, record, still, BAND, PROGRAMMED, method, None, smooth)
+
+
+@pytest.fixture(scope="module")
+def oscillating():
+    return monitored(Resonators())
+
+
+@pytest.fixture(scope="module")
+def walking():
+    return monitored(PaperWalk())
+
+
+@pytest.fixture(scope="module")
+def signals():
+    samples = paper_cut().cut.samples
+    return samples[:, :2], samples[:, 2:4]
+
+
+def error(found, lag=0.0):
+    return relative_error(found.estimate.force, paper_cut().force, RATE, lag)
+
+
+def test_oscillators_follow_a_steady_cut_without_lag(oscillating):
+    """300 to 4300 Hz, mean removed, live."""
+    assert np.all(error(oscillating) < 0.04)
+    assert np.all(error(oscillating) < error(oscillating, 1.0))
+    assert np.all(error(oscillating) < error(oscillating, -1.0))
+
+
+def test_the_papers_walk_lags_by_the_machines_delay(walking):
+    assert np.all(error(walking) > 0.5)
+    assert np.all(error(walking, 5.75) < 0.25)
+
+
+@pytest.mark.parametrize("method", [Resonators(), PaperWalk()])
+def test_the_smoother_has_neither_lag_nor_loss(method):
+    assert np.all(error(monitored(method, smooth=True)) < 0.03)
+
+
+def test_bands_hold_the_error(oscillating):
+    """Within the band the error is not larger than told; there is no noise without an error, either."""
+    made = paper_cut()
+    told = oscillating.estimate.standard_deviation[-1]
+    scatter = error(oscillating) * np.std(made.force, axis=0)
+    assert np.all(scatter < 1.2 * told)
+    assert np.all(told < 0.15 * np.std(made.force, axis=0))
+    assert np.all(told < 0.02 * oscillating.estimate.standard_deviation[0])
+
+
+def test_compensated_with_the_true_machine_it_is_flat(oscillating, walking):
+    """Times the true C31: oscillators are right at all orders of the spindle, the walk nearly everywhere."""
+    for i in (0, 1):
+        response = true_response(oscillating, paper_cut(), i)
+        low, high = (w / (2.0 * np.pi) for w in response.usable(response.line[0], at_lines=True))
+        assert low < 410.0
+        assert high > 4000.0
+        assert abs(response.delay_at_lines) * RATE < 0.1
+        response = true_response(walking, paper_cut(), i)
+        assert response.usable(1.3 * walking.band[0])[1] / (2.0 * np.pi) > 3000.0
+        assert 4.0 < response.delay_at_lines * RATE < 7.0
+        smooth = true_response(walking, paper_cut(), i, smoothed=True)
+        assert smooth.flatness(walking.band) < 1.0
+        assert abs(smooth.delay(walking.band)) * RATE < 0.1
+
+
+def test_run_out_of_the_flange_is_taken_out(oscillating):
+    """Four micrometres of it beside about one of vibration: without the air cut the forces are wrong."""
+    assert np.all(error(monitored(Resonators(), air=False)) > 3.0 * error(oscillating))
+
+
+def test_the_fixtures_motion_is_added(oscillating):
+    cut = paper_cut().cut
+    alone = replace(cut, samples=cut.samples[:, :2], sensors=cut.sensors[:2])
+    assert np.all(error(monitored(Resonators(), cut=alone)) > 1.5 * error(oscillating))
+
+
+def test_a_live_stream_in_blocks_is_the_record(oscillating, signals):
+    observer, (gap, acceleration) = oscillating.observer, signals
+    whole = observer.run(observer.init(), gap, acceleration)[1]
+    state, forces = observer.init(), []
+    for start, end in ((0, 1), (1, 500), (500, 500), (500, 1501), (1501, 4000)):
+        state, block = observer.run(state, gap[start:end], acceleration[start:end])
+        forces.append(block.force)
+    np.testing.assert_allclose(np.concatenate(forces), whole.force[:4000], rtol=0.0, atol=1e-12 * np.abs(whole.force).max())
+    state, one = observer.step(state, gap[4000], acceleration[4000])
+    np.testing.assert_allclose(one.force[0], whole.force[4000], rtol=0.0, atol=1e-12 * np.abs(whole.force).max())
+    assert state.count == 4001
+    np.testing.assert_array_equal(observer.observe(gap, acceleration).force, whole.force)
+
+
+def test_a_constant_in_the_gap_changes_nothing(oscillating, signals):
+    observer, (gap, acceleration) = oscillating.observer, signals
+    one = observer.observe(gap[:3000], acceleration[:3000]).force
+    two = observer.observe(gap[:3000] + 3e-4, acceleration[:3000]).force
+    np.testing.assert_allclose(two, one, atol=1e-6 * np.abs(one).max())
+
+
+def test_estimates_are_linear_in_the_signals(oscillating, signals):
+    bare = force_observer([replace(each, run_out=None) for each in oscillating.observer.axes])
+    gap, acceleration = (part[:2000] for part in signals)
+    shaken = np.random.default_rng(1).normal(size=gap.shape) * 1e-7
+    for smooth in (False, True):
+        one, two, both = (
+            bare.observe(g, a, smooth).force
+            for g, a in ((gap, acceleration), (shaken, 0.0 * shaken), (2.0 * gap - shaken, 2.0 * acceleration))
+        )
+        np.testing.assert_allclose(both, 2.0 * one - two, atol=1e-8 * np.abs(both).max())
+
+
+def test_run_out_signal_is_its_lines():
+    lines = RunOut(1200.0, np.array([1.0, 3.0]), np.array([1e-6 + 2e-6j, -1e-6j]), np.array([0.1, 0.0]))
+    t = np.arange(40, 90) / RATE
+    gap, acceleration = lines.signals(40, 50, 1.0 / RATE)
+    np.testing.assert_allclose(gap, (lines.gap[0] * np.exp(1200j * t) + lines.gap[1] * np.exp(3600j * t)).real, atol=1e-17)
+    np.testing.assert_allclose(acceleration, 0.1 * np.cos(1200.0 * t), atol=1e-12)
+
+
+def test_harmonics_of_a_cut():
+    assert harmonics(100.0, 4, (390.0, 1300.0), run_out=False).tolist() == [400.0, 800.0, 1200.0]
+    assert harmonics(100.0, 4, (200.0, 500.0)).tolist() == [200.0, 300.0, 400.0, 500.0]
+
+
+def test_tuning_does_what_it_says(oscillating):
+    """A smoothed walk keeps 0.1 dB at the worst place below the bandwidth, by the closed form of a stationary Wiener filter."""
+    transfer, noise = oscillating.observer.axes[0].transfer, 2e-9
+    for bandwidth in (1000.0, 3000.0):
+        walk = Tuning(noise, 2.0 * np.pi * bandwidth, 1e-3).random_walk(transfer)
+        omega = 2.0 * np.pi * np.linspace(BAND[0] * 0.7 / (2.0 * np.pi), bandwidth, 300)
+        signal = np.abs(transfer.response(omega)) ** 2 * (walk.intensity / omega) ** 2
+        kept = 20.0 * np.log10(signal / (signal + noise**2 / RATE))
+        assert kept.min() == pytest.approx(-0.1, abs=0.01)
+    with pytest.raises(InputError, match="bandwidth"):
+        Tuning(noise, 2.0 * np.pi * 100.0, 1e-3).random_walk(transfer)
+    with pytest.raises(InputError, match="harmonics"):
+        Tuning(noise, 2.0 * np.pi * 3000.0, 1e-3).resonators(transfer, np.array([10.0]))
+
+
+def test_oscillators_follow_a_change_within_the_response_time(oscillating, signals):
+    """The vibration doubles at once: half a revolution later most of the new force is there."""
+    observer = force_observer([replace(each, run_out=None) for each in oscillating.observer.axes])
+    gap, acceleration = (part[:6000] - part[:6000].mean(axis=0) for part in signals)
+    turned = oscillating.observer.axes[0].run_out.signals(0, 6000, 1.0 / RATE)[0]
+    gap = gap - np.stack([turned, oscillating.observer.axes[1].run_out.signals(0, 6000, 1.0 / RATE)[0]], axis=1)
+    doubled = np.where(np.arange(6000)[:, None] < 3840, 1.0, 2.0)
+    one, two = (observer.observe(f * gap, f * acceleration).force for f in (1.0, doubled))
+    period = 128
+    ratio = [
+        np.linalg.norm(two[k : k + period]) / np.linalg.norm(one[k : k + period]) for k in (3840 - period, 3840 + period, 3840 + 5 * period)
+    ]
+    assert ratio[0] == pytest.approx(1.0, abs=1e-9)
+    assert ratio[1] > 1.6
+    assert ratio[2] == pytest.approx(2.0, abs=0.05)
+
+
+def test_signals_are_checked(oscillating, signals):
+    observer, (gap, acceleration) = oscillating.observer, signals
+    with pytest.raises(InputError, match="one column"):
+        observer.run(observer.init(), gap[:, :1])
+    with pytest.raises(InputError, match="acceleration"):
+        observer.run(observer.init(), gap)
+    lost = np.array(gap[:10])
+    lost[3] = np.nan
+    with pytest.raises(InputError, match="lost"):
+        observer.run(observer.init(), lost, acceleration[:10])
