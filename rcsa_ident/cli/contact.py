@@ -12,7 +12,8 @@ from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, sa
 from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
-    from rcsa_ident.workflows.contact import ContactCalibration, TapTest
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.workflows.contact import ContactCalibration, Support, TapTest
 
 _UNITS = ("N/m per m", "N m/rad per m", "N s/m per m", "N m s/rad per m")
 
@@ -30,7 +31,8 @@ def contact(
     ],
     out: Annotated[Path, typer.Option(help="Tooling file to write, with the calibrated [contact].", show_default=False)],
     on: Annotated[
-        Path | None, typer.Option(help="RESULT.json of the machine that it was clamped in; default: free in space.", show_default=False)
+        Path | None,
+        typer.Option(help="RESULT.json or FLANGE.csv of the machine that it was clamped in; default: free in space.", show_default=False),
     ] = None,
     from_: Annotated[float, typer.Option("--from", help="Lowest frequency that is used, Hz.")] = 200.0,
     to: Annotated[
@@ -81,32 +83,47 @@ def _taps(tooling: Path, texts: list[str], on: Path | None, low: float, high: fl
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.io.hammer import labelled, read_hammer
     from rcsa_ident.io.setups import read_tooling
-    from rcsa_ident.workflows.contact import Support, TapTest
+    from rcsa_ident.workflows.contact import TapTest
 
-    machine, last = None, np.inf if high is None else high
+    last = np.inf if high is None else high
+    supports: dict[Dof, Support] = {}
     if on is not None:
-        from rcsa_ident.cli.lobes import read_machine
-
-        machine, data = read_machine(on)
-        low = max(low, data["band_hz"][0])
-        last = min(last, data["band_hz"][1])
+        supports, band = _supports(on)
+        low, last = max(low, band[0]), min(last, band[1])
     taps = []
     for text in texts:
         label, path = labelled(text, str(tooling))
         assembly = read_tooling(label).assembly
         values = read_hammer(path).values
         for axis, (frequency, receptance) in values.items():
-            support = None
-            if machine is not None:
-                dof = Dof(axis.lower())
-                if dof not in machine:
-                    raise InputError("--tap", f"axis {axis}", f"an axis of {on}", str(path))
-                support = Support(machine[dof].spindle, machine[dof].joint)
+            if on is not None and Dof(axis.lower()) not in supports:
+                raise InputError("--tap", f"axis {axis}", f"an axis of {on}", str(path))
+            support = supports.get(Dof(axis.lower()))
             kept = np.asarray(frequency) > 0.0
             name = path.name if len(values) == 1 else f"{path.name} {axis}"
             band = (2.0 * math.pi * low, 2.0 * math.pi * last)
             taps.append(TapTest(name, assembly, 2.0 * np.pi * frequency[kept], receptance[kept], support, band=band))
     return taps
+
+
+def _supports(path: Path) -> tuple[dict[Dof, Support], tuple[float, float]]:
+    """What an assembly was clamped in, per axis, and the band where it is known [Hz]."""
+    from rcsa_ident.coupling.joint import LumpedJoint
+    from rcsa_ident.workflows.contact import Support
+
+    if path.suffix.lower() == ".csv":
+        from rcsa_ident.io.flanges import read_flange_csv
+
+        flanges = read_flange_csv(path)
+        # a decoupled flange holds its joint already
+        rigid = LumpedJoint(1e18, 1e18)
+        edges = [f.band for f in flanges.values()]
+        band = max(e[0] for e in edges) / (2.0 * math.pi), min(e[1] for e in edges) / (2.0 * math.pi)
+        return {axis: Support(flange, rigid) for axis, flange in flanges.items()}, band
+    from rcsa_ident.cli.lobes import read_machine
+
+    machine, data = read_machine(path)
+    return {axis: Support(part.spindle, part.joint) for axis, part in machine.items()}, (data["band_hz"][0], data["band_hz"][1])
 
 
 def _remarks(found: ContactCalibration, taps: list[TapTest]) -> list[str]:

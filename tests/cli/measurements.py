@@ -5,13 +5,14 @@ from __future__ import annotations
 import typer
 from typer.testing import CliRunner
 
-from rcsa_ident.cli import calibrate, compare, contact
+from rcsa_ident.cli import calibrate, compare, contact, decouple
 
 app = typer.Typer()
 app.command("calibrate")(calibrate.calibrate)
 app.command("materials")(calibrate.materials)
 app.command("compare")(compare.compare)
 app.command("contact")(contact.contact)
+app.command("decouple")(decouple.decouple)
 
 
 def run(*arguments, code=0):

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.coupling.rcsa import couple
+from rcsa_ident.dynamics.coordinates import Dof, plane
+from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.io.curves import write_frf_csv
+from rcsa_ident.io.flanges import write_flange_csv
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.tool_holder.geometry import Contact
+from rcsa_ident.tool_holder.model import tool_holder_receptance
 from tests.cli.measurements import run
 from tests.oracles import analytic
 from tests.workflows.conftest import TOOLING
@@ -63,6 +70,29 @@ def test_a_band_that_does_not_tell_it(taps):
     result = run("contact", taps / "T1.toml", "--tap", taps / "T1.csv", "--out", taps / "C.toml", "--to", 1200, code=3)
     assert "hardly tell" in result.output.replace("\n", " ")
     assert (taps / "C.toml").exists()
+
+
+def test_clamped_in_a_measured_flange(taps):
+    """The same tool on a flange that FLANGE.csv describes, joint included: what was put in comes out."""
+    omega = 2.0 * np.pi * np.arange(150.0, 6100.0, 10.0)
+    psi = np.array([[0.3, 3.0], [-0.25, 2.0], [0.2, -4.0]])
+    modes = normal_modes(2.0 * np.pi * np.array([700.0, 1300.0, 2500.0]), np.array([0.05, 0.04, 0.06]), psi, plane("flange"))
+    write_flange_csv(taps / "FLANGE.csv", omega / (2.0 * np.pi), {Dof.X: modes.receptance(omega).values})
+    kept = omega[20:-20:2]
+    for name in ("T1", "LONG"):
+        a = replace(read_tooling(taps / f"{name}.toml").assembly, contact=TRUE)
+        h = couple(tool_holder_receptance(a, kept), modes.receptance(kept), LumpedJoint(1e18, 1e18))["tip", "tip"][:, 0, 0]
+        write_frf_csv(taps / f"on_{name}.csv", kept / (2.0 * np.pi), {"X": h})
+    arguments = ("--tap", taps / "on_T1.csv", "--tap", f"{taps / 'LONG.toml'}={taps / 'on_LONG.csv'}", "--on", taps / "FLANGE.csv")
+    run("contact", taps / "T1.toml", *arguments, "--out", taps / "C.toml")
+    found = read_tooling(taps / "C.toml").assembly.contact
+    assert found.translational_stiffness == pytest.approx(TRUE.translational_stiffness, rel=0.02)
+    assert found.rotational_stiffness == pytest.approx(TRUE.rotational_stiffness, rel=0.02)
+    wrong = run("contact", taps / "T1.toml", "--tap", taps / "y.csv", "--on", taps / "FLANGE.csv", "--out", taps / "C.toml", code=2)
+    assert "no such file" in wrong.output
+    write_frf_csv(taps / "y.csv", kept / (2.0 * np.pi), {"Y": h})
+    wrong = run("contact", taps / "T1.toml", "--tap", taps / "y.csv", "--on", taps / "FLANGE.csv", "--out", taps / "C.toml", code=2)
+    assert "an axis of" in wrong.output
 
 
 def test_what_is_refused(taps):

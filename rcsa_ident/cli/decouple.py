@@ -1,0 +1,142 @@
+"""decouple: the spindle's flange from hammer tests with several known toolings."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
+from rcsa_ident.errors import InputError
+
+if TYPE_CHECKING:
+    from rcsa_ident.coupling.flange_fit import DecoupledFlange
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.identification.posterior import MachineAxis
+    from rcsa_ident.workflows.decouple import FlangeTap
+
+#: Share of the frequencies at which a flange may be ambiguous or feed energy in without being called suspect.
+_MOST_DOUBTFUL = 0.25
+
+
+@answers
+def decouple(
+    tap: Annotated[
+        list[str],
+        typer.Option(
+            help="TOOLING.toml=FRF of a hammer test at the tip, or PLACE:TOOLING.toml=FRF with PLACE tip, cross (force at the tip, "
+            "response at the spindle's flange) or spindle. Three toolings at least; those at the spindle tell most.",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[Path, typer.Option(help="FLANGE.csv to write.", show_default=False)],
+    beside: Annotated[
+        Path | None, typer.Option(help="RESULT.json whose joint is taken out, too, and whose flange is drawn beside.", show_default=False)
+    ] = None,
+    from_: Annotated[float, typer.Option("--from", help="Lowest frequency that is used, Hz.")] = 200.0,
+    to: Annotated[float | None, typer.Option("--to", help="Highest frequency that is used, Hz; default: all.", show_default=False)] = None,
+    least_damping: Annotated[float, typer.Option(help="Damping ratio below which the machine has no mode, %.")] = 2.0,
+    plot: Annotated[Path | None, typer.Option(help="Figure of the first axis (png, svg, pdf).", show_default=False)] = None,
+    json_: Json = False,
+) -> None:
+    """Take known tool-holders out of measured assemblies: what is left is the spindle's flange, rotations included."""
+    import numpy as np
+
+    from rcsa_ident.errors import positive
+    from rcsa_ident.io.flanges import write_flange_csv
+    from rcsa_ident.workflows.decouple import flange_from_taps
+
+    writable(out)
+    if plot is not None:
+        writable(plot, "--plot")
+    share = positive("--least-damping", least_damping, "%") / 100.0
+    machine: dict[Dof, MachineAxis] = {}
+    if beside is not None:
+        from rcsa_ident.cli.lobes import read_machine
+
+        machine = read_machine(beside)[0]
+    taps = _taps(tap, positive("--from", from_, "Hz"), math.inf if to is None else positive("--to", to, "Hz"))
+    stages = Stages(quiet=json_)
+    with stages.stage("decoupling"):
+        found = {axis: flange_from_taps(own, axis, machine[axis].joint if axis in machine else None, share) for axis, own in taps.items()}
+    omega = next(iter(found.values())).receptance.omega
+    if any(not np.array_equal(f.receptance.omega, omega) for f in found.values()):
+        raise InputError("frequencies", "other ones for X than for Y", "the same for both axes")
+    write_flange_csv(out, omega / (2.0 * np.pi), {a: f.receptance.values for a, f in found.items()}, {a: f.std for a, f in found.items()})
+    if plot is not None:
+        _draw(found, machine, plot)
+    if json_:
+        emit({"axes": {a.upper(): _summary(f) for a, f in found.items()}, "seconds": stages.seconds, "out": str(out)})
+    else:
+        for axis, each in found.items():
+            row = _summary(each)
+            known = ", ".join(f"{100 * share:.2g} %" for share in row["relative_std"])
+            conditions = (
+                f"condition number {row['condition_median']:.3g} in the median, {100 * row['regularised']:.0f} % lean on neighbours"
+            )
+            say(f"{axis.upper()}: {row['frequencies']} frequencies, {conditions}; tF, tM, rM known to {known}")
+            for note in each.notes:
+                warn(f"{axis.upper()}: {note}")
+        say(f"written: {out}" + (f", {plot}" if plot is not None else ""))
+    if any(max(f.ambiguous.mean(), (f.dissipation < -1e-3).mean()) > _MOST_DOUBTFUL for f in found.values()):
+        raise typer.Exit(NOT_CONVERGED)
+
+
+def _taps(texts: list[str], low: float, high: float) -> dict[Dof, list[FlangeTap]]:
+    """The tests of each axis; an axis that a file lacks is left out."""
+    import numpy as np
+
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.io.hammer import read_hammer
+    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.workflows.compare import Place
+    from rcsa_ident.workflows.decouple import FlangeTap
+
+    assemblies: dict[str, Any] = {}
+    found: dict[Dof, list[FlangeTap]] = {}
+    for text in texts:
+        left, sign, path = text.partition("=")
+        place, colon, tooling = left.partition(":")
+        if not colon or place not in list(Place):
+            place, tooling = Place.TIP, left
+        if not sign:
+            raise InputError("--tap", text, "TOOLING.toml=FRF or PLACE:TOOLING.toml=FRF")
+        if tooling not in assemblies:
+            assemblies[tooling] = read_tooling(tooling).assembly
+        for axis, (frequency, values) in read_hammer(path).values.items():
+            kept = (np.asarray(frequency) >= low) & (np.asarray(frequency) <= high)
+            own = FlangeTap(Path(path).name, assemblies[tooling], Place(place), 2.0 * np.pi * frequency[kept], values[kept])
+            found.setdefault(Dof(axis.lower()), []).append(own)
+    complete = {axis: own for axis, own in found.items() if len(own) == len(texts)}
+    if not complete:
+        raise InputError("--tap", "no axis that all files hold", "the same axis in every file")
+    return complete
+
+
+def _summary(found: DecoupledFlange) -> dict[str, Any]:
+    import numpy as np
+
+    values = np.abs(found.receptance.values)
+    relative = [float(np.median(found.std[:, i, j] / values[:, i, j])) for i, j in ((0, 0), (0, 1), (1, 1))]
+    return {
+        "frequencies": int(found.condition.size),
+        "condition_median": float(np.median(found.condition)),
+        "relative_std": relative,
+        "regularised": float(found.regularised.mean()),
+        "ambiguous": float(found.ambiguous.mean()),
+        "not_passive": float((found.dissipation < -1e-3).mean()),
+        "notes": list(found.notes),
+    }
+
+
+def _draw(found: dict[Dof, DecoupledFlange], machine: dict[Dof, MachineAxis], path: Path) -> None:
+    from rcsa_ident.report.comparison import FlangePair, flange_comparison, save
+
+    axis, first = next(iter(found.items()))
+    curves = {"decoupled from hammer tests": first.receptance.values}
+    if axis in machine:
+        curves["identified in process"] = machine[axis].spindle.receptance(first.receptance.omega).values
+    title = f"spindle flange, {axis.upper()}"
+    save(flange_comparison(FlangePair(title, first.receptance.omega / (2.0 * math.pi), curves)), path)

@@ -1,0 +1,74 @@
+"""FLANGE.csv: the receptance block of a spindle's flange over frequency, measured or decoupled, with what is known of its errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.coordinates import Dof, plane
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.delimited import read_table
+from rcsa_ident.io.files import write_text
+from rcsa_ident.machine.measured import MeasuredFlange
+
+#: Entries of [[tF, tM], [rF, rM]]; a flange is reciprocal, so rF is tM.
+_ENTRIES = {"tF": (0, 0), "tM": (0, 1), "rM": (1, 1)}
+
+
+def write_flange_csv(
+    path: str | Path, frequency_hz: FloatArray, values: Mapping[Dof, ComplexArray], std: Mapping[Dof, FloatArray] | None = None
+) -> None:
+    """Write flange receptances: ``frequency_hz, X_tF_re, X_tF_im, X_tM_re, ..., Y_rM_im`` in m/N, rad/N and rad/(N m).
+
+    Parameters
+    ----------
+    values : mapping of Dof to complex array, shape (n, 2, 2)
+    std : mapping of Dof to array, shape (n, 2, 2), optional
+        Columns ``X_tF_std`` and so on: of the real and of the imaginary part each.
+    """
+    columns: dict[str, FloatArray] = {"frequency_hz": np.asarray(frequency_hz, dtype=float)}
+    for axis, block in values.items():
+        for name, (i, j) in _ENTRIES.items():
+            head = f"{axis.upper()}_{name}"
+            columns |= {f"{head}_re": block[:, i, j].real, f"{head}_im": block[:, i, j].imag}
+            if std is not None:
+                columns[f"{head}_std"] = std[axis][:, i, j]
+    table = np.stack(list(columns.values()), axis=1)
+    if not np.all(np.isfinite(table)):
+        raise InputError("flange receptance", "not finite", "finite numbers", str(path))
+    write_text(path, "\n".join([",".join(columns), *(",".join(str(v) for v in row) for row in table.tolist())]) + "\n")
+
+
+def read_flange_csv(path: str | Path) -> dict[Dof, MeasuredFlange]:
+    """Return the flange of each axis in a file; further columns are left alone.
+
+    Raises
+    ------
+    InputError
+        A column is missing, or the frequencies do not rise.
+    """
+    table = read_table(path, "flange")
+    flanges = {}
+    for axis in (Dof.X, Dof.Y):
+        names = [f"{axis.upper()}_{name}_{part}" for name in _ENTRIES for part in ("re", "im")]
+        if not any(name in table.header for name in names):
+            continue
+        missing = [name for name in ("frequency_hz", *names) if name not in table.header]
+        if missing:
+            raise InputError(f"column {missing[0]}", "nothing", "real and imaginary parts of tF, tM and rM", str(path))
+        frequency, *parts = table.columns(["frequency_hz", *names])
+        block = np.zeros((frequency.size, 2, 2), dtype=complex)
+        for k, (i, j) in enumerate(_ENTRIES.values()):
+            block[:, i, j] = block[:, j, i] = parts[2 * k] + 1j * parts[2 * k + 1]
+        rows = plane("flange", axis)
+        try:
+            flanges[axis] = MeasuredFlange(Receptance(2.0 * np.pi * frequency, block, rows, rows))
+        except InputError as error:
+            raise error.at(str(path)) from None
+    if not flanges:
+        raise InputError("flange", "no columns X_tF_re or Y_tF_re", "a flange's receptances", str(path))
+    return flanges

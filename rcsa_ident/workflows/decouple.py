@@ -1,0 +1,84 @@
+"""A machine's flange from hammer tests with several known toolings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.coupling.flange_fit import LEAST_DAMPING, DecoupledFlange, Observation, least_squares_flange
+from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.errors import InputError
+from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.workflows.compare import Place
+from rcsa_ident.workflows.contact import neighbour_noise
+from rcsa_ident.workflows.tip import turned_plane
+
+#: Share of a measured receptance that its calibration and the tool-holder's model may be off.
+MODEL_SHARE = 0.01
+_ENDS = {Place.TIP: ("tip", "tip"), Place.CROSS: ("spindle", "tip"), Place.SPINDLE: ("spindle", "spindle")}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlangeTap:
+    """A hammer test of one tooling clamped in the machine.
+
+    Parameters
+    ----------
+    name : str
+    assembly : ToolAssembly
+    place : Place
+        All but the bare flange.
+    omega : array, shape (n,) [rad/s]
+    values : complex array, shape (n,) [m/N]
+    """
+
+    name: str
+    assembly: ToolAssembly
+    place: Place
+    omega: FloatArray
+    values: ComplexArray
+
+
+def flange_from_taps(
+    taps: Sequence[FlangeTap],
+    axis: Dof,
+    joint: LumpedJoint | None = None,
+    least_damping: float | None = LEAST_DAMPING,
+    model_share: float = MODEL_SHARE,
+) -> DecoupledFlange:
+    """Return the flange that explains all tests of one axis.
+
+    Parameters
+    ----------
+    taps : sequence of FlangeTap
+        At the same frequencies; those with one tooling may be of several places.
+    joint : LumpedJoint or None
+        Between holder and spindle; None leaves it in the flange.
+    least_damping : float or None
+        As in `coupling.flange_fit.least_squares_flange`.
+    model_share : float [-]
+        Standard deviation of what the noise between neighbouring frequencies does not show, as a share of each receptance.
+    """
+    if not taps:
+        raise InputError("taps", "none", "hammer tests with three toolings at least")
+    omega = np.asarray(taps[0].omega, dtype=float)
+    planes: dict[int, Receptance] = {}
+    observations = []
+    for tap in taps:
+        if tap.place is Place.FLANGE:
+            raise InputError("hammer test", "of the bare flange", "with a tooling clamped: nothing is left to decouple", tap.name)
+        if tap.omega.shape != omega.shape or not np.allclose(tap.omega, omega, rtol=1e-9):
+            raise InputError("frequencies", f"{tap.omega.size} of them", f"the {omega.size} frequencies of {taps[0].name}", tap.name)
+        key = id(tap.assembly)
+        if key not in planes:
+            planes[key] = tool_holder_receptance(tap.assembly, omega)
+        holder = planes[key] if axis is Dof.X else turned_plane(planes[key])
+        std = np.hypot(neighbour_noise(tap.values), model_share * np.abs(tap.values))
+        observations.append(Observation(holder, *_ENDS[tap.place], tap.values, std))
+    return least_squares_flange(observations, joint, least_damping)
