@@ -228,6 +228,7 @@ def _method(name: LobeMethod) -> Any:
     from rcsa_ident.stability.full_discretisation import FullDiscretisation
     from rcsa_ident.stability.multi_frequency import MultiFrequency
     from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
+    from rcsa_ident.stability.time_domain import TimeDomain
     from rcsa_ident.stability.zero_order import ZeroOrder
 
     methods = {
@@ -235,6 +236,7 @@ def _method(name: LobeMethod) -> Any:
         LobeMethod.multi_frequency: MultiFrequency,
         LobeMethod.semi_discretisation: SemiDiscretisation,
         LobeMethod.full_discretisation: FullDiscretisation,
+        LobeMethod.time_domain: TimeDomain,
     }
     return methods[name]()
 

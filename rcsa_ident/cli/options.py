@@ -27,6 +27,7 @@ class LobeMethod(StrEnum):
     multi_frequency = "multi-frequency"
     semi_discretisation = "semi-discretisation"
     full_discretisation = "full-discretisation"
+    time_domain = "time-domain"
 
 
 def takes_groups(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -6,7 +6,7 @@ Universal files are read by `rcsa_ident.io.uff`: a file of one's own needs no ex
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,10 +25,8 @@ from rcsa_ident.io.uff import (
     KINDS,
     REACTION_FORCE,
     VELOCITY,
-    UffAxis,
     UffFunction,
     read_uff,
-    write_uff,
 )
 
 _STANDARD_GRAVITY = 9.80665
@@ -301,27 +299,3 @@ def _unit_in(names: str) -> tuple[float, int]:
         except InputError:
             continue
     return 1.0, 0
-
-
-def write_frfs_uff(
-    path: str | Path, frequency_hz: FloatArray, values: Mapping[tuple[str, str], ComplexArray], title: str = "", binary: bool = False
-) -> None:
-    """Write receptances [m/N] as frequency response functions of a universal file.
-
-    Parameters
-    ----------
-    values : mapping of (response, force) to complex array, shape (n,)
-        Each named by axis, and by a node in front where there are several: ``("1X", "1X")``.
-    """
-    functions = [
-        UffFunction(
-            FRF, frequency_hz, array, _place(response), _place(force), ordinate=UffAxis(DISPLACEMENT, "m"),
-            denominator=UffAxis(EXCITATION_FORCE, "N"), title=f"{title} {response} / {force}".strip(),
-        )
-        for (response, force), array in values.items()
-    ]  # fmt: skip
-    write_uff(path, functions, binary)
-
-
-def _place(name: str) -> tuple[int, int]:
-    return int(name[:-1] or 1), "XYZ".index(name[-1]) + 1

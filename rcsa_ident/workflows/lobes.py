@@ -18,6 +18,7 @@ from rcsa_ident.stability.lobes import StabilityMethod, stability_lobes, uncoupl
 from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
+from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.tip import TooltipResponse
 from rcsa_ident.workflows.tip_fit import fitted_modes
@@ -25,7 +26,7 @@ from rcsa_ident.workflows.tip_fit import fitted_modes
 #: Two peaks are one pocket unless the limit between them falls below this share of the lower one.
 POCKET = 0.85
 #: Methods that march through time: they take modes.
-MARCHING = (SemiDiscretisation, FullDiscretisation)
+MARCHING = (SemiDiscretisation, FullDiscretisation, TimeDomain)
 
 
 @dataclass(frozen=True, slots=True)

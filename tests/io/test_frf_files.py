@@ -9,7 +9,7 @@ import pytest
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import write_frf_csv
-from rcsa_ident.io.frf_files import Source, parse_units, read_frfs, read_tap_tests, write_frfs_uff
+from rcsa_ident.io.frf_files import Source, parse_units, read_frfs, read_tap_tests
 from rcsa_ident.io.uff import ACCELERATION, DISPLACEMENT, EXCITATION_FORCE, FRF, VELOCITY, UffAxis, UffFunction, write_uff
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
@@ -28,17 +28,6 @@ X, Y, XY = mode(700.0), mode(900.0), 0.2 * mode(800.0)
 def tip(values, **more):
     given = {"ordinate": UffAxis(DISPLACEMENT, "m"), "denominator": UffAxis(EXCITATION_FORCE, "N"), **more}
     return UffFunction(FRF, FREQUENCY, values, **given)
-
-
-@pytest.mark.parametrize("binary", [False, True])
-def test_an_export_reads_back(tmp_path, binary):
-    path = tmp_path / "tip.uff"
-    write_frfs_uff(path, FREQUENCY, {("X", "X"): X, ("Y", "Y"): Y, ("X", "Y"): XY}, "S1", binary)
-    found = read_tap_tests([Source(path)])
-    assert set(found) == {("X", "X"), ("Y", "Y"), ("X", "Y")}
-    for pair, values in ((("X", "X"), X), (("Y", "Y"), Y), (("X", "Y"), XY)):
-        np.testing.assert_allclose(found[pair][0], FREQUENCY, rtol=1e-9)
-        np.testing.assert_allclose(found[pair][1], values, rtol=1e-10)
 
 
 @pytest.mark.parametrize(

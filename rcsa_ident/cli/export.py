@@ -1,0 +1,119 @@
+"""export: FRFs and modes of a result in the formats of other programs."""
+
+from __future__ import annotations
+
+import math
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rcsa_ident.cli.common import Json, answers, emit, inclusive, say, warn, writable
+from rcsa_ident.cli.lobes import ResultFile, read_machine_over_speed
+from rcsa_ident.errors import InputError
+
+if TYPE_CHECKING:
+    from rcsa_ident.dynamics.receptance import Receptance
+
+
+class Format(StrEnum):
+    """What is written."""
+
+    uff = "uff"
+    uff_binary = "uff-binary"
+    csv = "csv"
+    json = "json"
+    hdf5 = "hdf5"
+
+
+class Part(StrEnum):
+    """What it is about."""
+
+    tip = "tip"
+    flange = "flange"
+    modes = "modes"
+
+
+@answers
+def export(
+    result: ResultFile,
+    out: Annotated[Path, typer.Option(help="File to write.", show_default=False)],
+    to: Annotated[Format, typer.Option(help="Format: UFF 58 or 58b, FRF.csv, JSON, HDF5.")] = Format.uff,
+    what: Annotated[
+        Part | None,
+        typer.Option(
+            help="Tip FRFs of a tooling, FRFs of the machine's flange, or its modes; default: tip with --tooling, else flange.",
+            show_default=False,
+        ),
+    ] = None,
+    tooling: Annotated[Path | None, typer.Option(help="TOOLING.toml, for the tip.", show_default=False)] = None,
+    from_hz: Annotated[
+        float | None, typer.Option(help="Lowest frequency, Hz; default: beginning of the identified band.", show_default=False)
+    ] = None,
+    to_hz: Annotated[
+        float | None, typer.Option(help="Highest frequency, Hz; default: end of the identified band.", show_default=False)
+    ] = None,
+    step_hz: Annotated[float, typer.Option(help="Frequency step, Hz.")] = 1.0,
+    speed: Annotated[
+        float | None, typer.Option(help="Spindle speed, rev/min, for a machine that changes with it.", show_default=False)
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Write tip FRFs, flange FRFs or modes for other programs."""
+    import numpy as np
+
+    from rcsa_ident.errors import positive
+    from rcsa_ident.io import exports
+    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.workflows.tip import tooltip
+
+    writable(out)
+    what = (Part.flange if tooling is None else Part.tip) if what is None else what
+    if (what is Part.tip) != (tooling is not None):
+        raise InputError("--tooling", "nothing" if tooling is None else str(tooling), "a TOOLING.toml with --what tip, and only there")
+    if what is Part.modes and to not in (Format.csv, Format.json):
+        raise InputError("--to", str(to), "csv or json for modes")
+    omega = None if speed is None else positive("--speed", speed, "rev/min") * math.pi / 30.0
+    machine, data = read_machine_over_speed(result)
+    axes = machine.at(omega)
+    if what is Part.modes:
+        exports.write_modes(out, {axis.upper(): part.at(axis, omega)[0] for axis, part in axes.items()}, to is Format.json)
+        written = f"modes of {len(axes)} axes"
+    else:
+        band = data["band_hz"]
+        low, high = math.ceil(band[0]) if from_hz is None else from_hz, band[1] if to_hz is None else to_hz
+        frequency = inclusive(low, high, step_hz, ("--from-hz", "--to-hz", "--step-hz"), "Hz")
+        if frequency[-1] > 1.001 * band[1] or frequency[0] < 0.999 * band[0]:
+            warn(f"the machine was identified from {band[0]:.0f} to {band[1]:.0f} Hz; outside the FRF is extrapolated")
+        grid = 2.0 * np.pi * frequency
+        if tooling is not None:
+            setup = read_tooling(tooling)
+            title = f"{data['campaign']['name']}, {setup.name}"
+            response = tooltip(axes, setup.assembly, grid, bands=False, speed=omega)
+            found = {axis.upper(): _tip(whole) for axis, whole in response.coupled.items()}
+        else:
+            title = f"{data['campaign']['name']}, flange"
+            found = {axis.upper(): part.at(axis, omega)[0].receptance(grid) for axis, part in axes.items()}
+        if to is Format.csv:
+            exports.write_receptances_csv(out, found)
+        elif to is Format.json:
+            exports.write_receptances_json(out, found, title)
+        elif to is Format.hdf5:
+            exports.write_receptances_hdf5(out, found, title)
+        else:
+            exports.write_receptances_uff(out, found, title, to is Format.uff_binary)
+        written = f"{what} FRFs at {frequency.size} frequencies"
+    if json_:
+        emit({"what": str(what), "format": str(to), "out": str(out)})
+        return
+    say(f"written: {out} ({written})")
+
+
+def _tip(whole: Receptance) -> Receptance:
+    """The tip's own motion under its own force."""
+    from rcsa_ident.dynamics.receptance import Receptance
+
+    rows = tuple(c for c in whole.rows if c.point == "tip" and not c.dof.is_slope)
+    places = [whole.rows.index(c) for c in rows]
+    return Receptance(whole.omega, whole.values[:, places][:, :, places], rows, rows)

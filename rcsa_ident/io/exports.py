@@ -1,0 +1,133 @@
+"""Curves and modes for other programs: universal files, CSV, JSON, HDF5."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.curves import write_frf_csv
+from rcsa_ident.io.files import replacing, write_text
+from rcsa_ident.io.uff import DISPLACEMENT, EXCITATION_FORCE, FRF, UffAxis, UffFunction, write_uff
+
+#: Directions as universal files number them; a slope dy/dz is a rotation about -X.
+_DIRECTIONS = {Dof.X: 1, Dof.Y: 2, Dof.Z: 3, Dof.SLOPE_X: 5, Dof.SLOPE_Y: -4}
+#: Points as universal files number them.
+_NODES = {"tip": 1, "spindle": 2, "flange": 2, "fixture": 3}
+_KIND = {False: "t", True: "r"}
+_LOAD = {False: "F", True: "M"}
+
+
+def write_receptances_uff(path: str | Path, receptances: Mapping[str, Receptance], title: str, binary: bool = False) -> None:
+    """Write every entry of receptances as a frequency response function; node 1 is the tip, node 2 the flange.
+
+    Parameters
+    ----------
+    receptances : mapping of axis (X or Y) to Receptance
+    binary : bool
+        Dataset 58b.
+    """
+    functions = [
+        UffFunction(
+            FRF,
+            receptance.omega / (2.0 * np.pi),
+            receptance.values[:, i, j],
+            _place(row),
+            _place(col),
+            ordinate=UffAxis(DISPLACEMENT, "rad" if row.dof.is_slope else "m"),
+            denominator=UffAxis(EXCITATION_FORCE, "N m" if col.dof.is_slope else "N"),
+            title=f"{title}: {row} / {col}",
+        )
+        for receptance in receptances.values()
+        for i, row in enumerate(receptance.rows)
+        for j, col in enumerate(receptance.cols)
+    ]
+    write_uff(path, functions, binary)
+
+
+def _place(coordinate: Coordinate) -> tuple[int, int]:
+    return _NODES.get(coordinate.point, 9), _DIRECTIONS[coordinate.dof]
+
+
+def named_entries(receptances: Mapping[str, Receptance]) -> dict[str, ComplexArray]:
+    """Return every entry by its name: ``X`` for motion per force, ``X_tM``, ``X_rF``, ``X_rM`` for those with a slope or a moment."""
+    found: dict[str, ComplexArray] = {}
+    for axis, receptance in receptances.items():
+        for i, row in enumerate(receptance.rows):
+            for j, col in enumerate(receptance.cols):
+                kind = _KIND[row.dof.is_slope] + _LOAD[col.dof.is_slope]
+                found[axis if kind == "tF" else f"{axis}_{kind}"] = receptance.values[:, i, j]
+    return found
+
+
+def write_receptances_csv(path: str | Path, receptances: Mapping[str, Receptance], further: Mapping[str, FloatArray] | None = None) -> None:
+    """Write FRF.csv with all entries: motion per force first, as every reader of FRF.csv wants it."""
+    entries = named_entries(receptances)
+    frequency = next(iter(receptances.values())).omega / (2.0 * np.pi)
+    rest = {name: values for name, values in entries.items() if name not in receptances}
+    columns = {
+        f"{name}_{part}": getattr(values, which) for name, values in rest.items() for part, which in (("re", "real"), ("im", "imag"))
+    }
+    write_frf_csv(path, frequency, {axis: entries[axis] for axis in receptances}, {**columns, **(further or {})})
+
+
+def write_receptances_json(path: str | Path, receptances: Mapping[str, Receptance], title: str) -> None:
+    """Write every entry as lists of real and imaginary parts."""
+    frequency = next(iter(receptances.values())).omega / (2.0 * np.pi)
+    entries = {name: {"re": v.real.tolist(), "im": v.imag.tolist()} for name, v in named_entries(receptances).items()}
+    data = {"title": title, "units": _UNITS, "frequency_hz": frequency.tolist(), "receptances": entries}
+    write_text(path, json.dumps(data, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+_UNITS = {"X, Y": "m/N", "tM": "m/(N m)", "rF": "rad/N", "rM": "rad/(N m)"}
+
+
+def write_receptances_hdf5(path: str | Path, receptances: Mapping[str, Receptance], title: str) -> None:
+    """Write every entry as a complex dataset beside ``frequency_hz``."""
+    import h5py
+
+    with replacing(path) as part, h5py.File(part, "w") as file:
+        file.attrs["title"] = title
+        file.attrs["units"] = json.dumps(_UNITS)
+        file["frequency_hz"] = next(iter(receptances.values())).omega / (2.0 * np.pi)
+        for name, values in named_entries(receptances).items():
+            file[name] = values
+
+
+def mode_records(axes: Mapping[str, ModalModel]) -> list[dict[str, Any]]:
+    """Return the modes of each axis with their shapes at all coordinates."""
+    return [
+        {
+            "axis": axis,
+            "natural_frequency_hz": float(omega) / (2.0 * np.pi),
+            "damping_ratio": float(zeta),
+            **{
+                f"phi_{_KIND[c.dof.is_slope]}_{part}": float(getattr(value, which))
+                for c, value in zip(model.coordinates, shape, strict=True)
+                for part, which in (("re", "real"), ("im", "imag"))
+            },
+        }
+        for axis, model in axes.items()
+        for omega, zeta, shape in zip(model.omega_n, model.zeta, model.phi, strict=True)
+    ]
+
+
+def write_modes(path: str | Path, axes: Mapping[str, ModalModel], as_json: bool) -> None:
+    """Write modes as CSV or JSON: h_pq = sum phi_p phi_q / (i omega - lambda) + its mirror."""
+    records: Sequence[dict[str, Any]] = mode_records(axes)
+    if not records:
+        raise InputError("modes", "none", "at least one mode", str(path))
+    if as_json:
+        residual = {axis: model.residual.tolist() for axis, model in axes.items()}
+        write_text(path, json.dumps({"modes": records, "residual_compliance": residual}, indent=1, allow_nan=False) + "\n")
+        return
+    rows = [",".join(records[0]), *(",".join(str(v) for v in record.values()) for record in records)]
+    write_text(path, "\n".join(rows) + "\n")

@@ -1,0 +1,299 @@
+"""lobes, advise and export as a user meets them."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from rcsa_ident.cli import advice, export, lobes
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.io.curves import read_lobes_csv, write_frf_csv
+from rcsa_ident.io.frf_files import Source, read_tap_tests
+from tests.cli import by_hand
+
+SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
+APP = typer.Typer(pretty_exceptions_enable=False)
+APP.command("lobes")(lobes.lobes)
+APP.command("advise")(advice.advise)
+APP.command("export")(export.export)
+KNOWN = ("--ktc-mpa", 900, "--krc", 0.3)
+FEED = ("--feed-per-tooth-mm", 0.1)
+
+
+def run(*arguments, code=0):
+    result = CliRunner().invoke(APP, [str(a) for a in arguments])
+    assert result.exit_code == code, result.output + repr(result.exception)
+    return result
+
+
+def answer_of(*arguments):
+    return json.loads(run(*arguments, "--json").stdout.splitlines()[-1])
+
+
+@pytest.fixture
+def shop(tmp_path):
+    """MODES.toml of a symmetric two-tooth mill, its tooling, and the same dynamics as tap tests."""
+    mode = "natural_frequency_hz = {}\ndamping_ratio = {}\nstiffness_n_per_m = {}\n"
+    (tmp_path / "M.toml").write_text(f"[[x]]\n{mode.format(700, 0.03, 8e6)}[[y]]\n{mode.format(800, 0.035, 6e6)}", encoding="utf-8")
+    (tmp_path / "T.toml").write_text(by_hand.TOOLING.replace("teeth = 4", "teeth = 2"), encoding="utf-8")
+    frequency = np.arange(0.0, 4000.0, 1.0)
+    for axis, f, z, k in (("x", 700.0, 0.03, 8e6), ("y", 800.0, 0.035, 6e6)):
+        r = frequency / f
+        h = 1.0 / k / (1.0 - r**2 + 2j * z * r)
+        rows = "".join(f"{a:.3f}\t{1e6 * v.real:.12e}\t{1e6 * v.imag:.12e}\n" for a, v in zip(frequency, h, strict=True))
+        (tmp_path / f"{axis}.frf").write_text("Freq [Hz]\tReal [um/N]\tImag\n" + rows, encoding="utf-8")
+    return tmp_path
+
+
+SPEEDS = ("--speed-from", 6000, "--speed-to", 16000, "--speed-step", 1000)
+
+
+@pytest.mark.parametrize("method", ["zero-order", "multi-frequency", "semi-discretisation", "full-discretisation", "time-domain"])
+def test_every_method_from_modes_and_from_tap_tests(shop, method):
+    """Modes that a method fits to the receptance give the lobes of the modes that were given."""
+    common = (shop / "T.toml", *KNOWN, "--speed-from", 9000, "--speed-to", 13000, "--speed-step", 2000, "--method", method)
+    one = answer_of("lobes", "--modes", shop / "M.toml", *common, "--out", shop / "a.csv")
+    two = answer_of("lobes", "--frf", f"X={shop}/x.frf", "--frf", f"Y={shop}/y.frf", *common, "--out", shop / "b.csv")
+    assert one["method"] == two["method"] == method
+    a, b = read_lobes_csv(shop / "a.csv"), read_lobes_csv(shop / "b.csv")
+    np.testing.assert_allclose(a.limit, b.limit, rtol=1e-3 if method == "zero-order" else 1e-2)
+    assert any("fitted with" in w for w in two["warnings"]) == (method not in ("zero-order", "multi-frequency"))
+    assert (shop / "a.csv").read_text(encoding="utf-8").splitlines()[0].endswith(",lobe,flip")
+
+
+def test_tested_cuts_are_counted_at_their_own_speeds(shop):
+    speed = 10013.0
+    run("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, "--speed-from", speed, "--speed-to", speed, "--out", shop / "one.csv")
+    limit = read_lobes_csv(shop / "one.csv").limit[0]
+    rows = [(0.9, "stable"), (0.99, "chatter"), (1.01, "chatter"), (1.2, "stable"), (1.3, "marginal"), (20.0 / limit, "chatter")]
+    text = "spindle_speed_rpm,axial_depth_mm,verdict\n" + "".join(f"{speed},{share * limit},{verdict}\n" for share, verdict in rows)
+    (shop / "CUTS.csv").write_text(text, encoding="utf-8")
+    out = ("--out", shop / "L.csv", "--tests", shop / "CUTS.csv", "--plot", shop / "L.svg")
+    answer = answer_of("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, *SPEEDS, *out)
+    assert answer["tested"] == {
+        "stable_stable": 1, "stable_chatter": 1, "chatter_stable": 1, "chatter_chatter": 2, "stable_marginal": 0, "chatter_marginal": 1,
+        "share_right": 0.6,
+    }  # fmt: skip
+    drawing = (shop / "L.svg").read_text(encoding="utf-8")
+    for words in ("tested: chatter", "tested: marginal", "3 of 5 tested cuts told right (1 unexpected chatter, 1 stable above the limit)"):
+        assert words in drawing
+    table = run("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, *SPEEDS, *out).stdout
+    assert "told right: 3 of 5, 60.0 %" in table
+
+
+def test_surface_error_stands_beside_the_lobes(shop):
+    common = ("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, *SPEEDS, "--out", shop / "L.csv", "--surface-depth-mm", 0.5)
+    assert "--feed-per-tooth-mm" in run(*common, code=2).stderr
+    run(*common, *FEED)
+    once = read_lobes_csv(shop / "L.csv").extra
+    run(*common, "--feed-per-tooth-mm", 0.2)
+    twice = read_lobes_csv(shop / "L.csv").extra
+    assert np.all(np.abs(once["surface_error_um"]) > 0.0)
+    np.testing.assert_allclose(twice["surface_error_mean_um"], 2.0 * once["surface_error_mean_um"], rtol=1e-9)
+
+
+def test_process_options_reach_the_method(shop):
+    """A worn flank raises limits at low speed, run-out and a swinging speed change them."""
+    common = ("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, "--method", "full-discretisation", "--max-depth-mm", 50)
+    slow = ("--speed-from", 1500, "--speed-to", 2100, "--speed-step", 300)
+    limits = {}
+    for name, more in {
+        "plain": (),
+        "worn": ("--wear-land-um", 80, "--indentation", 1e14),
+        "swing": ("--speed-variation", "0.1:0.2"),
+        "runout": ("--runout-um", "40,-40", "--feed-per-tooth-mm", 0.02),
+    }.items():
+        run(*common, *slow, "--out", shop / "L.csv", *more)
+        limits[name] = np.nan_to_num(read_lobes_csv(shop / "L.csv").limit, nan=50.0)
+    assert np.all(limits["worn"] > 1.2 * limits["plain"])
+    assert np.max(np.abs(limits["swing"] / limits["plain"] - 1.0)) > 0.05
+    assert np.max(np.abs(limits["runout"] / limits["plain"] - 1.0)) > 0.05
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--wear-land-um", 80), "--indentation: found nothing"),
+        (("--indentation", 1e14), "--wear-land-um: found nothing"),
+        (("--speed-variation", "0.1"), "AMPLITUDE:RATIO"),
+        (("--speed-variation", "a:b"), "--speed-variation"),
+        (("--speed-variation", "2:1"), "amplitude"),
+        (("--runout-um", "1,2,3"), "found 3 numbers, allowed is 2"),
+        (("--plot", "{}/a.pdf"), "found suffix '.pdf'"),
+        (("--plot", "{}/none/a.png"), "existing folder"),
+        (("--tests", "{}/none.csv"), "found no such file"),
+        (("--method", "full-discretisation", "--material", "butter"), "material: found butter"),
+        (("--frf", "x.frf"), "--modes and --frf"),
+        (("--frf-units", "um/N"), "given together with --frf"),
+        (("--feed-per-tooth-mm", 0), "--feed-per-tooth-mm"),
+    ],
+)
+def test_bad_options_are_one_sentence(shop, more, words):
+    base = ("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, *SPEEDS, "--out", shop / "L.csv")
+    result = run(*base, *(str(m).format(shop) for m in more), code=2)
+    assert words in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert not (shop / "L.csv").exists()
+
+
+def test_without_coefficients_nothing_is_known(shop):
+    base = ("lobes", "--modes", shop / "M.toml", shop / "T.toml", *SPEEDS, "--out", shop / "L.csv")
+    assert "--ktc-mpa" in run(*base, code=2).stderr
+    assert "--krc" in run(*base, "--ktc-mpa", 900, code=2).stderr
+    run(*base, "--material", "EN AW-6082", "--krc", 0.3)
+    named = read_lobes_csv(shop / "L.csv").limit
+    run(*base, "--ktc-mpa", 902, "--krc", 0.3)
+    np.testing.assert_allclose(named, read_lobes_csv(shop / "L.csv").limit)
+
+
+def test_units_and_records_of_tap_tests(shop):
+    base = ("lobes", shop / "T.toml", *KNOWN, *SPEEDS, "--out", shop / "L.csv")
+    run(*base, "--frf", f"X={shop}/x.frf", "--frf", f"Y={shop}/y.frf")
+    named = read_lobes_csv(shop / "L.csv").limit
+    run(*base, "--frf", f"X={shop}/x.frf", "--frf", f"Y={shop}/y.frf", "--frf-units", "nm/N")
+    softer = read_lobes_csv(shop / "L.csv").limit
+    assert np.all(np.isnan(softer))
+    assert "names no axis" in run(*base, "--frf", shop / "x.frf", code=2).stderr
+    tests = read_tap_tests([Source(shop / f"{a}.frf", (a.upper(), a.upper())) for a in "xy"])
+    curves = {axis: values for (axis, _), (_, values) in tests.items()}
+    write_frf_csv(shop / "F.csv", tests["X", "X"][0], curves)
+    run(*base, "--frf", shop / "F.csv")
+    np.testing.assert_allclose(read_lobes_csv(shop / "L.csv").limit, named)
+    assert "record 4" in run(*base, "--frf", f"X={shop}/F.csv#4", code=2).stderr
+
+
+def test_advice_from_modes(shop):
+    tip = ("--modes", shop / "M.toml", shop / "T.toml")
+    common = ("advise", *tip, *KNOWN, *FEED, "--speed-from", 6000, "--speed-to", 24000, "--max-depth-mm", 15)
+    more = ("--depth-mm", 2, "--cut", "20000:2", "--cut", "9000:4", "--out", shop / "A.csv", "--plot", shop / "A.png")
+    (tooling,) = answer_of(*common, *more)["toolings"]
+    with (shop / "A.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    speed, usable, rate = (
+        np.array([float(r[n]) for r in rows]) for n in ("spindle_speed_rpm", "usable_depth_mm", "removal_rate_cm3_per_min")
+    )
+    best = tooling["highest_removal"][0]
+    assert best["removal_rate_cm3_per_min"] == pytest.approx(rate.max())
+    # half immersion: a_e 6 mm, two teeth, 0.1 mm
+    np.testing.assert_allclose(rate, usable * 6.0 * 0.2 * speed / 1000.0, rtol=1e-9)
+    assert best["power_kw"] == pytest.approx(900e6 * best["removal_rate_cm3_per_min"] / 6e7 / 1e3)
+    for window in tooling["windows"]:
+        inside = (speed > window["from_rpm"]) & (speed < window["to_rpm"])
+        assert np.all(usable[inside] >= 2.0)
+    fast, slow = tooling["planned"]
+    assert slow["stable"] == (slow["limit_depth_mm"] >= 4.0)
+    assert fast["probability"] is None
+    assert (shop / "A.png").stat().st_size > 10_000
+    # what the spindle lacks, and a reserve, only ever take away
+    (weak,) = answer_of(*common, "--max-power-kw", 0.5, "--max-speed-rpm", 20000, "--out", shop / "B.csv")["toolings"]
+    assert weak["highest_removal"][0]["power_kw"] <= 0.5 * (1.0 + 1e-9)
+    assert weak["highest_removal"][0]["spindle_speed_rpm"] <= 20000.0
+    assert weak["highest_removal"][0]["bound"] == "power"
+    assert "highest removal rate" in run(*common, "--depth-mm", 40, "--max-depth-mm", 50).stdout
+
+
+def test_advice_compares_stickouts_and_toolings(result_file, tmp_path):
+    tool = result_file.parent / "T1.toml"
+    base = (*FEED, "--speed-from", 8000, "--speed-to", 16000, "--speed-step", 100)
+    answer = answer_of(
+        "advise", result_file, tool, *base, "--stickout-mm", "50,60,75", "--plot", tmp_path / "S.png", "--out", tmp_path / "S.csv"
+    )
+    assert [t["stickout_mm"] for t in answer["toolings"]] == pytest.approx([50.0, 60.0, 75.0])
+    same = answer_of("advise", result_file, tool, *base)["toolings"][0]
+    assert same["lowest_limit_mm"] == pytest.approx(answer["toolings"][1]["lowest_limit_mm"])
+    assert same["common_stable_depth_mm"] <= same["lowest_limit_mm"]
+    header = (tmp_path / "S.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert "usable_depth_mm_3" in header
+    assert "common_depth_mm_1" in header
+    other = tmp_path / "T2.toml"
+    other.write_text(tool.read_text(encoding="utf-8").replace('name = "T1"', 'name = "T2"'), encoding="utf-8")
+    two = answer_of("advise", result_file, tool, other, *base)
+    assert [t["tooling"] for t in two["toolings"]] == ["T1", "T2"]
+    assert "comparison" in run("advise", result_file, tool, other, *base).stdout
+
+
+def test_probability_counts_the_machines_of_the_posterior(result_file):
+    tool = result_file.parent / "T1.toml"
+    base = (*FEED, "--speed-from", 11000, "--speed-to", 12000, "--speed-step", 100, "--tolerance", 0, "--reserve", 0)
+    (likely,) = answer_of("advise", result_file, tool, *base, "--probability", 50)["toolings"]
+    (sure,) = answer_of("advise", result_file, tool, *base, "--probability", 100)["toolings"]
+    assert sure["highest_removal"][0]["axial_depth_mm"] < likely["highest_removal"][0]["axial_depth_mm"]
+    depth = likely["lowest_limit_mm"]
+    cuts = [
+        answer_of("advise", result_file, tool, *base, "--cut", f"11500:{share * depth}")["toolings"][0]["planned"][0]
+        for share in (0.05, 6.0)
+    ]
+    assert cuts[0]["probability"] == 1.0
+    assert cuts[1]["probability"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ((), "--feed-per-tooth-mm: found nothing"),
+        ((*FEED, "--cut", "12000"), "RPM:MM"),
+        ((*FEED, "--cut", "12000:-1"), "RPM:MM"),
+        ((*FEED, "--cut", "12000:99"), "--max-depth-mm"),
+        ((*FEED, "--tolerance", 30), "--tolerance"),
+        ((*FEED, "--probability", 0), "--probability"),
+        ((*FEED, "--reserve", 95), "--reserve"),
+        ((*FEED, "--max-power-kw", 0), "--max-power-kw"),
+        ((*FEED, "--spindle", "{}/none.csv"), "none.csv: spindle: found no such file"),
+        ((*FEED, "--stickout-mm", "50,60"), "--stickout-mm"),
+    ],
+)
+def test_bad_questions_are_one_sentence(shop, more, words):
+    result = run("advise", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, *SPEEDS, *(str(m).format(shop) for m in more), code=2)
+    assert words in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+
+
+def test_a_stickout_that_nothing_holds(result_file):
+    assert "at most 88 mm" in run("advise", result_file, result_file.parent / "T1.toml", *FEED, "--stickout-mm", "95", code=2).stderr
+
+
+@pytest.mark.parametrize("form", ["uff", "uff-binary", "csv"])
+def test_an_exported_tip_gives_the_lobes_of_the_result(result_file, tmp_path, form):
+    tool, file = result_file.parent / "T1.toml", tmp_path / f"tip.{'csv' if form == 'csv' else 'uff'}"
+    run("export", result_file, "--to", form, "--tooling", tool, "--out", file, "--from-hz", 100)
+    speeds = ("--speed-from", 6000, "--speed-to", 12000, "--speed-step", 500)
+    run("lobes", result_file, tool, "--out", tmp_path / "a.csv", *speeds, "--no-bands")
+    run("lobes", "--frf", file, tool, "--out", tmp_path / "b.csv", *speeds, "--ktc-mpa", 902, "--krc", 0.26)
+    a, b = (read_lobes_csv(tmp_path / f"{n}.csv") for n in "ab")
+    np.testing.assert_allclose(a.limit, b.limit, rtol=1e-6)
+
+
+def test_export_of_flange_and_modes(result_file, tmp_path):
+    for form, name in (("json", "f.json"), ("hdf5", "f.h5"), ("uff", "f.uff")):
+        run("export", result_file, "--to", form, "--out", tmp_path / name)
+    data = json.loads((tmp_path / "f.json").read_text(encoding="utf-8"))
+    assert {"X", "X_tM", "X_rF", "X_rM", "Y"} <= set(data["receptances"])
+    run("export", result_file, "--to", "csv", "--what", "modes", "--out", tmp_path / "m.csv")
+    rows = list(csv.DictReader((tmp_path / "m.csv").read_text(encoding="utf-8").splitlines()))
+    machine, _ = lobes.read_machine(result_file)
+    assert float(rows[0]["natural_frequency_hz"]) == pytest.approx(machine[Dof.X].spindle.modes.omega_n[0] / (2.0 * np.pi))
+    for more, words in (
+        (("--to", "uff", "--what", "modes"), "csv or json for modes"),
+        (("--what", "tip"), "--tooling: found nothing"),
+        (("--what", "flange", "--tooling", result_file.parent / "T1.toml"), "--tooling"),
+        (("--to-hz", 100), "--to-hz"),
+    ):
+        assert words in run("export", result_file, "--out", tmp_path / "n.uff", *more, code=2).stderr
+        assert not (tmp_path / "n.uff").exists()
+
+
+def test_the_face_mill_of_the_shared_files(tmp_path):
+    if not (SHARED / "facemill_x.frf").exists():
+        pytest.skip("the face mill's FRFs are not beside the project")
+    tooling = tmp_path / "T.toml"
+    tooling.write_text(by_hand.TOOLING.replace("teeth = 4", "teeth = 2").replace("12.0", "31.75"), encoding="utf-8")
+    frf = ("--frf", f"X={SHARED}/facemill_x.frf", "--frf", f"Y={SHARED}/facemill_y.frf")
+    answer = answer_of("lobes", *frf, tooling, "--out", tmp_path / "L.csv", "--ktc-mpa", 1319.4, "--krc", 788.8 / 1319.4)
+    assert answer["absolute_limit_mm"] == pytest.approx(1.015, abs=1e-3)
+    assert answer["absolute_frequency_hz"] == pytest.approx(1441.0, abs=1.0)
