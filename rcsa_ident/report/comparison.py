@@ -221,7 +221,7 @@ def flange_comparison(pair: FlangePair) -> Figure:
         for column, ((i, j), label) in zip(grid.T, entries, strict=True):
             for k, (name, values) in enumerate(pair.values.items()):
                 colour = pair.colours.get(name, usual[k % 3])
-                style = {"ls": (0, (4, 1.5))} if k == 0 else {}
+                style = {"ls": (0, (4, 1.5))} if k == 0 and len(pair.values) > 1 else {}
                 column[0].semilogy(pair.frequency, np.abs(values[:, i, j]), color=colour, label=name, **style)
                 phase = np.degrees(np.angle(values[:, i, j]))
                 phase[1:][np.abs(np.diff(phase)) > 180.0] = np.nan
