@@ -231,9 +231,9 @@ def lookups(plan, places, points, angle, time, table):
                         value *= (x - table[0, i]) / (table[0, j] - table[0, i])
                 weight[p, d, j] = value
             # mostly a point stands there already: it alone counts
-            best = np.argmax(weight[p, d])
-            if abs(weight[p, d, best] - 1.0) < 1e-9:
-                where[p, d] += best
+            there = np.argmax(weight[p, d])
+            if abs(weight[p, d, there] - 1.0) < 1e-9:
+                where[p, d] += there
                 weight[p, d] = 0.0
                 weight[p, d, 0] = 1.0
     return where, weight

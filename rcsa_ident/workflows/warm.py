@@ -21,6 +21,9 @@ from rcsa_ident.identification.paper import PaperGeneticAlgorithm
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.signals.measurement import AxisLines, CutMeasurement, measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.modes import TipModes
+from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.virtual.milling import mill_cut
@@ -93,6 +96,13 @@ def _lobes() -> None:
         LobeConditions(MillingProcess(cutter, _COEFFICIENTS, _CONDITIONS.engagement), speeds, 0.01).lobes(tip)
 
 
+def _lobes_in_time() -> None:
+    model = normal_modes(np.array([5000.0]), np.array([0.05]), np.ones((1, 1)), (Coordinate("tip", Dof.X),))
+    process, speeds = MillingProcess(_CUTTER, _COEFFICIENTS, _CONDITIONS.engagement), np.array([900.0])
+    for method in (FullDiscretisation(), TimeDomain(periods=20)):
+        LobeConditions(process, speeds, 1e-3, method).lobes(TipModes.of({Dof.X: model}))
+
+
 def _virtual_machine() -> None:
     places = [f"{place}.{axis}" for place in ("tip", "flange", "fixture") for axis in "xy"]
     pole = np.array([-100.0 + 5000.0j, -100.0 + 6000.0j])
@@ -109,5 +119,6 @@ STEPS: dict[str, Callable[[], None]] = {
     "default method": _default_method,
     "paper's method": _paper_method,
     "lobes": _lobes,
+    "lobes in time": _lobes_in_time,
     "virtual machine": _virtual_machine,
 }
