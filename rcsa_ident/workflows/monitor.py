@@ -40,6 +40,8 @@ STEP_HZ = 5.0
 VISIBLE = 9.0
 #: A standard deviation of the angle between cut and air cut above which taking out run-out does more harm than good [rad].
 LOOSE_ANGLE = 0.1
+#: Share of the vibration's power at the spindle's orders below which the speed is wrong, and below which that is worth a word.
+UNRELATED, PERIODIC = 0.5, 0.9
 METHOD = Resonators()
 
 
@@ -128,6 +130,7 @@ def observe(
     steady = _steady(cut, axes, programmed, top, teeth)
     speed = steady.spindle_speed
     notes = list(speed_faults(steady.displacement, steady.lines, programmed))
+    _periodic(steady, programmed, notes)
     band = _band(identified, top, speed, teeth, notes)
     run_out = _run_out(steady, air, axes, programmed, top, teeth, notes)
     known = machine.speed_range
@@ -185,6 +188,17 @@ def _steady(recording: Recording, axes: tuple[Dof, ...], programmed: float, top:
     if isinstance(steady, str):
         raise InputError("recording", steady, "a steady record of the programmed speed")
     return steady
+
+
+def _periodic(steady: SteadyRecord, programmed: float, notes: list[str]) -> None:
+    """Refuse a speed whose orders the vibration does not follow; say where a good part of it does not."""
+    signals = steady.displacement - steady.displacement.mean(axis=0)
+    share = 1.0 - float(np.sum(steady.lines.rest[:, : signals.shape[1]] ** 2) / max(np.sum(signals**2), 1e-300))
+    if share < UNRELATED:
+        found = f"{programmed * 30.0 / np.pi:.0f} rev/min, whose orders make {100.0 * share:.0f} % of the vibration"
+        raise InputError("--speed-rpm", found, "the speed of the spindle to 1 % [rev/min], in a cut without chatter")
+    if share < PERIODIC:
+        notes.append(f"{100.0 * (1.0 - share):.0f} % of the vibration does not follow the spindle: chatter, or not a steady cut")
 
 
 def _band(identified: tuple[float, float], top: float, speed: float, teeth: int, notes: list[str]) -> tuple[float, float]:
