@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rcsa_ident.cli.conditions import Subject
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.posterior import MachineAxis
-    from rcsa_ident.report.lobes import Tested
+    from rcsa_ident.report.lobes import Judged
     from rcsa_ident.stability.result import StabilityLobes
     from rcsa_ident.stability.surface import SurfaceError
     from rcsa_ident.workflows.lobes import LobeConditions
@@ -172,12 +172,12 @@ def check_plot(path: Path | None) -> None:
     writable(path, "--plot")
 
 
-def tested_cuts(path: Path, subject: Subject, conditions: LobeConditions) -> Tested:
+def tested_cuts(path: Path, subject: Subject, conditions: LobeConditions) -> Judged:
     """Return tested cuts with what the lobes say of them, each at its own speed."""
     import numpy as np
 
     from rcsa_ident.io.tested_cuts import read_tested_cuts
-    from rcsa_ident.report.lobes import Tested
+    from rcsa_ident.report.lobes import Judged
     from rcsa_ident.stability.tested import tally
 
     cuts = read_tested_cuts(path)
@@ -186,7 +186,7 @@ def tested_cuts(path: Path, subject: Subject, conditions: LobeConditions) -> Tes
     )
     limits = subject.limits(own, False)
     places = np.searchsorted(limits.lobes.spindle_speed, cuts.spindle_speed)
-    return Tested(cuts, tally(cuts, limits.lobes.limit_depth[places]))
+    return Judged(cuts, tally(cuts, limits.lobes.limit_depth[places]))
 
 
 def _share(percent: float) -> float:

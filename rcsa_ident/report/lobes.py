@@ -25,7 +25,7 @@ _VERDICTS = {Verdict.STABLE: ("o", _GREEN, "none"), Verdict.CHATTER: ("X", _RED,
 _CURVES = ("#0072B2", "#C8501A", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#1f2933")
 
 
-class Tested(NamedTuple):
+class Judged(NamedTuple):
     """Tested cuts with what the lobes said of them."""
 
     cuts: TestedCuts
@@ -42,14 +42,14 @@ class Panel(NamedTuple):
     max_depth : float [m]
     others : mapping of name to array, shape (n,) [m]
         Limits at the same speeds, as of idle FRFs.
-    tested : Tested or None
+    tested : Judged or None
     """
 
     title: str
     lobes: StabilityLobes
     max_depth: float
     others: Mapping[str, FloatArray] = {}
-    tested: Tested | None = None
+    tested: Judged | None = None
 
 
 def stability_figure(
@@ -58,7 +58,7 @@ def stability_figure(
     band: tuple[FloatArray, FloatArray] | None = None,
     best: Sequence[tuple[float, float]] = (),
     true_limit: FloatArray | None = None,
-    tested: Tested | None = None,
+    tested: Judged | None = None,
     surface: SurfaceError | None = None,
 ) -> Figure:
     """Limit depth over spindle speed, the chatter frequency below, the best speeds marked.
@@ -72,7 +72,7 @@ def stability_figure(
     best : sequence of (speed [rad/s], depth [m])
     true_limit : array, shape (n,) [m]
         Where it is known.
-    tested : Tested, optional
+    tested : Judged, optional
         Drawn over the lobes.
     surface : SurfaceError, optional
         Drawn below them.
@@ -110,7 +110,7 @@ def stability_figure(
     return figure
 
 
-def _ceiling(lobes: StabilityLobes, max_depth: float, tested: Tested | None) -> float:
+def _ceiling(lobes: StabilityLobes, max_depth: float, tested: Judged | None) -> float:
     limit = 1e3 * np.minimum(lobes.limit_depth, max_depth)
     ceiling = 1e3 * max_depth if np.any(lobes.stable) else min(1e3 * max_depth, 1.25 * float(np.max(limit)))
     return ceiling if tested is None else max(ceiling, 1.08e3 * float(tested.cuts.axial_depth.max()))
@@ -132,7 +132,7 @@ def _draw_limit(
     ax.text(0.008, 0.03, "stable", transform=ax.transAxes, va="bottom", color=_GREEN, fontsize=9.5, style="italic")
 
 
-def _draw_tested(ax: Axes, tested: Tested) -> None:
+def _draw_tested(ax: Axes, tested: Judged) -> None:
     speed, depth = tested.cuts.spindle_speed * _RPM, 1e3 * tested.cuts.axial_depth
     for verdict, (marker, colour, filling) in _VERDICTS.items():
         seen = tested.cuts.seen(verdict)
@@ -175,7 +175,7 @@ def _draw_surface(ax: Axes, surface: SurfaceError) -> None:
 _LEAVE = {"entry": "enter", "exit": "leave"}
 
 
-def tested_figure(panels: Sequence[Panel]) -> Figure:
+def cases_figure(panels: Sequence[Panel]) -> Figure:
     """Lobes of several cases with the cuts that were tested in each, two in a row."""
     rows = (len(panels) + 1) // 2
     cols = min(2, len(panels))
