@@ -23,6 +23,7 @@ USUAL, PRIOR_STD = Contact(2e10, 6e5, 1e5, 40.0), float(np.log(10.0))
 UNTOLD = 0.5
 #: Starts beside the prior's centre: logarithms of all stiffnesses and of all dampings.
 _STARTS = ((0.0, 0.0), (1.5, 0.0), (-1.5, 0.0), (0.0, 1.5), (0.0, -1.5), (3.0, 1.0))
+_TRIED = 3
 _STEP = 1e-4
 
 
@@ -150,23 +151,27 @@ def calibrate_contact(
     if not taps:
         raise InputError("taps", "none", "at least one tap test")
     problem = _Problem(tuple(taps), prior or USUAL, positive("prior_std", prior_std), modulus_spread, positive("gain_spread", gain_spread))
-    best: tuple[float, FloatArray] | None = None
-    for done, (stiffer, looser) in enumerate(_STARTS, start=1):
+    starts = []
+    for stiffer, looser in _STARTS:
         start = np.zeros(problem.size)
         start[:2], start[2:4] = stiffer, looser
-        problem.model_error = 0.3
-        found, cost = problem.solve(start, 8)
+        starts.append((_loss(problem.residual(start)), start))
+    # the prior's centre, and those that begin best
+    likely = [starts[0], *sorted(starts[1:], key=lambda s: s[0])[: _TRIED - 1]]
+    best: tuple[float, FloatArray] | None = None
+    for done, (_, start) in enumerate(likely, start=1):
+        found, cost = problem.solve(start, 10, 1e-2)
         if best is None or cost < best[0]:
             best = (cost, found)
         if progress is not None:
-            progress(done, len(_STARTS) + 3)
+            progress(done, _TRIED + 3)
     assert best is not None
     theta = best[1]
     for k in range(3):
         problem.learn(theta)
-        theta, _ = problem.solve(theta, 20)
+        theta, _ = problem.solve(theta, 20, 1e-5)
         if progress is not None:
-            progress(len(_STARTS) + k + 1, len(_STARTS) + 3)
+            progress(_TRIED + k + 1, _TRIED + 3)
     return _answer(problem, theta)
 
 
@@ -252,7 +257,7 @@ class _Problem:
             slope[here.size - self.size + k, k] = 1.0 / self.width[k]
         return slope
 
-    def solve(self, theta: FloatArray, steps: int) -> tuple[FloatArray, float]:
+    def solve(self, theta: FloatArray, steps: int, least_gain: float) -> tuple[FloatArray, float]:
         """Levenberg-Marquardt on a loss that grows linearly from four deviations on."""
         left = self.residual(theta)
         cost, damping = _loss(left), 1e-2
@@ -270,7 +275,7 @@ class _Problem:
                     gained, theta, left, cost, damping = cost - new, trial, tried, new, 0.2 * damping
                     break
                 damping = max(5.0 * damping, 1e-6)
-            if gained <= 1e-5 * cost:
+            if gained <= least_gain * cost:
                 break
         return theta, cost
 

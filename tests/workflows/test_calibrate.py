@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from rcsa_ident.cutting.calibration import calibrate_mean_force
+from rcsa_ident.cutting.force import force_history
 from rcsa_ident.cutting.signal_fit import Dynamometer, calibrate_signal
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
@@ -135,6 +136,41 @@ def test_few_lost_samples_are_bridged():
     broken[[500, 501, 3000]] = np.nan
     whole, mended = (measure_force("c", "a", Recording(RATE, f, SENSORS), None, CUTTER, conditions) for f in (force, broken))
     np.testing.assert_allclose(mended.mean, whole.mean, rtol=1e-3)
+
+
+@dataclass(frozen=True)
+class AxialSensor:
+    """A force along the spindle's axis."""
+
+    name: str = "fz"
+    quantity: Quantity = Quantity.FORCE
+    axis: Dof = Dof.Z
+    sensitivity: float = 1.0
+
+    def response(self, omega):
+        return np.ones(omega.size, dtype=complex)
+
+
+@pytest.mark.parametrize("signal", [False, True])
+def test_a_force_along_the_axis_gives_the_axial_coefficients(signal):
+    """Kinematic forces of a slot with an axial part; both methods take it from the means."""
+    rng = np.random.default_rng(12)
+    coefficients = replace(COEFFICIENTS, axial_ratio=0.15, axial_edge=2e3)
+    cuts = [(c, None) for c in plan(1.5e-4, SLOT)]
+    setup = campaign(cuts)
+
+    def read(cut):
+        conditions = cuts[int(cut.id[1:])][0]
+        angle = conditions.spindle_speed * np.arange(round(0.4 * RATE)) / RATE + rng.random()
+        force = force_history(CUTTER, conditions, coefficients, angle, slices=8)
+        return Recording(RATE, force + 0.2 * rng.normal(size=force.shape), (*SENSORS, AxialSensor())), None
+
+    found = calibrate(setup, read, signal=signal)
+    assert found.forces.names == ("K_tc", "K_rc", "K_te", "K_re", "K_ac", "K_ae")
+    assert found.forces.of("K_ac")[0] == pytest.approx(0.15 * TRUE[0], rel=0.03)
+    assert found.forces.of("K_ae")[0] == pytest.approx(2e3, rel=0.1)
+    assert found.forces.coefficients.axial_ratio == pytest.approx(0.15, rel=0.03)
+    assert found.notes == ("no air cuts: zero is taken from the sensors as it is",)
 
 
 def test_nothing_usable():
