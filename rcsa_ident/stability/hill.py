@@ -73,22 +73,29 @@ class PeriodicTeeth:
 
         [alpha(t)] = sum_r [alpha_r] e^{i r w_T t}, one tooth's tip at immersion 0 when t = 0.
         """
+        return self._lines(count, depth, 1.0, self.process.coefficients.radial_ratio)
+
+    def rubbing(self, count: int, depth: float) -> ComplexArray:
+        """Return the same of process damping, over its strength and the cutting speed: force per width and velocity."""
+        damping = self.process.damping
+        return np.zeros((2 * count + 1, 2, 2), dtype=complex) if damping is None else self._lines(count, depth, damping.friction, 1.0)
+
+    def _lines(self, count: int, depth: float, tangential: float, radial: float) -> ComplexArray:
         r = np.arange(-count, count + 1)
         kept = np.abs(r) <= (count if self.harmonics is None else self.harmonics)
-        order = self.process.cutter.teeth * r
+        cutter, engagement = self.process.cutter, self.process.engagement
+        order = cutter.teeth * r
         q = np.array([-2, 0, 2])
-        kr = self.process.coefficients.radial_ratio
         sc, ss, cc = np.array([0.25j, 0, -0.25j]), np.array([-0.25, 0.5, -0.25]), np.array([0.25, 0.5, 0.25])
-        form = np.array([[-sc - kr * ss, -cc - kr * sc], [ss - kr * sc, sc - kr * cc]])
+        form = tangential * np.array([[-sc, -cc], [ss, sc]]) - radial * np.array([[ss, sc], [sc, cc]])
         # the integral of e^{i (q - m) phi} over the immersion
-        start, end = self.process.engagement.entry, self.process.engagement.exit
+        start, end = engagement.entry, engagement.exit
         n, half = q - order[:, None], 0.5 * (end - start)
         window = 2.0 * half * np.exp(0.5j * n * (start + end)) * np.sinc(n * half / np.pi)
-        lines = self.process.cutter.teeth / (2.0 * np.pi) * np.einsum("rq,ijq->rij", window, form)
-        lag = order * depth * np.tan(self.process.cutter.helix) / self.process.cutter.diameter
+        lines = cutter.teeth / (2.0 * np.pi) * np.einsum("rq,ijq->rij", window, form)
+        lag = order * depth * np.tan(cutter.helix) / cutter.diameter
         lines *= (kept * np.exp(-1j * lag) * np.sinc(lag / np.pi))[:, None, None]
-        c, s = np.cos(self.process.feed_angle), np.sin(self.process.feed_angle)
-        rotation = np.array([[c, -s], [s, c]])
+        rotation = self.process.machine_from_feed
         return rotation @ lines @ rotation.T
 
 
@@ -105,11 +112,18 @@ class Hill:
 
     def __init__(self, tip: TipMotion, teeth: PeriodicTeeth, passing: float) -> None:
         self.tip, self.teeth, self.passing = tip, teeth, passing
+        process = teeth.process
+        speed = 0.5 * process.cutter.diameter * passing / process.cutter.teeth
+        #: Of process damping, force per width and velocity [N s/m^2].
+        self.viscosity = 0.0 if process.damping is None else process.damping.strength / speed
         count = int(np.ceil(tip.omega[-1] / passing)) + 1
         self.every = np.arange(-count, count)
         self.nodes, size = self._nodes(self.every)
         # the largest eigenvalue that a harmonic may have by itself
-        self.strength = 2.0 * teeth.process.coefficients.tangential * float(np.linalg.norm(teeth.lines(0, 0.0)[0], 2)) * size
+        self.strength = 2.0 * process.coefficients.tangential * float(np.linalg.norm(teeth.lines(0, 0.0)[0], 2)) * size
+        if self.viscosity > 0.0:
+            rub = self.viscosity * float(np.linalg.norm(teeth.rubbing(0, 0.0)[0], 2))
+            self.strength = self.strength + rub * passing * np.abs(self.every + 0.5) * size
         self.heard = self._stronger(_SILENT * self.strength.max())
         self.loud = self._stronger(_LOUD * self.strength.max())
 
@@ -153,13 +167,19 @@ class Hill:
         return self.every[reach <= max(loud.max(initial=0.0), 1.0)]
 
     def matrices(self, offset: np.ndarray, omega: FloatArray, depth: float) -> ComplexArray:
-        """Return K_tc (1 - e^{-i w T}) [alpha_{k-l}] G(w + l w_T), shape (n, 2 h, 2 h) [1/m]."""
+        """Return (K_tc (1 - e^{-i w T}) [alpha_{k-l}] + i (w + l w_T) C [beta_{k-l}]) G(w + l w_T), shape (n, 2 h, 2 h) [1/m].
+
+        [beta] is what process damping makes of a velocity.
+        """
         h = offset.size
-        lines = self.teeth.lines(h - 1, depth)
-        toeplitz = lines[offset[:, None] - offset + h - 1]
-        tip = self.tip.at(omega[:, None] + self.passing * offset)
-        tip *= (self.teeth.process.coefficients.tangential * (1.0 - np.exp(-2j * np.pi * omega / self.passing)))[:, None, None, None]
-        wide = toeplitz.transpose(1, 0, 2, 3).reshape(h, 2 * h, 2) @ tip
+        apart = offset[:, None] - offset + h - 1
+        frequency = omega[:, None] + self.passing * offset
+        tip = self.tip.at(frequency)
+        regenerated = (self.teeth.process.coefficients.tangential * (1.0 - np.exp(-2j * np.pi * omega / self.passing)))[:, None, None, None]
+        wide = self.teeth.lines(h - 1, depth)[apart].transpose(1, 0, 2, 3).reshape(h, 2 * h, 2) @ (regenerated * tip)
+        if self.viscosity > 0.0:
+            moving = (1j * self.viscosity * frequency)[:, :, None, None] * tip
+            wide = wide + self.teeth.rubbing(h - 1, depth)[apart].transpose(1, 0, 2, 3).reshape(h, 2 * h, 2) @ moving
         return wide.transpose(0, 2, 1, 3).reshape(omega.size, 2 * h, 2 * h)
 
     def _nodes(self, offset: np.ndarray) -> tuple[FloatArray, FloatArray]:

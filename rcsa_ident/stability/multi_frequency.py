@@ -25,7 +25,9 @@ class MultiFrequency:
     With [alpha(t)] = sum_r [alpha_r] e^{i r w_T t}, w_T the tooth-passing frequency, a force with the harmonics
     F_k e^{i (w + k w_T) t} repeats itself for
 
-        F_k = a K_tc (1 - e^{-i w T}) sum_l [alpha_{k-l}] G(w + l w_T) F_l.
+        F_k = a K_tc (1 - e^{-i w T}) sum_l [alpha_{k-l}] G(w + l w_T) F_l,
+
+    beside it what process damping makes of the velocity i (w + l w_T) G F_l.
 
     At each w the eigenvalues of the right-hand side without a are followed; a is the inverse of one that is real and
     positive. One tooth-passing interval holds all w that differ, and conjugate symmetry leaves half of it; at its end,

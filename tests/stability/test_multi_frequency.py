@@ -12,11 +12,14 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.directional import mean_directional_matrix
-from rcsa_ident.cutting.process import MillingProcess, SpeedVariation
-from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
+from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from tests.oracles import naive
 
@@ -281,3 +284,22 @@ def test_bad_input(change, words):
 def test_number_of_harmonics(harmonics):
     with pytest.raises(InputError, match="harmonics"):
         MultiFrequency(harmonics)
+
+
+@pytest.mark.parametrize("rpm", [2500.0, 4100.0, 8200.0])
+def test_process_damping_agrees_with_a_march_through_time(rpm):
+    """Harmonics of the velocity's force on one side, a damping matrix over time on the other."""
+    process = MillingProcess(Cutter(4, 0.012, np.radians(30.0)), COEFFICIENTS, HALF_DOWN, 0.3, damping=ProcessDamping(1.5e14, 40e-6, 0.3))
+    shape = {axis: np.array([[m**-0.5] for a, _, _, m in SKEWED if a == axis]) for axis in (0, 1)}
+    models = {
+        dof: normal_modes(
+            [2.0 * np.pi * f for a, f, _, _ in SKEWED if a == axis], [z for a, _, z, _ in SKEWED if a == axis], shape[axis], (TIP[axis],)
+        )
+        for axis, dof in enumerate((Dof.X, Dof.Y))
+    }
+    marched = stability_lobes(TipModes.of(models), process, [rpm * RPM], 30e-3, FullDiscretisation(tolerance=1e-5))
+    found = stability_lobes(tip(SKEWED), process, [rpm * RPM], 30e-3, MULTI)
+    np.testing.assert_allclose(found.limit_depth, marched.limit_depth, rtol=2e-4)
+    np.testing.assert_allclose(found.chatter_frequency, marched.chatter_frequency, rtol=2e-5)
+    undamped = stability_lobes(tip(SKEWED), MillingProcess(process.cutter, COEFFICIENTS, HALF_DOWN, 0.3), [rpm * RPM], 30e-3, MULTI)
+    assert found.limit_depth[0] > undamped.limit_depth[0]
