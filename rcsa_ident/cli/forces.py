@@ -113,7 +113,7 @@ def forces(
         flat = "none" if lines[0] is None else f"{lines[0]:.0f} to {lines[1]:.0f} Hz"
         say(
             f"{axis}: rms {row['rms_n']:.1f} N, peaks {row['lowest_n']:.0f} to {row['highest_n']:.0f} N, ± {row['std_n']:.2g} N; "
-            f"within 1 dB at the spindle's orders: {flat}; delay {1e6 * row['delay_s']:.0f} µs"
+            f"within 1 dB at the spindle's orders: {flat}; delay {round(1e6 * row['delay_s'])} µs"
         )
     for note in found.notes:
         warn(note)

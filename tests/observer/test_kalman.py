@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcsa_ident.errors import InputError
-from rcsa_ident.observer import _kernels
 from rcsa_ident.observer.force_model import RandomWalk, TeethResonators, augmented
 from rcsa_ident.observer.kalman import kalman_filter, riccati
 from rcsa_ident.observer.transfer_function import SampledModes
@@ -251,30 +250,6 @@ def test_an_oscillator_is_right_at_its_own_frequency(kalman):
     np.testing.assert_allclose(compensated, 1.0, atol=1e-6)
     between = np.array([300.0])
     assert abs(steady.response(between)[0] * PLANT.response(between) - 1.0) > 1e-3
-
-
-def test_kernels_have_slow_twins(kalman, measured):
-    """The same steps with dense matrices, and the kernels' own Python."""
-    a, seen, force, _ = kalman.model.matrices()
-    live = kalman.model.live
-    x, expected = np.zeros(a.shape[0]), []
-    for k, z in enumerate(measured[:150]):
-        x = a @ x
-        innovation = z - kalman.model.noise * (seen @ x)
-        x = x + kalman.gain[min(k, kalman.gain.shape[0] - 1)].T.ravel()[live] * innovation
-        expected.append([force @ x, innovation])
-    found = kalman.run(kalman.init(), measured[:150])[1]
-    np.testing.assert_allclose(found[:, [0, 2]], expected, rtol=1e-9, atol=1e-9 * np.abs(found[:, 0]).max())
-    if not hasattr(_kernels.kalman_steps, "py_func"):
-        return
-    arrays, result = kalman._arrays(), np.empty((150, 3))
-    _kernels.kalman_steps.py_func(*arrays, kalman.gain, 0, measured[:150], np.zeros((2, kalman.model.decay.size)), result)
-    np.testing.assert_allclose(result, found, rtol=1e-9, atol=1e-12 * np.abs(found).max())
-    series = np.ascontiguousarray(found[:, 2]), np.ascontiguousarray(found[:, 0])
-    slow = _kernels.smoothed_force.py_func(*arrays, kalman.gain, kalman.variance, kalman.row, *series)
-    np.testing.assert_allclose(slow, kalman.smooth(found), rtol=1e-9, atol=1e-10 * np.abs(slow).max())
-    weight = kalman.lag_weights(7)
-    np.testing.assert_allclose(_kernels.lagged_force.py_func(weight, *series), _kernels.lagged_force(weight, *series), rtol=1e-9, atol=1e-9)
 
 
 def test_settings_are_checked():

@@ -8,7 +8,6 @@ import scipy.signal
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.observer._kernels import modal_filter
 from rcsa_ident.observer.transfer_function import SampledModes, acceleration_filter, high_pass, transfer_function, warped
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.observer.flange_machine import BAND, paper_cut
@@ -92,9 +91,6 @@ def test_filter_is_the_difference_equation_in_blocks_too():
     second, two = modes.run(first, signal[77:])
     np.testing.assert_array_equal(np.concatenate([one, two]), whole)
     np.testing.assert_array_equal(second, state)
-    decay, gain = (np.stack([v.real, v.imag]) for v in (modes.decay, modes.gain))
-    slow = modal_filter.py_func(decay, gain, 0.25, signal, np.zeros((2, 2))) if hasattr(modal_filter, "py_func") else whole
-    np.testing.assert_allclose(slow, whole, rtol=1e-12, atol=1e-14)
 
 
 def test_bands_that_cannot_be_are_refused(cross):

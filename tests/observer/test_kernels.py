@@ -1,0 +1,98 @@
+"""Each kernel beside a slow twin: complex numbers and dense matrices, one line of algebra a step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rcsa_ident.observer._kernels import kalman_steps, lagged_force, modal_filter, smoothed_force
+
+PLANTS, FORCES, NOISES, SAMPLES, SETTLING = 3, 2, 2, 60, 4
+
+
+@pytest.fixture
+def system():
+    """Modes, gains that change for a few steps, measurements; dense matrices of the same."""
+    rng = np.random.default_rng(7)
+    m = PLANTS + FORCES + NOISES
+    decay = rng.uniform(0.5, 0.95, m) * np.exp(1j * rng.uniform(0.1, 2.0, m))
+    observed, through = rng.normal(size=(2, m)), 0.3
+    observed[:, PLANTS : PLANTS + FORCES] = 0.0
+    gain, row = 0.05 * rng.normal(size=(SETTLING, 2, m)), rng.normal(size=(SETTLING, 2, m))
+    variance = rng.uniform(1.0, 2.0, SETTLING)
+    a = np.zeros((2 * m, 2 * m))
+    for k, z in enumerate(decay):
+        a[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = [[z.real, -z.imag], [z.imag, z.real]]
+    force = np.zeros(2 * m)
+    force[2 * PLANTS : 2 * (PLANTS + FORCES) : 2] = 1.0
+    plants = np.zeros(2 * m)
+    plants[: 2 * PLANTS : 2] = 1.0
+    a = a + np.outer(plants, force)
+    seen = observed.T.ravel() + through * force
+    parts = np.stack([decay.real, decay.imag])
+    return (parts, observed, PLANTS, FORCES, through), gain, row, variance, (a, seen, force), rng.normal(size=SAMPLES)
+
+
+def filtered(gain, dense, measured):
+    a, seen, force = dense
+    x, result = np.zeros(force.size), []
+    for k, z in enumerate(measured):
+        x = a @ x
+        innovation = z - seen @ x
+        x = x + gain[min(k, len(gain) - 1)].T.ravel() * innovation
+        result.append((force @ x, x[2 * PLANTS], innovation))
+    return np.array(result), x
+
+
+def test_kalman_steps(system):
+    arrays, gain, _, _, dense, measured = system
+    expected, last = filtered(gain, dense, measured)
+    state, result = np.zeros((2, PLANTS + FORCES + NOISES)), np.empty((SAMPLES, 3))
+    kalman_steps(*arrays, gain, 0, measured, state, result)
+    np.testing.assert_allclose(result, expected, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(state.T.ravel(), last, rtol=1e-9, atol=1e-12)
+    # in two blocks, the second knows how many steps went before
+    state, parts = np.zeros_like(state), []
+    for first, last_sample in ((0, 2), (2, SAMPLES)):
+        part = np.empty((last_sample - first, 3))
+        kalman_steps(*arrays, gain, first, measured[first:last_sample], state, part)
+        parts.append(part)
+    np.testing.assert_array_equal(np.vstack(parts), result)
+
+
+def test_smoothed_force(system):
+    """The backward recursion with full matrices."""
+    arrays, gain, row, variance, dense, measured = system
+    a, seen, force = dense
+    result, _ = filtered(gain, dense, measured)
+    adjoint, expected = np.zeros(force.size), np.empty(SAMPLES)
+    for k in range(SAMPLES - 1, -1, -1):
+        j = min(k, SETTLING - 1)
+        expected[k] = result[k, 0] - row[j].T.ravel() @ adjoint
+        kept = np.eye(force.size) - np.outer(gain[j].T.ravel(), seen)
+        adjoint = a.T @ (kept.T @ adjoint - seen * result[k, 2] / variance[j])
+    found = smoothed_force(*arrays, gain, variance, row, np.ascontiguousarray(result[:, 2]), np.ascontiguousarray(result[:, 0]))
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_lagged_force():
+    rng = np.random.default_rng(3)
+    weight, innovation, force = rng.normal(size=5), rng.normal(size=20), rng.normal(size=20)
+    expected = [force[k] + weight @ innovation[k + 1 : k + 6] for k in range(15)]
+    np.testing.assert_allclose(lagged_force(weight, innovation, force), expected, rtol=1e-12)
+    assert lagged_force(weight, innovation[:3], force[:3]).size == 0
+    np.testing.assert_array_equal(lagged_force(weight[:0], innovation, force), force)
+
+
+def test_modal_filter():
+    rng = np.random.default_rng(5)
+    decay = np.array([0.9 * np.exp(0.4j), 0.5, 0.7 * np.exp(2.0j)])
+    gain, signal = rng.normal(size=3) + 1j * rng.normal(size=3), rng.normal(size=80)
+    x, expected = np.zeros(3, dtype=complex), []
+    for u in signal:
+        expected.append(0.25 * u + 2.0 * np.sum(gain * x).real)
+        x = decay * x + u
+    state = np.zeros((2, 3))
+    found = modal_filter(*(np.stack([v.real, v.imag]) for v in (decay, gain)), 0.25, signal, state)
+    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(state[0] + 1j * state[1], x, rtol=1e-10)
