@@ -137,15 +137,21 @@ def subjects_of(
 
 def _tip_of(options: TipOptions) -> Receptance | TipModes:
     """Return the tip's modes from a modal model, or its receptance from tap tests."""
-    from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.io.frf_files import read_tap_tests
     from rcsa_ident.io.modes import read_modes
     from rcsa_ident.stability.modes import TipModes
-    from rcsa_ident.workflows.lobes import measured_tip
 
     if options.modes is not None:
         return TipModes.of(read_modes(options.modes))
-    found = read_tap_tests([_source(text) for text in options.frf or []], options.frf_units)
+    return idle_tip(options.frf or [], options.frf_units)
+
+
+def idle_tip(texts: Sequence[str], units: str | None = None) -> Receptance:
+    """Return the tip's receptance from tap tests, each written as with --frf."""
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.io.frf_files import read_tap_tests
+    from rcsa_ident.workflows.lobes import measured_tip
+
+    found = read_tap_tests([_source(text) for text in texts], units)
     pairs = {(Dof(a.lower()), Dof(b.lower())): curve for (a, b), curve in found.items()}
     return measured_tip({a: c for (a, b), c in pairs.items() if a is b}, {pair: c for pair, c in pairs.items() if pair[0] is not pair[1]})
 

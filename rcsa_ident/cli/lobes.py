@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rcsa_ident.report.lobes import Judged
     from rcsa_ident.stability.result import StabilityLobes
     from rcsa_ident.stability.surface import SurfaceError
+    from rcsa_ident.stability.tested import TestedCuts
     from rcsa_ident.workflows.lobes import LobeConditions
     from rcsa_ident.workflows.speeds import MachineOverSpeed
     from rcsa_ident.workflows.tip import TooltipResponse
@@ -173,17 +174,21 @@ def check_plot(path: Path | None) -> None:
 
 
 def tested_cuts(path: Path, subject: Subject, conditions: LobeConditions) -> Judged:
+    """Return the tested cuts of a file with what the lobes say of them."""
+    from rcsa_ident.io.tested_cuts import read_tested_cuts
+
+    return judged(read_tested_cuts(path), subject, conditions)
+
+
+def judged(cuts: TestedCuts, subject: Subject, conditions: LobeConditions) -> Judged:
     """Return tested cuts with what the lobes say of them, each at its own speed."""
     import numpy as np
 
-    from rcsa_ident.io.tested_cuts import read_tested_cuts
     from rcsa_ident.report.lobes import Judged
     from rcsa_ident.stability.tested import tally
 
-    cuts = read_tested_cuts(path)
-    own = replace(
-        conditions, speeds=np.unique(cuts.spindle_speed), max_depth=max(conditions.max_depth, 1.01 * float(cuts.axial_depth.max()))
-    )
+    deepest = 1.01 * float(cuts.axial_depth.max())
+    own = replace(conditions, speeds=np.unique(cuts.spindle_speed), max_depth=max(conditions.max_depth, deepest))
     limits = subject.limits(own, False)
     places = np.searchsorted(limits.lobes.spindle_speed, cuts.spindle_speed)
     return Judged(cuts, tally(cuts, limits.lobes.limit_depth[places]))

@@ -113,6 +113,24 @@ def show_tally(tally: Tally) -> None:
         out.print(f"told right: {tally.stable_stable + tally.chatter_chatter} of {tally.decided}, {100.0 * tally.share_right:.1f} %")
 
 
+def show_cases(rows: Sequence[tuple[str, Tally | None, Tally | None]]) -> None:
+    """Print how many cuts of each case are told right, in process and, where there are tap tests, at standstill."""
+    columns = ("case", "told right", "unexpected\nchatter", "stable above\nthe limit", "marginal", "told right\nby tap tests")
+    table = _table(*columns, title="tested cuts")
+    table.columns[0].justify = "left"
+    for name, own, idle in rows:
+        cells = ["", "", "", ""]
+        if own is not None:
+            marginal = own.stable_marginal + own.chatter_marginal
+            cells = [_right(own), str(own.stable_chatter), str(own.chatter_stable), str(marginal) if marginal else ""]
+        table.add_row(escape(name), *cells, "" if idle is None else _right(idle))
+    console().print(table)
+
+
+def _right(tally: Tally) -> str:
+    return f"{tally.stable_stable + tally.chatter_chatter} of {tally.decided}"
+
+
 def _table(*columns: str, title: str) -> Table:
     table = Table(*columns, title=title, title_justify="left")
     for column in table.columns:

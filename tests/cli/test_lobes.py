@@ -11,7 +11,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from rcsa_ident.cli import advice, export, lobes
+from rcsa_ident.cli import advice, cases, export, lobes
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.curves import read_lobes_csv, write_frf_csv
 from rcsa_ident.io.frf_files import Source, read_tap_tests
@@ -22,6 +22,7 @@ APP = typer.Typer(pretty_exceptions_enable=False)
 APP.command("lobes")(lobes.lobes)
 APP.command("advise")(advice.advise)
 APP.command("export")(export.export)
+APP.command("cases")(cases.cases)
 KNOWN = ("--ktc-mpa", 900, "--krc", 0.3)
 FEED = ("--feed-per-tooth-mm", 0.1)
 
@@ -297,3 +298,29 @@ def test_the_face_mill_of_the_shared_files(tmp_path):
     answer = answer_of("lobes", *frf, tooling, "--out", tmp_path / "L.csv", "--ktc-mpa", 1319.4, "--krc", 788.8 / 1319.4)
     assert answer["absolute_limit_mm"] == pytest.approx(1.015, abs=1e-3)
     assert answer["absolute_frequency_hz"] == pytest.approx(1441.0, abs=1.0)
+
+
+def test_cases_in_process_and_at_standstill(result_file, tmp_path):
+    """Cuts at 0.9 and 1.1 of the machine's own limit are told right by it, and not by tap tests of a machine twice as soft."""
+    folder, speeds = result_file.parent, ("--speed-from", 9000, "--speed-to", 15000, "--speed-step", 500)
+    run(
+        "lobes", result_file, folder / "T1.toml", *speeds, "--no-bands", "--immersion", 0.7, "--strategy", "up", "--out", tmp_path / "L.csv"
+    )
+    known = read_lobes_csv(tmp_path / "L.csv")
+    rows = [
+        (s, share * d, v) for s, d in zip(known.speed[:4], known.limit[:4], strict=True) for share, v in ((0.9, "stable"), (1.1, "chatter"))
+    ]
+    lines = "".join(f"{s},{d},{v}\n" for s, d, v in rows)
+    (folder / "CUTS.csv").write_text("spindle_speed_rpm,axial_depth_mm,verdict\n" + lines, encoding="utf-8")
+    run("export", result_file, "--to", "csv", "--tooling", folder / "T1.toml", "--out", tmp_path / "tip.csv", "--from-hz", 100)
+    found = read_tap_tests([Source(tmp_path / "tip.csv")])
+    write_frf_csv(folder / "idle.csv", found["X", "X"][0], {axis: 2.0 * values for (axis, _), (_, values) in found.items()})
+    case = 'tooling = "T1.toml"\nradial_depth_mm = 8.4\nstrategy = "up"\ntests = "CUTS.csv"\n'
+    (folder / "CASES.toml").write_text(f'[[cases]]\n{case}[[cases]]\nname = "idle, too"\n{case}idle = ["idle.csv"]\n', encoding="utf-8")
+    common = ("cases", result_file, folder / "CASES.toml", *speeds, "--plot", tmp_path / "C.svg")
+    plain, both = answer_of(*common)["cases"]
+    assert plain["tested"]["share_right"] == both["tested"]["share_right"] == 1.0
+    assert "tested_idle" not in plain
+    assert both["tested_idle"]["chatter_stable"] == 4
+    assert "from tap tests" in (tmp_path / "C.svg").read_text(encoding="utf-8")
+    assert "8 of 8" in run(*common).stdout

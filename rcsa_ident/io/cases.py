@@ -1,0 +1,100 @@
+"""CASES.toml: configurations of machine and process that were tested, each with its cuts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.keys import Table
+from rcsa_ident.io.setups import feed_angle_of, read_toml, read_tooling
+from rcsa_ident.io.tested_cuts import read_tested_cuts
+from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.stability.tested import TestedCuts
+
+_CASE = (
+    "name", "tooling", "feed_direction", "radial_depth_mm", "strategy", "entry_angle_deg", "exit_angle_deg", "feed_per_tooth_mm", "tests",
+    "idle",
+)  # fmt: skip
+
+
+class Case(NamedTuple):
+    """One configuration.
+
+    Parameters
+    ----------
+    name : str
+    tooling : Tooling
+    engagement : Engagement
+    feed_angle : float [rad]
+    feed_per_tooth : float or None [m]
+    cuts : TestedCuts or None
+    idle : tuple of str
+        Tap-test FRFs of this tooling, each as ``X=FILE``, ``Y=FILE`` or ``FILE``.
+    """
+
+    name: str
+    tooling: Tooling
+    engagement: Engagement
+    feed_angle: float
+    feed_per_tooth: float | None
+    cuts: TestedCuts | None
+    idle: tuple[str, ...]
+
+
+def read_cases(path: str | Path) -> list[Case]:
+    """Return the cases of a file; the paths in it are relative to it.
+
+    Raises
+    ------
+    InputError
+        Names the file, the key, what was found and what is allowed.
+    """
+    top = Table(read_toml(path, "cases"), str(path), known=("cases",))
+    return [_case(table, Path(path).parent, i) for i, table in enumerate(top.tables("cases", _CASE), start=1)]
+
+
+def _case(table: Table, folder: Path, number: int) -> Case:
+    tooling = read_tooling(folder / table.text("tooling"))
+    idle = table.value("idle", "a list of texts, as X=FILE", [])
+    if not isinstance(idle, list) or not all(isinstance(text, str) for text in idle):
+        table.refuse("idle", f"{idle!r}", "a list of texts, as X=FILE")
+    feed = table.number("feed_per_tooth_mm", "mm", None, above=0.0, most=10.0)
+    return Case(
+        table.text("name", f"case {number}"),
+        tooling,
+        _engagement(table, tooling.cutter.diameter),
+        feed_angle_of(table) if "feed_direction" in table else 0.0,
+        None if feed is None else feed * 1e-3,
+        read_tested_cuts(folder / table.text("tests")) if "tests" in table else None,
+        tuple(_beside(text, folder) for text in idle),
+    )
+
+
+def _engagement(table: Table, diameter: float) -> Engagement:
+    """Both angles, or a radial depth and a strategy; a slot needs no strategy."""
+    if "radial_depth_mm" not in table:
+        entry = table.number("entry_angle_deg", "deg", least=0.0, most=180.0)
+        exit_ = table.number("exit_angle_deg", "deg", least=0.0, most=180.0)
+        if exit_ <= entry:
+            table.refuse("exit_angle_deg", f"{exit_:g}", f"above entry_angle_deg, {entry:g} [deg]")
+        return Engagement(float(np.radians(entry)), float(np.radians(exit_)))
+    for key in ("entry_angle_deg", "exit_angle_deg"):
+        if key in table:
+            table.refuse(key, "given beside radial_depth_mm", "the radial depth, or both angles")
+    share = table.number("radial_depth_mm", "mm", above=0.0, most=diameter * 1e3 * (1.0 + 1e-9)) * 1e-3 / diameter
+    slot = share > 1.0 - 1e-9
+    strategy = table.text("strategy", choices=("up", "down")) if "strategy" in table or not slot else "up"
+    return Engagement.from_immersion(min(share, 1.0), strategy)
+
+
+def _beside(text: str, folder: Path) -> str:
+    axes, sign, name = text.partition("=")
+    if sign and axes.upper() in ("X", "Y", "XX", "YY", "XY", "YX"):
+        return f"{axes}={folder / name}"
+    if not text.strip():
+        raise InputError("idle", "an empty text", "X=FILE, Y=FILE or FILE")
+    return str(folder / text)
