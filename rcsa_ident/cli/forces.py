@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -49,6 +50,14 @@ def forces(
     ] = None,
     smooth: Annotated[bool, typer.Option(help="Each sample given the whole record, instead of as it would be live.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Picture of the forces and of the observer's response.", show_default=False)] = None,
+    idle_percent: Annotated[
+        float | None,
+        typer.Option(
+            help="Share of the time in which no tooth cuts, at least, %: there the force is zero, which gives the mean. "
+            "Default: forces without their mean.",
+            show_default=False,
+        ),
+    ] = None,
     sampling_rate_hz: Annotated[float | None, typer.Option(help="Of a recording that carries no rate, Hz.", show_default=False)] = None,
     wear: Annotated[
         Path | None,
@@ -66,6 +75,7 @@ def forces(
     from rcsa_ident.io.forces import sensors_of_result, write_forces_csv
     from rcsa_ident.io.recordings import read_recording
     from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.observer.force import lifted
     from rcsa_ident.observer.tuning import PaperWalk, Resonators
     from rcsa_ident.workflows.monitor import observe
 
@@ -92,6 +102,11 @@ def forces(
             found = observe(machine, setup.assembly, setup.cutter.teeth, cut, still, (low, high), programmed, method, bandwidth, smooth)
         except InputError as error:
             raise error if error.where else error.at(str(recording)) from None
+    level = None
+    if idle_percent is not None:
+        settled = max(each.kalman.gain.shape[0] for each in found.observer.axes)
+        raised, level = lifted(found.estimate, idle_percent / 100.0, min(settled, found.estimate.force.shape[0] // 2))
+        found = replace(found, estimate=raised)
     estimate = found.estimate
     write_forces_csv(
         out,
@@ -105,6 +120,10 @@ def forces(
     if wear is not None:
         worn = _wear(wear, found, setup, (axial_depth_mm or 0.0, feed_mm or 0.0), immersion, strategy, feed_direction)
     summary = _summary(found, str(observer), smooth)
+    if level is not None:
+        summary["mean_force"] = "from the time in which no tooth cuts"
+        for axis, value in zip(estimate.axes, level.tolist(), strict=True):
+            summary["axes"][axis.upper()]["mean_n"] = value
     if json_:
         emit(summary | {"wear": worn, "seconds": stages.seconds, "out": str(out)})
         return
@@ -118,7 +137,9 @@ def forces(
     for note in found.notes:
         warn(note)
     low_hz, high_hz = summary["band_hz"]
-    say(f"forces without their mean, {low_hz:.0f} to {high_hz:.0f} Hz, {summary['spindle_speed_rpm']:.2f} rev/min")
+    say(
+        f"forces {'without their' if level is None else 'with the'} mean, {low_hz:.0f} to {high_hz:.0f} Hz, {summary['spindle_speed_rpm']:.2f} rev/min"
+    )
     for name, row in (worn or {}).get("coefficients", {}).items():
         trend = f"{row['trend_per_s']:+.2g} ± {row['trend_std_per_s']:.1g} a second"
         say(f"{name}: {row['mean']:.4g} ± {row['std']:.2g} {row['unit']}, {trend}")

@@ -225,6 +225,33 @@ class ForceObserver:
         return ForceEstimate(tuple(each.axis for each in self.axes), self.step_time, frozen(force), frozen(deviation), frozen(consistency))
 
 
+def lifted(estimate: ForceEstimate, idle: float, first: int = 0) -> tuple[ForceEstimate, FloatArray]:
+    """Return the estimate with the mean that an interrupted cut gives away: between its teeth the force is zero.
+
+    Parameters
+    ----------
+    estimate : ForceEstimate
+    idle : float
+        Share of the time in which no tooth cuts, at least.
+    first : int
+        Samples that are not looked at, while the observer settles.
+
+    Returns
+    -------
+    ForceEstimate and array, shape (a,) [N]
+        The forces, and what was added to each axis: the middle of the narrowest range that holds half of the idle share,
+        with its sign turned.
+    """
+    if not 0.0 < idle < 1.0:
+        raise InputError("idle share", idle, "above 0 and below 1: some time in which no tooth cuts")
+    levels = []
+    for values in np.sort(estimate.force[first:], axis=0).T:
+        held = max(int(0.5 * idle * values.size), 2)
+        start = int(np.argmin(values[held - 1 :] - values[: values.size - held + 1]))
+        levels.append(-float(np.mean(values[start : start + held])))
+    return replace(estimate, force=frozen(estimate.force + np.array(levels))), frozen(levels)
+
+
 def axis_observer(
     axis: Dof,
     transfer: TransferFunction,

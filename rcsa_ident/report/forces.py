@@ -28,7 +28,7 @@ def force_history(
     start : float [s], optional
         By default the middle of the record.
     true : array, shape (n, a) [N], optional
-        A measured or simulated force, without its mean.
+        A measured or simulated force, with or without its mean as the estimate.
     """
     time = estimate.time
     length = revolutions * 2.0 * np.pi / spindle_speed
@@ -44,7 +44,7 @@ def force_history(
             if true is not None:
                 ax.plot(milliseconds, true[shown, i], color=_TRUTH, lw=1.0, ls="--", label="true")
             ax.plot(milliseconds, force, color=colour, label="estimated")
-            ax.set_ylabel(f"force {name} without its mean [N]")
+            ax.set_ylabel(f"force {name} [N]")
             ax.set_title(f"{name}: {revolutions:g} revolutions from {start:.3f} s")
         grid[0, 0].legend(loc="upper right", ncols=3)
         grid[-1, 0].set_xlabel("time [ms]")

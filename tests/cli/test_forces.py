@@ -95,6 +95,15 @@ def test_the_papers_walk_lags(folder):
     assert data["axes"]["X"]["delay_s"] * 25600.0 == pytest.approx(5.3, abs=1.0)
 
 
+def test_the_mean_where_the_cut_is_interrupted(folder):
+    data = json.loads(run(*arguments(folder, "--air", folder / "air.h5", "--idle-percent", 40, "--json")).stdout)
+    _, force, _ = read_forces_csv(folder / "F.csv")
+    for i, axis in enumerate("XY"):
+        true = paper_cut().force[:, i]
+        assert data["axes"][axis]["mean_n"] == pytest.approx(true.mean(), abs=0.05 * np.std(true) + 1.0)
+        assert np.mean(force[axis][2000:]) == pytest.approx(true.mean(), abs=0.1 * np.std(true) + 1.0)
+
+
 @pytest.mark.parametrize(
     ("more", "text"),
     [
@@ -102,6 +111,7 @@ def test_the_papers_walk_lags(folder):
         (("--bandwidth-hz", "0"), "--bandwidth-hz"),
         (("--bandwidth-hz", "100"), "harmonics in the band"),
         (("--plot", "F.gif"), "--plot"),
+        (("--idle-percent", "120"), "idle share"),
         (("--wear", "W.csv"), "--axial-depth-mm"),
         (("--out", "no/such/F.csv"), "--out"),
         (("--air", "nowhere.h5"), "nowhere.h5"),

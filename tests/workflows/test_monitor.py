@@ -145,7 +145,7 @@ def test_bad_records_are_refused_in_a_sentence():
 
 def test_figures_have_units_and_bands(found):
     history = force_history(found.estimate, found.spindle_speed)
-    assert [ax.get_ylabel() for ax in history.axes] == ["force X without its mean [N]", "force Y without its mean [N]"]
+    assert [ax.get_ylabel() for ax in history.axes] == ["force X [N]", "force Y [N]"]
     assert history.axes[-1].get_xlabel() == "time [ms]"
     low, high = history.axes[0].get_xlim()
     assert high - low > 3.0 * 5.0
