@@ -10,8 +10,9 @@ import typer
 
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn
 from rcsa_ident.cli.conditions import Subject, coefficients, idle_tip, speeds_of
-from rcsa_ident.cli.lobes import Plot, ResultFile, check_plot, judged, read_machine_over_speed
+from rcsa_ident.cli.lobes import Plot, ResultFile, check_plot, judged
 from rcsa_ident.cli.options import CutOptions, SpeedOptions, takes_groups
+from rcsa_ident.cli.results import read_machine_over_speed
 
 if TYPE_CHECKING:
     from rcsa_ident.arrays import FloatArray

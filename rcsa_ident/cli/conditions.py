@@ -106,7 +106,7 @@ def subjects_of(
     files: Sequence[Path], tip: TipOptions, stiffness_spread: float, stickouts: str | None = None, most: int = 1
 ) -> list[Subject]:
     """Return the toolings that a command is about: RESULT.json TOOLING.toml ..., or with --modes or --frf the tooling alone."""
-    from rcsa_ident.cli.lobes import read_machine_over_speed
+    from rcsa_ident.cli.results import read_machine_over_speed
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.io.stickouts import read_stickouts
 

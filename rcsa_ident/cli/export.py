@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rcsa_ident.cli.common import Json, answers, emit, inclusive, say, warn, writable
-from rcsa_ident.cli.lobes import ResultFile, read_machine_over_speed
+from rcsa_ident.cli.lobes import ResultFile
+from rcsa_ident.cli.results import read_machine_over_speed
 from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:

@@ -12,6 +12,8 @@ import typer
 from rcsa_ident.cli.common import Json, Stages, answers, emit, inclusive, say, warn, writable
 from rcsa_ident.cli.conditions import process_of, speeds_of, subjects_of, warn_outside
 from rcsa_ident.cli.options import Bands, CutOptions, SpeedOptions, StiffnessSpread, TipOptions, takes_groups
+from rcsa_ident.cli.results import read_machine as read_machine
+from rcsa_ident.cli.results import read_machine_over_speed as read_machine_over_speed
 from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,7 +28,6 @@ if TYPE_CHECKING:
     from rcsa_ident.stability.surface import SurfaceError
     from rcsa_ident.stability.tested import TestedCuts
     from rcsa_ident.workflows.lobes import LobeConditions
-    from rcsa_ident.workflows.speeds import MachineOverSpeed
     from rcsa_ident.workflows.tip import TooltipResponse
 
 ResultFile = Annotated[Path, typer.Argument(help="RESULT.json of an identification.", show_default=False)]
@@ -198,27 +199,6 @@ def _share(percent: float) -> float:
     if not 0.0 <= percent <= 50.0:
         raise InputError("--stiffness-spread", percent, "a number from 0 to 50 [%]")
     return percent / 100.0
-
-
-def read_machine(path: Path) -> tuple[dict[Dof, MachineAxis], dict[str, Any]]:
-    """Return the machine of a result file beside the file's content."""
-    from rcsa_ident.io.identifications import machine_from_json
-    from rcsa_ident.io.results import read_result
-
-    data = read_result(path)
-    machine = machine_from_json(data, str(path))
-    if data["status"] != "converged":
-        warn(f"{path} is {data['status']}: {'; '.join(data['reasons'])}")
-    return machine, data
-
-
-def read_machine_over_speed(path: Path) -> tuple[MachineOverSpeed, dict[str, Any]]:
-    """Return the machine of a result file, with the models of single speed bands, beside the file's content."""
-    from rcsa_ident.io.identifications import speed_bands_from_json
-    from rcsa_ident.workflows.speeds import MachineOverSpeed
-
-    machine, data = read_machine(path)
-    return MachineOverSpeed(machine, speed_bands_from_json(data, str(path))), data
 
 
 def tip_response(
