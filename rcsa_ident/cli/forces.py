@@ -137,9 +137,8 @@ def forces(
     for note in found.notes:
         warn(note)
     low_hz, high_hz = summary["band_hz"]
-    say(
-        f"forces {'without their' if level is None else 'with the'} mean, {low_hz:.0f} to {high_hz:.0f} Hz, {summary['spindle_speed_rpm']:.2f} rev/min"
-    )
+    mean = "without their mean" if level is None else "with their mean"
+    say(f"forces {mean}, {low_hz:.0f} to {high_hz:.0f} Hz, {summary['spindle_speed_rpm']:.2f} rev/min")
     for name, row in (worn or {}).get("coefficients", {}).items():
         trend = f"{row['trend_per_s']:+.2g} ± {row['trend_std_per_s']:.1g} a second"
         say(f"{name}: {row['mean']:.4g} ± {row['std']:.2g} {row['unit']}, {trend}")

@@ -214,6 +214,19 @@ def test_the_errors_dynamics_are_stable_and_the_riccati_equation_holds(intensity
     assert 0.0 < kalman.force_variance[-1] <= row @ predicted @ row * (1.0 + 1e-9)
 
 
+def test_noises_reach_the_measurement_through_their_filters():
+    """Stationary variance of what the unmodelled force and the accelerometer's noise add, against the filters' impulse responses."""
+    a, seen, _, q = model().matrices()
+    impulse = np.eye(1, 2000)[0]
+    for block, filter_, std in ((slice(0, 5), PLANT, 2.0), (slice(10, 12), SHAKEN, 3.0)):
+        covariance = scipy.linalg.solve_discrete_lyapunov(a[block, block], q[block, block])
+        found = seen[block] @ covariance @ seen[block] * model().noise ** 2
+        # the part that passes at once is white: it is in the measurement's noise, or too small to matter
+        later = filter_.run(filter_.init(), impulse)[1][1:]
+        assert found == pytest.approx(std**2 * np.sum(later**2), rel=1e-9)
+    assert model().noise == pytest.approx(np.hypot(5e-8, 3.0 * SHAKEN.through))
+
+
 def test_riccati_agrees_with_scipy():
     a, seen, _, q = model().matrices()
     other = scipy.linalg.solve_discrete_are(a.T, seen[:, None], q, np.eye(1))
