@@ -223,8 +223,8 @@ def test_noises_reach_the_measurement_through_their_filters():
         found = seen[block] @ covariance @ seen[block] * model().noise ** 2
         # the part that passes at once is white: it is in the measurement's noise, or too small to matter
         later = filter_.run(filter_.init(), impulse)[1][1:]
-        assert found == pytest.approx(std**2 * np.sum(later**2), rel=1e-9)
-    assert model().noise == pytest.approx(np.hypot(5e-8, 3.0 * SHAKEN.through))
+        assert found == pytest.approx(std**2 * np.sum(later**2), rel=1e-9, abs=0.0)
+    assert model().noise == pytest.approx(np.hypot(5e-8, 3.0 * SHAKEN.through), rel=1e-12, abs=0.0)
 
 
 def test_riccati_agrees_with_scipy():
