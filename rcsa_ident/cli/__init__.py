@@ -8,7 +8,21 @@ for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
 
 import typer  # noqa: E402
 
-from rcsa_ident.cli import demo, identify, lobes, machine, plan  # noqa: E402
+from rcsa_ident.cli import (  # noqa: E402
+    advice,
+    calibrate,
+    cases,
+    compare,
+    contact,
+    decouple,
+    demo,
+    export,
+    forces,
+    identify,
+    lobes,
+    machine,
+    plan,
+)
 
 app = typer.Typer(
     name="rcsa-ident",
@@ -19,14 +33,16 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-app.command("demo")(demo.demo)
-app.command("check")(identify.check)
-app.command("identify")(identify.identify)
-app.command("tooltip")(lobes.tooltip)
-app.command("lobes")(lobes.lobes)
-app.command("plan")(plan.plan)
-app.command("simulate")(machine.simulate)
-app.command("warm")(machine.warm)
+#: In the order of the work, under headings.
+_COMMANDS = {
+    "Identification": (demo.demo, identify.check, identify.identify, plan.plan, export.export),
+    "Any tool": (lobes.tooltip, lobes.lobes, advice.advise, cases.cases, forces.forces),
+    "Measurements beside": (calibrate.calibrate, calibrate.materials, compare.compare, decouple.decouple, contact.contact),
+    "Virtual machine, set-up": (machine.simulate, machine.warm),
+}
+for _title, _commands in _COMMANDS.items():
+    for _command in _commands:
+        app.command(_command.__name__, rich_help_panel=_title)(_command)
 
 
 def _version(asked: bool) -> None:

@@ -199,7 +199,7 @@ def _sensor(name: str, data: Any, where: str) -> Sensor:
     return Sensor(
         name,
         quantity,
-        None if trigger else Dof(table.text("axis", choices=("X", "Y")).lower()),
+        None if trigger else Dof(table.text("axis", choices=("X", "Y", "Z") if quantity is Quantity.FORCE else ("X", "Y")).lower()),
         sensitivity,
         table.number("delay_s", "s", 0.0, least=-1.0, most=1.0),
         table.number("bandwidth_hz", "Hz", None, above=0.0),

@@ -31,7 +31,7 @@ class Sensor:
         The channel's name in the recordings.
     quantity : Quantity
     axis : Dof or None
-        Machine axis, X or Y, positive as the axis; None for a trigger.
+        Machine axis, X or Y, for a force also Z, positive as the axis; None for a trigger.
     sensitivity : float [V/m, V/(m/s^2), V/N]
         Signal per quantity; 1 where the file is in SI.
     delay : float [s]
@@ -54,8 +54,10 @@ class Sensor:
     tooth_angle: float | None = None
 
     def __post_init__(self) -> None:
-        if self.quantity is not Quantity.TRIGGER and self.axis not in (Dof.X, Dof.Y):
-            raise InputError(f"sensors.{self.name}.axis", self.axis, "X or Y")
+        # a dynamometer also feels along the spindle
+        known = (Dof.X, Dof.Y, Dof.Z) if self.quantity is Quantity.FORCE else (Dof.X, Dof.Y)
+        if self.quantity is not Quantity.TRIGGER and self.axis not in known:
+            raise InputError(f"sensors.{self.name}.axis", self.axis, "X, Y or Z" if len(known) == 3 else "X or Y")
         if not np.isfinite(self.sensitivity) or self.sensitivity == 0.0:
             raise InputError(f"sensors.{self.name}.sensitivity", self.sensitivity, "a finite number other than 0")
         if self.bandwidth is not None:

@@ -222,6 +222,7 @@ BROKEN_CAMPAIGNS = [
     ('"displacement"', '"displacment"', ["sensors.flange_x.quantity", '"displacment"', "did you mean displacement?"]),
     ('"displacement"\naxis = "X"', '"displacement"', ["sensors.flange_x.axis", "found nothing", "one of X, Y"]),
     ('axis = "X"', 'axis = "Z"', ["sensors.flange_x.axis", '"Z"', "one of X, Y"]),
+    ('"displacement"\naxis = "X"', '"force"\naxis = "W"', ["sensors.flange_x.axis", '"W"', "one of X, Y, Z"]),
     ("sensitivity = 10.0e3", "sensitivity = 0", ["sensors.flange_x.sensitivity", "found 0", "other than 0"]),
     ("sensitivity = 10.0e3", "", ["sensors.flange_x.sensitivity", "found nothing"]),
     ("sensitivity = 10.0e3", "sensitivity = 1e4\ntooth_angle_deg = 0", ["sensors.flange_x.tooth_angle_deg", "an unknown key"]),
@@ -309,3 +310,9 @@ def test_reading_does_not_depend_on_the_working_directory(campaign, monkeypatch)
     monkeypatch.chdir(campaign.parent)
     assert read_campaign(Path("campaign")).cuts[0].recording.is_file()
     assert os.getcwd() == str(campaign.parent)
+
+
+def test_a_dynamometer_also_feels_along_the_spindle(campaign):
+    text = campaign.read_text()
+    campaign.write_text(text.replace('"displacement"\naxis = "X"', '"force"\naxis = "Z"', 1))
+    assert Dof.Z in {sensor.axis for sensor in read_campaign(campaign).sensors if sensor.quantity is Quantity.FORCE}
