@@ -313,6 +313,6 @@ def test_reading_does_not_depend_on_the_working_directory(campaign, monkeypatch)
 
 
 def test_a_dynamometer_also_feels_along_the_spindle(campaign):
-    text = campaign.read_text()
-    campaign.write_text(text.replace('"displacement"\naxis = "X"', '"force"\naxis = "Z"', 1))
+    path = campaign / "campaign.toml"
+    path.write_text(path.read_text().replace('"displacement"\naxis = "X"', '"force"\naxis = "Z"', 1))
     assert Dof.Z in {sensor.axis for sensor in read_campaign(campaign).sensors if sensor.quantity is Quantity.FORCE}
