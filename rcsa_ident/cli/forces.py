@@ -71,7 +71,7 @@ def forces(
     json_: Json = False,
 ) -> None:
     """Estimate the cutting forces of a recording from the flange's vibration."""
-    from rcsa_ident.cli.lobes import read_machine_over_speed
+    from rcsa_ident.cli.results import read_machine_over_speed
     from rcsa_ident.io.forces import sensors_of_result, write_forces_csv
     from rcsa_ident.io.recordings import read_recording
     from rcsa_ident.io.setups import read_tooling
