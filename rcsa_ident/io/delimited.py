@@ -10,13 +10,13 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.io.channels import TIME_COLUMNS, placed
 from rcsa_ident.io.files import MEGABYTE, read_bytes
 from rcsa_ident.io.keys import listed
-from rcsa_ident.io.time_base import Irregular, uniform
+from rcsa_ident.io.time_base import Irregular
 
 LARGEST_TEXT = 256 * MEGABYTE
 DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}
-TIME_COLUMNS = ("time", "time_s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,18 +121,9 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
             raise InputError("sampling_rate_hz", "nothing", "a column 'time' [s], or the campaign's rate [Hz]", table.where)
         return positive("sampling_rate_hz", default_rate, "Hz"), columns
     try:
-        rate, index = uniform(columns[0], default_rate)
+        return placed(columns[0], columns[1:], default_rate)
     except Irregular as error:
         raise InputError("column time", error.found, error.allowed, table.at(error.row)) from None
-    channels = columns[1:]
-    if index[-1] + 1 == index.size:
-        return rate, channels
-    padded = []
-    for values in channels:
-        full = np.full(index[-1] + 1, np.nan)
-        full[index] = values
-        padded.append(full)
-    return rate, padded
 
 
 def _text(raw: bytes, field: str, where: str) -> str:

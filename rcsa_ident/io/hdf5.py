@@ -79,6 +79,44 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         raise InputError("recording", _cause(error), "a complete HDF5 file", where) from None
 
 
+def read_vectors(path: Path, names: Sequence[str], wished: Sequence[str], kinds: Sequence[str]) -> dict[str, FloatArray]:
+    """Return vectors as MATLAB keeps them, one row or one column, shape (n,) each: the named ones, and those of `wished` that are there.
+
+    Parameters
+    ----------
+    kinds : sequence of str
+        Allowed values of the attribute ``MATLAB_class``; without it the type of the samples decides.
+    """
+    where = str(path)
+    size = existing_file(path, "recording", LARGEST_FILE).stat().st_size
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            present = _hard_links(file, where)
+            found = [*names, *(name for name in wished if name in present)]
+            datasets = [_dataset(file, name, present, where, vectors=True) for name in found]
+            for name, dataset in zip(found, datasets, strict=True):
+                _check_kind(dataset, kinds, f"channel {name}", where)
+            _check_size(datasets[: len(names)], names, size, where)
+            for name, dataset in zip(found[len(names) :], datasets[len(names) :], strict=True):
+                _check_size([dataset], [name], size, where)
+            return {name: dataset[()].ravel() for name, dataset in zip(found, datasets, strict=True)}
+    except InputError:
+        raise
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, zlib.error) as error:
+        raise InputError("recording", _cause(error), "a complete HDF5 file", where) from None
+
+
+def _check_kind(dataset: h5py.Dataset, kinds: Sequence[str], field: str, where: str) -> None:
+    """Texts and truths look like whole numbers, but for this attribute."""
+    if not h5py.h5a.exists(dataset.id, b"MATLAB_class"):
+        return
+    described = h5py.h5a.open(dataset.id, b"MATLAB_class")
+    fixed = described.dtype.kind == "S" and described.dtype.itemsize <= 64 and math.prod(described.shape) == 1
+    kind = bytes(np.ravel(dataset.attrs["MATLAB_class"])[0]).decode("ascii", "replace") if fixed else "no name"
+    if kind not in kinds:
+        raise InputError(field, f"values of class {kind}", "real numbers", where)
+
+
 def _cause(error: Exception) -> str:
     """The library's own reason stands in parentheses behind what it was about to do."""
     text = str(error.args[0]) if error.args else type(error).__name__
@@ -101,7 +139,7 @@ def _hard_links(file: h5py.File, where: str) -> list[str]:
     return names
 
 
-def _dataset(file: h5py.File, name: str, present: list[str], where: str) -> h5py.Dataset:
+def _dataset(file: h5py.File, name: str, present: list[str], where: str, vectors: bool = False) -> h5py.Dataset:
     """The dataset of one channel, of which nothing but the description has been read."""
     field = f"channel {name}"
     if name not in present:
@@ -114,8 +152,9 @@ def _dataset(file: h5py.File, name: str, present: list[str], where: str) -> h5py
         raise InputError(field, "a virtual dataset", "samples in the file itself", where)
     if plist.get_external_count() > 0:
         raise InputError(field, "samples in an external file", "samples in the file itself", where)
-    if dataset.shape is None or len(dataset.shape) != 1 or dataset.shape[0] == 0:
-        raise InputError(field, f"shape {dataset.shape}", "a 1-D dataset with at least one sample", where)
+    shape = dataset.shape
+    if shape is None or len(shape) not in ((1, 2) if vectors else (1,)) or math.prod(shape) != max(shape) or 0 in shape:
+        raise InputError(field, f"shape {shape}", f"a {'vector' if vectors else '1-D dataset'} with at least one sample", where)
     if dataset.dtype.kind not in "biuf":
         raise InputError(field, f"values of type {dataset.dtype}", "real numbers", where)
     filters = [plist.get_filter(i)[0] for i in range(plist.get_nfilters())]
@@ -130,8 +169,8 @@ def _dataset(file: h5py.File, name: str, present: list[str], where: str) -> h5py
 
 def _check_size(datasets: list[h5py.Dataset], names: Sequence[str], size: int, where: str) -> None:
     """Lengths agree, and what is declared is plausible for a file of `size` bytes and was really written."""
-    lengths = {d.shape[0] for d in datasets}
-    declared = sum(d.shape[0] * max(d.dtype.itemsize, 8) for d in datasets)
+    lengths = {d.size for d in datasets}
+    declared = sum(d.size * max(d.dtype.itemsize, 8) for d in datasets)
     if declared > LARGEST_DATA:
         raise InputError(
             "recording", f"{declared / MEGABYTE:.3g} MB of declared samples", f"at most {LARGEST_DATA / MEGABYTE:.0f} MB", where
@@ -140,13 +179,13 @@ def _check_size(datasets: list[h5py.Dataset], names: Sequence[str], size: int, w
         found = f"{declared} bytes declared in a file of {size} bytes"
         raise InputError("recording", found, f"at most {LARGEST_RATIO} times the file's size", where)
     if len(lengths) > 1:
-        found = ", ".join(f"{n}: {d.shape[0]}" for n, d in zip(names, datasets, strict=True))
+        found = ", ".join(f"{n}: {d.size}" for n, d in zip(names, datasets, strict=True))
         raise InputError("channels", f"different lengths ({found})", "channels of one length", where)
     for name, dataset in zip(names, datasets, strict=True):
         if dataset.chunks is None:
             written = dataset.id.get_storage_size() > 0
         else:
-            chunks = -(-dataset.shape[0] // dataset.chunks[0])
+            chunks = math.prod(-(-n // c) for n, c in zip(dataset.shape, dataset.chunks, strict=True))
             if chunks > MOST_CHUNKS:
                 raise InputError(f"channel {name}", f"{chunks} chunks", f"at most {MOST_CHUNKS} chunks", where)
             written = dataset.id.get_num_chunks() >= chunks
@@ -161,7 +200,7 @@ def _check_chunks(dataset: h5py.Dataset, field: str, where: str) -> None:
         return
     plist = dataset.id.get_create_plist()
     filters = [plist.get_filter(i)[0] for i in range(plist.get_nfilters())]
-    declared = dataset.chunks[0] * dataset.dtype.itemsize
+    declared = math.prod(dataset.chunks) * dataset.dtype.itemsize
     # filters may add a little of their own to what cannot be compressed
     largest = declared + declared // 4 + 1024
     stored: list[tuple[tuple[int, ...], int]] = []

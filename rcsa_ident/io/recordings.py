@@ -9,7 +9,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.io import delimited, hdf5
+from rcsa_ident.io import delimited, hdf5, matlab, parquet, tdms, universal_records, wav
 from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
@@ -19,7 +19,17 @@ __all__ = ["READERS", "read_cut", "read_recording", "write_hdf5"]
 Reader = Callable[[Path, Sequence[str], float | None], tuple[float, list[FloatArray]]]
 
 #: A format is a suffix and a function of path, channel names and the campaign's rate, which returns rate and channels.
-READERS: dict[str, Reader] = {".h5": hdf5.read_channels, ".hdf5": hdf5.read_channels, ".csv": delimited.read_channels}
+READERS: dict[str, Reader] = {
+    ".h5": hdf5.read_channels,
+    ".hdf5": hdf5.read_channels,
+    ".csv": delimited.read_channels,
+    ".tdms": tdms.read_channels,
+    ".uff": universal_records.read_channels,
+    ".unv": universal_records.read_channels,
+    ".wav": wav.read_channels,
+    ".mat": matlab.read_channels,
+    ".parquet": parquet.read_channels,
+}
 
 
 def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: float | None = None) -> Recording:
@@ -47,10 +57,12 @@ def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: 
         raise InputError("sensors", "none", "at least one sensor", str(path))
     rate, channels = reader(path, [sensor.name for sensor in sensors], default_rate)
     samples = np.empty((channels[0].size, len(sensors)))
-    for i, (sensor, values) in enumerate(zip(sensors, channels, strict=True)):
-        samples[:, i] = values
-        if sensor.quantity is not Quantity.TRIGGER:
-            samples[:, i] /= sensor.sensitivity
+    # an overflow is a lost sample, see below
+    with np.errstate(over="ignore"):
+        for i, (sensor, values) in enumerate(zip(sensors, channels, strict=True)):
+            samples[:, i] = values
+            if sensor.quantity is not Quantity.TRIGGER:
+                samples[:, i] /= sensor.sensitivity
     # an overflow in the acquisition is a lost sample like any other
     samples[np.isinf(samples)] = np.nan
     samples.setflags(write=False)

@@ -30,6 +30,7 @@ _DATA = {2: ("f4", 1), 4: ("f8", 1), 5: ("f4", 2), 6: ("f8", 2)}
 _ASCII = str.maketrans({"µ": "u", "μ": "u", "²": "2"})
 _END = b"-1"
 _HEADER = 11
+_BLOCK = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +60,10 @@ class UffFunction:
         The file's units of length and force in one SI unit (dataset 164).
     where : str
         File and line.
+    names : tuple of str
+        What the file calls the function, the most particular first: response entity, label of the ordinate, title, place as ``3:-X``.
+    step : float
+        Of an even abscissa, as the header rounds it to six digits; 0 where the abscissa stands in the file point by point.
     """
 
     kind: int
@@ -72,6 +77,8 @@ class UffFunction:
     title: str = ""
     factors: tuple[float, float] = (1.0, 1.0)
     where: str = ""
+    names: tuple[str, ...] = ()
+    step: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "abscissa", frozen(self.abscissa))
@@ -169,7 +176,8 @@ def _function(lines: _Lines, binary: bool, head: Sequence[bytes], factors: tuple
     if even not in (0, 1):
         raise InputError("abscissa spacing", even, "0 (uneven) or 1 (even)", lines.here)
     first, step = (_number(form[30 + 13 * i : 43 + 13 * i], name, lines) for i, name in enumerate(("abscissa start", "abscissa step")))
-    axes = [UffAxis(_whole(line[:10], "axis type", lines), _unit(line[47:])) for line in (lines.text() for _ in range(4))]
+    labels = [lines.text() for _ in range(4)]
+    axes = [UffAxis(_whole(line[:10], "axis type", lines), _unit(line[47:])) for line in labels]
     numbers = _binary(lines, head, data_type, count, bool(even)) if binary else _ascii(lines, data_type, count, bool(even))
     columns = numbers.reshape(count, -1)
     abscissa = first + step * np.arange(count) if even else columns[:, 0]
@@ -178,7 +186,17 @@ def _function(lines: _Lines, binary: bool, head: Sequence[bytes], factors: tuple
     if not (np.all(np.isfinite(abscissa)) and np.all(np.isfinite(values))):
         raise InputError("dataset 58", "values that are not finite", "finite numbers", where)
     known = "" if title.upper() == "NONE" else title
-    return UffFunction(kind, abscissa, values, response, reference, axes[0], axes[1], axes[2], known, factors, where)
+    names = [dof[30:41].strip(), labels[1][25:46].strip(), known, _place(*response)]
+    names = [name for name in dict.fromkeys(names) if name and name.upper() != "NONE"]
+    return UffFunction(
+        kind, abscissa, values, response, reference, axes[0], axes[1], axes[2], known, factors, where, tuple(names), step if even else 0.0
+    )
+
+
+def _place(node: int, direction: int) -> str:
+    """Node and axis as ``3:-X``, empty without a node."""
+    axis = ("", "X", "Y", "Z", "RX", "RY", "RZ")[min(abs(direction), 6)]
+    return f"{node}:{'-' if direction < 0 else '+'}{axis}" if node and axis else f"{node}" * bool(node)
 
 
 def _ascii(lines: _Lines, data_type: int, count: int, even: bool) -> FloatArray:
@@ -190,7 +208,9 @@ def _ascii(lines: _Lines, data_type: int, count: int, even: bool) -> FloatArray:
     if line is None:
         raise InputError("dataset 58", "the end of the file", "-1 at the end of the dataset", lines.here)
     try:
-        numbers = _numbers(b" ".join(rows))
+        # in blocks: a word takes many times the memory of its number
+        blocks = [_numbers(b" ".join(rows[i : i + _BLOCK])) for i in range(0, len(rows), _BLOCK)]
+        numbers = np.concatenate([np.empty(0), *blocks])
     except ValueError:
         for i, row in enumerate(rows):
             try:
