@@ -4,13 +4,13 @@ Lobes come from the identified sample runs, whose cuts were half-immersion, stab
 chatters is told by a march of the true machine. Cuts lie between 0.6 and 1.6 times the zero-order limit of the true receptance; those
 whose disturbance changes by less than 1.5 % from tooth to tooth are marginal. About two minutes.
 
-``python -m benchmarks.tested_cuts [FIGURE.png]`` draws them.
+``python -m benchmarks tested_cuts [FIGURE.png]`` draws them.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -99,6 +99,9 @@ def _case(folder: Path, number: int, name: str, radial_mm: float, feed: str) -> 
     return f"[[cases]]\n{texts}radial_depth_mm = {radial_mm}\nfeed_per_tooth_mm = {FEED * 1e3}\n"
 
 
-if __name__ == "__main__":
-    for each in run(Path(sys.argv[1]) if sys.argv[1:] else None):
+def main(arguments: list[str]) -> None:
+    """Print the rows; an argument names the figure to draw."""
+    parser = argparse.ArgumentParser(prog="benchmarks tested_cuts", description=__doc__)
+    parser.add_argument("figure", nargs="?", type=Path, help="PNG or SVG of the cases")
+    for each in run(parser.parse_args(arguments).figure):
         print(f"{each['claim']:<60} {each['ours']:.1f} {each['unit']}  {each['accuracy']}")

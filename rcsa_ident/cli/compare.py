@@ -48,7 +48,7 @@ def compare(
     """Show a hammer test of the idle machine beside the dynamics identified in process."""
     import numpy as np
 
-    from rcsa_ident.cli.lobes import read_machine_over_speed
+    from rcsa_ident.cli.results import read_machine_over_speed
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.errors import InputError, positive
     from rcsa_ident.io.hammer import labelled, read_hammer

@@ -120,7 +120,7 @@ def _supports(path: Path) -> tuple[dict[Dof, Support], tuple[float, float]]:
         edges = [f.band for f in flanges.values()]
         band = max(e[0] for e in edges) / (2.0 * math.pi), min(e[1] for e in edges) / (2.0 * math.pi)
         return {axis: Support(flange, rigid) for axis, flange in flanges.items()}, band
-    from rcsa_ident.cli.lobes import read_machine
+    from rcsa_ident.cli.results import read_machine
 
     machine, data = read_machine(path)
     return {axis: Support(part.spindle, part.joint) for axis, part in machine.items()}, (data["band_hz"][0], data["band_hz"][1])

@@ -54,7 +54,7 @@ def decouple(
     share = positive("--least-damping", least_damping, "%") / 100.0
     machine: dict[Dof, MachineAxis] = {}
     if beside is not None:
-        from rcsa_ident.cli.lobes import read_machine
+        from rcsa_ident.cli.results import read_machine
 
         machine = read_machine(beside)[0]
     taps = _taps(tap, positive("--from", from_, "Hz"), math.inf if to is None else positive("--to", to, "Hz"))

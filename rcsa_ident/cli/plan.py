@@ -71,7 +71,7 @@ def plan(
     json_: Json = False,
 ) -> None:
     """Choose the stable cuts that tell most about the tooltips that are wanted, and say what they will be good for."""
-    from rcsa_ident.cli.lobes import read_machine
+    from rcsa_ident.cli.results import read_machine
     from rcsa_ident.io.files import write_text
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.workflows.plan import Allowed, plan_cuts

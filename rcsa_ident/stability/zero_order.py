@@ -16,7 +16,7 @@ from rcsa_ident.stability.modes import TipModes, receptance_of
 from rcsa_ident.stability.result import StabilityLobes
 
 #: Teeth in the cut, on average, below which the mean directional matrix no longer tells the whole story.
-FEWEST_TEETH_IN_CUT = 0.5
+FEWEST_TEETH_IN_CUT = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +88,9 @@ def _doubts(process: MillingProcess, receptance: Receptance, critical: float | N
     if in_cut < FEWEST_TEETH_IN_CUT - 1e-9:
         angle = np.degrees(engagement.exit - engagement.entry)
         doubts.append(
-            f"low radial immersion: {in_cut:.2f} teeth in the cut on average ({cutter.teeth} teeth, {angle:.0f} degrees of engagement); "
-            "a cut this interrupted has period-doubling (flip) lobes and moved limits that the mean directional coefficients do not show"
+            f"interrupted cut: {in_cut:.2f} teeth in the cut on average ({cutter.teeth} teeth, {angle:.0f} degrees of engagement); it has "
+            "moved limits, and at low immersion period-doubling (flip) lobes, that the mean directional coefficients do not show: "
+            "multi-frequency and full-discretisation do"
         )
     if np.ptp(cutter.runout) > 0.0:
         doubts.append("run-out is left out: the limit is that of equal teeth")

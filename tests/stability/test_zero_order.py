@@ -59,7 +59,7 @@ def test_published_minimum(name):
     assert lobes.absolute_frequency == pytest.approx(2.0 * np.pi * frequency, rel=2e-5)
     assert lobes.limit_depth.min() == pytest.approx(depth, rel=1e-3)
     assert lobes.limit_depth.min() >= lobes.absolute_limit * (1.0 - 1e-9)
-    assert lobes.warnings == ()
+    assert [w.split(":")[0] for w in lobes.warnings] == ([] if name == "slot" else ["interrupted cut"])
 
 
 def test_published_slot_table():
@@ -188,7 +188,7 @@ def test_one_flexible_direction():
 def test_doubts_are_told():
     thin = Engagement.from_immersion(0.1, "down")
     lobes = stability_lobes(tip(symmetric), MillingProcess(Cutter(2, 0.012), COEFFICIENTS, thin), [900.0], 1.0)
-    assert any("low radial immersion" in w and "flip" in w for w in lobes.warnings)
+    assert any("interrupted cut" in w and "flip" in w for w in lobes.warnings)
     edge = tip(symmetric, BAND[: np.searchsorted(BAND, 2.0 * np.pi * 910.0)])
     assert any("edge" in w for w in stability_lobes(edge, MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT), [900.0], 1.0).warnings)
     coarse = tip(symmetric, 2.0 * np.pi * np.arange(400.0, 2000.0, 20.0))
