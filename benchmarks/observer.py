@@ -220,7 +220,8 @@ def _whole_row(found: MonitoredCut, cut: VirtualCut, name: str) -> dict[str, Any
     state = observer.init()
     cost = best_of(lambda: observer.run(state, gap, acceleration)) / gap.size
     order, flat = observer.axes[0].transfer.order, observer.axes[0].transfer.flatness
-    text = f"{1e6 / cut.cut.rate / cost / 1e6:.0f} times faster than the samples come, each axis; C31 of order {order}, fitted to {flat:.3f} dB"
+    times = 1.0 / (cut.cut.rate * cost)
+    text = f"{times:.0f} times faster than the samples come, each axis; C31 of order {order}, fitted to {flat:.3f} dB"
     return row(f"observer, {name}: a step and axis with run-out and both sensors", cost * 1e6, None, "us", text)
 
 
