@@ -76,7 +76,8 @@ def marched_lobes(
         found = cut.multiplier(float(speed), depth, step, waves=True)
         limit[i], chatter[i] = depth, dominant(found)
         lobe[i] = int(chatter[i] / (speed * cut.process.cutter.teeth))
-        flip[i] = abs(np.angle(found.value)) > np.pi - 1e-3
+        # a quasi-periodic vibration may pass -1, too, but as one of a pair
+        flip[i] = found.value.real < 0.0 and abs(found.value.imag) < 1e-6 * abs(found.value)
     doubts = [f"at {lost} of {speeds.size} speeds the limit is not converged to {100.0 * tolerance:g} %"] if lost else []
     return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), method, tuple(doubts), flip)
 
