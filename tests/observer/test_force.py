@@ -137,6 +137,9 @@ def test_run_out_signal_is_its_lines():
     gap, acceleration = lines.signals(40, 50, 1.0 / RATE)
     np.testing.assert_allclose(gap, (lines.gap[0] * np.exp(1200j * t) + lines.gap[1] * np.exp(3600j * t)).real, atol=1e-17)
     np.testing.assert_allclose(acceleration, 0.1 * np.cos(1200.0 * t), atol=1e-12)
+    for orders in ([0.0, 1.0], [1.5, 2.0], [2.0, 1.0]):
+        with pytest.raises(InputError, match="orders"):
+            RunOut(1200.0, np.array(orders), np.zeros(2), np.zeros(2))
 
 
 def test_harmonics_of_a_cut():
