@@ -1,6 +1,8 @@
 """The command line: the one place where workflows, files and reports are put together."""
 
 import os
+from collections.abc import Callable
+from typing import Any
 
 # one thread per process: the linear algebra here is small, its sums stay the same on any number of cores
 for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
@@ -34,7 +36,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 #: In the order of the work, under headings.
-_COMMANDS = {
+_COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
     "Identification": (demo.demo, identify.check, identify.identify, plan.plan, export.export),
     "Any tool": (lobes.tooltip, lobes.lobes, advice.advise, cases.cases, forces.forces),
     "Measurements beside": (calibrate.calibrate, calibrate.materials, compare.compare, decouple.decouple, contact.contact),
