@@ -14,6 +14,8 @@ import numpy as np
 
 #: Krylov vectors between two looks at the eigenvalues, at least and at most; all of them at most.
 _FIRST, _EVERY, _MOST = 8, 3, 240
+#: A mode that decays by less than this many nepers in a period may stand beside the largest multiplier.
+_LASTS = 1.5
 
 
 @numba.njit(cache=True)
@@ -411,7 +413,14 @@ def multiplier(pole, outputs, inputs, constant, cut, table, frozen, tolerance, w
     basis[0] /= np.sqrt(np.sum(basis[0] ** 2))
     value, residual, used = 0.0j, 1.0, 0
     ritz = np.zeros(1, dtype=np.complex128)
+    # as many eigenvalues as the structure itself has near the largest: fewer vectors may hide one of them
+    last = places.shape[0] - 1
+    duration = places[last, 0] + places[last, 1] * places[last, 2]
+    slowest = np.max(pole.real)
     look = _FIRST
+    for k in range(m):
+        if pole[k].real * duration > -_LASTS and (pole[k].real - slowest) * duration > -0.5 * _LASTS:
+            look += 2
     for n in range(most):
         state[:] = basis[n, :m] + 1j * basis[n, m : 2 * m]
         motion[kept:points] = basis[n, 2 * m :].reshape(points - kept, r)

@@ -153,9 +153,9 @@ class _Run:
     number: int
 
     def pushed(self, push: float) -> _Run:
-        """Return a copy whose modes are pushed aside by about `push` [m] at the tip."""
+        """Return a copy whose modes are pushed aside by about `push` [m] at the tip, and the surface that it left as well."""
         aside = push * np.exp(1j * np.arange(self.state.size))
-        return _Run(self.cut, self.plan, self.lag, self.state + aside, self.force.copy(), self.past.copy(), self.number)
+        return _Run(self.cut, self.plan, self.lag, self.state + aside, self.force.copy(), self.past + push, self.number)
 
     def settle(self, tolerance: float) -> bool:
         """Go to the state that a period repeats, stable or not: Anderson's acceleration of one period after the other.
@@ -291,20 +291,23 @@ class _Cut:
 
     def growth(self, depth: float, periods: int) -> float:
         """Return the logarithm of the growth of a disturbance per tooth period."""
-        sizes, _ = self._disturbance(depth, periods)
+        return self._rate(self._disturbance(depth, periods)[0]) / self.tooth_periods
+
+    def _rate(self, sizes: FloatArray) -> float:
+        """Logarithm of the growth per period."""
         logs = np.log(np.maximum(sizes, 1e-300))
         if logs.size < 6:
-            # chatter, or peace, at once
-            return float((logs[-1] - logs[0]) / max(logs.size - 1, 1)) / self.tooth_periods
+            # chatter, or peace, at once: from what it was pushed by
+            return float(logs[-1] - np.log(_PUSH * self.feed)) / logs.size
         # the first part is left to what dies away faster; a line through the rest
         first = int(_FASTER * logs.size)
-        return float(np.polyfit(np.arange(first, logs.size), logs[first:], 1)[0]) / self.tooth_periods
+        return float(np.polyfit(np.arange(first, logs.size), logs[first:], 1)[0])
 
     def vibration(self, depth: float, periods: int) -> tuple[float, bool]:
         """Return the frequency of the disturbance [rad/s], and whether it comes back the other way round each period."""
         sizes, path = self._disturbance(depth, periods)
         first = int(_FASTER * sizes.size)
-        rate = np.polyfit(np.arange(first, sizes.size), np.log(np.maximum(sizes[first:], 1e-300)), 1)[0] / self.per_period
+        rate = self._rate(sizes) / self.per_period
         path = path[first * self.per_period :]
         window = np.exp(-rate * np.arange(path.shape[0])) * np.hanning(path.shape[0])
         lines = np.linalg.norm(np.fft.rfft(path * window[:, None], 4 * path.shape[0], axis=0), axis=1)
@@ -325,7 +328,7 @@ class _Cut:
         for _ in range(max(8, int(np.ceil(periods / self.tooth_periods)))):
             change = pushed.march(self.per_period) - still.march(self.per_period)
             paths.append(change[:, :2])
-            sizes.append(float(np.linalg.norm(change[-1, :4] * scale)))
+            sizes.append(float(np.linalg.norm(change[:, :4] * scale)) / np.sqrt(change.shape[0]))
             if not _GONE * push < sizes[-1] < _CHATTER * self.feed:
                 break
         return np.array(sizes), np.concatenate(paths)
