@@ -1,7 +1,8 @@
 """Parquet recordings: one flat column of numbers a channel; read by pyarrow, which comes with the extra `parquet`.
 
-A page of a few kilobytes may stand for gigabytes. So the headers of all pages that would be read are looked at before:
-how much they unpack to, and that they lie inside of the file.
+A page of a few kilobytes may stand for gigabytes, and the library ends the whole process over some damaged descriptions. So
+the description and the headers of all pages that would be read are looked at here before: how much they unpack to, and
+that they lie inside of the file.
 """
 
 from __future__ import annotations
@@ -29,12 +30,23 @@ from rcsa_ident.io.files import MEGABYTE, read_bytes
 from rcsa_ident.io.time_base import Irregular
 
 COMPLETE = "a complete Parquet file"
-LARGEST_FOOTER = 16 * MEGABYTE
+LARGEST_FOOTER = 2 * MEGABYTE
 LARGEST_PAGE = 64 * MEGABYTE
 MOST_PAGES = 100_000
 MOST_GROUPS = 10_000
 _MAGIC = b"PAR1"
+#: Physical types as the format numbers them, those that a channel may have, and whole numbers among the converted and logical types.
+_TYPES = ("BOOLEAN", "INT32", "INT64", "INT96", "FLOAT", "DOUBLE", "BYTE_ARRAY", "FIXED_LEN_BYTE_ARRAY")
 _NUMBERS = ("INT32", "INT64", "FLOAT", "DOUBLE")
+_CONVERTED = range(11, 19)
+_LOGICAL_INTEGER = 10
+_REPEATED = 2
+#: Kinds of values of Thrift's compact protocol.
+_TRUE, _FALSE, _I8, _I16, _I32, _I64, _F64, _BYTES, _LIST, _SET, _MAP, _STRUCT = range(1, 13)
+_DEEPEST = 8
+
+#: A structure: values by their number and kind.
+Struct = dict[tuple[int, int], Any]
 
 
 def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[FloatArray]]:
@@ -51,6 +63,11 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         allowed = f"at most {LARGEST_FOOTER // MEGABYTE} MB, inside of the file"
         raise InputError("recording", f"a description of {footer} bytes", allowed, where)
     try:
+        described = _struct(raw, len(raw) - 8 - footer)[0]
+        wanted, rate = _checked(described, names, default_rate, raw, where)
+    except (IndexError, struct.error):
+        raise InputError("recording", "a description that cannot be read", COMPLETE, where) from None
+    try:
         import pyarrow
         from pyarrow.parquet import ParquetFile
     except ImportError:
@@ -59,7 +76,8 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         # types that the file asks for beyond its numbers are not made
         options = {"arrow_extensions_enabled": False, "page_checksum_verification": True, "pre_buffer": False}
         with ParquetFile(pyarrow.BufferReader(raw), **options) as file:
-            wanted, rate = _checked(file.metadata, names, default_rate, raw, where)
+            if file.metadata.num_rows != described[3, _I64]:
+                raise InputError("recording", "two numbers of rows", COMPLETE, where)
             table = file.read(columns=wanted, use_threads=False)
             columns = [_numbers(table, name, pyarrow) for name in wanted]
     except InputError:
@@ -82,79 +100,90 @@ def _numbers(table: Any, name: str, pyarrow: Any) -> FloatArray:
     return table.column(name).cast(pyarrow.float64(), safe=False).to_numpy()
 
 
-def _checked(
-    metadata: Any, names: Sequence[str], default: float | None, raw: bytes, where: str
-) -> tuple[list[str], float | None]:
+def _checked(described: Struct, names: Sequence[str], default: float | None, raw: bytes, where: str) -> tuple[list[str], float | None]:
     """Columns to read, the time last where there is one, and the rate that the file or the campaign says."""
-    schema = [metadata.schema.column(i) for i in range(metadata.num_columns)]
-    present = [column.path for column in schema]
+    schema = _structs(described, 2)
+    if not schema or any(column.get((5, _I32)) for column in schema[1:]) or schema[0].get((5, _I32)) != len(schema) - 1:
+        raise InputError("recording", "nested columns", "one number a row in each column", where)
+    columns = schema[1:]
+    present = [column[4, _BYTES].decode("utf-8", "replace") for column in columns if (4, _BYTES) in column]
+    if len(present) < len(columns):
+        raise IndexError
     time = [name for name in present if name.lower() in TIME_COLUMNS and name not in names]
     if len(time) > 1:
         raise InputError("time", f"columns {' and '.join(time)}", "one time column", where)
     wanted = [*names, *time]
     places = [the_only(name, present, where) for name in wanted]
-    for place in places:
-        column = schema[place]
-        field = f"column {column.path}"
-        if column.max_repetition_level or column.max_definition_level > 1 or column.path != column.name:
-            raise InputError(field, "a nested column", "one number a row", where)
-        if column.physical_type not in _NUMBERS or column.logical_type.type not in ("NONE", "INT"):
-            kind = column.logical_type.type if column.logical_type.type != "NONE" else column.physical_type
-            raise InputError(field, f"values of type {kind}", f"numbers ({', '.join(_NUMBERS)})", where)
-    if not 0 < metadata.num_rows:
-        raise InputError("recording", f"{metadata.num_rows} rows", "at least one row", where)
-    check_declared(metadata.num_rows, len(set(wanted)), len(raw), where)
-    _check_groups(metadata, places, raw, where)
-    return wanted, _rate(metadata, default, where)
+    for name, place in zip(wanted, places, strict=True):
+        kind = _kind(columns[place])
+        if kind not in _NUMBERS:
+            raise InputError(f"column {name}", f"values of type {kind}", f"numbers ({', '.join(_NUMBERS)})", where)
+    rows = described[3, _I64] if (3, _I64) in described else -1
+    if rows < 1:
+        raise InputError("recording", f"{rows} rows", "at least one row", where)
+    check_declared(rows, len(wanted), len(raw), where)
+    _check_groups(_structs(described, 4), places, rows, raw, where)
+    return wanted, _rate(_structs(described, 5), default, where)
 
 
-def _rate(metadata: Any, default: float | None, where: str) -> float | None:
-    text = (metadata.metadata or {}).get(RATE.encode())
-    if text is None:
-        return default
-    try:
-        return positive(RATE, float(text[:40]), "Hz")
-    except ValueError:
-        raise InputError(RATE, text[:40].decode("utf-8", "replace"), "a finite number greater than 0 [Hz]", where) from None
+def _kind(column: Struct) -> str:
+    """Physical type, or what keeps a column from being numbers."""
+    if column.get((3, _I32)) == _REPEATED:
+        return "lists"
+    converted, logical = column.get((6, _I32)), column.get((10, _STRUCT), {})
+    if (converted is not None and converted not in _CONVERTED) or any(number != _LOGICAL_INTEGER for number, _ in logical):
+        return "times, texts or decimals"
+    number = column.get((1, _I32), -1)
+    return _TYPES[number] if 0 <= number < len(_TYPES) else f"number {number}"
 
 
-def _check_groups(metadata: Any, places: Sequence[int], raw: bytes, where: str) -> None:
+def _rate(pairs: Sequence[Struct], default: float | None, where: str) -> float | None:
+    for pair in pairs:
+        if pair.get((1, _BYTES)) == RATE.encode():
+            text = pair.get((2, _BYTES), b"")[:40].decode("utf-8", "replace")
+            try:
+                return positive(RATE, float(text), "Hz")
+            except ValueError:
+                raise InputError(RATE, text, "a finite number greater than 0 [Hz]", where) from None
+    return default
+
+
+def _check_groups(groups: Sequence[Struct], places: Sequence[int], rows: int, raw: bytes, where: str) -> None:
     """The pages of every wanted column lie in the file, hold as many rows as there are, and unpack to what a recording may have."""
-    if metadata.num_row_groups > MOST_GROUPS:
-        raise InputError("recording", f"{metadata.num_row_groups} row groups", f"at most {MOST_GROUPS}", where)
-    unpacked, pages, rows = 0, 0, 0
-    for i in range(metadata.num_row_groups):
-        group = metadata.row_group(i)
-        rows += group.num_rows
+    if len(groups) > MOST_GROUPS:
+        raise InputError("recording", f"{len(groups)} row groups", f"at most {MOST_GROUPS}", where)
+    unpacked, pages, found = 0, 0, 0
+    for group in groups:
+        count = group.get((3, _I64), -1)
+        found += count
         for place in places:
-            chunk = group.column(place)
-            if chunk.num_values != group.num_rows or chunk.file_path:
-                found = f"{chunk.num_values} values in {group.num_rows} rows" if not chunk.file_path else "values in another file"
-                raise InputError("recording", found, COMPLETE, where)
-            sizes = _page_sizes(raw, chunk, where)
+            chunk = _structs(group, 1)[place]
+            data = chunk.get((3, _STRUCT), {})
+            if data.get((5, _I64)) != count or (1, _BYTES) in chunk:
+                shown = "values in another file" if (1, _BYTES) in chunk else f"{data.get((5, _I64))} values in {count} rows"
+                raise InputError("recording", shown, COMPLETE, where)
+            sizes = _page_sizes(raw, data, where)
             unpacked, pages = unpacked + sum(sizes), pages + len(sizes)
             if unpacked > LARGEST_DATA or pages > MOST_PAGES or max(sizes, default=0) > LARGEST_PAGE:
-                found = f"{pages} pages of up to {max(sizes) / MEGABYTE:.3g} MB, together {unpacked / MEGABYTE:.3g} MB"
+                shown = f"{pages} pages of up to {max(sizes) / MEGABYTE:.3g} MB, together {unpacked / MEGABYTE:.3g} MB"
                 allowed = f"at most {MOST_PAGES} of {LARGEST_PAGE // MEGABYTE} MB, together {LARGEST_DATA // MEGABYTE} MB"
-                raise InputError("recording", found, allowed, where)
-    if rows != metadata.num_rows:
-        raise InputError("recording", f"{rows} rows in groups", f"{metadata.num_rows} as the file says", where)
+                raise InputError("recording", shown, allowed, where)
+    if found != rows:
+        raise InputError("recording", f"{found} rows in groups", f"{rows} as the file says", where)
 
 
-def _page_sizes(raw: bytes, chunk: Any, where: str) -> list[int]:
+def _page_sizes(raw: bytes, chunk: Struct, where: str) -> list[int]:
     """What each page of a column's chunk unpacks to [bytes]."""
-    starts = [chunk.data_page_offset, chunk.dictionary_page_offset if chunk.has_dictionary_page else None]
-    place = min(start for start in starts if start)
-    end = place + chunk.total_compressed_size
+    place, dictionary = chunk[9, _I64] if (9, _I64) in chunk else -1, chunk.get((11, _I64), 0)
+    # as the library does it
+    place = dictionary if 0 < dictionary < place else place
+    end = place + chunk.get((7, _I64), -1)
     if not 4 <= place <= end <= len(raw) - 8:
         raise InputError("recording", f"pages from byte {place} to {end}", f"pages inside of a file of {len(raw)} bytes", where)
     sizes: list[int] = []
     while place < end:
-        try:
-            header, place = _struct(raw, place)
-        except (IndexError, struct.error, RecursionError):
-            raise InputError("recording", "a page without a header", COMPLETE, where) from None
-        full, packed = header.get(2, -1), header.get(3, -1)
+        header, place = _struct(raw, place)
+        full, packed = header.get((2, _I32), -1), header.get((3, _I32), -1)
         if full < 0 or packed < 0 or place + packed > end:
             raise InputError("recording", f"a page of {packed} bytes that unpack to {full}", "pages inside of their column", where)
         sizes.append(full)
@@ -164,6 +193,63 @@ def _page_sizes(raw: bytes, chunk: Any, where: str) -> list[int]:
     return sizes
 
 
+def _structs(outer: Struct, number: int) -> list[Struct]:
+    """The structures of a list, none where there is no such list."""
+    kind, items = outer.get((number, _LIST), (_STRUCT, []))
+    if kind != _STRUCT and items:
+        raise IndexError
+    return items
+
+
+def _struct(raw: bytes, place: int, depth: int = 0) -> tuple[Struct, int]:
+    """Read a structure in Thrift's compact protocol; returns where it ends, too."""
+    found: Struct = {}
+    number = 0
+    while (head := raw[place]) != 0:
+        place, kind = place + 1, head & 15
+        if head >> 4:
+            number += head >> 4
+        else:
+            number, place = _zigzag(raw, place)
+        if kind in (_TRUE, _FALSE):
+            found[number, kind] = kind == _TRUE
+        else:
+            found[number, kind], place = _value(raw, place, kind, depth)
+    return found, place + 1
+
+
+def _value(raw: bytes, place: int, kind: int, depth: int) -> tuple[Any, int]:
+    if depth > _DEEPEST:
+        raise IndexError
+    if kind in (_TRUE, _FALSE, _I8):
+        return raw[place], place + 1
+    if kind in (_I16, _I32, _I64):
+        return _zigzag(raw, place)
+    if kind == _F64:
+        return struct.unpack_from("<d", raw, place)[0], place + 8
+    if kind == _BYTES:
+        length, place = _varint(raw, place)
+        if place + length > len(raw):
+            raise IndexError
+        return raw[place : place + length], place + length
+    if kind == _STRUCT:
+        return _struct(raw, place, depth + 1)
+    if kind not in (_LIST, _SET):
+        raise IndexError
+    head = raw[place]
+    length, place = (head >> 4, place + 1) if head >> 4 != 15 else _varint(raw, place + 1)
+    items = []
+    for _ in range(length):
+        item, place = _value(raw, place, head & 15, depth + 1)
+        items.append(item)
+    return (head & 15, items), place
+
+
+def _zigzag(raw: bytes, place: int) -> tuple[int, int]:
+    value, place = _varint(raw, place)
+    return (value >> 1) ^ -(value & 1), place
+
+
 def _varint(raw: bytes, place: int) -> tuple[int, int]:
     value = 0
     for shift in range(0, 70, 7):
@@ -171,49 +257,4 @@ def _varint(raw: bytes, place: int) -> tuple[int, int]:
         place += 1
         if not raw[place - 1] & 0x80:
             return value, place
-    raise IndexError
-
-
-def _struct(raw: bytes, place: int, depth: int = 0) -> tuple[dict[int, int], int]:
-    """32-bit numbers of a structure in Thrift's compact protocol by their ids, and where it ends; the rest is passed over."""
-    found: dict[int, int] = {}
-    field = 0
-    while (head := raw[place]) != 0:
-        place += 1
-        if head >> 4:
-            field += head >> 4
-        else:
-            number, place = _varint(raw, place)
-            field = (number >> 1) ^ -(number & 1)
-        kind = head & 15
-        if kind == 5:
-            number, place = _varint(raw, place)
-            found[field] = (number >> 1) ^ -(number & 1)
-        elif kind not in (1, 2):
-            place = _skip(raw, place, kind, depth)
-    return found, place + 1
-
-
-def _skip(raw: bytes, place: int, kind: int, depth: int) -> int:
-    if depth > 8:
-        raise IndexError
-    if kind in (1, 2, 3):
-        return place + 1
-    if kind in (4, 5, 6):
-        return _varint(raw, place)[1]
-    if kind == 7:
-        return place + 8
-    if kind == 8:
-        length, place = _varint(raw, place)
-        return place + length
-    if kind == 12:
-        return _struct(raw, place, depth + 1)[1]
-    if kind in (9, 10):
-        head = raw[place]
-        length, place = (head >> 4, place + 1) if head >> 4 != 15 else _varint(raw, place + 1)
-        for _ in range(length):
-            place = _skip(raw, place, head & 15, depth + 1)
-            if place > len(raw):
-                raise IndexError
-        return place
     raise IndexError

@@ -55,10 +55,10 @@ def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: 
         raise InputError("recording", f"suffix '{path.suffix}'", "one of " + ", ".join(READERS), str(path))
     if not sensors:
         raise InputError("sensors", "none", "at least one sensor", str(path))
-    rate, channels = reader(path, [sensor.name for sensor in sensors], default_rate)
-    samples = np.empty((channels[0].size, len(sensors)))
-    # an overflow is a lost sample, see below
-    with np.errstate(over="ignore"):
+    # what overflows or is no number is a lost sample, see below
+    with np.errstate(all="ignore"):
+        rate, channels = reader(path, [sensor.name for sensor in sensors], default_rate)
+        samples = np.empty((channels[0].size, len(sensors)))
         for i, (sensor, values) in enumerate(zip(sensors, channels, strict=True)):
             samples[:, i] = values
             if sensor.quantity is not Quantity.TRIGGER:

@@ -43,6 +43,8 @@ def uniform(time: FloatArray, expected: float | None = None) -> tuple[float, np.
         raise Irregular(row, f"{time[row]:.9g} after {time[row - 1]:.9g}", "times that rise [s]")
     resolution = _resolution(time)
     typical = float(np.median(step))
+    if not 1e-12 <= typical <= 1e12:
+        raise Irregular(1, f"steps of {typical:.3g} s", "steps from 1e-12 to 1e12 s")
     # steps of rounded times differ by the rounding, their mean hardly does
     typical = float(np.mean(step[np.abs(step - typical) <= max(1.1 * resolution, 0.1 * typical)]))
     index = np.concatenate([[0.0], np.cumsum(np.rint(step / typical))])

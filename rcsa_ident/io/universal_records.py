@@ -69,7 +69,9 @@ def _rate(function: UffFunction, name: str, expected: float | None) -> float:
     time = function.abscissa
     # times in text keep six digits too, so that the later ones are coarse: a straight line through all of them is enough
     places = np.arange(time.size, dtype=float)
-    step, start = np.polynomial.polynomial.Polynomial.fit(places, time, 1).convert().coef[::-1]
+    centred = places - places.mean()
+    step = float(centred @ (time - time.mean()) / (centred @ centred))
+    start = float(time.mean() - step * places.mean())
     if step > 0.0 and np.all(np.abs(start + step * places - time) <= JITTER * step + 1.2 * _SPREAD * np.abs(time)):
         return snapped(1.0 / step, _SPREAD, expected)
     try:
