@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from rcsa_ident.cutting.process import MillingProcess
     from rcsa_ident.dynamics.receptance import Receptance
     from rcsa_ident.machining_setup import Tooling
+    from rcsa_ident.stability.map import StabilityMap
     from rcsa_ident.stability.modes import TipModes
     from rcsa_ident.stability.surface import SurfaceError
     from rcsa_ident.workflows.limits import Limits
@@ -77,6 +78,15 @@ class Subject:
         # a fit knows modes inside its band: those above the identified one are the tool's and the holder's own
         omega = self.omega(BEYOND if isinstance(conditions.method, MARCHING) else 1.0)
         return machine_limits(self.machine, self.tooling.assembly, omega, conditions, DRAWS if bands else 0, self.stiffness_spread)
+
+    def map(self, conditions: LobeConditions, depths: int, full: bool) -> StabilityMap:
+        """Return the map of stable cuts up to the conditions' largest depth."""
+        from rcsa_ident.workflows.maps import machine_map, tip_map
+
+        if self.machine is not None:
+            return machine_map(self.machine, self.tooling.assembly, self.omega(BEYOND), conditions, depths, full)
+        assert self.tip is not None
+        return tip_map(self.tip, conditions, depths, full)
 
     def doubts(self, limits: Limits) -> list[str]:
         """What speaks against the limits beyond their own warnings."""

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.posterior import MachineAxis
     from rcsa_ident.report.lobes import Judged
+    from rcsa_ident.stability.map import StabilityMap
     from rcsa_ident.stability.result import StabilityLobes
     from rcsa_ident.stability.surface import SurfaceError
     from rcsa_ident.stability.tested import TestedCuts
@@ -118,6 +119,14 @@ def lobes(
             help="Also the surface location error of stable cuts at this depth, mm; with --feed-per-tooth-mm.", show_default=False
         ),
     ] = None,
+    map_: Annotated[
+        Path | None,
+        typer.Option(
+            "--map", help="MAP.csv to write: which depths are stable above the first limit, and --plot draws them.", show_default=False
+        ),
+    ] = None,
+    map_depths: Annotated[int, typer.Option(min=2, max=2000, help="Steps of the depth in the map.")] = 100,
+    map_full: Annotated[bool, typer.Option(help="Compute every point of the map instead of following the boundary.")] = False,
     plot: Plot = None,
     bands: Bands = True,
     stiffness_spread: StiffnessSpread = 0.05,
@@ -128,6 +137,8 @@ def lobes(
 
     writable(out)
     check_plot(plot)
+    if map_ is not None:
+        writable(map_, "--map")
     (subject,) = subjects_of(files, tip, stiffness_spread)
     process = process_of(cut, speeds, subject)
     conditions = speeds_of(speeds, process)
@@ -140,17 +151,26 @@ def lobes(
         found, doubts = limits.lobes, subject.doubts(limits)
         tested = None if tests is None else tested_cuts(tests, subject, conditions)
         surface = None if surface_depth_mm is None else subject.surface(process, found.spindle_speed, surface_depth_mm * 1e-3)
+    chart = None
+    if map_ is not None:
+        with stages.stage("map"):
+            chart = subject.map(conditions, map_depths, map_full)
+        write_map(map_, chart)
     doubts += [] if surface is None else list(surface.warnings)
     write_lobes(out, found, limits.band, surface)
     best = best_speeds(found)
     if plot is not None:
         from rcsa_ident.report.lobes import save_figure, stability_figure
 
-        save_figure(stability_figure(found, conditions.max_depth, limits.band, best, tested=tested, surface=surface), str(plot))
+        save_figure(
+            stability_figure(found, conditions.max_depth, limits.band, best, tested=tested, surface=surface, chart=chart), str(plot)
+        )
     if json_:
         summary = lobes_summary(found, best) | (
             {} if tested is None else {"tested": asdict(tested.tally) | {"share_right": tested.tally.share_right}}
         )
+        if chart is not None:
+            summary |= {"map": {"multipliers": chart.evaluations, "error": chart.error, "out": str(map_)}}
         emit(summary | {"warnings": doubts, "seconds": stages.seconds, "out": str(out)} | ({} if plot is None else {"plot": str(plot)}))
         return
     from rcsa_ident.cli.tables import show_lobes, show_tally
@@ -162,6 +182,9 @@ def lobes(
         warn(doubt)
     if plot is not None:
         say(f"drawn: {plot}")
+    if chart is not None:
+        points = f"{chart.growth.size} cuts, {chart.evaluations} multipliers, {stages.seconds['map']:.2f} s"
+        say(f"written: {map_} ({points})")
     say(f"written: {out} ({found.spindle_speed.size} speeds, {stages.seconds['lobes']:.2f} s)")
 
 
@@ -245,6 +268,15 @@ def peaks_of(frequency: FloatArray, response: TooltipResponse) -> dict[Dof, Any]
             band = 2.0 * math.hypot(real * unit.real, imaginary * unit.imag)
         peaks[axis] = (peak_row(frequency, values), band)
     return peaks
+
+
+def write_map(path: Path, chart: StabilityMap) -> None:
+    """Write MAP.csv."""
+    import numpy as np
+
+    from rcsa_ident.io.curves import write_map_csv
+
+    write_map_csv(path, np.round(chart.spindle_speed * (30.0 / np.pi), 9), np.round(chart.depth * 1e3, 9), chart.growth)
 
 
 def write_lobes(

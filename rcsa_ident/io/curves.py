@@ -152,6 +152,22 @@ def write_speed_csv(path: str | Path, speed_rpm: ArrayLike, columns: Mapping[str
     _write(path, {LOBES[0]: speed}, columns, finite=[LOBES[0]])
 
 
+def write_map_csv(path: str | Path, speed_rpm: FloatArray, depth_mm: FloatArray, growth: FloatArray) -> None:
+    """Write a map of stable cuts, a row for each speed and depth: how fast a vibration grows per tooth, and 1 where none does.
+
+    Parameters
+    ----------
+    speed_rpm : array, shape (n,)
+    depth_mm : array, shape (k,)
+    growth : array, shape (n, k) [-]
+        Logarithm of the growth per tooth period.
+    """
+    n, k = growth.shape
+    columns = {LOBES[0]: np.repeat(speed_rpm, k), "axial_depth_mm": np.tile(depth_mm, n)}
+    further = {"growth_per_tooth": growth.ravel(), "stable": (growth.ravel() < 0.0).astype(float)}
+    _write(path, columns, further, finite=list(columns), whole=["stable"])
+
+
 def read_lobes_csv(path: str | Path) -> LobeCurves:
     """Return stability lobes and further columns of LOBES.csv; an empty cell is NaN."""
     table = read_table(path, "lobes")

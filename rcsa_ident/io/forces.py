@@ -14,7 +14,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.delimited import read_table
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.keys import Table, listed
-from rcsa_ident.io.setups import _sensor
+from rcsa_ident.io.setups import sensor_of
 from rcsa_ident.signals.recording import Sensor
 
 TIME = "time_s"
@@ -73,7 +73,7 @@ def sensors_of_result(data: Mapping[str, Any], where: str) -> tuple[Sensor, ...]
         The file, for the messages.
     """
     tables = Table(data, where).named_tables("sensors")
-    sensors = tuple(_sensor(name, table.data, where) for name, table in tables.items())
+    sensors = tuple(sensor_of(name, table.data, where) for name, table in tables.items())
     if not sensors:
         raise InputError("sensors", "none", "at least one sensor", where)
     return sensors

@@ -186,7 +186,7 @@ def read_campaign(folder: str | Path) -> Campaign:
     return Campaign(name, rate, sensors, workpiece, toolings, cuts)
 
 
-def _sensor(name: str, data: Any, where: str) -> Sensor:
+def sensor_of(name: str, data: Any, where: str) -> Sensor:
     kind = Table(data, where, f"sensors.{name}", sorted({*_SENSOR, *_TRIGGER}))
     quantity = Quantity(kind.text("quantity", choices=tuple(Quantity)))
     trigger = quantity is Quantity.TRIGGER

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS, _grid
+from rcsa_ident.stability.map import StabilityMap
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.surface import SurfaceError
 from rcsa_ident.stability.tested import Tally, TestedCuts, Verdict
@@ -60,6 +61,7 @@ def stability_figure(
     true_limit: FloatArray | None = None,
     tested: Judged | None = None,
     surface: SurfaceError | None = None,
+    chart: StabilityMap | None = None,
 ) -> Figure:
     """Limit depth over spindle speed, the chatter frequency below, the best speeds marked.
 
@@ -76,13 +78,17 @@ def stability_figure(
         Drawn over the lobes.
     surface : SurfaceError, optional
         Drawn below them.
+    chart : StabilityMap, optional
+        Tells the cuts that are stable above the first limit.
     """
     rows = (2.2, 1.0) if surface is None else (2.2, 1.0, 1.0)
     figure, grid = _grid(len(rows), 1, 4.6 if surface is None else 5.8, rows, sharey="none")
     top, bottom = grid[0, 0], grid[-1, 0]
     with mpl.rc_context(_STYLE):
         ceiling = _ceiling(lobes, max_depth, tested)
-        _draw_limit(top, lobes, max_depth, ceiling, band)
+        if chart is not None:
+            ceiling = 1e3 * float(chart.depth[-1])
+        _draw_limit(top, lobes, max_depth, ceiling, band, chart)
         if true_limit is not None:
             top.plot(
                 lobes.spindle_speed * _RPM, 1e3 * np.minimum(true_limit, max_depth), "--", color=_TRUTH, lw=1.1, label="from the true FRF"
@@ -117,11 +123,23 @@ def _ceiling(lobes: StabilityLobes, max_depth: float, tested: Judged | None) -> 
 
 
 def _draw_limit(
-    ax: Axes, lobes: StabilityLobes, max_depth: float, ceiling: float, band: tuple[FloatArray, FloatArray] | None = None
+    ax: Axes,
+    lobes: StabilityLobes,
+    max_depth: float,
+    ceiling: float,
+    band: tuple[FloatArray, FloatArray] | None = None,
+    chart: StabilityMap | None = None,
 ) -> None:
     speed, limit = lobes.spindle_speed * _RPM, 1e3 * np.minimum(lobes.limit_depth, max_depth)
-    ax.fill_between(speed, 0.0, limit, color="#009E73", alpha=0.13, lw=0)
-    ax.fill_between(speed, limit, ceiling, color="#C8501A", alpha=0.10, lw=0)
+    if chart is None:
+        ax.fill_between(speed, 0.0, limit, color="#009E73", alpha=0.13, lw=0)
+        ax.fill_between(speed, limit, ceiling, color="#C8501A", alpha=0.10, lw=0)
+    else:
+        # a cut of no depth is stable
+        depth = 1e3 * np.concatenate([[0.0], chart.depth])
+        growth = np.concatenate([np.minimum(chart.growth[:, :1], -0.1), chart.growth], axis=1).T
+        ax.contourf(chart.spindle_speed * _RPM, depth, growth, [-np.inf, 0.0, np.inf], colors=["#009E73", "#C8501A"], alpha=0.13)
+        ax.contour(chart.spindle_speed * _RPM, depth, growth, [0.0], colors=[_GREY], linewidths=0.9)
     if band is not None:
         low, high = (1e3 * np.minimum(edge, max_depth) for edge in band)
         ax.fill_between(speed, low, high, color=COLOURS["X"], alpha=0.35, lw=0, label="95 % of what the records leave open")

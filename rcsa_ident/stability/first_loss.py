@@ -9,11 +9,15 @@ import scipy.optimize
 
 #: Ratio of the depths at which the growth is looked at before a change of sign is refined, and far from one.
 RATIO, _LONG = 1.2, 1.6
+#: The same where islands may stand.
+_CAREFUL = 1.05
 #: A peak of the growth below zero that comes so near to it, as a share of the growth without a cut, is looked at closely.
 _NEAR = 0.4
 
 
-def first_loss(growth: Callable[[float], float], low: float, high: float, tolerance: float, ratio: float = RATIO) -> float | None:
+def first_loss(
+    growth: Callable[[float], float], low: float, high: float, tolerance: float, ratio: float = RATIO, careful_from: float = np.inf
+) -> float | None:
     """Return the smallest depth at which `growth` changes from negative to positive, or None if there is none up to `high`.
 
     The growth is looked at on a ladder of depths; between three of them it may rise above zero and fall again, as it does where
@@ -30,6 +34,8 @@ def first_loss(growth: Callable[[float], float], low: float, high: float, tolera
         Of the depth, relative.
     ratio : float
         Between steps of the ladder.
+    careful_from : float
+        Depth beyond which its steps are small whatever the growth: islands may stand there.
     """
     seen: dict[float, float] = {}
 
@@ -51,7 +57,8 @@ def first_loss(growth: Callable[[float], float], low: float, high: float, tolera
     while depths[-1] < high:
         # far below zero, as deep as a tool that does not cut, the ladder's steps are long
         calm = min(max(2.0 * values[-1] / at_low - 1.0, 0.0), 1.0)
-        depths.append(min(depths[-1] * (ratio + (_LONG - ratio) * calm), high))
+        step = ratio + (_LONG - ratio) * calm
+        depths.append(min(max(min(depths[-1] * step, careful_from), depths[-1] * _CAREFUL), high))
         values.append(known(depths[-1]))
         if values[-1] >= 0.0:
             return _root(known, depths[-2], depths[-1], tolerance)

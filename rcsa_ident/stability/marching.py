@@ -15,6 +15,8 @@ _WEAK = 0.02
 #: Nodes per period of the highest mode that counts, with polynomials of high degree and as many more with those of low degree;
 #: steps, where coefficients stand still.
 _NODES, _LOW_DEGREE, _STEPS = 9.0, 4.0, 24.0
+#: Depth over axial pitch beyond which islands may stand under a limit: the one at 5 % immersion and 30 degrees stands at 0.2.
+ISLANDS = 0.1
 #: Residual of the multiplier for a first look.
 ROUGH = 1e-4
 #: How much finer the step is by which the error is told, and how often the search is repeated with it.
@@ -60,6 +62,19 @@ def surely_stable(cut: PeriodMap) -> float:
     return 0.9 / (2.0 * teeth * c.tangential * float(np.hypot(1.0, c.radial_ratio)) * cut.modes.largest)
 
 
+def islands_from(cut: PeriodMap) -> float:
+    """The depth beyond which islands of instability may stand under the first limit.
+
+    Where a helix spreads an interrupted cut over the angle, period doubling ends above as well as below, at depths that are shares
+    of the axial pitch.
+    """
+    process = cut.process
+    in_cut = process.cutter.teeth * (process.engagement.exit - process.engagement.entry) / (2.0 * np.pi)
+    if process.cutter.helix == 0.0 or in_cut >= 1.0:
+        return np.inf
+    return float(ISLANDS * np.pi * process.cutter.diameter / (process.cutter.teeth * np.tan(process.cutter.helix)))
+
+
 def marched_lobes(
     cut: PeriodMap, speeds: FloatArray, max_depth: float, intervals: int | None, tolerance: float, method: str
 ) -> StabilityLobes:
@@ -94,10 +109,10 @@ def _limit(
     tooth = 2.0 * np.pi / (cut.process.cutter.teeth * speed)
     if intervals is not None:
         step = tooth / intervals
-        return first_loss(Growth(cut, speed, step), low, max_depth, 1e-3 * tolerance), step, True
+        return first_loss(Growth(cut, speed, step), low, max_depth, 1e-3 * tolerance, careful_from=islands_from(cut)), step, True
     # a search that is a little too deep and a little rough, then the limit from where it ended
     step = longest_step(cut)
-    depth = first_loss(Growth(cut, speed, step, ROUGH), low, 1.1 * max_depth, 10.0 * tolerance)
+    depth = first_loss(Growth(cut, speed, step, ROUGH), low, 1.1 * max_depth, 10.0 * tolerance, careful_from=islands_from(cut))
     if depth is None:
         return None, step, True
     for _ in range(_REPEATS):
@@ -105,7 +120,7 @@ def _limit(
         found = _polished(growth, depth, tolerance)
         if found is None:
             # not there with the finer step: looked for again
-            depth = first_loss(growth, low, 1.1 * max_depth, tolerance)
+            depth = first_loss(growth, low, 1.1 * max_depth, tolerance, careful_from=islands_from(cut))
             if depth is None:
                 return None, step, True
             found = depth, (growth(1.01 * depth) - growth(0.99 * depth)) / (0.02 * depth)

@@ -19,6 +19,9 @@ from rcsa_ident.identification.data import IdentificationData, prepare
 from rcsa_ident.identification.default import DefaultMethod
 from rcsa_ident.identification.paper import PaperGeneticAlgorithm
 from rcsa_ident.identification.search import SearchSettings
+from rcsa_ident.observer.force_model import RandomWalk, augmented
+from rcsa_ident.observer.kalman import kalman_filter
+from rcsa_ident.observer.transfer_function import SampledModes
 from rcsa_ident.signals.measurement import AxisLines, CutMeasurement, measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
@@ -103,6 +106,14 @@ def _lobes_in_time() -> None:
         LobeConditions(process, speeds, 1e-3, method).lobes(TipModes.of({Dof.X: model}))
 
 
+def _observer() -> None:
+    plant = SampledModes(np.array([0.9 + 0.2j]), np.array([1e-8 + 0.0j]), 0.0, 1e-4)
+    kalman = kalman_filter(augmented(plant, RandomWalk(10.0, 100.0), 1e-8), 2)
+    measured = plant.run(plant.init(), np.zeros(8))[1]
+    kalman.smooth(kalman.run(kalman.init(), measured)[1])
+    kalman.run_lagged(kalman.init(), measured, kalman.lag_weights(2))
+
+
 def _virtual_machine() -> None:
     places = [f"{place}.{axis}" for place in ("tip", "flange", "fixture") for axis in "xy"]
     pole = np.array([-100.0 + 5000.0j, -100.0 + 6000.0j])
@@ -120,5 +131,6 @@ STEPS: dict[str, Callable[[], None]] = {
     "paper's method": _paper_method,
     "lobes": _lobes,
     "lobes in time": _lobes_in_time,
+    "force observer": _observer,
     "virtual machine": _virtual_machine,
 }

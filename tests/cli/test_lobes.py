@@ -68,6 +68,30 @@ def test_every_method_from_modes_and_from_tap_tests(shop, method):
     assert (shop / "a.csv").read_text(encoding="utf-8").splitlines()[0].endswith(",lobe,flip")
 
 
+def test_a_map_knows_islands_that_the_first_limit_does_not(tmp_path):
+    """The helical mill at low immersion: closed islands of period doubling under and above the lobes."""
+    (tmp_path / "M.toml").write_text(
+        "[[x]]\nnatural_frequency_hz = 922.0\ndamping_ratio = 0.011\nmodal_mass_kg = 0.03993\n", encoding="utf-8"
+    )
+    text = by_hand.TOOLING.replace("teeth = 4", "teeth = 2\nhelix_deg = 30.0")
+    (tmp_path / "T.toml").write_text(text, encoding="utf-8")
+    told = answer_of(
+        *("lobes", "--modes", tmp_path / "M.toml", tmp_path / "T.toml", "--ktc-mpa", 600, "--krc", 1 / 3, "--immersion", 0.05),
+        *("--strategy", "up", "--method", "full-discretisation", "--speed-from", 11500, "--speed-to", 13500, "--speed-step", 50),
+        *("--max-depth-mm", 16, "--out", tmp_path / "L.csv", "--map", tmp_path / "M.csv", "--plot", tmp_path / "L.png"),
+    )
+    rows = np.loadtxt(tmp_path / "M.csv", delimiter=",", skiprows=1)
+    assert rows.shape == (41 * 100, 4)
+    assert told["map"]["multipliers"] < 2000
+    at = rows[rows[:, 0] == 12150.0]
+    np.testing.assert_array_equal(at[:, 3], at[:, 2] < 0.0)
+    # stable, an island, stable again, then the lobe
+    assert np.count_nonzero(np.diff(at[:, 3])) == 3
+    limit = read_lobes_csv(tmp_path / "L.csv").limit[read_lobes_csv(tmp_path / "L.csv").speed == 12150.0]
+    assert at[at[:, 3] == 0.0, 1].min() - 0.16 <= limit[0] <= at[at[:, 3] == 0.0, 1].min()
+    assert (tmp_path / "L.png").stat().st_size > 10_000
+
+
 def test_tested_cuts_are_counted_at_their_own_speeds(shop):
     speed = 10013.0
     run("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, "--speed-from", speed, "--speed-to", speed, "--out", shop / "one.csv")
