@@ -171,7 +171,7 @@ def read_campaign(folder: str | Path) -> Campaign:
     name = head.text("name", folder.resolve().name)
     rate = head.number("sampling_rate_hz", "Hz", None, above=0.0, most=1e8)
     channels = top.table("sensors")
-    sensors = tuple(_sensor(key, channels.data[key], str(path)) for key in channels)
+    sensors = tuple(sensor_of(key, channels.data[key], str(path)) for key in channels)
     if not sensors:
         top.refuse("sensors", "an empty table", "at least one table [sensors.<channel>]")
     workpiece = workpiece_of(top.table("workpiece", WORKPIECE_KEYS))
