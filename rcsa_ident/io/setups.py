@@ -187,6 +187,7 @@ def read_campaign(folder: str | Path) -> Campaign:
 
 
 def sensor_of(name: str, data: Any, where: str) -> Sensor:
+    """Return the sensor of one table, whose key is the channel's name; also a result file carries such tables."""
     kind = Table(data, where, f"sensors.{name}", sorted({*_SENSOR, *_TRIGGER}))
     quantity = Quantity(kind.text("quantity", choices=tuple(Quantity)))
     trigger = quantity is Quantity.TRIGGER
