@@ -80,7 +80,9 @@ def placed(time: FloatArray, channels: Sequence[FloatArray], expected: float | N
 
 def lacks(what: str, package: str, extra: str, where: str) -> InputError:
     """Return the error of a format whose package is not installed."""
-    return InputError("recording", f"{what}, and {package} is not installed", f'an installation with pip install "rcsa-ident[{extra}]"', where)
+    return InputError(
+        "recording", f"{what}, and {package} is not installed", f'an installation with pip install "rcsa-ident[{extra}]"', where
+    )
 
 
 def cannot_be_read(error: Exception, allowed: str, where: str) -> InputError:

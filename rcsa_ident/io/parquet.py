@@ -118,7 +118,7 @@ def _checked(described: Struct, names: Sequence[str], default: float | None, raw
         kind = _kind(columns[place])
         if kind not in _NUMBERS:
             raise InputError(f"column {name}", f"values of type {kind}", f"numbers ({', '.join(_NUMBERS)})", where)
-    rows = described[3, _I64] if (3, _I64) in described else -1
+    rows = described.get((3, _I64), -1)
     if rows < 1:
         raise InputError("recording", f"{rows} rows", "at least one row", where)
     check_declared(rows, len(wanted), len(raw), where)
@@ -174,7 +174,7 @@ def _check_groups(groups: Sequence[Struct], places: Sequence[int], rows: int, ra
 
 def _page_sizes(raw: bytes, chunk: Struct, where: str) -> list[int]:
     """What each page of a column's chunk unpacks to [bytes]."""
-    place, dictionary = chunk[9, _I64] if (9, _I64) in chunk else -1, chunk.get((11, _I64), 0)
+    place, dictionary = chunk.get((9, _I64), -1), chunk.get((11, _I64), 0)
     # as the library does it
     place = dictionary if 0 < dictionary < place else place
     end = place + chunk.get((7, _I64), -1)

@@ -57,7 +57,10 @@ def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: 
         raise InputError("sensors", "none", "at least one sensor", str(path))
     # what overflows or is no number is a lost sample, see below
     with np.errstate(all="ignore"):
-        rate, channels = reader(path, [sensor.name for sensor in sensors], default_rate)
+        try:
+            rate, channels = reader(path, [sensor.name for sensor in sensors], default_rate)
+        except InputError as error:
+            raise (error if error.where else error.at(str(path))) from None
         samples = np.empty((channels[0].size, len(sensors)))
         for i, (sensor, values) in enumerate(zip(sensors, channels, strict=True)):
             samples[:, i] = values

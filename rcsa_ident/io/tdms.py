@@ -82,9 +82,7 @@ def _check_structure(raw: bytes, where: str) -> None:
                 found = f"a segment that is cut off, {len(raw) - place} bytes left of it"
                 raise InputError("recording", found, COMPLETE, where)
             if flags & _METADATA:
-                paths, properties = _segment_paths(
-                    raw[start : start + metadata], order, len(raw), MOST_ENTRIES - entries, where
-                )
+                paths, properties = _segment_paths(raw[start : start + metadata], order, len(raw), MOST_ENTRIES - entries, where)
                 present = set(paths) if flags & _NEW_LIST else present | set(paths)
                 entries += properties
             entries, segments, place = entries + len(present), segments + 1, start + whole

@@ -22,7 +22,7 @@ _TIME_KINDS = (1, 0)
 _TIME_AXIS = (17, 0)
 #: Six digits of the header's step, and of times in text.
 _DIGITS = 6
-_SPREAD = 0.5000001 * 10.0 ** (1 - _DIGITS)
+_SPREAD = 0.5001 * 10.0 ** (1 - _DIGITS)
 
 
 def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[FloatArray]]:
@@ -72,8 +72,10 @@ def _rate(function: UffFunction, name: str, expected: float | None) -> float:
     centred = places - places.mean()
     step = float(centred @ (time - time.mean()) / (centred @ centred))
     start = float(time.mean() - step * places.mean())
-    if step > 0.0 and np.all(np.abs(start + step * places - time) <= JITTER * step + 1.2 * _SPREAD * np.abs(time)):
-        return snapped(1.0 / step, _SPREAD, expected)
+    off = np.abs(start + step * places - time)
+    if step > 0.0 and np.all(off <= JITTER * step + 1.2 * _SPREAD * np.abs(time)):
+        # rounding by at most `off` turns the line by at most 3 off / (n step) of its slope
+        return snapped(1.0 / step, 3.3 * float(off.max()) / (time.size * step) + 1e-9, expected)
     try:
         rate, index = uniform(time, expected)
     except Irregular as error:
@@ -85,4 +87,4 @@ def _rate(function: UffFunction, name: str, expected: float | None) -> float:
 
 def _spread(step: float) -> float:
     """Half a unit of the sixth digit, relative."""
-    return 0.5000001 * 10.0 ** (math.floor(math.log10(step)) + 1 - _DIGITS) / step
+    return 0.5001 * 10.0 ** (math.floor(math.log10(step)) + 1 - _DIGITS) / step

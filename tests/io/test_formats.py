@@ -177,6 +177,16 @@ def test_lost_samples_are_nan(tmp_path, name):
     assert np.isnan(read_recording(path, SENSORS[:1]).samples[:, 0]).tolist() == [False, True, True, True, False] * 10
 
 
+def read_or_refused(path: Path) -> None:
+    """Any other exception ends the test."""
+    sentence = ""
+    try:
+        assert read_recording(path, SENSORS[:2], 51200.0).samples.shape[1] == 2
+    except InputError as error:
+        sentence = str(error)
+    assert "\n" not in sentence
+
+
 @pytest.mark.parametrize("name", FORMATS)
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
@@ -192,12 +202,7 @@ def test_damage_never_raises_anything_else(tmp_path_factory, name, data):
         length = data.draw(st.integers(0, 8))
         raw[place : place + length] = data.draw(st.binary(max_size=8))
     path.write_bytes(bytes(raw))
-    try:
-        found = read_recording(path, SENSORS[:2], 51200.0)
-    except InputError as error:
-        assert "\n" not in str(error)
-    else:
-        assert found.samples.shape[1] == 2
+    read_or_refused(path)
 
 
 @pytest.mark.parametrize("suffix", READERS)
@@ -208,10 +213,7 @@ def test_noise_never_raises_anything_else(tmp_path_factory, suffix, raw):
     heads = {".tdms": b"TDSm", ".wav": b"RIFF\0\0\0\0WAVE", ".parquet": b"PAR1", ".uff": b"    -1\n    58\n"}
     mat = bytes(124) + b"\x00\x01IM"
     path.write_bytes({**heads, ".mat": mat}.get(suffix, b"") + raw + (b"PAR1" if suffix == ".parquet" else b""))
-    try:
-        read_recording(path, SENSORS[:1], 51200.0)
-    except InputError as error:
-        assert "\n" not in str(error)
+    read_or_refused(path)
 
 
 @pytest.mark.parametrize(("module", "suffix", "extra"), [("nptdms", ".tdms", "tdms"), ("pyarrow", ".parquet", "parquet")])

@@ -106,8 +106,11 @@ def two_groups(path: Path, **second: object) -> None:
     stamps = {"wf_increment": 1e-3, "wf_start_offset": 0.0}
     with nptdms.TdmsWriter(str(path)) as writer:
         writer.write_segment(
-            [nptdms.ChannelObject("one", "a", RAMP, stamps), nptdms.ChannelObject("two", "a", -RAMP, stamps | second)]
-            + [nptdms.ChannelObject("two", "b", 2 * RAMP, stamps | second)]
+            [
+                nptdms.ChannelObject("one", "a", RAMP, stamps),
+                nptdms.ChannelObject("two", "a", -RAMP, stamps | second),
+                nptdms.ChannelObject("two", "b", 2 * RAMP, stamps | second),
+            ]
         )
 
 
