@@ -88,4 +88,4 @@ def lacks(what: str, package: str, extra: str, where: str) -> InputError:
 def cannot_be_read(error: Exception, allowed: str, where: str) -> InputError:
     """Return one sentence for whatever a library raised on a broken file."""
     reason = " ".join((str(error) or type(error).__name__).split())
-    return InputError("recording", f"one that cannot be read ({reason[:90]})", allowed, where)
+    return InputError("recording", f"one that cannot be read ({listed([reason[:90]])})", allowed, where)

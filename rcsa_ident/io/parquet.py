@@ -27,6 +27,7 @@ from rcsa_ident.io.channels import (
     the_only,
 )
 from rcsa_ident.io.files import MEGABYTE, read_bytes
+from rcsa_ident.io.keys import listed
 from rcsa_ident.io.time_base import Irregular
 
 COMPLETE = "a complete Parquet file"
@@ -144,7 +145,7 @@ def _rate(pairs: Sequence[Struct], default: float | None, where: str) -> float |
             try:
                 return positive(RATE, float(text), "Hz")
             except ValueError:
-                raise InputError(RATE, text, "a finite number greater than 0 [Hz]", where) from None
+                raise InputError(RATE, listed([text]), "a finite number greater than 0 [Hz]", where) from None
     return default
 
 

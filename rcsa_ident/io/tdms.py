@@ -20,6 +20,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io.channels import LARGEST_FILE, RATE, cannot_be_read, check_declared, check_lengths, lacks, snapped, the_only
 from rcsa_ident.io.files import read_bytes
+from rcsa_ident.io.keys import listed
 
 COMPLETE = "a complete TDMS file"
 MOST_SEGMENTS = 100_000
@@ -191,7 +192,7 @@ def _check_scales(properties: Mapping[str, Any], field: str, where: str) -> None
         return
     count = properties.get("NI_Number_Of_Scales", 0)
     if not isinstance(count, int | np.integer) or not 0 <= count <= MOST_SCALES:
-        raise InputError(field, f"{count} scalings", f"from 0 to {MOST_SCALES}", where)
+        raise InputError(field, f"{listed([str(count)])} scalings", f"from 0 to {MOST_SCALES}", where)
     sums = 0
     for key, value in properties.items():
         match = re.fullmatch(r"NI_Scale\[(\d{1,9})\]_(.+)", key)
@@ -201,13 +202,15 @@ def _check_scales(properties: Mapping[str, Any], field: str, where: str) -> None
         if number >= MOST_SCALES:
             raise InputError(field, f"a scaling of number {number}", f"a number below {MOST_SCALES}", where)
         if what == "Scale_Type" and value not in SCALES:
-            raise InputError(field, f"a scaling of type {value}", f"one of {', '.join(SCALES)}", where)
+            raise InputError(field, f"a scaling of type {listed([str(value)])}", f"one of {', '.join(SCALES)}", where)
         sums += what == "Scale_Type" and value in ("Add", "Subtract")
         raw = isinstance(value, int | np.integer) and value == _NO_DATA
         if what.endswith("Input_Source") and not raw and not (isinstance(value, int | np.integer) and 0 <= value < number):
-            raise InputError(field, f"scaling {number} of scaling {value}", "the input of a scaling before its output", where)
+            raise InputError(
+                field, f"scaling {number} of scaling {listed([str(value)])}", "the input of a scaling before its output", where
+            )
         if what.endswith("_Size") and not (isinstance(value, int | np.integer) and 0 <= value <= len(properties)):
-            raise InputError(field, f"a scaling of {value} values", f"at most {len(properties)}", where)
+            raise InputError(field, f"a scaling of {listed([str(value)])} values", f"at most {len(properties)}", where)
     # each may double the work of those before it
     if sums > 4:
         raise InputError(field, f"{sums} sums of scalings", "at most 4", where)
@@ -224,7 +227,7 @@ def _rate(found: Sequence[Any], names: Sequence[str], default: float | None, whe
             rates.append(positive(RATE, default, "Hz"))
             continue
         if not isinstance(step, int | float) or not 0.0 < step < math.inf or not 0.0 < 1.0 / step < math.inf:
-            raise InputError(f"wf_increment of channel {name}", step, "a finite number above 0 [s]", where)
+            raise InputError(f"wf_increment of channel {name}", listed([str(step)]), "a finite number above 0 [s]", where)
         rates.append(snapped(1.0 / step, 1e-9, default))
     if len(set(rates)) > 1:
         shown = ", ".join(f"{n}: {r:g}" for n, r in zip(names, rates, strict=True))
@@ -242,7 +245,7 @@ def _start(properties: Mapping[str, Any], name: str, where: str) -> tuple[int, f
     """Whole seconds and the rest of a channel's start, and whether the file says when that was."""
     offset = properties.get("wf_start_offset", 0.0)
     if not isinstance(offset, int | float) or not math.isfinite(offset):
-        raise InputError(f"wf_start_offset of channel {name}", offset, "a finite number [s]", where)
+        raise InputError(f"wf_start_offset of channel {name}", listed([str(offset)]), "a finite number [s]", where)
     stamp = properties.get("wf_start_time")
     if stamp is None:
         return 0, offset, "wf_start_offset" in properties

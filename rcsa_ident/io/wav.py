@@ -13,6 +13,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.channels import LARGEST_FILE, RATE, check_declared, the_only
 from rcsa_ident.io.files import read_bytes
+from rcsa_ident.io.keys import listed
 
 COMPLETE = "a complete WAV file"
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
@@ -64,7 +65,7 @@ def _chunks(raw: bytes, where: str) -> tuple[str, dict[str, tuple[int, int]]]:
         if size == _UNKNOWN_LENGTH and name == "data" and long:
             size = long
         if place + 8 + size > len(raw):
-            raise InputError("recording", f"a chunk '{name.strip()}' that is cut off", COMPLETE, where)
+            raise InputError("recording", f"a chunk {listed([name.strip()])} that is cut off", COMPLETE, where)
         chunks.setdefault(name, (place + 8, size))
         if len(chunks) > _MOST_CHUNKS:
             raise InputError("recording", f"more than {_MOST_CHUNKS} chunks", f"at most {_MOST_CHUNKS}", where)

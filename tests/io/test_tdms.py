@@ -282,3 +282,11 @@ def test_the_walk_agrees_with_the_library(tmp_path):
     paths, properties = reader._segment_paths(raw[28 : 28 + metadata], "<", len(raw), 10**6, "")
     assert paths == [b"/", b"/'g'", b"/'g'/'a'"]
     assert properties == 2 + len(scaled(LINEAR, SQUARE))
+
+
+def test_a_text_of_the_file_stays_in_one_line(tmp_path):
+    for properties in (scaled({"type": "Two\nlines"}), {"wf_increment": "two\nlines"}, scaled(LINEAR, NI_Number_Of_Scales="two\nlines")):
+        write(tmp_path / "cut.tdms", properties)
+        with pytest.raises(InputError) as caught:
+            read_recording(tmp_path / "cut.tdms", (A,))
+        assert "\n" not in str(caught.value)
