@@ -17,6 +17,8 @@ from rcsa_ident.errors import InputError
 #: Lines per half-power bandwidth of the least damped mode, and the most there may be.
 LINES_PER_BANDWIDTH = 10.0
 MOST_LINES = 200_000
+#: How far above the highest mode the harmonics of a force are looked at, and the ratio of frequencies up there.
+_ABOVE, _STRETCH = 10.0, 1.03
 TIP = (Coordinate("tip", Dof.X), Coordinate("tip", Dof.Y))
 
 
@@ -108,17 +110,26 @@ class TipModes:
         values = pole_sum(frozen(omega), np.concatenate([self.pole, self.pole.conj()]), np.concatenate([residues, residues.conj()]))
         return values.reshape(-1, 2, 2) + self.constant
 
-    def receptance(self) -> Receptance:
-        """Return the receptance at frequencies that resolve the sharpest mode, from 0.1 to 2 times the modes' own."""
+    def receptance(self, wide: bool = False) -> Receptance:
+        """Return the receptance at frequencies that resolve the sharpest mode, from 0.1 to 2 times the modes' own.
+
+        Parameters
+        ----------
+        wide : bool
+            From 0.02 times on, and few up to 10 times: where the harmonics of a force still move the tip.
+        """
         frequency = np.abs(self.pole)
         waves = np.abs(self.pole.imag) > 0.0
         step = float(np.min(-2.0 * self.pole.real[waves], initial=np.inf)) / LINES_PER_BANDWIDTH
-        low, high = 0.1 * float(frequency.min()), 2.0 * float(frequency.max())
+        low, high = (0.02 if wide else 0.1) * float(frequency.min()), 2.0 * float(frequency.max())
         step = min(step, (high - low) / 100.0)
         if (high - low) / step > MOST_LINES:
             sharpest = float(np.min(-self.pole.real / frequency))
             raise InputError("damping_ratio", sharpest, f"modes that {MOST_LINES} frequencies resolve")
         omega = np.linspace(low, high, int((high - low) / step) + 2)
+        if wide:
+            tail = np.arange(1, int(np.log(0.5 * _ABOVE) / np.log(_STRETCH)) + 1)
+            omega = np.concatenate([omega, high * _STRETCH**tail])
         return Receptance(omega, self.at(omega), TIP, TIP)
 
     @property
@@ -138,6 +149,6 @@ def modes_of(tip: Receptance | TipModes, method: str) -> TipModes:
     )
 
 
-def receptance_of(tip: Receptance | TipModes) -> Receptance:
+def receptance_of(tip: Receptance | TipModes, wide: bool = False) -> Receptance:
     """Return the receptance that a method in the frequency domain takes."""
-    return tip.receptance() if isinstance(tip, TipModes) else tip
+    return tip.receptance(wide) if isinstance(tip, TipModes) else tip

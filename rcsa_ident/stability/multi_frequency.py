@@ -54,7 +54,7 @@ class MultiFrequency:
             raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
         if np.ptp(cutter.pitch) > 1e-9:
             raise InputError("pitch", np.degrees(cutter.pitch).tolist(), "equal pitch: zero-order and full-discretisation take any")
-        motion = TipMotion.of(receptance_of(tip))
+        motion = TipMotion.of(receptance_of(tip, wide=True))
         teeth = PeriodicTeeth(process, self.harmonics)
         limit = np.full(speeds.size, np.inf)
         chatter = np.full(speeds.size, np.nan)

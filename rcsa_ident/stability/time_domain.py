@@ -280,8 +280,11 @@ class _Cut:
         )
         lag = whole * (np.arange(slices) + 0.5) / slices
         run = _Run(self, plan, lag, np.zeros_like(self.pole), np.zeros(2), np.zeros((self.per_turn + 2, 2)), 0)
-        # from rest through one period of a force that knows no vibration: what is left decides on the state that repeats itself
-        turns = int(np.ceil(self.per_turn / self.per_period))
+        # from rest through one period of a force that knows no vibration: what is left decides on the state that repeats itself;
+        # a period before that one, for a tooth may be in the cut where it begins
+        turns = int(np.ceil(run.past.shape[0] / self.per_period))
+        run.march(self.per_period)
+        run.state[:] = 0.0
         run.march(self.per_period)
         duration = float(np.diff(self.time(self.step * np.array([0.0, self.per_period])))[0])
         run.state /= 1.0 - np.exp(self.pole * duration)
@@ -319,9 +322,8 @@ class _Cut:
         """What two cuts side by side, one of them pushed, differ by: the state's size after each period, and the tip's path."""
         push = _PUSH * self.feed
         still = self.begin(depth)
-        if not self.process.cutter.equally_spaced or self.process.speed_variation is not None:
-            # teeth that differ do not start in their steady state
-            still.settle(1e-3 * push)
+        # teeth that differ, or rub, do not start in their steady state
+        still.settle(1e-3 * push)
         pushed = still.pushed(push)
         scale = np.array([1.0, 1.0, 1.0 / self.highest, 1.0 / self.highest])
         sizes, paths = [], []
