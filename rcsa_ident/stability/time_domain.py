@@ -249,9 +249,15 @@ class _Cut:
         v = self.process.speed_variation
         if v is None:
             return angle / self.speed
-        swing = v.ratio * self.speed
-        dense = np.linspace(0.0, 1.05 * float(angle[-1]) / (self.speed * (1.0 - v.amplitude)), 4 * angle.size)
-        return np.interp(angle, self.speed * (dense + v.amplitude / swing * (1.0 - np.cos(swing * dense))), dense)
+        swing, time = v.ratio * self.speed, angle / self.speed
+        for _ in range(60):
+            # Newton's method, no further than a part of a swing at once
+            change = time + v.amplitude / swing * (1.0 - np.cos(swing * time)) - angle / self.speed
+            change = np.clip(change / (1.0 + v.amplitude * np.sin(swing * time)), -1.0 / swing, 1.0 / swing)
+            time = time - change
+            if np.max(np.abs(change)) * swing < 1e-13:
+                break
+        return time
 
     def begin(self, depth: float) -> _Run:
         """Return a cut in the steady state of equal teeth, where nothing regenerates."""

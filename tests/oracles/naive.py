@@ -8,6 +8,7 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
+import scipy.linalg
 
 
 def pole_sum(omega, pole, residue):
@@ -76,3 +77,92 @@ def zero_order_limit(
                 best, place = 1.0 / (tangential * f.real), middle
         previous = here
     return best, place
+
+
+def directional_integral(phi: np.ndarray, tangential: float, radial: float) -> np.ndarray:
+    """Force on the tool (feed, normal) per chip of teeth at the immersions phi, K_t and K_r each times one: shape (n, 2, 2)."""
+    s, c = np.sin(phi), np.cos(phi)
+    forward, normal = -(tangential * c + radial * s), tangential * s - radial * c
+    return np.stack([np.stack([forward * s, forward * c], axis=-1), np.stack([normal * s, normal * c], axis=-1)], axis=-2)
+
+
+def milling_multiplier(
+    modes: tuple[tuple[int, float, float, float], ...],
+    windows: list[tuple[float, float, float, float]],
+    stiffness: tuple[float, float],
+    edges: np.ndarray,
+    clock: Callable[[np.ndarray], np.ndarray],
+    turn: float = 0.0,
+    lag: float = 0.0,
+    slices: int = 1,
+    rub: tuple[float, float] = (0.0, 0.0),
+    points: int = 8,
+) -> complex:
+    """The largest Floquet multiplier of a milling cut by dense first-order semi-discretisation with matrix exponentials.
+
+    Parameters
+    ----------
+    modes : axis (0 or 1), natural frequency [Hz], damping ratio, mass [kg]
+    windows : (angle ahead of tooth 1, start, end, delay angle) of each tooth
+    stiffness, rub : tangential and radial, depth times K and depth times the viscous force per velocity
+    edges : angles of the steps from 0 to a period
+    clock : time of an angle
+    lag : angle between the two ends of the edge
+    """
+    n, m = edges.size - 1, len(modes)
+    time, period = clock(edges), edges[-1]
+    free, out, into = np.zeros((2 * m, 2 * m)), np.zeros((2, 2 * m)), np.zeros((2 * m, 2))
+    for k, (axis, frequency, zeta, mass) in enumerate(modes):
+        wn = 2.0 * np.pi * frequency
+        free[k, m + k], free[m + k, k], free[m + k, m + k] = 1.0, -(wn**2), -2.0 * zeta * wn
+        out[axis, k], into[m + k, axis] = 1.0, 1.0 / mass
+    rate = np.hstack([np.zeros((2, m)), out[:, :m]])
+    rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
+    total = 2 * m + 2 * n
+    state = np.eye(total)[: 2 * m]
+    past = [np.eye(total)[2 * m + 2 * i : 2 * m + 2 * i + 2] for i in range(n)] + [out @ state]
+    seconds = np.concatenate([time[:-1] - time[-1], time])
+    delays = sorted({w[3] for w in windows})
+    node, share = np.polynomial.legendre.leggauss(points)
+    node, share = 0.5 * (node + 1.0), 0.5 * share
+
+    def before(angle: float) -> np.ndarray:
+        """Where the tip was, on straight lines over time; `angle` from minus a period on."""
+        when = float(clock(np.array([angle]))[0]) if angle >= 0.0 else float(clock(np.array([angle + period]))[0] - time[-1])
+        j = min(max(int(np.searchsorted(seconds, when + 1e-12 * time[-1], side="right")) - 1, 0), len(past) - 2)
+        part = (when - seconds[j]) / (seconds[j + 1] - seconds[j])
+        return past[j] if abs(part) < 1e-9 else (1.0 - part) * past[j] + part * past[j + 1]
+
+    for i in range(n):
+        h = time[i + 1] - time[i]
+        place = edges[i] + node * (edges[i + 1] - edges[i])
+        cut = {d: np.zeros((2, 2)) for d in delays}
+        damping = np.zeros((2, 2))
+        for offset, start, end, d in windows:
+            for z in (np.arange(slices) + 0.5) / slices:
+                phi = np.mod(place + offset - lag * z, 2.0 * np.pi)
+                inside = (share * ((phi >= start) & (phi < end)) / slices)[:, None, None]
+                cut[d] += np.sum(inside * directional_integral(phi, *stiffness), axis=0)
+                damping += np.sum(inside * directional_integral(phi, *rub), axis=0)
+        cut = {d: rotation @ value @ rotation.T for d, value in cut.items()}
+        matrix = free + into @ (sum(cut.values()) @ out + rotation @ damping @ rotation.T @ rate)
+        size = 2 * m
+        step = scipy.linalg.expm(
+            np.block(
+                [
+                    [matrix * h, into * h, np.zeros((size, 2))],
+                    [np.zeros((2, size + 2)), np.eye(2)],
+                    [np.zeros((2, size + 4))],
+                ]
+            )
+        )
+        begin, end_ = np.zeros((2, total)), np.zeros((2, total))
+        for d in delays:
+            if np.any(cut[d]):
+                begin -= cut[d] @ before(edges[i] - d)
+                end_ -= cut[d] @ before(edges[i + 1] - d)
+        after = step[:size, :size] @ state + step[:size, size : size + 2] @ begin + step[:size, size + 2 :] @ (end_ - begin)
+        state = after
+        past.append(out @ state)
+    values = np.linalg.eigvals(np.concatenate([state, *past[n : 2 * n]]))
+    return complex(values[np.argmax(np.abs(values))])

@@ -1,0 +1,69 @@
+"""Mills that the tests of the marching methods share, as modes and as the tables that slow twins take."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+from rcsa_ident.dynamics.modal import ModalModel, normal_modes
+from rcsa_ident.stability import _cut_kernels as kernels
+from rcsa_ident.stability.modes import TipModes
+from rcsa_ident.stability.period_map import PeriodMap
+from tests.oracles.literature import FOUR_MODES, INSPERGER_STEPAN
+
+RPM = np.pi / 30.0
+#: Modes as axis (0 or 1), natural frequency [Hz], damping ratio, mass [kg].
+Table = tuple[tuple[int, float, float, float], ...]
+_I = INSPERGER_STEPAN
+ONE: Table = ((0, _I["natural_frequency_hz"], _I["damping_ratio"], _I["modal_mass"]),)
+TWO: Table = (*ONE, (1, *ONE[0][1:]))
+SKEWED: Table = ((0, 780.0, 0.03, 0.05), (1, 930.0, 0.02, 0.04), (1, 1350.0, 0.03, 0.08))
+FOUR: Table = tuple((axis, *row) for axis, name in ((0, "x"), (1, "y")) for row in FOUR_MODES[name].tolist())
+COEFFICIENTS = CuttingCoefficients(_I["tangential"], _I["normal"] / _I["tangential"])
+FOUR_COEFFICIENTS = CuttingCoefficients(FOUR_MODES["tangential"], FOUR_MODES["normal"] / FOUR_MODES["tangential"])
+SLOT = Engagement(0.0, np.pi)
+HALF = Engagement.from_immersion(0.5, "down")
+
+
+def plane(axis: Dof, table: Table, residual: float = 0.0) -> ModalModel:
+    """Modes of one direction."""
+    _, frequency, zeta, mass = np.array([row for row in table if row[0] == int(axis is Dof.Y)]).T
+    shape, where = 1.0 / np.sqrt(mass)[:, None], (Coordinate("tip", axis),)
+    return normal_modes(2.0 * np.pi * frequency, zeta, shape, where, np.array([[residual]]))
+
+
+def tip(table: Table, residual: tuple[float, float] = (0.0, 0.0), turn: float = 0.0) -> TipModes:
+    """The tip's modes; `turn` is the machine turned about the spindle."""
+    axes = [axis for i, axis in enumerate((Dof.X, Dof.Y)) if any(row[0] == i for row in table)]
+    found = TipModes.of({axis: plane(axis, table, residual[int(axis is Dof.Y)]) for axis in axes})
+    c, s = np.cos(turn), np.sin(turn)
+    rotation = np.array([[c, -s], [s, c]])
+    return TipModes(found.pole, rotation @ found.outputs, found.inputs @ rotation.T, rotation @ found.constant @ rotation.T)
+
+
+def mill(teeth: int = 2, immersion: float = 0.5, strategy: str = "down", helix: float = 0.0, **more) -> MillingProcess:
+    """A cut with a cutter of 12 mm; `pitch` and `runout` are the cutter's."""
+    own = {name: np.asarray(more.pop(name)) for name in ("pitch", "runout") if name in more}
+    coefficients = more.pop("coefficients", COEFFICIENTS)
+    return MillingProcess(Cutter(teeth, 0.012, helix, **own), coefficients, Engagement.from_immersion(immersion, strategy), **more)
+
+
+def plan_of(cut: PeriodMap, speed: float, depth: float, step: float) -> np.ndarray:
+    """The scalars that the kernels take."""
+    process = cut.process
+    c, d, v = process.coefficients, process.damping, process.speed_variation
+    plan = np.zeros(kernels.DELAYS + cut.delays.size)
+    plan[kernels.PERIOD], plan[kernels.SPACING], plan[kernels.SPEED], plan[kernels.DEPTH] = cut.period, cut.spacing, speed, depth
+    plan[kernels.LAG] = 2.0 * np.tan(process.cutter.helix) / process.cutter.diameter
+    plan[kernels.KT], plan[kernels.KR] = c.tangential, c.tangential * c.radial_ratio
+    if d is not None:
+        plan[kernels.CT], plan[kernels.CR] = d.friction * d.strength, d.strength
+    if v is not None:
+        plan[kernels.SWING], plan[kernels.SWINGS] = v.amplitude, v.ratio
+    plan[kernels.RADIUS], plan[kernels.STEP], plan[kernels.FROZEN] = 0.5 * process.cutter.diameter, step, float(cut.frozen)
+    plan[kernels.DELAYS :] = cut.delays
+    return plan
