@@ -68,11 +68,16 @@ def read_tooling(path: str | Path) -> Tooling:
     InputError
         Names the file, the key, what was found and what is allowed.
     """
-    top = Table(read_toml(path, "tooling"), str(path), known=_TOOLING)
+    return tooling_of(read_toml(path, "tooling"), str(path), Path(path).stem)
+
+
+def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
+    """Return the tooling of a table of keys as `read_tooling` finds it in a file; `name` counts where the table has none."""
+    top = Table(data, where, known=_TOOLING)
     materials = material_library(top)
     tool = top.table("tool", ("stickout_mm", "segments"))
     holder = top.table("holder", ("insertion_mm", "segments"))
-    name = top.text("name", Path(path).stem)
+    name = top.text("name", name)
     cutter = _cutter(top.table("cutter", _CUTTER))
     pieces = beam_segments(tool, materials)
     stickout = tool.number("stickout_mm", "mm", above=0.0, most=5000.0) * 1e-3

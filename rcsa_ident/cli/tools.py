@@ -1,0 +1,169 @@
+"""import-tools and draw: toolings from the library of a CAM program, and to scale on paper."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rcsa_ident.cli.common import BAD_INPUT, Json, answers, emit, say, warn, writable
+from rcsa_ident.errors import InputError
+
+if TYPE_CHECKING:
+    from rcsa_ident.io.tool_libraries import Imported
+    from rcsa_ident.tool_holder.geometry import Contact
+
+_ASSUMED = "What the library cannot tell"
+
+
+@answers
+def import_tools(
+    library: Annotated[Path, typer.Argument(help="Tool library of Fusion 360 or HSM: .json, or .tools with it.", show_default=False)],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for one TOOLING.toml a tool; made where it is missing.", show_default=False)
+    ] = None,
+    list_: Annotated[bool, typer.Option("--list", help="Only say what the library holds.")] = False,
+    tool: Annotated[
+        list[str] | None, typer.Option(help="Name or number of a tool to import, as often as wanted; default: all.", show_default=False)
+    ] = None,
+    holder: Annotated[
+        str | None,
+        typer.Option(help="Holder of the library for tools that have none of their own.", show_default=False, rich_help_panel=_ASSUMED),
+    ] = None,
+    stickout_mm: Annotated[
+        float | None,
+        typer.Option(help="Stickout, mm; default: the library's length below the holder.", show_default=False, rich_help_panel=_ASSUMED),
+    ] = None,
+    insertion_mm: Annotated[
+        float | None,
+        typer.Option(
+            help="Length in the holder's bore, mm; default: all that is behind its nose.", show_default=False, rich_help_panel=_ASSUMED
+        ),
+    ] = None,
+    flute_ratio: Annotated[
+        float, typer.Option(help="Equivalent diameter of the fluted part over the cutting diameter.", rich_help_panel=_ASSUMED)
+    ] = 0.8,
+    helix_deg: Annotated[float, typer.Option(help="Helix, degrees, where the library gives none.", rich_help_panel=_ASSUMED)] = 30.0,
+    material: Annotated[
+        str | None,
+        typer.Option(help="Of the tools: carbide, steel; default: the library's.", show_default=False, rich_help_panel=_ASSUMED),
+    ] = None,
+    contact: Annotated[
+        Path | None,
+        typer.Option(help="TOOLING.toml whose contact of tool and holder counts here, too.", show_default=False, rich_help_panel=_ASSUMED),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that are there.")] = False,
+    json_: Json = False,
+) -> None:
+    """Make toolings from the tool library of a CAM program; each file says what was assumed."""
+    from rcsa_ident.io.files import write_text
+    from rcsa_ident.io.tool_libraries import Assumptions, file_names, read_tool_library
+
+    if (out is None) != list_:
+        raise InputError("--out", "nothing" if out is None else "--out beside --list", "a folder, or --list")
+    assumed = Assumptions(flute_ratio, helix_deg, stickout_mm, insertion_mm, material, _contact(contact), holder)
+    entries = _chosen(read_tool_library(library, assumed), tool or [], str(library))
+    made = [entry for entry in entries if entry.tooling is not None]
+    paths: list[Path] = []
+    if out is not None:
+        paths = [out / name for name in file_names([entry.name for entry in made])]
+        there = [path.name for path in paths if path.exists()]
+        if there and not overwrite:
+            raise InputError("--out", f"{len(there)} of the files already ({there[0]})", "another folder, or --overwrite", str(out))
+        _folder(out)
+        for entry, path in zip(made, paths, strict=True):
+            write_text(path, entry.text)
+    if json_:
+        files = dict(zip([entry.number for entry in made], map(str, paths), strict=False))
+        emit(
+            {
+                "library": str(library),
+                "entries": len(entries),
+                "toolings": len(made),
+                "tools": [_row(e, files.get(e.number)) for e in entries],
+            }
+        )
+    else:
+        _show(entries)
+        if out is not None:
+            say(f"written: {len(paths)} toolings to {out}; each begins with what was assumed")
+    if not made:
+        if not json_:
+            warn("no tool of the library became a tooling")
+        raise typer.Exit(BAD_INPUT)
+
+
+@answers
+def draw(
+    tooling: Annotated[Path, typer.Argument(help="TOOLING.toml.", show_default=False)],
+    out: Annotated[Path, typer.Option(help="TOOLING.svg to write.", show_default=False)],
+    json_: Json = False,
+) -> None:
+    """Draw a tooling to scale, dimensioned in millimetres."""
+    from rcsa_ident.io.files import write_text
+    from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.report.drawing import tooling_svg
+
+    writable(out)
+    setup = read_tooling(tooling)
+    write_text(out, tooling_svg(setup))
+    assembly = setup.assembly
+    if json_:
+        lengths = {"stickout_mm": assembly.stickout, "insertion_mm": assembly.insertion, "holder_mm": assembly.holder_length}
+        emit({"name": setup.name, "out": str(out), **{key: round(1e3 * value, 6) for key, value in lengths.items()}})
+    else:
+        say(f"written: {out}")
+
+
+def _contact(path: Path | None) -> Contact | None:
+    if path is None:
+        return None
+    from rcsa_ident.io.setups import read_tooling
+
+    contact = read_tooling(path).assembly.contact
+    if contact is None:
+        raise InputError("contact", "none", "a tooling with a table [contact]", str(path))
+    return contact
+
+
+def _chosen(entries: list[Imported], wanted: list[str], where: str) -> list[Imported]:
+    if not wanted:
+        return entries
+    found: list[Imported] = []
+    for text in wanted:
+        named = [entry for entry in entries if text in (entry.name, str(entry.number))]
+        if not named:
+            raise InputError("--tool", text, f"the name or the number of an entry, from 1 to {len(entries)}; --list shows them", where)
+        found += [entry for entry in named if entry not in found]
+    return found
+
+
+def _folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError("--out", error.strerror or str(error), "a folder that can be written to", str(out)) from None
+
+
+def _row(entry: Imported, path: str | None) -> dict[str, object]:
+    row: dict[str, object] = {"number": entry.number, "name": entry.name, "type": entry.kind, "usable": entry.tooling is not None}
+    return row | {"reason": entry.reason, "notes": list(entry.notes), "file": path}
+
+
+def _show(entries: list[Imported]) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table()
+    for title in ("no.", "tool", "type", "teeth", "Ø mm", "stickout + insertion mm", ""):
+        table.add_column(title, justify="right" if title in ("no.", "teeth", "Ø mm") else "left")
+    for entry in entries:
+        shape = ["", "", ""]
+        if entry.tooling is not None:
+            cutter, assembly = entry.tooling.cutter, entry.tooling.assembly
+            shape = [str(cutter.teeth), f"{1e3 * cutter.diameter:.4g}", f"{1e3 * assembly.stickout:.4g} + {1e3 * assembly.insertion:.4g}"]
+        last = entry.reason or f"{len(entry.notes)} assumptions"
+        table.add_row(str(entry.number), *(escape(text) for text in (entry.name, entry.kind, *shape, last)))
+    Console(highlight=False).print(table)

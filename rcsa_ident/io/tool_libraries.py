@@ -1,0 +1,438 @@
+"""Tool libraries of Fusion 360 and HSM: plain JSON, or that JSON in a zip container (.tools), become toolings.
+
+A library knows the shape of cutter and holder. What it cannot know is said in the tooling's own notes: how the fluted part
+bends, how deep the tool sits, what holds it. Segments of a holder run from the tool's side to the spindle's, as a tooling's do.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import tomllib
+import zipfile
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, NoReturn
+
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.files import MEGABYTE, read_bytes
+from rcsa_ident.io.keys import Table, listed
+from rcsa_ident.io.setups import tooling_of
+from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
+
+LARGEST_LIBRARY = 32 * MEGABYTE
+MOST_ENTRIES = 20_000
+MOST_SEGMENTS = 200
+_MOST_FILES = 100
+UNITS = {"millimeters": 1.0, "inches": 25.4}
+#: Of a holder's length and a gauge line: they come from drawings with rounded figures.
+_ROUNDING = 0.05
+_HOLDER = "holder"
+_CARBIDE, _STEEL = "carbide", "steel"
+_BODIES = {"carbide": _CARBIDE, "hss": _STEEL, "hssco": _STEEL}
+
+
+@dataclass(frozen=True, slots=True)
+class Assumptions:
+    """What a library cannot tell.
+
+    Parameters
+    ----------
+    flute_ratio : float
+        Diameter of the solid cylinder that bends as the fluted part, over the cutting diameter.
+    helix_deg : float [deg]
+        Where the library gives none.
+    stickout_mm, insertion_mm : float or None [mm]
+        None takes the library's length below the holder, and what is left of the tool behind it.
+    material : str or None
+        Of the tool; None takes the library's.
+    contact : Contact or None
+        Of tool and holder; None joins them rigidly.
+    holder : str or None
+        Holder of the library for tools that have none of their own.
+    """
+
+    flute_ratio: float = 0.8
+    helix_deg: float = 30.0
+    stickout_mm: float | None = None
+    insertion_mm: float | None = None
+    material: str | None = None
+    contact: Contact | None = None
+    holder: str | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.3 <= self.flute_ratio <= 1.0:
+            raise InputError("flute ratio", self.flute_ratio, "a ratio from 0.3 to 1")
+        if not 0.0 <= self.helix_deg <= 80.0:
+            raise InputError("helix", self.helix_deg, "an angle from 0 to 80 [deg]")
+        if self.material is not None and self.material not in MATERIALS:
+            raise InputError("material", self.material, f"one of {', '.join(MATERIALS)}")
+        if self.stickout_mm is not None and not 0.0 < self.stickout_mm <= 5000.0:
+            raise InputError("stickout", self.stickout_mm, "a length above 0, at most 5000 [mm]")
+        if self.insertion_mm is not None and not 0.0 <= self.insertion_mm <= 5000.0:
+            raise InputError("insertion", self.insertion_mm, "a length from 0 to 5000 [mm]")
+
+
+class Imported(NamedTuple):
+    """An entry of a library.
+
+    Parameters
+    ----------
+    number : int
+        In the library, from 1.
+    name, kind : str
+    tooling : Tooling or None
+    text : str
+        The tooling as TOML, its notes as comments; empty without one.
+    notes : tuple of str
+        What was assumed.
+    reason : str
+        Why there is no tooling.
+    """
+
+    number: int
+    name: str
+    kind: str
+    tooling: Tooling | None
+    text: str
+    notes: tuple[str, ...]
+    reason: str
+
+
+def read_tool_library(path: str | Path, assumptions: Assumptions | None = None) -> list[Imported]:
+    """Return every entry of a library file, with a tooling or with the reason why there is none.
+
+    Raises
+    ------
+    InputError
+        The file as a whole is no library.
+    """
+    return import_tools(read_bytes(path, "tool library", LARGEST_LIBRARY), str(path), assumptions)
+
+
+def import_tools(raw: bytes, where: str, assumptions: Assumptions | None = None) -> list[Imported]:
+    """Return every entry of a library that is already in memory, see `read_tool_library`."""
+    given = assumptions or Assumptions()
+    content = _content(raw, where)
+    entries = content.get("data", [content]) if isinstance(content, Mapping) else content
+    if (
+        not isinstance(entries, list)
+        or not entries
+        or not any(isinstance(e, Mapping) and ("geometry" in e or "segments" in e) for e in entries)
+    ):
+        raise InputError("tool library", "no list of tools", "a list 'data' of tools with 'geometry' and 'holder'", where)
+    if len(entries) > MOST_ENTRIES:
+        raise InputError("tool library", f"{len(entries)} entries", f"at most {MOST_ENTRIES}", where)
+    spare = None
+    if given.holder is not None:
+        holders = [e for e in entries if isinstance(e, Mapping) and e.get("type") == _HOLDER]
+        named = [e for e in holders if given.holder in (_name(e), _line(e.get("product-id", "")))]
+        if len(named) != 1:
+            known = listed([_name(e) for e in holders]) or "it has none"
+            raise InputError("holder", f"{given.holder}, {len(named)} times", f"one of the library's holders: {known}", where)
+        spare = named[0]
+    found = []
+    for number, entry in enumerate(entries, start=1):
+        place = f"data[{number - 1}]" if len(entries) > 1 or "data" in content else ""
+        if not isinstance(entry, Mapping):
+            found.append(Imported(number, "", "", None, "", (), "no table of keys"))
+            continue
+        name, kind = _name(entry), _line(entry.get("type", ""))
+        try:
+            data, notes = _tooling(Table(entry, where, place), name, given, spare)
+            text = _toml(data, notes)
+            tooling = tooling_of(tomllib.loads(text), where, name)
+            found.append(Imported(number, name, kind, tooling, text, tuple(notes), ""))
+        except _Skipped as skipped:
+            found.append(Imported(number, name, kind, None, "", (), str(skipped)))
+        except InputError as error:
+            reason = _line(f"{error.field}: found {error.found}, allowed is {error.allowed}", 400)
+            found.append(Imported(number, name, kind, None, "", (), reason))
+    return found
+
+
+def file_names(names: Sequence[str]) -> list[str]:
+    """Return a file name for each tooling: letters, digits, points and dashes, no two alike."""
+    found: list[str] = []
+    taken: set[str] = set()
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-._")[:60] or "tool"
+        count, free = 1, plain
+        while free.lower() in taken:
+            count += 1
+            free = f"{plain}-{count}"
+        taken.add(free.lower())
+        found.append(f"{free}.toml")
+    return found
+
+
+class _Skipped(Exception):
+    """An entry is not a milling tool in a holder."""
+
+
+def _content(raw: bytes, where: str) -> Any:
+    """The JSON of a library, out of its container where it is in one."""
+    if raw[:4] == b"PK\x03\x04":
+        raw = _unpacked(raw, where)
+
+    def refuse(text: str) -> NoReturn:
+        raise InputError("tool library", text, "finite numbers", where)
+
+    try:
+        return json.loads(raw.decode("utf-8-sig"), parse_constant=refuse)
+    except InputError:
+        raise
+    except UnicodeDecodeError:
+        raise InputError("tool library", "bytes that are no text", "JSON in UTF-8, or a .tools container with it", where) from None
+    except json.JSONDecodeError as error:
+        raise InputError(
+            "tool library", f"no JSON ({error.msg})", "JSON, or a .tools container with it", f"{where} line {error.lineno}"
+        ) from None
+    except (RecursionError, ValueError):
+        raise InputError("tool library", "JSON without end", "JSON as a tool library has it", where) from None
+
+
+def _unpacked(raw: bytes, where: str) -> bytes:
+    """The one JSON file of a zip container; it is unpacked no further than the limit."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(raw)) as container:
+            files = container.infolist()
+            chosen = [f for f in files if f.filename.lower().endswith(".json")]
+            if len(files) > _MOST_FILES or len(chosen) != 1:
+                raise InputError("tool library", f"{len(chosen)} JSON files among {len(files)}", f"one, among at most {_MOST_FILES}", where)
+            # other methods unpack more than they are asked for
+            if chosen[0].compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) or chosen[0].flag_bits & 1:
+                raise InputError("tool library", "a packed file of another method", "plain or deflated, without a password", where)
+            with container.open(chosen[0]) as file:
+                content = file.read(LARGEST_LIBRARY + 1)
+    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError, NotImplementedError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError("tool library", "a container that is damaged", "a complete zip container", where) from None
+    if len(content) > LARGEST_LIBRARY:
+        raise InputError("tool library", f"more than {LARGEST_LIBRARY // MEGABYTE} MB", f"at most {LARGEST_LIBRARY // MEGABYTE} MB", where)
+    return content
+
+
+def _line(value: Any, longest: int = 200) -> str:
+    """A text of the library as one printable line."""
+    text = value if isinstance(value, str) else ""
+    return " ".join("".join(sign if sign.isprintable() else " " for sign in text).split())[:longest]
+
+
+def _name(entry: Mapping[str, Any]) -> str:
+    return next((text for key in ("description", "product-id", "guid") if (text := _line(entry.get(key, "")))), "tool")
+
+
+def _tooling(entry: Table, name: str, given: Assumptions, spare: Mapping[str, Any] | None) -> tuple[dict[str, Any], list[str]]:
+    """Keys of a tooling file, lengths in millimetres, and what was assumed."""
+    kind = _line(entry.data.get("type", ""))
+    if "mill" not in kind or "thread" in kind:
+        raise _Skipped(f"a {kind}, not a milling tool" if kind else "an entry without a type")
+    notes: list[str] = []
+    scale = _unit(entry, notes)
+    geometry = entry.table("geometry")
+    diameter = geometry.number("DC", "", above=0.0) * scale
+    teeth = geometry.number("NOF", least=1, most=100, whole=True)
+    helix = geometry.number("FHA", "deg", None, least=0.0, most=80.0)
+    if helix is None:
+        helix = given.helix_deg
+        notes.append(f"helix {helix:g} deg: the library gives none")
+    material = _body(entry, given, notes)
+    segments, shank = _tool_segments(entry, geometry, diameter, scale, given, material, notes)
+    stickout, insertion = _lengths(geometry, scale, given, notes)
+    holder = _holder_segments(entry, scale, shank, insertion, spare, notes)
+    if insertion is None:
+        insertion = _behind(sum(s["length_mm"] for s in segments) - stickout, holder, notes)
+        holder = _bored(holder, insertion, shank)
+    data: dict[str, Any] = {
+        "name": name,
+        "cutter": {"teeth": teeth, "diameter_mm": diameter, "helix_deg": helix},
+        "tool": {"stickout_mm": stickout, "segments": segments},
+        "holder": {"insertion_mm": insertion, "segments": holder},
+    }
+    if given.contact is None:
+        notes.append(
+            "no contact: tool and holder are joined rigidly; calibrate it, or take that of a tooling with the same kind of clamping"
+        )
+    else:
+        notes.append("contact of another tooling")
+        keys = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
+        data["contact"] = {key: getattr(given.contact, key) for key in keys}
+    return data, notes
+
+
+def _unit(table: Table, notes: list[str]) -> float:
+    if "unit" not in table:
+        notes.append("lengths in millimetres: the library names no unit")
+        return 1.0
+    unit = table.text("unit", choices=tuple(UNITS))
+    if unit == "inches":
+        notes.append("lengths from inches")
+    return UNITS[unit]
+
+
+def _body(entry: Table, given: Assumptions, notes: list[str]) -> str:
+    if given.material is not None:
+        return given.material
+    named = _line(entry.data.get("BMC", "")).lower()
+    material = _BODIES.get(re.sub(r"[^a-z]", "", named), _CARBIDE)
+    if re.sub(r"[^a-z]", "", named) not in _BODIES:
+        notes.append(f"tool of {material}: the library says {named or 'nothing'}")
+    elif material == _STEEL:
+        notes.append("high-speed steel taken as steel")
+    return material
+
+
+def _tool_segments(
+    entry: Table, geometry: Table, diameter: float, scale: float, given: Assumptions, material: str, notes: list[str]
+) -> tuple[list[dict[str, Any]], float]:
+    """From the tip: fluted part, neck, the library's shaft, shank; and the shank's diameter."""
+    whole = geometry.number("OAL", "", above=0.0) * scale
+    fluted = min(geometry.number("LCF", "", above=0.0) * scale, whole)
+    shank = geometry.number("SFDM", "", None, above=0.0)
+    if shank is None:
+        notes.append("shank as thick as the cutter: the library gives none (SFDM)")
+    shank = diameter if shank is None else shank * scale
+    segments = [{"length_mm": fluted, "outer_diameter_mm": given.flute_ratio * diameter}]
+    notes.append(f"fluted part as a cylinder of {given.flute_ratio:g} times the cutting diameter")
+    shoulder = min((geometry.number("shoulder-length", "", None, least=0.0) or 0.0) * scale, whole)
+    if shoulder > fluted + 1e-6:
+        neck = geometry.number("shoulder-diameter", "", None, above=0.0)
+        segments.append({"length_mm": shoulder - fluted, "outer_diameter_mm": diameter if neck is None else neck * scale})
+    shaft = entry.data.get("shaft")
+    if isinstance(shaft, Mapping) and shaft.get("segments"):
+        segments += _stack(Table(shaft, entry.where, entry.name("shaft")), scale)
+    left = whole - sum(s["length_mm"] for s in segments)
+    if left < -_ROUNDING:
+        geometry.refuse("OAL", f"{whole:.6g} mm, {-left:.6g} less than flutes, neck and shaft", "the length over all")
+    if left > 1e-6:
+        segments.append({"length_mm": left, "outer_diameter_mm": shank})
+    return [s | {"material": material} for s in _merged(segments)], shank
+
+
+def _merged(segments: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Neighbours of one diameter become one."""
+    found: list[dict[str, Any]] = []
+    for each in segments:
+        last = found[-1] if found else each
+        if found and last["outer_diameter_mm"] == each["outer_diameter_mm"] and not {"end_diameter_mm"} & (last.keys() | each.keys()):
+            found[-1] = last | {"length_mm": last["length_mm"] + each["length_mm"]}
+        else:
+            found.append(each)
+    return found
+
+
+def _lengths(geometry: Table, scale: float, given: Assumptions, notes: list[str]) -> tuple[float, float | None]:
+    """Stickout, and insertion where it is given."""
+    if given.stickout_mm is not None:
+        stickout = given.stickout_mm
+    else:
+        stickout = geometry.number("LB", "length below the holder", above=0.0) * scale
+        notes.append(f"stickout {stickout:.6g} mm: the library's length below the holder (LB)")
+    return stickout, given.insertion_mm
+
+
+def _stack(table: Table, scale: float) -> list[dict[str, Any]]:
+    """Cones of a shaft or a holder; those without height only mark a step."""
+    cones = table.tables("segments")
+    if len(cones) > MOST_SEGMENTS:
+        table.refuse("segments", f"{len(cones)} segments", f"at most {MOST_SEGMENTS}")
+    found = []
+    for cone in cones:
+        height = cone.number("height", "", least=0.0) * scale
+        if height < 1e-6:
+            continue
+        lower, upper = (cone.number(key, "", above=0.0) * scale for key in ("lower-diameter", "upper-diameter"))
+        found.append({"length_mm": height, "outer_diameter_mm": lower} | ({} if lower == upper else {"end_diameter_mm": upper}))
+    return found
+
+
+def _holder_segments(
+    entry: Table, scale: float, shank: float, insertion: float | None, spare: Mapping[str, Any] | None, notes: list[str]
+) -> list[dict[str, Any]]:
+    """The holder's cones up to its gauge line, of steel, bored for the tool where the insertion is given."""
+    own = entry.data.get("holder")
+    if isinstance(own, Mapping) and own.get("segments"):
+        table = Table(own, entry.where, entry.name("holder"))
+    elif spare is not None:
+        table = Table(spare, entry.where, "holder")
+        notes.append(f"holder {_name(spare)} of the library")
+    else:
+        raise _Skipped("a tool without a holder; name one of the library's")
+    if "unit" in table:
+        scale = UNITS[table.text("unit", choices=tuple(UNITS))]
+    cones = _stack(table, scale)
+    if not cones:
+        table.refuse("segments", "no height", "cones with a height above 0")
+    gauge = table.number("gaugeLength", "", None, least=0.0)
+    total = sum(c["length_mm"] for c in cones)
+    if gauge and gauge * scale < total - _ROUNDING:
+        cones = _cut(cones, gauge * scale)[0]
+        notes.append(f"holder up to its gauge line, {gauge * scale:.6g} of {total:.6g} mm: what is behind sits in the spindle")
+    elif not gauge:
+        notes.append(f"holder to the end of its last segment, {total:.6g} mm: the library gives no gauge line")
+    notes.append("holder of solid steel behind the tool: the library gives no bore")
+    cones = [c | {"material": _STEEL} for c in cones]
+    return cones if insertion is None else _bored(cones, insertion, shank)
+
+
+def _behind(left: float, holder: list[dict[str, Any]], notes: list[str]) -> float:
+    """Insertion that the library leaves open: what there is of the tool behind the holder's nose, inside of the holder."""
+    if left <= 0.0:
+        raise _Skipped("a tool that ends at the holder's nose (OAL and LB): the insertion has to be given")
+    # a nanometre less than the whole: figures are rounded when they are written
+    insertion = min(left, sum(c["length_mm"] for c in holder) - 1e-6)
+    notes.append(f"insertion {insertion:.6g} mm: all of the tool behind the holder's nose (OAL and LB); a bore may be shorter")
+    return insertion
+
+
+def _cut(cones: list[dict[str, Any]], length: float) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """The stack in front of a length and the one behind it."""
+    front: list[dict[str, Any]] = []
+    for i, cone in enumerate(cones):
+        if cone["length_mm"] > length + 1e-9:
+            if length < 1e-9:
+                return front, cones[i:]
+            first, last = cone["outer_diameter_mm"], cone.get("end_diameter_mm", cone["outer_diameter_mm"])
+            middle = first + (last - first) * length / cone["length_mm"]
+            ends = ({"end_diameter_mm": middle}, {"end_diameter_mm": last}) if "end_diameter_mm" in cone else ({}, {})
+            before = cone | {"length_mm": length} | ends[0]
+            return [*front, before], [
+                cone | {"length_mm": cone["length_mm"] - length, "outer_diameter_mm": middle} | ends[1],
+                *cones[i + 1 :],
+            ]
+        front.append(cone)
+        length -= cone["length_mm"]
+    return front, []
+
+
+def _bored(cones: list[dict[str, Any]], insertion: float, shank: float) -> list[dict[str, Any]]:
+    front, behind = _cut(cones, insertion)
+    return [c | {"inner_diameter_mm": shank} for c in front] + behind
+
+
+def _toml(data: Mapping[str, Any], notes: Sequence[str]) -> str:
+    """A tooling file."""
+    lines = [f"# {note}" for note in notes]
+    lines.append(f"name = {json.dumps(data['name'], ensure_ascii=False)}")
+    for key in ("cutter", "tool", "holder", "contact"):
+        if key not in data:
+            continue
+        lines.append(f"[{key}]")
+        lines += [f"{name} = {_number(value)}" for name, value in data[key].items() if name != "segments"]
+        if "segments" in data[key]:
+            lines += ["segments = [", *(f"  {_inline(segment)}," for segment in data[key]["segments"]), "]"]
+    return "\n".join(lines) + "\n"
+
+
+def _inline(segment: Mapping[str, Any]) -> str:
+    return "{ " + ", ".join(f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {_number(v)}" for k, v in segment.items()) + " }"
+
+
+def _number(value: float | int) -> str:
+    return str(value) if isinstance(value, int) else repr(round(value, 9)) if abs(value) < 1e6 else repr(float(value))

@@ -1,0 +1,286 @@
+"""Tool libraries of CAM programs: shapes, units, what is assumed, and files that lie."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+import tomllib
+import tracemalloc
+import zipfile
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.tool_libraries import Assumptions, file_names, import_tools, read_tool_library
+from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
+from tests.io.fusion import END_MILL, end_mill, inches, library
+
+
+def imported(*entries, **assumed):
+    return import_tools(json.dumps(library(*entries)).encode(), "L.json", Assumptions(**assumed))
+
+
+def only(entry, **assumed):
+    found = imported(entry, **assumed)[0]
+    assert found.reason == ""
+    return found
+
+
+def shape(segments):
+    return [tuple(round(1e3 * v, 9) for v in (s.length, s.diameter, s.end, s.inner_diameter)) for s in segments]
+
+
+def test_the_shape_of_tool_and_holder():
+    """By hand: tip to spindle, the holder's cones as they stand in the library, cut at the gauge line, bored where the tool sits."""
+    found = only(END_MILL)
+    assembly, cutter = found.tooling.assembly, found.tooling.cutter
+    assert (found.name, found.kind, found.number) == ("VHM 12 R0 long", "flat end mill", 1)
+    assert (cutter.teeth, round(1e3 * cutter.diameter, 9)) == (4, 12.0)
+    assert shape(assembly.tool) == [(26.0, 9.6, 9.6, 0.0), (78.0, 12.0, 12.0, 0.0)]
+    assert shape(assembly.holder) == [
+        (2.0, 28.0, 32.0, 12.0), (42.0, 32.0, 32.0, 12.0), (8.0, 32.0, 32.0, 0.0), (17.0, 50.0, 54.0, 0.0), (26.0, 63.0, 63.0, 0.0),
+    ]  # fmt: skip
+    assert 1e3 * assembly.stickout == pytest.approx(60.0, abs=1e-9)
+    assert 1e3 * assembly.insertion == pytest.approx(44.0, abs=1e-9)
+    assert {s.material for s in assembly.tool} == {MATERIALS["carbide"]}
+    assert {s.material for s in assembly.holder} == {MATERIALS["steel"]}
+    assert assembly.contact is None
+
+
+def test_inches_are_the_same_tool():
+    metric, other = only(END_MILL).tooling.assembly, only(inches(END_MILL)).tooling.assembly
+    assert shape(metric.tool) == shape(other.tool)
+    assert shape(metric.holder) == shape(other.holder)
+    assert other.stickout == pytest.approx(metric.stickout, abs=1e-12)
+    assert "lengths from inches" in only(inches(END_MILL)).notes
+
+
+def test_the_text_is_the_tooling(tmp_path):
+    contact = Contact(2.0e10, 6.0e5, 1.0e5, 40.0)
+    found = only(END_MILL, contact=contact)
+    (tmp_path / "T.toml").write_text(found.text, encoding="utf-8")
+    read = read_tooling(tmp_path / "T.toml")
+    assert read.assembly == found.tooling.assembly
+    assert read.assembly.contact == contact
+    assert (read.name, read.cutter.teeth, read.cutter.helix) == (found.name, 4, found.tooling.cutter.helix)
+    assert found.text.startswith("".join(f"# {note}\n" for note in found.notes))
+
+
+@pytest.mark.parametrize(
+    ("entry", "assumed", "note"),
+    [
+        (END_MILL, {}, "helix 30 deg: the library gives none"),
+        (END_MILL, {}, "fluted part as a cylinder of 0.8 times the cutting diameter"),
+        (END_MILL, {}, "stickout 60 mm: the library's length below the holder (LB)"),
+        (END_MILL, {}, "insertion 44 mm: all of the tool behind the holder's nose (OAL and LB); a bore may be shorter"),
+        (END_MILL, {}, "holder up to its gauge line, 95 of 135 mm: what is behind sits in the spindle"),
+        (END_MILL, {}, "no contact: tool and holder are joined rigidly"),
+        (END_MILL, {"contact": Contact(1e10, 1e5)}, "contact of another tooling"),
+        (end_mill(unit=None), {}, "lengths in millimetres: the library names no unit"),
+        (end_mill(BMC="hss"), {}, "high-speed steel taken as steel"),
+        (end_mill(BMC="ceramics"), {}, "tool of carbide: the library says ceramics"),
+        (end_mill(BMC=None), {}, "tool of carbide: the library says nothing"),
+        (end_mill(geometry__SFDM=None), {}, "shank as thick as the cutter: the library gives none (SFDM)"),
+        (end_mill(holder__gaugeLength=None), {}, "holder to the end of its last segment, 135 mm: the library gives no gauge line"),
+    ],
+)
+def test_what_is_assumed_is_said(entry, assumed, note):
+    assert any(each.startswith(note) for each in only(entry, **assumed).notes)
+
+
+def test_what_is_given_is_not_assumed():
+    found = only(end_mill(geometry__FHA=38.0), stickout_mm=50.0, insertion_mm=30.0, flute_ratio=0.75, material="steel")
+    assembly = found.tooling.assembly
+    assert [round(1e3 * v, 6) for v in (assembly.stickout, assembly.insertion)] == [50.0, 30.0]
+    assert shape(assembly.tool) == [(26.0, 9.0, 9.0, 0.0), (54.0, 12.0, 12.0, 0.0)]
+    assert assembly.tool[0].material == MATERIALS["steel"]
+    assert found.tooling.cutter.helix == pytest.approx(0.6632251157578453)
+    assert not any(word in note for note in found.notes for word in ("helix", "stickout", "insertion"))
+    assert only(end_mill(geometry__FHA=0)).tooling.cutter.helix == 0.0
+
+
+def test_neck_and_shaft():
+    cones = ((10.0, 11.0, 14.0), (20.0, 14.0, 14.0))
+    segments = [{"height": h, "lower-diameter": lower, "upper-diameter": upper} for h, lower, upper in cones]
+    tool = end_mill(geometry__SFDM=16.0, **{"geometry__shoulder-diameter": 11.0}) | {"shaft": {"segments": segments, "type": "shaft"}}
+    assert shape(only(tool).tooling.assembly.tool) == [
+        (26.0, 9.6, 9.6, 0.0), (4.0, 11.0, 11.0, 0.0), (10.0, 11.0, 14.0, 0.0), (20.0, 14.0, 14.0, 0.0), (44.0, 16.0, 16.0, 0.0),
+    ]  # fmt: skip
+
+
+def test_a_cone_is_cut_where_the_tool_ends():
+    """Halfway through a cone from 40 to 60 mm its diameter is 50 mm, and the volume stays."""
+    tool = end_mill(holder__segments=[{"height": 60.0, "lower-diameter": 40.0, "upper-diameter": 60.0}], holder__gaugeLength=60.0)
+    assert shape(only(tool, insertion_mm=30.0).tooling.assembly.holder) == [(30.0, 40.0, 50.0, 12.0), (30.0, 50.0, 60.0, 0.0)]
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    heights=st.lists(st.floats(0.01, 60.0), min_size=1, max_size=8),
+    share=st.floats(0.05, 1.0),
+    scale=st.sampled_from([1.0, 25.4]),
+    length=st.floats(61.0, 400.0),
+)
+def test_lengths_add_up_whatever_the_figures(heights, share, scale, length):
+    cones = [{"height": h / scale, "lower-diameter": (30.0 + h) / scale, "upper-diameter": (31.0 + 2.0 * h) / scale} for h in heights]
+    total = sum(heights)
+    tool = end_mill() if scale == 1.0 else inches(end_mill())
+    tool["holder"] = {"segments": cones, "gaugeLength": share * total / scale}
+    tool["geometry"]["OAL"] = length / scale
+    found = imported(tool)[0]
+    assert found.reason == ""
+    assembly = found.tooling.assembly
+    # a gauge line within the rounding of the drawing is the holder's end
+    assert 1e3 * assembly.holder_length == pytest.approx(share * total, abs=0.0501)
+    assert 1e3 * assembly.insertion == pytest.approx(min(length - 60.0, 1e3 * assembly.holder_length), abs=1e-5)
+    assert 1e3 * assembly.stickout == pytest.approx(60.0, abs=1e-5)
+
+
+SKIPPED = [
+    (end_mill(type="drill"), "a drill, not a milling tool"),
+    (end_mill(type="thread mill"), "a thread mill, not a milling tool"),
+    (end_mill(type=None), "an entry without a type"),
+    (end_mill(holder=None), "a tool without a holder; name one of the library's"),
+    (end_mill(holder={}), "a tool without a holder"),
+    (end_mill(geometry__OAL=60.0), "a tool that ends at the holder's nose (OAL and LB): the insertion has to be given"),
+    (end_mill(geometry__OAL=None), "data[0].geometry.OAL: found nothing"),
+    (end_mill(geometry__NOF=0), "data[0].geometry.NOF: found 0, allowed is a whole number at least 1"),
+    (end_mill(geometry__NOF="four"), 'data[0].geometry.NOF: found the text "four"'),
+    (end_mill(geometry__DC=-1.0), "data[0].geometry.DC: found -1.0"),
+    (end_mill(geometry__DC=1e300), "cutter.diameter_mm: found"),
+    (end_mill(geometry=None), "data[0].geometry: found nothing"),
+    (end_mill(unit="furlongs"), 'data[0].unit: found the text "furlongs", allowed is one of millimeters, inches'),
+    (end_mill(holder__segments=[{"height": 0.0, "lower-diameter": 1.0, "upper-diameter": 1.0}]), "no height"),
+    (end_mill(holder__segments=[{"height": 9.0, "lower-diameter": 0.0, "upper-diameter": 1.0}]), "lower-diameter: found 0.0"),
+    (end_mill(holder__segments=[{"height": 9.0}]), "data[0].holder.segments[0].lower-diameter: found nothing"),
+    (end_mill(holder__segments=[{"height": 1.0, "lower-diameter": 9.0, "upper-diameter": 9.0}] * 300), "300 segments"),
+    (end_mill(geometry__SFDM=40.0), "holder.segments[0].inner_diameter_mm: found 40, allowed is below the outer diameter, 28"),
+    (end_mill(description="two\nlines", geometry__NOF="two\nlines"), 'found the text "two lines"'),
+    ("a text", "no table of keys"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("entry", "reason"), SKIPPED, ids=[f"{i}" for i in range(len(SKIPPED))])
+def test_an_entry_that_cannot_be_a_tooling_says_why_and_the_others_go_on(entry, reason):
+    found = imported(entry, END_MILL)
+    assert reason in found[0].reason
+    assert "\n" not in found[0].reason + found[0].name
+    assert found[0].tooling is None
+    assert found[0].text == ""
+    assert found[1].tooling is not None
+
+
+def test_a_holder_of_the_library_serves_tools_without_one():
+    spare = {"type": "holder", "description": "Weldon 12", "product-id": "W-12", **END_MILL["holder"]}
+    spare["description"] = "Weldon 12"
+    bare = end_mill(holder=None)
+    for name in ("Weldon 12", "W-12"):
+        found = imported(bare, spare, holder=name)
+        assert shape(found[0].tooling.assembly.holder) == shape(only(END_MILL).tooling.assembly.holder)
+        assert "holder Weldon 12 of the library" in found[0].notes
+        assert found[1].reason == "a holder, not a milling tool"
+    with pytest.raises(InputError, match=r"holder: found Hydro, 0 times, allowed is one of the library's holders: Weldon 12"):
+        imported(bare, spare, holder="Hydro")
+
+
+def test_names_are_safe_in_toml_and_as_files(tmp_path):
+    names = ['Ø12 "long" \\ # x', "../../etc/passwd", "a/b", "A-B", "", "\u0007\u2028", "CON 𝕏 ﷽"]
+    for found in imported(*[end_mill(description=name) for name in names]):
+        assert tomllib.loads(found.text)["name"] == found.name
+    files = file_names([*names, "a b"])
+    assert files == ["12-long-x.toml", "etc-passwd.toml", "a-b.toml", "A-B-2.toml", "tool.toml", "tool-2.toml", "CON.toml", "a-b-3.toml"]
+
+
+def zipped(content: bytes, name: str = "tools.json", method: int = zipfile.ZIP_DEFLATED, more: int = 0) -> bytes:
+    raw = io.BytesIO()
+    with zipfile.ZipFile(raw, "w", method) as container:
+        container.writestr(name, content)
+        for i in range(more):
+            container.writestr(f"{i}.png", b"")
+    return raw.getvalue()
+
+
+def test_a_container_a_list_and_a_single_tool(tmp_path):
+    text = json.dumps(library(END_MILL)).encode()
+    for i, raw in enumerate(
+        (zipped(text), zipped(text, method=zipfile.ZIP_STORED), json.dumps([END_MILL]).encode(), json.dumps(END_MILL).encode())
+    ):
+        path = tmp_path / f"{i}.tools"
+        path.write_bytes(raw)
+        assert [each.tooling is not None for each in read_tool_library(path)] == [True]
+    assert import_tools(b"\xef\xbb\xbf" + text, "L.json")[0].tooling is not None
+
+
+BOMB = b'{"data": [' + b" " * 60_000_000 + b"]}"
+HOSTILE = {
+    "empty list": (b'{"data": []}', "no list of tools"),
+    "another json": (b'{"data": {"a": 1}}', "no list of tools"),
+    "a number": (b"12", "no list of tools"),
+    "no json": (b"{'data': []}", "L.json line 1: tool library: found no JSON"),
+    "binary": (b"\xff\xfe\x00", "bytes that are no text"),
+    "nan": (b'{"data": [{"geometry": {"DC": NaN}}]}', "found NaN, allowed is finite numbers"),
+    "deep": (b"[" * 200_000, "JSON"),
+    "digits": (b'{"data": [{"geometry": {"DC": ' + b"9" * 6000 + b"}}]}", "JSON without end"),
+    "many": (json.dumps({"data": [{"geometry": {}}] * 30_000}).encode(), "30000 entries, allowed is at most 20000"),
+    "a bomb": (zipped(BOMB), "more than 32 MB"),
+    "a bomb by bzip2": (zipped(BOMB, method=zipfile.ZIP_BZIP2), "a packed file of another method"),
+    "a bomb by lzma": (zipped(BOMB, method=zipfile.ZIP_LZMA), "a packed file of another method"),
+    "many files": (zipped(b"{}", more=200), "1 JSON files among 201"),
+    "no file": (zipped(b"{}", "tools.txt"), "0 JSON files among 1"),
+    "cut off": (zipped(json.dumps(library(END_MILL)).encode())[:200], "a container that is damaged"),
+    "garbled": (zipped(json.dumps(library(END_MILL)).encode()).replace(b"tools.json", b"tools.jsox", 1), "a container that is damaged"),
+    "in name only": (b"PK\x03\x04" + struct.pack("<I", 7) * 10, "a container that is damaged"),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_library_costs_one_sentence(name):
+    raw, words = HOSTILE[name]
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError) as caught:
+            import_tools(raw, "L.json")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert words in str(caught.value)
+    assert "L.json" in str(caught.value)
+    assert peak < 80e6
+
+
+@pytest.mark.parametrize(
+    ("assumed", "words"),
+    [
+        ({"flute_ratio": 1.2}, "flute ratio: found 1.2"),
+        ({"flute_ratio": float("nan")}, "flute ratio: found nan"),
+        ({"helix_deg": 90.0}, "helix: found 90.0"),
+        ({"material": "wood"}, "material: found wood, allowed is one of carbide"),
+        ({"stickout_mm": 0.0}, "stickout: found 0.0"),
+        ({"insertion_mm": -1.0}, "insertion: found -1.0"),
+    ],
+)
+def test_assumptions_have_their_ranges(assumed, words):
+    with pytest.raises(InputError, match=words):
+        Assumptions(**assumed)
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.floats(allow_nan=False, allow_infinity=False) | st.integers() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(["segments", "height", "lower-diameter", "DC"]), inner),
+    max_leaves=6,
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.data())
+def test_any_value_anywhere_gives_a_tooling_or_a_reason(data):
+    key = data.draw(st.sampled_from(["geometry", "holder", "shaft", "type", "unit", "BMC", "description", *END_MILL["geometry"]]))
+    value = data.draw(JSON)
+    tool = end_mill()
+    (tool["geometry"] if key in tool["geometry"] else tool)[key] = value
+    for found in imported(tool, END_MILL):
+        assert (found.tooling is None) == bool(found.reason)
