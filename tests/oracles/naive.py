@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import scipy.linalg
+import scipy.sparse.linalg
 
 
 def pole_sum(omega, pole, residue):
@@ -119,8 +120,9 @@ def milling_multiplier(
     rate = np.hstack([np.zeros((2, m)), out[:, :m]])
     rotation = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     total = 2 * m + 2 * n
-    state = np.eye(total)[: 2 * m]
-    past = [np.eye(total)[2 * m + 2 * i : 2 * m + 2 * i + 2] for i in range(n)] + [out @ state]
+    unit = np.eye(total)
+    state = unit[: 2 * m]
+    past = [unit[2 * m + 2 * i : 2 * m + 2 * i + 2] for i in range(n)] + [out @ state]
     seconds = np.concatenate([time[:-1] - time[-1], time])
     delays = sorted({w[3] for w in windows})
     node, share = np.polynomial.legendre.leggauss(points)
@@ -164,5 +166,6 @@ def milling_multiplier(
         after = step[:size, :size] @ state + step[:size, size : size + 2] @ begin + step[:size, size + 2 :] @ (end_ - begin)
         state = after
         past.append(out @ state)
-    values = np.linalg.eigvals(np.concatenate([state, *past[n : 2 * n]]))
+    monodromy = np.concatenate([state, *past[n : 2 * n]])
+    values = scipy.sparse.linalg.eigs(monodromy, 6, v0=np.cos(np.arange(float(total))), tol=1e-10, return_eigenvectors=False)
     return complex(values[np.argmax(np.abs(values))])
