@@ -1,0 +1,83 @@
+"""The service, put together in one place."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+
+from api import problems
+from api.observe import Observed
+from api.parts import Metrics, Parts, Rates
+from api.routes import health, keys, machines, queries, toolings
+from api.schemas.common import ProblemDocument
+from api.security import HEADER
+from api.settings import Settings
+from api.stores.records import Store
+from api.stores.sql import open_store
+from api.work.pool import Pool, Work
+from rcsa_ident import __version__
+
+V1 = "/v1"
+_ABOUT = """Tooltip FRFs and stability lobes of any tooling on machines that were identified from ordinary stable cuts.
+Lengths are millimetres, speeds rev/min, coefficients MPa, receptances m/N. Errors are problem documents (RFC 9457)."""
+
+
+def create_app(settings: Settings, store: Store | None = None, work: Work | None = None) -> FastAPI:
+    """Return the service.
+
+    Parameters
+    ----------
+    settings : Settings
+    store, work : optional
+        In place of the database and the processes that the settings name.
+    """
+    if store is None and not settings.database:
+        settings.data.mkdir(parents=True, exist_ok=True)
+    kept = open_store(settings.database_url) if store is None else store
+    workers = Pool(settings.workers, settings.queue, settings.kept_machines) if work is None else work
+    parts = Parts(settings, kept, workers, Rates(settings.requests_per_minute, settings.burst), Metrics(lambda: float(workers.waiting)))
+
+    @asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        workers.start()
+        yield
+        workers.stop()
+        kept.close()
+
+    app = FastAPI(
+        title="rcsa-ident",
+        version=__version__,
+        description=_ABOUT,
+        lifespan=lifespan,
+        docs_url="/docs",
+        redoc_url=None,
+    )
+    app.state.parts = parts
+    problems.install(app)
+    app.include_router(health.router)
+    for each in (keys, machines, toolings, queries):
+        app.include_router(each.router, prefix=V1)
+    app.add_middleware(Observed, parts=parts)
+    app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
+    return app
+
+
+def _openapi(app: FastAPI) -> dict[str, Any]:
+    """OpenAPI with the problem document, and with the key that guarded routes ask for."""
+    if app.openapi_schema is None:
+        schema = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
+        components = schema.setdefault("components", {})
+        problem = ProblemDocument.model_json_schema(ref_template="#/components/schemas/{model}")
+        components.setdefault("schemas", {}).update(problem.pop("$defs"))
+        components["schemas"]["ProblemDocument"] = problem
+        components["securitySchemes"] = {"key": {"type": "apiKey", "in": "header", "name": HEADER}}
+        for path in schema["paths"].values():
+            for operation in path.values():
+                if "x-scope" in operation:
+                    operation["security"] = [{"key": []}]
+        app.openapi_schema = schema
+    return app.openapi_schema

@@ -1,0 +1,111 @@
+"""One line of log and one count for each request, under an id that the answer carries, too; nothing unexpected leaves the service."""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+import secrets
+import time
+from datetime import UTC, datetime
+from typing import Any
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from api.parts import Parts
+from api.problems import Problem, document
+from api.stores.records import Unavailable
+from api.work.pool import Busy
+
+log = logging.getLogger("rcsa_ident.service")
+_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
+RETRY = {"Retry-After": "2"}
+
+
+class Observed:
+    """The outermost layer of the service."""
+
+    def __init__(self, app: ASGIApp, parts: Parts) -> None:
+        self.app, self.parts = app, parts
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        request = Request(scope)
+        given = request.headers.get("x-request-id", "")
+        id = given if _ID.fullmatch(given) else secrets.token_hex(8)
+        request.state.request_id = id
+        status, start = 0, time.perf_counter()
+
+        async def observed(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                extra = [(b"x-request-id", id.encode()), (b"x-content-type-options", b"nosniff")]
+                message = {**message, "headers": [*message.get("headers", []), *extra]}
+            await send(message)
+
+        try:
+            await self.app(scope, self._limited(request, receive), observed)
+        except Exception as error:
+            problem = _problem(error)
+            log.error("unexpected" if problem.status == 500 else "unavailable", exc_info=error, extra={"fields": {"request_id": id}})
+            if status == 0:
+                await document(request, problem)(scope, receive, observed)
+        finally:
+            self._told(scope, id, status, time.perf_counter() - start)
+
+    def _limited(self, request: Request, receive: Receive) -> Receive:
+        """Let no more of a body in than is allowed, whether its length is told before or not."""
+        most, seen = self.parts.settings.max_body_bytes, 0
+        told = request.headers.get("content-length", "")
+        too_large = HTTPException(413, f"at most {most} bytes")
+
+        async def limited() -> Message:
+            nonlocal seen
+            if told.isdecimal() and int(told[:20]) > most:
+                raise too_large
+            message = await receive()
+            seen += len(message.get("body", b""))
+            if seen > most:
+                raise too_large
+            return message
+
+        return limited
+
+    def _told(self, scope: Scope, id: str, status: int, seconds: float) -> None:
+        # the pattern, not the path: ids would make a counter each
+        route = getattr(scope.get("route"), "path", "unknown")
+        method = scope["method"] if scope["method"] in ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS") else "other"
+        self.parts.metrics.requests.labels(method, route, str(status)).inc()
+        self.parts.metrics.seconds.labels(method, route).observe(seconds)
+        caller = scope.get("state", {}).get("caller")
+        fields = {"request_id": id, "method": method, "route": route, "status": status, "seconds": round(seconds, 6)}
+        log.info("request", extra={"fields": fields | ({} if caller is None else {"key": caller.id, "group": caller.group})})
+
+
+def _problem(error: Exception) -> Problem:
+    if isinstance(error, Unavailable):
+        return Problem(503, "the store does not answer now", headers=RETRY)
+    if isinstance(error, Busy):
+        return Problem(503, "too many questions wait for an answer", headers=RETRY)
+    return Problem(500, "something unexpected happened; the log has it under this request's id")
+
+
+class JsonLines(logging.Formatter):
+    """A record as one line of JSON."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        line: dict[str, Any] = {
+            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "event": record.getMessage(),
+        }
+        line |= getattr(record, "fields", {})
+        if record.exc_info:
+            line["exception"] = self.formatException(record.exc_info)
+        return json.dumps(line, ensure_ascii=False, default=str)

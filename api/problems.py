@@ -1,0 +1,112 @@
+"""Problem documents (RFC 9457): every error that a client sees, with the field at fault; never the text of an unexpected exception."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.keys import describe
+
+MEDIA_TYPE = "application/problem+json"
+_LONGEST = 200
+_TITLES = {413: "Content too large", 422: "Input not usable"}
+
+
+class Problem(Exception):
+    """An answer other than the one that was asked for.
+
+    Parameters
+    ----------
+    status : int
+    detail : str
+    errors : sequence of {field, found, allowed}
+    headers : mapping of str to str
+    """
+
+    def __init__(
+        self, status: int, detail: str, errors: Sequence[Mapping[str, str]] = (), headers: Mapping[str, str] | None = None
+    ) -> None:
+        super().__init__(detail)
+        self.status, self.detail, self.errors, self.headers = status, detail, list(errors), dict(headers or {})
+
+
+def title(status: int) -> str:
+    """Return the short name of a status."""
+    return _TITLES.get(status) or HTTPStatus(status).phrase
+
+
+def document(request: Request, problem: Problem) -> JSONResponse:
+    """Return a problem as the answer to a request."""
+    content: dict[str, Any] = {"type": "about:blank", "title": title(problem.status), "status": problem.status, "detail": problem.detail}
+    if problem.errors:
+        content["errors"] = problem.errors
+    content["request_id"] = getattr(request.state, "request_id", "")
+    return JSONResponse(content, problem.status, problem.headers, MEDIA_TYPE)
+
+
+def of_input(error: InputError) -> Problem:
+    """Return the problem of something that is not usable."""
+    found = _short(error.found if isinstance(error.found, str) else describe(error.found))
+    return Problem(422, f"{error.field}: found {found}, allowed is {error.allowed}", [_entry(error.field, found, error.allowed)])
+
+
+def of_validation(errors: Sequence[Any]) -> Problem:
+    """Return the problem of a body, a query or a path that has not the documented form; long values are cut."""
+    entries = []
+    for error in errors[:20]:
+        place = [str(part) for part in error["loc"] if part not in ("body", "query", "path", "header")]
+        # of a choice between forms pydantic names its own types, which the client has not written
+        name = ".".join(place) or str(error["loc"][0] if error["loc"] else "body")
+        found = "nothing" if error["type"] == "missing" else _short(describe(error.get("input")))
+        entries.append(_entry(name, found, error["msg"]))
+    first = entries[0]
+    return Problem(422, f"{first['field']}: found {first['found']}; {first['allowed']}", entries)
+
+
+def _entry(field: str, found: str, allowed: str) -> dict[str, str]:
+    return {"field": _short(field), "found": found, "allowed": allowed}
+
+
+def _short(text: str) -> str:
+    # a lone half of a surrogate pair has no UTF-8
+    text = text.encode("utf-8", "backslashreplace").decode("utf-8")
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+
+
+def install(app: FastAPI) -> None:
+    """Answer every foreseen exception with a problem document."""
+
+    def known(request: Request, error: Exception) -> Response:
+        assert isinstance(error, Problem)
+        return document(request, error)
+
+    def unusable(request: Request, error: Exception) -> Response:
+        assert isinstance(error, InputError)
+        return document(request, of_input(error))
+
+    def malformed(request: Request, error: Exception) -> Response:
+        assert isinstance(error, RequestValidationError)
+        return document(request, of_validation(error.errors()))
+
+    def plain(request: Request, error: Exception) -> Response:
+        assert isinstance(error, HTTPException)
+        words = {
+            413: f"the body is too large: {error.detail}",
+            400: "the body can not be read",
+            404: "nothing is there",
+            405: "the path does not take this method",
+        }
+        detail = words.get(error.status_code, title(error.status_code))
+        return document(request, Problem(error.status_code, detail, headers=error.headers))
+
+    app.add_exception_handler(Problem, known)
+    app.add_exception_handler(InputError, unusable)
+    app.add_exception_handler(RequestValidationError, malformed)
+    app.add_exception_handler(HTTPException, plain)

@@ -1,0 +1,1 @@
+"""Thin: a question in, what the parts answer out."""

@@ -1,0 +1,44 @@
+"""For those who run the service: is it there, does it answer, what has it done."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from fastapi import APIRouter, Response
+from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
+
+from api.parts import ThisService
+from api.problems import Problem
+from api.routes.common import problems
+from api.schemas.common import Answer
+
+router = APIRouter(tags=["health"])
+
+
+class State(Answer):
+    """How it is."""
+
+    status: Literal["ok"]
+
+
+@router.get("/health", summary="Whether the process is there")
+async def health() -> State:
+    return State(status="ok")
+
+
+@router.get("/ready", summary="Whether store and workers answer", responses=problems(503, always=()))
+def ready(parts: ThisService) -> State:
+    parts.store.check()
+    if not parts.work.ready:
+        raise Problem(503, "workers are starting", headers={"Retry-After": "2"})
+    return State(status="ok")
+
+
+@router.get(
+    "/metrics",
+    summary="Prometheus",
+    response_class=Response,
+    responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}, "description": "Counters since the start."}},
+)
+async def metrics(parts: ThisService) -> Response:
+    return Response(generate_latest(parts.metrics.registry), media_type=CONTENT_TYPE_LATEST)

@@ -1,0 +1,138 @@
+"""The library of toolings: tooling files, or their keys as JSON."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from fastapi import APIRouter, Request, Response
+from fastapi.concurrency import run_in_threadpool
+
+from api.parts import ThisService
+from api.problems import Problem
+from api.routes.common import BODY, After, Limit, ToolingName, expected, found_or_404, guard, page, problems, tagged, unchanged, utf8
+from api.schemas.common import Page, body_of
+from api.schemas.toolings import EXAMPLE, ToolingAnswer, ToolingKeys, ToolingSummary
+from api.security import Guarded, WhoAsks, now
+from api.stores.records import Document, Stale, digest_of
+from api.work.toolings import LARGEST, parsed, toml_of, tooling_of
+from rcsa_ident.report.drawing import tooling_svg
+
+router = APIRouter(prefix="/toolings", tags=["toolings"], route_class=Guarded)
+TOML, JSON, SVG = "application/toml", "application/json", "image/svg+xml"
+_BODY = {
+    "required": True,
+    "content": {
+        JSON: {"schema": {"$ref": "#/components/schemas/ToolingKeys"}, "example": EXAMPLE},
+        TOML: {"schema": {"type": "string"}, "example": toml_of(EXAMPLE)},
+    },
+}
+
+
+@router.put(
+    "/{name}",
+    summary="Write a tooling",
+    description="If-Match or If-None-Match: * keep what somebody else has written meanwhile.",
+    openapi_extra=guard("upload", requestBody=_BODY, **{"x-content-types": (JSON, TOML)}),
+    responses={201: {"model": ToolingAnswer, "description": "There was none before."}, **problems(412, *BODY)},
+)
+async def write(name: ToolingName, request: Request, response: Response, parts: ThisService, caller: WhoAsks) -> ToolingAnswer:
+    raw = await request.body()
+    if len(raw) > LARGEST:
+        raise Problem(413, f"a tooling has at most {LARGEST // 1000} kB")
+    is_toml = request.headers["content-type"].split(";")[0].strip().lower() == TOML
+
+    def keep() -> tuple[bool, Document]:
+        text = utf8(raw) if is_toml else toml_text(body_of(ToolingKeys, raw))
+        document = Document(caller.group, name, text, json.dumps(_summary(text)), digest_of(text), now())
+        kept = parts.store.toolings
+        before = expected(request, lambda: getattr(kept.brief(caller.group, name), "digest", None))
+        return kept.put(document, before), document
+
+    try:
+        new, document = await run_in_threadpool(keep)
+    except Stale:
+        raise Problem(412, "the tooling is not the one that the query expects") from None
+    response.status_code = 201 if new else 200
+    response.headers.update(tagged(document.digest))
+    return _answer(document)
+
+
+@router.get("", summary="List toolings", openapi_extra=guard("read"), responses=problems(422))
+def list_toolings(parts: ThisService, caller: WhoAsks, after: After = "", limit: Limit = 50) -> Page[ToolingSummary]:
+    rows, following = page(parts.store.toolings.list(caller.group, after, limit + 1), limit, lambda row: row.name)
+    return Page(
+        items=[ToolingSummary(name=row.name, changed=row.changed, etag=row.digest, **json.loads(row.summary)) for row in rows],
+        next=following,
+    )
+
+
+@router.get(
+    "/{name}",
+    summary="A tooling, as JSON or as the tooling file (Accept: application/toml)",
+    openapi_extra=guard("read"),
+    response_class=Response,
+    responses={
+        200: {"model": ToolingAnswer, "description": "A tooling.", "content": {TOML: {"schema": {"type": "string"}}}},
+        304: {"description": "If-None-Match names it."},
+        **problems(404, 422),
+    },
+)
+def get(name: ToolingName, request: Request, parts: ThisService, caller: WhoAsks) -> Response:
+    document = found_or_404(parts.store.toolings.get(caller.group, name), "tooling")
+    headers = tagged(document.digest) | {"Vary": "Accept"}
+    if unchanged(request, document.digest):
+        return Response(status_code=304, headers=headers)
+    if TOML in request.headers.get("accept", ""):
+        return Response(document.text.encode(), media_type=TOML, headers=headers)
+    return Response(_answer(document).model_dump_json(), media_type=JSON, headers=headers)
+
+
+@router.get(
+    "/{name}/drawing",
+    summary="A tooling to scale, SVG in millimetres",
+    openapi_extra=guard("read"),
+    response_class=Response,
+    responses={
+        200: {"description": "A drawing.", "content": {SVG: {"schema": {"type": "string"}}}},
+        304: {"description": "If-None-Match names it."},
+        **problems(404, 422),
+    },
+)
+def drawing(name: ToolingName, request: Request, parts: ThisService, caller: WhoAsks) -> Response:
+    document = found_or_404(parts.store.toolings.get(caller.group, name), "tooling")
+    if unchanged(request, document.digest):
+        return Response(status_code=304, headers=tagged(document.digest))
+    # opened as a page of its own it runs nothing and loads nothing
+    headers = tagged(document.digest) | {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'"}
+    return Response(tooling_svg(tooling_of(document.text)), media_type=SVG, headers=headers)
+
+
+@router.delete("/{name}", status_code=204, summary="Forget a tooling", openapi_extra=guard("upload"), responses=problems(404, 412, 422))
+def forget(name: ToolingName, request: Request, parts: ThisService, caller: WhoAsks) -> Response:
+    kept = parts.store.toolings
+    try:
+        there = kept.delete(caller.group, name, expected(request, lambda: getattr(kept.brief(caller.group, name), "digest", None)))
+    except Stale:
+        raise Problem(412, "the tooling is not the one that the query expects") from None
+    if not there:
+        raise Problem(404, "there is no such tooling")
+    return Response(status_code=204)
+
+
+def toml_text(keys: ToolingKeys) -> str:
+    """Return keys as the text of a tooling file."""
+    return toml_of(keys.model_dump(exclude_unset=True, exclude_none=True))
+
+
+def _summary(text: str) -> dict[str, Any]:
+    """What a list tells; everything that the commands would refuse is refused."""
+    tooling = tooling_of(text)
+    cutter = tooling.cutter
+    own = parsed(text).get("name", "")
+    return {"teeth": cutter.teeth, "diameter_mm": cutter.diameter * 1e3, "stickout_mm": tooling.assembly.stickout * 1e3, "label": own[:200]}
+
+
+def _answer(document: Document) -> ToolingAnswer:
+    keys = ToolingKeys.model_validate(parsed(document.text))
+    return ToolingAnswer(name=document.name, tooling=keys, changed=document.changed, etag=document.digest)

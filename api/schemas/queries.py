@@ -1,0 +1,305 @@
+"""Queries after a tool change: tooltip FRF, stability lobes, advice."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import ConfigDict, Field
+
+from api.schemas.common import Answer, Body, Id, Line, Name
+from api.schemas.machines import Curve
+from api.schemas.toolings import EXAMPLE, ToolingKeys
+from api.work.questions import AdviceQuestion, CutQuestion, LobeQuestion, TipQuestion
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.process import ProcessDamping
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.setups import FEED_DIRECTIONS
+
+_RPM = math.pi / 30.0
+MOST_TOOLINGS, MOST_SPEEDS = 12, 5000
+Method = Literal["zero-order", "multi-frequency", "semi-discretisation", "full-discretisation", "time-domain"]
+Angle = Annotated[float, Field(strict=False, ge=0.0, le=180.0)]
+Turn = Annotated[float, Field(strict=False, ge=-360.0, le=360.0)]
+Micrometre = Annotated[float, Field(strict=False, ge=-1000.0, le=1000.0)]
+Land = Annotated[float, Field(strict=False, ge=0.01, le=1000.0)]
+Pressure = Annotated[float, Field(strict=False, ge=1e9, le=1e17)]
+Percent = Annotated[float, Field(strict=False, ge=0.0, le=50.0)]
+Rpm = Annotated[float, Field(strict=False, ge=100.0, le=200_000.0)]
+Hertz = Annotated[float, Field(strict=False, ge=1.0, le=20_000.0)]
+Depth = Annotated[float, Field(strict=False, gt=0.0, le=500.0)]
+Tooling = Annotated[Name | ToolingKeys, Field(description="Name in the library, or the tooling itself.")]
+Spread = Annotated[Percent, Field(description="How well the tool-holder's stiffness is known [%]: part of the bands.")]
+
+
+class TipQuery(Body):
+    """Which tip at which frequencies."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"machine": "m1", "tooling": EXAMPLE, "to_hz": 4000.0}]})
+
+    machine: Id
+    tooling: Tooling
+    from_hz: Hertz = 100.0
+    to_hz: Hertz | None = Field(None, description="By default the end of the identified band.")
+    step_hz: Annotated[float, Field(strict=False, ge=0.01, le=1000.0)] = 1.0
+    spindle_speed_rpm: Rpm | None = Field(None, description="For a machine that changes with it.")
+    bands: bool = True
+    stiffness_spread_percent: Spread = 0.05
+
+    def question(self) -> TipQuestion:
+        """Return the query in SI."""
+        speed = None if self.spindle_speed_rpm is None else self.spindle_speed_rpm * _RPM
+        return TipQuestion(self.from_hz, self.to_hz, self.step_hz, speed, self.bands, self.stiffness_spread_percent / 100.0)
+
+
+class TipAnswer(Answer):
+    """Tooltip receptances, tip over tip."""
+
+    tooling: str
+    warnings: list[str]
+    frequency_hz: list[float]
+    axes: dict[str, Curve]
+
+
+class Cut(Body):
+    """What cuts, and how; coefficients that are not given are those of the identification's workpiece."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"immersion": 0.5, "strategy": "down"}]})
+
+    immersion: Annotated[float, Field(strict=False, ge=0.001, le=1.0, description="Radial depth over diameter; 1 is a slot.")] = 0.5
+    strategy: Literal["up", "down"] = "down"
+    entry_deg: Annotated[Angle | None, Field(description="With exit_deg in place of immersion.")] = None
+    exit_deg: Angle | None = None
+    feed_direction: Annotated[Literal["+X", "-X", "+Y", "-Y"] | Turn, Field(description="Or degrees from +X.")] = "+X"
+    feed_per_tooth_mm: Annotated[float, Field(strict=False, gt=0.0, le=10.0)] | None = None
+    material: Annotated[Line | None, Field(description="Of the library of materials.")] = None
+    ktc_mpa: Annotated[float, Field(strict=False, ge=1.0, le=50_000.0)] | None = None
+    krc: Annotated[float, Field(strict=False, ge=-1.0, le=5.0)] | None = None
+    kte_n_per_mm: Annotated[float, Field(strict=False, ge=0.0, le=1000.0)] | None = None
+    kre_n_per_mm: Annotated[float, Field(strict=False, ge=0.0, le=1000.0)] | None = None
+    runout_um: Annotated[list[Micrometre] | None, Field(max_length=100, description="Radial offset of each edge.")] = None
+    wear_land_um: Annotated[Land | None, Field(description="Process damping, with indentation.")] = None
+    indentation: Annotated[Pressure | None, Field(description="[N/m^3], 1e14 for aluminium.")] = None
+    friction: Annotated[float, Field(strict=False, ge=0.0, le=2.0)] = 0.3
+
+    def question(self) -> CutQuestion:
+        """Return the cut in SI."""
+        if (self.entry_deg is None) != (self.exit_deg is None):
+            raise InputError("cut.exit_deg" if self.exit_deg is None else "cut.entry_deg", "nothing", "both angles, or neither")
+        if (self.wear_land_um is None) != (self.indentation is None):
+            missing = "wear_land_um" if self.wear_land_um is None else "indentation"
+            raise InputError(f"cut.{missing}", "nothing", "wear_land_um and indentation, or neither")
+        if self.entry_deg is None or self.exit_deg is None:
+            engagement = Engagement.from_immersion(self.immersion, self.strategy)
+        elif self.exit_deg - self.entry_deg < 0.1:
+            raise InputError("cut.exit_deg", self.exit_deg, f"at least 0.1 above entry_deg, {self.entry_deg:g} [deg]")
+        else:
+            engagement = Engagement(math.radians(self.entry_deg), math.radians(self.exit_deg))
+        direction = self.feed_direction
+        angle = FEED_DIRECTIONS[direction] if isinstance(direction, str) else math.radians(direction)
+        values = (
+            ("tangential", self.ktc_mpa, 1e6), ("radial_ratio", self.krc, 1.0),
+            ("tangential_edge", self.kte_n_per_mm, 1e3), ("radial_edge", self.kre_n_per_mm, 1e3),
+        )  # fmt: skip
+        damping = None
+        if self.wear_land_um is not None and self.indentation is not None:
+            damping = ProcessDamping(self.indentation, self.wear_land_um * 1e-6, self.friction)
+        return CutQuestion(
+            engagement,
+            float(angle),
+            None if self.feed_per_tooth_mm is None else self.feed_per_tooth_mm * 1e-3,
+            self.material,
+            tuple((name, value * unit) for name, value, unit in values if value is not None),
+            None if self.runout_um is None else tuple(offset * 1e-6 for offset in self.runout_um),
+            damping,
+        )
+
+
+class Speeds(Body):
+    """Spindle speeds, the last one included."""
+
+    from_rpm: Rpm = 4000.0
+    to_rpm: Rpm = 20_000.0
+    step_rpm: Annotated[float, Field(strict=False, ge=0.1, le=100_000.0)] = 50.0
+
+    def question(self) -> tuple[float, ...]:
+        """Return the speeds [rad/s], rising."""
+        count = math.floor((self.to_rpm - self.from_rpm) / self.step_rpm + 1e-9) + 1
+        if not 1 <= count <= MOST_SPEEDS:
+            raise InputError("speeds.to_rpm", f"{max(count, 0)} speeds", f"1 to {MOST_SPEEDS} of them, from_rpm at most to_rpm")
+        return tuple((self.from_rpm + self.step_rpm * k) * _RPM for k in range(count))
+
+
+class LobeQuery(Body):
+    """Which toolings on which machine, and which cut."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "machine": "m1",
+                    "toolings": [EXAMPLE],
+                    "cut": {"immersion": 0.5, "strategy": "down"},
+                    "speeds": {"from_rpm": 4000, "to_rpm": 20000, "step_rpm": 50},
+                    "max_depth_mm": 10.0,
+                }
+            ]
+        }
+    )
+
+    machine: Id
+    toolings: list[Tooling] = Field(min_length=1, max_length=MOST_TOOLINGS, description="Several are compared.")
+    cut: Cut = Field(default_factory=Cut)
+    speeds: Speeds = Field(default_factory=Speeds)
+    max_depth_mm: Depth = 10.0
+    method: Annotated[Method, Field(description="Methods other than zero-order answer for few speeds only.")] = "zero-order"
+    bands: bool = True
+    stiffness_spread_percent: Spread = 0.05
+
+    def question(self, work_seconds: float) -> LobeQuestion:
+        """Return the query in SI, for one of its toolings."""
+        return LobeQuestion(
+            self.cut.question(),
+            self.speeds.question(),
+            self.max_depth_mm * 1e-3,
+            self.method,
+            self.bands,
+            self.stiffness_spread_percent / 100.0,
+            work_seconds / len(self.toolings),
+        )
+
+
+class BestSpeed(Answer):
+    """A pocket of the lobes."""
+
+    spindle_speed_rpm: float
+    limit_depth_mm: float | None = Field(description="null: stable up to the depth that was asked for.")
+
+
+class ToolingLobes(Answer):
+    """Stability lobes of a tooling; a number that is null belongs to a cut that is stable up to the depth that was asked for."""
+
+    tooling: str
+    method: str
+    spindle_speed_rpm: list[float]
+    limit_depth_mm: list[float | None]
+    limit_depth_low_mm: list[float | None] | None = Field(description="95 % of the machines that the records allow lie above it.")
+    limit_depth_high_mm: list[float | None] | None
+    chatter_frequency_hz: list[float | None]
+    lobe: list[int | None]
+    flip: list[bool]
+    absolute_limit_mm: float | None
+    absolute_frequency_hz: float | None
+    best_speeds: list[BestSpeed]
+    warnings: list[str]
+
+
+class LobeAnswer(Answer):
+    """Lobes of all toolings, in the order of the query."""
+
+    machine: str
+    toolings: list[ToolingLobes]
+
+
+class PlannedQuery(Body):
+    """A cut that somebody wants to make."""
+
+    spindle_speed_rpm: Rpm
+    axial_depth_mm: Depth
+
+
+class AdviceQuery(LobeQuery):
+    """What a machinist asks; cut.feed_per_tooth_mm is needed."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"machine": "m1", "toolings": [EXAMPLE], "cut": {"immersion": 0.5, "feed_per_tooth_mm": 0.1}, "max_power_kw": 20.0}
+            ]
+        }
+    )
+
+    max_power_kw: Annotated[float, Field(strict=False, gt=0.0, le=10_000.0)] | None = None
+    max_torque_nm: Annotated[float, Field(strict=False, gt=0.0, le=1e6)] | None = None
+    max_speed_rpm: Rpm | None = None
+    tolerance_percent: Annotated[float, Field(strict=False, ge=0.0, le=20.0)] = 1.0
+    probability_percent: Annotated[float, Field(strict=False, gt=0.0, le=100.0)] = 95.0
+    reserve_percent: Annotated[float, Field(strict=False, ge=0.0, le=90.0)] = 10.0
+    depth_mm: Depth | None = Field(None, description="At which speeds may one cut so deep?")
+    planned: list[PlannedQuery] = Field(default=[], max_length=20, description="How far are these cuts from chatter?")
+
+    def advice(self, work_seconds: float) -> AdviceQuestion:
+        """Return the query in SI, for one of its toolings."""
+        if self.cut.feed_per_tooth_mm is None:
+            raise InputError("cut.feed_per_tooth_mm", "nothing", "the feed per tooth [mm]: power and removal rate grow with it")
+        for i, cut in enumerate(self.planned):
+            if cut.axial_depth_mm > self.max_depth_mm:
+                raise InputError(f"planned.{i}.axial_depth_mm", cut.axial_depth_mm, f"at most max_depth_mm, {self.max_depth_mm:g}")
+        return AdviceQuestion(
+            self.question(work_seconds),
+            None if self.max_power_kw is None else self.max_power_kw * 1e3,
+            self.max_torque_nm,
+            None if self.max_speed_rpm is None else self.max_speed_rpm * _RPM,
+            self.tolerance_percent / 100.0,
+            self.probability_percent / 100.0,
+            self.reserve_percent / 100.0,
+            None if self.depth_mm is None else self.depth_mm * 1e-3,
+            tuple((cut.spindle_speed_rpm * _RPM, cut.axial_depth_mm * 1e-3) for cut in self.planned),
+        )
+
+
+class OperatingPoint(Answer):
+    """A cut that one may make."""
+
+    spindle_speed_rpm: float
+    axial_depth_mm: float
+    removal_rate_cm3_per_min: float
+    power_kw: float
+    torque_nm: float
+    bound: str = Field(description="What stands against more depth: chatter, power, torque, speed or depth.")
+
+
+class Window(Answer):
+    """Speeds at which a depth is allowed."""
+
+    from_rpm: float
+    to_rpm: float
+    best_rpm: float
+    allowed_mm: float
+
+
+class PlannedAnswer(Answer):
+    """How a planned cut stands."""
+
+    spindle_speed_rpm: float
+    axial_depth_mm: float
+    stable: bool
+    limit_depth_mm: float | None
+    robust_limit_mm: float | None
+    margin: float | None = Field(description="Share of the depth by which the limit lies above it.")
+    chatter_frequency_hz: float | None
+    slower_rpm: float | None
+    faster_rpm: float | None
+    probability: float | None
+    load: float | None
+    power_kw: float
+    torque_nm: float
+    removal_rate_cm3_per_min: float
+
+
+class ToolingAdvice(Answer):
+    """Advice for a tooling."""
+
+    tooling: str
+    stickout_mm: float
+    highest_removal: list[OperatingPoint]
+    windows: list[Window]
+    planned: list[PlannedAnswer]
+    warnings: list[str]
+
+
+class AdviceAnswer(Answer):
+    """Advice for all toolings, in the order of the query."""
+
+    machine: str
+    toolings: list[ToolingAdvice]

@@ -1,0 +1,116 @@
+"""Toolings: the keys of a tooling file. What they may hold is checked by the reader of such files; here stands their form."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field, StringConstraints
+
+from api.schemas.common import Answer, Body, Line
+
+Number = Annotated[float, Field(strict=False)]
+Text = Annotated[str, StringConstraints(min_length=1, max_length=200)]
+MOST_SEGMENTS = 200
+
+EXAMPLE: dict[str, Any] = {
+    "name": "S1-ER32",
+    "cutter": {"teeth": 4, "diameter_mm": 12.0},
+    "tool": {"stickout_mm": 70.5, "segments": [{"length_mm": 110.5, "outer_diameter_mm": 12.0, "material": "carbide"}]},
+    "holder": {
+        "insertion_mm": 40.0,
+        "segments": [{"length_mm": 40.0, "outer_diameter_mm": 50.0, "inner_diameter_mm": 12.0, "material": "steel"}],
+    },
+    "contact": {
+        "translational_stiffness": 2.0e10,
+        "rotational_stiffness": 6.0e5,
+        "translational_damping": 6.0e4,
+        "rotational_damping": 9.0,
+    },
+}
+
+
+class CutterKeys(Body):
+    """[cutter]"""
+
+    teeth: int
+    diameter_mm: Number
+    helix_deg: Number = 0.0
+    pitch_deg: list[Number] | None = Field(None, max_length=100)
+
+
+class SegmentKeys(Body):
+    """A segment of tool or holder, from the free end towards the flange."""
+
+    length_mm: Number
+    outer_diameter_mm: Number
+    inner_diameter_mm: Number = 0.0
+    end_diameter_mm: Number | None = None
+    material: Text
+    area_mm2: Number | None = None
+    second_moment_mm4: Number | None = None
+
+
+class ToolKeys(Body):
+    """[tool]"""
+
+    stickout_mm: Number
+    segments: list[SegmentKeys] = Field(min_length=1, max_length=MOST_SEGMENTS)
+
+
+class HolderKeys(Body):
+    """[holder]"""
+
+    insertion_mm: Number
+    segments: list[SegmentKeys] = Field(min_length=1, max_length=MOST_SEGMENTS)
+
+
+class ContactKeys(Body):
+    """[contact], per metre of insertion"""
+
+    translational_stiffness: Number
+    rotational_stiffness: Number
+    translational_damping: Number
+    rotational_damping: Number
+
+
+class MaterialKeys(Body):
+    """[materials.NAME]"""
+
+    youngs_modulus_gpa: Number | None = None
+    density: Number | None = None
+    poisson: Number | None = None
+    loss_factor: Number | None = None
+
+
+class ToolingKeys(Body):
+    """A tooling, with the keys of a tooling file."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE]})
+
+    name: Text | None = None
+    cutter: CutterKeys
+    tool: ToolKeys
+    holder: HolderKeys
+    contact: ContactKeys | None = None
+    materials: dict[Text, MaterialKeys] | None = Field(None, max_length=50)
+
+
+class ToolingAnswer(Answer):
+    """A tooling of the library."""
+
+    name: str
+    tooling: ToolingKeys
+    changed: str
+    etag: str
+
+
+class ToolingSummary(Answer):
+    """A tooling in short."""
+
+    name: str
+    teeth: int
+    diameter_mm: float
+    stickout_mm: float
+    label: Line
+    changed: str
+    etag: str

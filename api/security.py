@@ -1,0 +1,124 @@
+"""Who asks, and what they may: keys, scopes, groups, rates, and bodies of the right kind; checked before anything is read."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import math
+import secrets
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Annotated, Any
+
+from fastapi import Depends, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.routing import APIRoute
+
+from api.parts import Parts, parts_of
+from api.problems import Problem
+from api.stores.records import Key
+
+SCOPES = ("read", "upload", "run", "admin")
+HEADER = "X-API-Key"
+#: Whose everything is where no key is asked for.
+LOCAL_GROUP = "local"
+#: A key is PREFIX_ID_SECRET.
+PREFIX = "ri"
+_LOCAL_NAMES = ("localhost", "127.0.0.1", "[::1]")
+
+
+@dataclass(frozen=True, slots=True)
+class Caller:
+    """Who asks.
+
+    Parameters
+    ----------
+    id : str
+        Of the key.
+    group : str
+    scopes : tuple of str
+    """
+
+    id: str
+    group: str
+    scopes: tuple[str, ...]
+
+    def may(self, scope: str) -> bool:
+        """Whether a scope is among this caller's; admin may do everything in its group."""
+        return scope in self.scopes or "admin" in self.scopes
+
+
+def now() -> str:
+    """Return the time, UTC."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+def new_id() -> str:
+    """Return an id of the service's own: later ones sort behind earlier ones."""
+    return f"{int(datetime.now(UTC).timestamp() * 1e3):012x}{secrets.token_hex(6)}"
+
+
+def make_key(group: str, scopes: tuple[str, ...], label: str) -> tuple[Key, str]:
+    """Return a new key, and the text that opens with it; that text is nowhere kept."""
+    # 256 random bits: nobody guesses them, so a plain hash is enough
+    id, secret = new_id(), secrets.token_urlsafe(32)
+    return Key(id, group, label, scopes, hash_of(secret), now()), f"{PREFIX}_{id}_{secret}"
+
+
+def hash_of(secret: str) -> str:
+    """Return what is kept of a secret."""
+    return hashlib.sha256(secret.encode("utf-8", "replace")).hexdigest()
+
+
+def caller_of(request: Request, parts: Parts) -> Caller:
+    """Return who asks; without a key only where none is asked for."""
+    text = request.headers.get(HEADER, "")
+    if not text and not parts.settings.asks_for_keys:
+        # a page from elsewhere may reach loopback through a name of its own
+        host = request.headers.get("host", "").rsplit(":", 1)[0] if not request.headers.get("host", "").endswith("]") else "[::1]"
+        if host.lower() not in _LOCAL_NAMES:
+            raise Problem(403, "without a key the service answers on localhost only")
+        return Caller("local", LOCAL_GROUP, SCOPES)
+    _, _, rest = text.partition("_")
+    id, _, secret = rest.partition("_")
+    key = parts.store.keys.get(id) if text.startswith(f"{PREFIX}_") and id.isalnum() and id.isascii() and len(id) <= 64 else None
+    # an unknown id takes as long as a wrong secret
+    kept = key.secret_hash if key is not None else hash_of("")
+    if not hmac.compare_digest(hash_of(secret), kept) or key is None:
+        raise Problem(401, f"a valid key is needed in the header {HEADER}", headers={"WWW-Authenticate": "ApiKey"})
+    return Caller(key.id, key.group, key.scopes)
+
+
+class Guarded(APIRoute):
+    """A route that looks at key, scope, rate and content type before it reads a body; the scope stands in OpenAPI as ``x-scope``."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        answer = super().get_route_handler()
+        extra = self.openapi_extra or {}
+        scope = extra["x-scope"]
+        kinds = extra.get("x-content-types", ("application/json",)) if self.body_field or "requestBody" in extra else ()
+
+        async def handler(request: Request) -> Response:
+            parts = parts_of(request)
+            caller = await run_in_threadpool(caller_of, request, parts)
+            request.state.caller = caller
+            if not caller.may(scope):
+                raise Problem(403, f"the key has not the scope {scope}")
+            seconds = parts.rates.wait(caller.id)
+            if seconds > 0.0:
+                raise Problem(429, "too many requests with this key", headers={"Retry-After": str(math.ceil(seconds))})
+            kind = request.headers.get("content-type", "").split(";")[0].strip().lower()
+            if kinds and kind not in kinds:
+                raise Problem(415, f"found content type {kind[:80] or 'nothing'}, allowed is {' or '.join(kinds)}")
+            return await answer(request)
+
+        return handler
+
+
+def _caller(request: Request) -> Caller:
+    caller: Caller = request.state.caller
+    return caller
+
+
+WhoAsks = Annotated[Caller, Depends(_caller)]

@@ -1,0 +1,107 @@
+"""``rcsa-ident-serve``: the service on this machine."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rcsa_ident.errors import InputError
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help="The web service; settings come from RCSA_IDENT_... too.")
+
+
+@app.callback(invoke_without_command=True)
+def serve(
+    context: typer.Context,
+    data: Annotated[Path | None, typer.Option(help="Folder of the store (RCSA_IDENT_DATA).", show_default=False)] = None,
+    host: Annotated[str | None, typer.Option(help="Where to listen (RCSA_IDENT_HOST).", show_default="127.0.0.1")] = None,
+    port: Annotated[int | None, typer.Option(help="Port (RCSA_IDENT_PORT).", show_default="8000")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes that compute (RCSA_IDENT_WORKERS).", show_default="cores")] = None,
+) -> None:
+    """Start the service, unless a command is named."""
+    from api.settings import from_environment
+
+    given = {"data": data, "host": host, "port": port, "workers": workers}
+    try:
+        # with both at once, so that a host is never judged beside the keys of another
+        found = {f"RCSA_IDENT_{name.upper()}": str(value) for name, value in given.items() if value is not None}
+        settings = from_environment({**os.environ, **found})
+    except InputError as error:
+        _fail(error)
+    context.obj = settings
+    if context.invoked_subcommand is None:
+        _run(settings)
+
+
+@app.command("create-key")
+def create_key(
+    context: typer.Context,
+    group: Annotated[str, typer.Option(help="Whose machines and toolings it opens.")] = "default",
+    scopes: Annotated[str, typer.Option(help="Some of read, upload, run, admin, divided by commas.")] = "admin",
+    label: Annotated[str, typer.Option(help="What it is for.")] = "",
+) -> None:
+    """Make a key and print it once; the first one of a group is made so."""
+    import re
+
+    from api.schemas.common import NAME_PATTERN
+    from api.security import SCOPES, make_key
+    from api.stores.sql import open_store
+
+    try:
+        wanted = tuple(dict.fromkeys(part.strip() for part in scopes.split(",")))
+        if not set(wanted) <= set(SCOPES):
+            raise InputError("--scopes", scopes, f"some of {', '.join(SCOPES)}, divided by commas")
+        if not re.fullmatch(NAME_PATTERN.strip("^$"), group):
+            raise InputError("--group", group, "letters, digits, blanks and . _ + - ( ), at most 64")
+        if not label.isprintable() or len(label) > 200:
+            raise InputError("--label", label, "a line of at most 200 characters")
+        settings = context.obj
+        if not settings.database:
+            settings.data.mkdir(parents=True, exist_ok=True)
+        store = open_store(settings.database_url)
+        key, text = make_key(group, wanted, label)
+        store.keys.add(key)
+        store.close()
+    except InputError as error:
+        _fail(error)
+    typer.echo(text)
+
+
+def _run(settings: object) -> None:
+    import uvicorn
+
+    from api.main import create_app
+    from api.observe import JsonLines
+    from api.settings import Settings
+
+    assert isinstance(settings, Settings)
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(JsonLines())
+    logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
+    try:
+        service = create_app(settings)
+    except InputError as error:
+        _fail(error)
+    except OSError as error:
+        _fail(InputError("RCSA_IDENT_DATA", error.strerror or "an error", "a folder that can be made and written to"))
+    told = {"store": (settings.database and "database by URL") or str(settings.data), "workers": settings.workers}
+    log = logging.getLogger("rcsa_ident.service")
+    log.info("starting", extra={"fields": told | {"address": f"http://{settings.host}:{settings.port}"}})
+    if not settings.asks_for_keys:
+        log.warning("no keys are asked for: everybody on this machine may do everything (RCSA_IDENT_KEYS=on asks for them)")
+    uvicorn.run(service, host=settings.host, port=settings.port, log_config=None, access_log=False, server_header=False)
+
+
+def _fail(error: InputError) -> None:
+    typer.echo(f"error: {error}", err=True)
+    raise typer.Exit(2)
+
+
+def main() -> None:
+    """Run the command."""
+    app()

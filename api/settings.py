@@ -1,0 +1,105 @@
+"""What a person may set about the service, from the environment; read once, then handed down."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rcsa_ident.errors import InputError
+
+PREFIX = "RCSA_IDENT_"
+MEGABYTE = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Everything that differs between two installations.
+
+    Parameters
+    ----------
+    data : Path
+        Folder of the embedded store; made where it is missing.
+    database : str
+        URL of a database in its place, as ``postgresql+psycopg://user@host/name``; empty for SQLite in the data folder.
+    host, port
+        Where the service listens.
+    keys : bool or None
+        Whether a key is asked for; None asks for one unless the service listens on loopback alone.
+    workers : int
+        Processes that compute.
+    queue : int
+        Queries that may wait for one.
+    max_body_bytes : int
+    requests_per_minute, burst : int
+        Per key.
+    work_seconds : float [s]
+        Estimated work of one query; a longer one is refused.
+    kept_machines : int
+        Machines whose receptances each worker keeps.
+    """
+
+    data: Path = field(default_factory=lambda: Path("rcsa-ident-data"))
+    database: str = ""
+    host: str = "127.0.0.1"
+    port: int = 8000
+    keys: bool | None = None
+    workers: int = field(default_factory=lambda: max(1, min(os.cpu_count() or 1, 8)))
+    queue: int = 64
+    max_body_bytes: int = 16 * MEGABYTE
+    requests_per_minute: int = 6000
+    burst: int = 600
+    work_seconds: float = 20.0
+    kept_machines: int = 4
+
+    def __post_init__(self) -> None:
+        for name, least, most in (
+            ("port", 0, 65535), ("workers", 1, 256), ("queue", 0, 100_000), ("max_body_bytes", 1000, 10**9),
+            ("requests_per_minute", 1, 10**9), ("burst", 1, 10**9), ("work_seconds", 0.1, 3600.0), ("kept_machines", 1, 1000),
+        ):  # fmt: skip
+            if not least <= getattr(self, name) <= most:
+                raise InputError(PREFIX + name.upper(), getattr(self, name), f"a number from {least:g} to {most:g}")
+        if self.keys is False and not self.loopback:
+            raise InputError(f"{PREFIX}KEYS", "off", f"on: the service listens on {self.host}, which others reach, too")
+
+    @property
+    def loopback(self) -> bool:
+        """Whether only this machine reaches the service."""
+        try:
+            return self.host == "localhost" or ipaddress.ip_address(self.host).is_loopback
+        except ValueError:
+            return False
+
+    @property
+    def asks_for_keys(self) -> bool:
+        """Whether a query needs a key."""
+        return not self.loopback if self.keys is None else self.keys
+
+    @property
+    def database_url(self) -> str:
+        """Where the store is."""
+        return self.database or f"sqlite:///{self.data / 'service.db'}"
+
+
+def from_environment(environment: Mapping[str, str]) -> Settings:
+    """Return the settings of ``RCSA_IDENT_DATA``, ``RCSA_IDENT_PORT`` and so on; what is not there keeps its default."""
+    readers: dict[str, Callable[[str], Any]] = {"data": Path, "database": str, "host": str, "keys": _switch, "work_seconds": float}
+    given: dict[str, Any] = {}
+    for name in Settings.__dataclass_fields__:
+        text = environment.get(PREFIX + name.upper(), "").strip()
+        if text:
+            try:
+                given[name] = readers.get(name, int)(text)
+            except ValueError:
+                allowed = "on or off" if name == "keys" else "a number"
+                raise InputError(PREFIX + name.upper(), text, allowed) from None
+    return Settings(**given)
+
+
+def _switch(text: str) -> bool:
+    if text.lower() not in ("on", "off", "true", "false", "1", "0"):
+        raise ValueError(text)
+    return text.lower() in ("on", "true", "1")

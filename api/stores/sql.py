@@ -1,0 +1,236 @@
+"""The store in a database: SQLite in WAL mode beside the service, or PostgreSQL by URL, through the same statements."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+from sqlalchemy import Connection, Engine, Select, Table, create_engine, delete, event, insert, select, text, update
+from sqlalchemy.engine import make_url
+from sqlalchemy.exc import ArgumentError, DBAPIError, IntegrityError, NoSuchModuleError, OperationalError, TimeoutError
+
+from api.stores import tables
+from api.stores.records import ABSENT, Document, Documents, Key, Keys, Machine, Machines, Stale, Taken, Unavailable
+from rcsa_ident.errors import InputError
+
+#: How long an idempotency key is remembered.
+REMEMBERED = timedelta(days=1)
+_BUSY_MS = 5000
+
+
+def open_store(url: str) -> SqlStore:
+    """Return the store of a URL, made or brought to today's version where need be."""
+    try:
+        parsed = make_url(url)
+        engine = create_engine(parsed, pool_pre_ping=not url.startswith("sqlite"))
+    except (ArgumentError, NoSuchModuleError, ModuleNotFoundError) as error:
+        # the URL may hold a password: only what is wrong with it is told
+        allowed = "a URL as sqlite:///FILE or postgresql+psycopg://USER@HOST/NAME, with its driver installed"
+        raise InputError("RCSA_IDENT_DATABASE", type(error).__name__, allowed) from None
+    if engine.dialect.name == "sqlite":
+        event.listen(engine, "connect", _sqlite)
+        event.listen(engine, "begin", _begin)
+    try:
+        with engine.begin() as connection:
+            tables.migrate(connection)
+    except OperationalError:
+        raise InputError("RCSA_IDENT_DATABASE", "no answer", f"a database that can be opened ({parsed.render_as_string()})") from None
+    return SqlStore(engine)
+
+
+def _sqlite(connection: Any, _record: Any) -> None:
+    """Readers do not wait for a writer; what is committed is on the disk, also after a loss of power."""
+    # transactions begin where SQLAlchemy says so, not before the first write
+    connection.isolation_level = None
+    for pragma in ("journal_mode=WAL", "synchronous=FULL", f"busy_timeout={_BUSY_MS}", "foreign_keys=ON"):
+        connection.execute(f"PRAGMA {pragma}")
+
+
+def _begin(connection: Connection) -> None:
+    wanted = "IMMEDIATE" if connection.get_execution_options().get("writes", True) else "DEFERRED"
+    connection.exec_driver_sql(f"BEGIN {wanted}")
+
+
+class SqlStore:
+    """Everything in one database."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine = engine
+        self.keys: Keys = SqlKeys(self)
+        self.machines: Machines = SqlMachines(self)
+        self.identifications: Documents = SqlDocuments(self, tables.identifications)
+        self.toolings: Documents = SqlDocuments(self, tables.toolings)
+
+    @contextmanager
+    def writing(self) -> Iterator[Connection]:
+        """A transaction that writes; on SQLite one at a time."""
+        with self._answering(), self.engine.begin() as connection:
+            yield connection
+
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
+        """A transaction that only reads."""
+        with self._answering(), self.engine.connect() as connection:
+            yield connection.execution_options(writes=False)
+
+    @contextmanager
+    def _answering(self) -> Iterator[None]:
+        try:
+            yield
+        except IntegrityError:
+            raise
+        except (DBAPIError, TimeoutError) as error:
+            if isinstance(error, OperationalError | TimeoutError) or error.connection_invalidated:
+                raise Unavailable from error
+            raise
+
+    def check(self) -> None:
+        with self.reading() as connection:
+            connection.execute(text("SELECT 1"))
+
+    def close(self) -> None:
+        self.engine.dispose()
+
+
+class SqlKeys:
+    """Keys in a table."""
+
+    def __init__(self, store: SqlStore) -> None:
+        self.store = store
+
+    def add(self, key: Key) -> None:
+        with self.store.writing() as connection:
+            connection.execute(insert(tables.keys).values(asdict(key) | {"scopes": " ".join(key.scopes)}))
+
+    def get(self, id: str) -> Key | None:
+        with self.store.reading() as connection:
+            row = connection.execute(select(tables.keys).where(tables.keys.c.id == id)).first()
+        return None if row is None else _key(row)
+
+    def list(self, group: str, after: str, limit: int) -> list[Key]:
+        t = tables.keys
+        with self.store.reading() as connection:
+            rows = connection.execute(select(t).where(t.c.group == group, t.c.id > after).order_by(t.c.id).limit(limit)).all()
+        return [_key(row) for row in rows]
+
+    def delete(self, group: str, id: str) -> bool:
+        with self.store.writing() as connection:
+            found = connection.execute(delete(tables.keys).where(tables.keys.c.group == group, tables.keys.c.id == id))
+            return found.rowcount > 0
+
+
+def _key(row: Any) -> Key:
+    data = row._asdict()
+    return Key(**data | {"scopes": tuple(data["scopes"].split())})
+
+
+class SqlMachines:
+    """Machines in a table."""
+
+    def __init__(self, store: SqlStore) -> None:
+        self.store = store
+
+    def add(self, machine: Machine, repeat: tuple[str, str] | None = None) -> Machine:
+        r = tables.repeats
+        try:
+            with self.store.writing() as connection:
+                if repeat is not None:
+                    before = (datetime.now(UTC) - REMEMBERED).isoformat()
+                    connection.execute(delete(r).where(r.c.created < before))
+                    earlier = self._earlier(connection, machine.group, repeat)
+                    if earlier is not None:
+                        return earlier
+                    connection.execute(insert(r).values(asdict(machine) | {"key": repeat[0], "digest": repeat[1]}))
+                connection.execute(insert(tables.machines).values(asdict(machine)))
+                return machine
+        except IntegrityError:
+            # somebody else was first between look and write, or has the name
+            with self.store.reading() as connection:
+                earlier = None if repeat is None else self._earlier(connection, machine.group, repeat)
+            if earlier is None:
+                raise Taken("name") from None
+            return earlier
+
+    def _earlier(self, connection: Connection, group: str, repeat: tuple[str, str]) -> Machine | None:
+        r = tables.repeats
+        row = connection.execute(select(r).where(r.c.group == group, r.c.key == repeat[0])).first()
+        if row is None:
+            return None
+        if row.digest != repeat[1]:
+            raise Taken("idempotency key")
+        return Machine(row.id, group, row.name, row.description, row.created)
+
+    def get(self, group: str, id: str) -> Machine | None:
+        t = tables.machines
+        with self.store.reading() as connection:
+            row = connection.execute(select(t).where(t.c.group == group, t.c.id == id)).first()
+        return None if row is None else Machine(**row._asdict())
+
+    def list(self, group: str, after: str, limit: int) -> list[Machine]:
+        t = tables.machines
+        with self.store.reading() as connection:
+            rows = connection.execute(select(t).where(t.c.group == group, t.c.id > after).order_by(t.c.id).limit(limit)).all()
+        return [Machine(**row._asdict()) for row in rows]
+
+    def delete(self, group: str, id: str) -> bool:
+        t, i = tables.machines, tables.identifications
+        with self.store.writing() as connection:
+            connection.execute(delete(i).where(i.c.group == group, i.c.name == id))
+            return connection.execute(delete(t).where(t.c.group == group, t.c.id == id)).rowcount > 0
+
+
+class SqlDocuments:
+    """Texts in a table."""
+
+    def __init__(self, store: SqlStore, table: Table) -> None:
+        self.store, self.table = store, table
+
+    def put(self, document: Document, expected: str | None = None) -> bool:
+        t, data = self.table, asdict(document)
+        here = (t.c.group == document.group, t.c.name == document.name)
+        try:
+            with self.store.writing() as connection:
+                there = connection.execute(select(t.c.digest).where(*here).with_for_update()).scalar()
+                if expected is not None and (there or ABSENT) != expected:
+                    raise Stale
+                if there is None:
+                    connection.execute(insert(t).values(data))
+                else:
+                    connection.execute(update(t).where(*here).values(data))
+                return there is None
+        except IntegrityError:
+            # the first text of that name came from somebody else in the same moment
+            return self.put(document, expected)
+
+    def get(self, group: str, name: str) -> Document | None:
+        t = self.table
+        with self.store.reading() as connection:
+            row = connection.execute(select(t).where(t.c.group == group, t.c.name == name)).first()
+        return None if row is None else Document(**row._asdict())
+
+    def brief(self, group: str, name: str) -> Document | None:
+        t = self.table
+        with self.store.reading() as connection:
+            row = connection.execute(self._brief().where(t.c.group == group, t.c.name == name)).first()
+        return None if row is None else Document(**row._asdict(), text="")
+
+    def _brief(self) -> Select[Any]:
+        return select(*(column for column in self.table.c if column.name != "text"))
+
+    def list(self, group: str, after: str, limit: int) -> list[Document]:
+        t = self.table
+        with self.store.reading() as connection:
+            rows = connection.execute(self._brief().where(t.c.group == group, t.c.name > after).order_by(t.c.name).limit(limit)).all()
+        return [Document(**row._asdict(), text="") for row in rows]
+
+    def delete(self, group: str, name: str, expected: str | None = None) -> bool:
+        t = self.table
+        here = (t.c.group == group, t.c.name == name)
+        with self.store.writing() as connection:
+            there = connection.execute(select(t.c.digest).where(*here).with_for_update()).scalar()
+            if expected is not None and (there or ABSENT) != expected:
+                raise Stale
+            return connection.execute(delete(t).where(*here)).rowcount > 0

@@ -1,0 +1,81 @@
+"""Tables, and how a store of an earlier version becomes one of today."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from sqlalchemy import Column, Connection, Integer, MetaData, String, Table, Text, UniqueConstraint, insert, inspect, select, update
+
+from rcsa_ident.errors import InputError
+
+metadata = MetaData()
+# names compare by their bytes everywhere: the order of a list must not depend on the database's language
+_Name = String(128).with_variant(String(128, collation="C"), "postgresql")
+
+meta = Table("meta", metadata, Column("schema_version", Integer, nullable=False))
+keys = Table(
+    "keys",
+    metadata,
+    Column("id", _Name, primary_key=True),
+    Column("group", _Name, nullable=False, index=True),
+    Column("label", String(200), nullable=False),
+    Column("scopes", String(200), nullable=False),
+    Column("secret_hash", String(64), nullable=False),
+    Column("created", String(40), nullable=False),
+)
+machines = Table(
+    "machines",
+    metadata,
+    Column("id", _Name, primary_key=True),
+    Column("group", _Name, nullable=False),
+    Column("name", _Name, nullable=False),
+    Column("description", Text, nullable=False),
+    Column("created", String(40), nullable=False),
+    UniqueConstraint("group", "name"),
+)
+repeats = Table(
+    "idempotency_keys",
+    metadata,
+    Column("group", _Name, primary_key=True),
+    Column("key", String(200), primary_key=True),
+    Column("digest", String(64), nullable=False),
+    Column("id", _Name, nullable=False),
+    Column("name", _Name, nullable=False),
+    Column("description", Text, nullable=False),
+    Column("created", String(40), nullable=False, index=True),
+)
+
+
+def _documents(name: str) -> Table:
+    return Table(
+        name,
+        metadata,
+        Column("group", _Name, primary_key=True),
+        Column("name", _Name, primary_key=True),
+        Column("text", Text, nullable=False),
+        Column("summary", Text, nullable=False),
+        Column("digest", String(64), nullable=False),
+        Column("changed", String(40), nullable=False),
+    )
+
+
+identifications = _documents("identifications")
+toolings = _documents("toolings")
+
+#: What turns a store of version k + 1 into one of version k + 2, in order; a released step is never edited.
+MIGRATIONS: tuple[Callable[[Connection], None], ...] = ()
+SCHEMA_VERSION = 1 + len(MIGRATIONS)
+
+
+def migrate(connection: Connection) -> None:
+    """Bring the store to today's version within one transaction; a store of a later version is refused."""
+    if not inspect(connection).has_table("meta"):
+        metadata.create_all(connection)
+        connection.execute(insert(meta).values(schema_version=SCHEMA_VERSION))
+        return
+    version = connection.execute(select(meta.c.schema_version)).scalar_one()
+    if version > SCHEMA_VERSION:
+        raise InputError("store", f"schema version {version}", f"at most {SCHEMA_VERSION}: a later release has written it")
+    for step in MIGRATIONS[version - 1 :]:
+        step(connection)
+    connection.execute(update(meta).values(schema_version=SCHEMA_VERSION))

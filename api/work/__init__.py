@@ -1,0 +1,1 @@
+"""What worker processes compute: the same workflows as the commands, with what does not change kept between queries."""

@@ -1,0 +1,138 @@
+"""Worker processes for what computes: the event loop never does, and a full queue says so at once."""
+
+from __future__ import annotations
+
+import asyncio
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any, Protocol, TypeVar
+
+T = TypeVar("T")
+
+
+class Busy(Exception):
+    """More work waits than is allowed, or a worker has just died."""
+
+
+class Work(Protocol):
+    """Where questions are computed."""
+
+    async def run(self, call: Callable[..., T], *arguments: Any) -> T:
+        """Return what a call answers; raises `Busy` where too many wait."""
+
+    @property
+    def waiting(self) -> int:
+        """Questions that have no answer yet."""
+
+    @property
+    def ready(self) -> bool:
+        """Whether workers are there."""
+
+    def start(self) -> None:
+        """Start workers."""
+
+    def stop(self) -> None:
+        """End workers."""
+
+
+class Pool:
+    """Spawned processes: nothing of the server's threads or locks is inherited.
+
+    Parameters
+    ----------
+    workers : int
+    queue : int
+        Questions that may wait beyond those at work.
+    machines : int
+        That each worker keeps.
+    """
+
+    def __init__(self, workers: int, queue: int, machines: int) -> None:
+        self.workers, self.queue, self.machines = workers, queue, machines
+        self.executor: ProcessPoolExecutor | None = None
+        self.waiting = 0
+        self.warm = 0
+
+    @property
+    def ready(self) -> bool:
+        return self.warm > 0
+
+    def start(self) -> None:
+        # each worker computes on one core; read by the libraries when they are first imported there
+        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+            os.environ.setdefault(name, "1")
+        context = multiprocessing.get_context("spawn")
+        self.executor = ProcessPoolExecutor(self.workers, context, initializer=_begin, initargs=(self.machines,))
+        self.warm = 0
+        for _ in range(self.workers):
+            self.executor.submit(warm).add_done_callback(self._warmed)
+
+    def _warmed(self, future: Any) -> None:
+        if not future.cancelled() and future.exception() is None:
+            self.warm += 1
+
+    async def run(self, call: Callable[..., T], *arguments: Any) -> T:
+        if self.executor is None or self.waiting >= self.workers + self.queue:
+            raise Busy
+        executor = self.executor
+        self.waiting += 1
+        try:
+            return await asyncio.wrap_future(executor.submit(guarded, call, *arguments))
+        except BrokenProcessPool as error:
+            # a worker was killed, perhaps for its memory: all that waited is lost, and told so
+            if self.executor is executor:
+                executor.shutdown(wait=False, cancel_futures=True)
+                self.start()
+            raise Busy from error
+        finally:
+            self.waiting -= 1
+
+    def stop(self) -> None:
+        if self.executor is not None:
+            self.executor.shutdown(wait=True, cancel_futures=True)
+            self.executor = None
+            self.warm = 0
+
+
+def _begin(machines: int) -> None:
+    """In a new worker: import what answers, and end with the service, however that ends."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def follow() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
+    from api.work import answers
+
+    answers.keep(machines)
+
+
+def guarded(call: Callable[..., T], *arguments: Any) -> T:
+    """Return what a call answers; numbers that are each allowed but lead nowhere together are told as bad input."""
+    import numpy as np
+
+    from rcsa_ident.errors import InputError
+
+    try:
+        with np.errstate(all="ignore"):
+            return call(*arguments)
+    except InputError:
+        raise
+    except (ArithmeticError, np.linalg.LinAlgError, ValueError) as error:
+        if isinstance(error, ArithmeticError | np.linalg.LinAlgError) or "infs or NaNs" in str(error):
+            raise InputError("numbers of the query", "no finite answer", "a tooling and a cut that can be computed") from None
+        raise
+
+
+def warm() -> None:
+    """Run a small job through every kernel that a quick answer needs, so that they are compiled, or read from the cache."""
+    from rcsa_ident.workflows.warm import STEPS
+
+    for step in ("tool-holder", "lobes"):
+        STEPS[step]()
