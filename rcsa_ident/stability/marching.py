@@ -15,8 +15,9 @@ _WEAK = 0.02
 #: Nodes per period of the highest mode that counts, with polynomials of high degree and as many more with those of low degree;
 #: steps, where coefficients stand still.
 _NODES, _LOW_DEGREE, _STEPS = 9.0, 4.0, 24.0
-#: Depth over axial pitch beyond which islands may stand under a limit: the one at 5 % immersion and 30 degrees stands at 0.2.
-ISLANDS = 0.1
+#: Depth over axial pitch beyond which islands may stand under a limit: at 5 % immersion and 30 degrees one stands at 0.2, at 20 % and
+#: 17 degrees at 0.03.
+ISLANDS = 0.03
 #: Residual of the multiplier for a first look.
 ROUGH = 1e-4
 #: How much finer the step is by which the error is told, and how often the search is repeated with it.
