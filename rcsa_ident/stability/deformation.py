@@ -124,6 +124,7 @@ def deflected_edge(process: MillingProcess, deflection: ToolDeflection, speed: f
     edges = np.linspace(0.0, depth, count + 1)
     middle, width = 0.5 * (edges[1:] + edges[:-1]), depth / count
     lag = np.tan(process.cutter.helix) / radius * middle
+    half = 0.5 * np.tan(process.cutter.helix) / radius * width
     teeth = 2.0 * np.pi / process.cutter.teeth * np.arange(process.cutter.teeth) if deflection.all_teeth else np.zeros(1)
     c, kr = process.coefficients, process.coefficients.tangential * process.coefficients.radial_ratio
     bent = _bending(middle, deflection)
@@ -137,12 +138,15 @@ def deflected_edge(process: MillingProcess, deflection: ToolDeflection, speed: f
         for _ in range(_ROUNDS):
             actual = min(max(nominal - off, 0.0), 2.0 * radius)
             span = np.arccos(1.0 - actual / radius)
-            cuts = (phi >= np.pi - span - 1e-12) & (phi <= np.pi + 1e-12) if down else (phi >= -1e-12) & (phi <= span + 1e-12)
+            first, last = (np.pi - span, np.pi) if down else (0.0, span)
+            # the share of each slice that is in the cut; of the one that generates the wall, half
+            inside = np.minimum(phi + half, last) - np.maximum(phi - half, first)
+            cuts = np.maximum(inside, 0.0) / (2.0 * half) if half > 0.0 else (inside >= -1e-12).astype(float)
             chip = feed
             if deflection.chip_reduction == "literal":
                 chip = feed - radius * abs(np.sin(leave - entry) - np.sin(span))
-            tangential = np.where(cuts, c.tangential * chip * s + c.tangential_edge, 0.0)
-            radial = np.where(cuts, kr * chip * s + c.radial_edge, 0.0)
+            tangential = cuts * (c.tangential * chip * s + c.tangential_edge)
+            radial = cuts * (kr * chip * s + c.radial_edge)
             forward = width * np.sum(-tangential * co - radial * s, axis=1)
             normal = width * np.sum(tangential * s - radial * co, axis=1)
             new = float(bent[k] @ normal + deflection.machine_yy * normal.sum() + deflection.machine_yx * forward.sum())
