@@ -118,6 +118,14 @@ def test_a_cone_is_cut_where_the_tool_ends():
     assert shape(only(tool, insertion_mm=30.0).tooling.assembly.holder) == [(30.0, 40.0, 50.0, 12.0), (30.0, 50.0, 60.0, 0.0)]
 
 
+def test_rounded_figures_leave_the_tool_inside_of_the_holder():
+    """Eight thirds of a length lose more by their rounding than a tooling forgives."""
+    cones = [{"height": 10.0 / 3.0, "lower-diameter": 30.0, "upper-diameter": 40.0}] * 8
+    found = only(end_mill(holder__segments=cones, holder__gaugeLength=None, geometry__OAL=150.0)).tooling.assembly
+    assert 1e3 * found.insertion == pytest.approx(80.0 / 3.0, abs=1e-5)
+    assert found.insertion <= found.holder_length
+
+
 @settings(max_examples=50, deadline=None)
 @given(
     heights=st.lists(st.floats(0.01, 60.0), min_size=1, max_size=8),

@@ -114,6 +114,17 @@ def test_odd_names_leave_the_numbers(tmp_path, names):
     assert read_recording(tmp_path / "cut.wav", (FIRST,)).samples.shape == (4, 1)
 
 
+def test_a_name_by_an_entity_is_none(tmp_path):
+    names = b'<!DOCTYPE x [<!ENTITY n "gap">]><x><TRACK><INTERLEAVE_INDEX>1</INTERLEAVE_INDEX><NAME>&n;</NAME></TRACK></x>'
+    for raw, known in ((names, False), (names[names.index(b"<x>") :].replace(b"&n;", b"gap"), True)):
+        (tmp_path / "cut.wav").write_bytes(riff(form(), chunk(b"iXML", raw), SAMPLES))
+        if known:
+            assert read_recording(tmp_path / "cut.wav", (Sensor("gap", Quantity.TRIGGER),)).samples.shape == (4, 1)
+            continue
+        with pytest.raises(InputError, match=r"channel gap: found no such channel, allowed is one channel of the file: ch1"):
+            read_recording(tmp_path / "cut.wav", (Sensor("gap", Quantity.TRIGGER),))
+
+
 HOSTILE = {
     "gigabytes": (riff(form(), chunk(b"data", bytes(8), 2**31)), "a chunk data that is cut off"),
     "never finished": (riff(form(), chunk(b"data", bytes(8), 2**32 - 1)), "a chunk data that is cut off"),
