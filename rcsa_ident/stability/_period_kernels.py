@@ -406,7 +406,7 @@ def multiplier(pole, outputs, inputs, constant, cut, table, frozen, tolerance, w
     motion, force, state = np.zeros((2 * points, r)), np.zeros((points, r)), np.empty(m, dtype=np.complex128)
     # a start without any symmetry: the golden ratio's multiples, beside what is known
     for i in range(size):
-        basis[0, i] = 0.05 * ((i + 1) * 0.6180339887498949 % 1.0 - 0.5)
+        basis[0, i] = 0.5 * ((i + 1) * 0.6180339887498949 % 1.0 - 0.5)
     norm = np.sqrt(np.sum(start**2))
     if start.size == size and norm > 0.0:
         basis[0] += start / norm

@@ -14,14 +14,12 @@ from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
-from rcsa_ident.stability.marching import ROUGH, Growth, islands_from, longest_step
+from rcsa_ident.stability.marching import ROUGH, Growth, longest_step
 from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.period_map import PeriodMap
 
 #: Points along the side of a block at the start.
-_BLOCK = 8
-#: Blocks of so many points' distance are not divided, unless islands may stand in them: the boundary is followed from there.
-_SMALL = 4
+_BLOCK = 4
 #: A block whose corners are alike is divided where one of them comes so near to zero, as a share of their range.
 _NEAR = 0.5
 #: Depths on the boundary that are compared with those of a shorter step, and how much shorter.
@@ -131,13 +129,14 @@ def stability_map(
             for j in range(depths.size):
                 growth[i, j] = at(i, j)
     else:
-        small = 1 if np.isfinite(islands_from(cut)) else _SMALL
         blocks = [(i, k, j, m) for i, k in _parts(speeds.size) for j, m in _parts(depths.size)]
         while blocks:
             i, k, j, m = blocks.pop()
             corners = at(i, j), at(i, m), at(k, j), at(k, m)
+            if max(k - i, m - j) <= 1:
+                continue
             low, high = min(corners), max(corners)
-            if max(k - i, m - j) <= small or (low * high > 0.0 and min(abs(low), abs(high)) > _NEAR * (high - low)):
+            if low * high > 0.0 and min(abs(low), abs(high)) > _NEAR * (high - low):
                 s, t = np.linspace(0.0, 1.0, k - i + 1)[:, None], np.linspace(0.0, 1.0, m - j + 1)
                 one, two = corners[0] + t * (corners[1] - corners[0]), corners[2] + t * (corners[3] - corners[2])
                 growth[i : k + 1, j : m + 1] = one + s * (two - one)

@@ -20,6 +20,8 @@ from rcsa_ident.stability.modes import TipModes
 RESIDUAL = 1e-6
 #: Most swings of a varying speed after which the teeth have to stand as they did.
 _SWINGS = 60
+#: Cuts that are kept laid out.
+_KEPT = 512
 #: Slices of the edge per metre where modes have a shape along it.
 SLICES = 6000.0
 
@@ -119,6 +121,9 @@ class PeriodMap:
         # writable copies: a kernel is compiled anew for read-only arrays
         self.pole = modes.pole.copy()
         self._straight: tuple[FloatArray, FloatArray] | None = None
+        #: Whether all forces are proportional to the depth.
+        self.proportional = cutter.helix == 0.0 and engagements is None and modes.shape is None
+        self._unit: dict[tuple[float, float], tuple[FloatArray, ...]] = {}
 
     def duration(self, speed: float) -> float:
         """Seconds of a period."""
@@ -148,6 +153,29 @@ class PeriodMap:
         residual : float
             Of the eigenvalue, as a share of it, at which the search for it ends.
         """
+        cut = self._laid_out(speed, depth, step)
+        first = np.zeros(0) if start is None else start.real
+        value, left, _, vector, force = _period_kernels.multiplier(
+            self.pole, self.outputs, self.inputs, self.constant, cut, self.table, self.frozen, residual, waves, first
+        )
+        value = complex(value)
+        if value.imag < 0.0:
+            value, vector, force = value.conjugate(), vector.conj(), force.conj()
+        omega, motion = self._waves(value, speed, force, cut[0], cut[-1]) if waves else (np.zeros(0), np.zeros(0))
+        return Multiplier(value, self.duration(speed), vector, omega, motion, float(left))
+
+    def _laid_out(self, speed: float, depth: float, step: float) -> tuple[FloatArray, ...]:
+        """The cut over its period; without a helix it is laid out once for all depths, since every force grows with the depth."""
+        if not self.proportional:
+            return self._lay_out(speed, depth, step)
+        if (speed, step) not in self._unit:
+            if len(self._unit) >= _KEPT:
+                self._unit.clear()
+            self._unit[speed, step] = self._lay_out(speed, 1.0, step)
+        places, stiffness, damping, where, weight, time = self._unit[speed, step]
+        return places, depth * stiffness, depth * damping, where, weight, time
+
+    def _lay_out(self, speed: float, depth: float, step: float) -> tuple[FloatArray, ...]:
         process = self.process
         rows, shapes = self._rows(speed, depth)
         c, d, v = process.coefficients, process.damping, process.speed_variation
@@ -169,16 +197,7 @@ class PeriodMap:
             float(self.frozen),
         )
         plan[kernels.DELAYS :] = self.delays
-        cut = kernels.lay_out(rows, shapes, plan, self.table)
-        first = np.zeros(0) if start is None else start.real
-        value, left, _, vector, force = _period_kernels.multiplier(
-            self.pole, self.outputs, self.inputs, self.constant, cut, self.table, self.frozen, residual, waves, first
-        )
-        value = complex(value)
-        if value.imag < 0.0:
-            value, vector, force = value.conjugate(), vector.conj(), force.conj()
-        omega, motion = self._waves(value, speed, force, cut[0], cut[-1]) if waves else (np.zeros(0), np.zeros(0))
-        return Multiplier(value, self.duration(speed), vector, omega, motion, float(left))
+        return kernels.lay_out(rows, shapes, plan, self.table)
 
     def _rows(self, speed: float, depth: float) -> tuple[FloatArray, FloatArray]:
         """Windows and the directions that they push in, as the kernels want them."""
