@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
+from itertools import groupby
 
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import BeamSegment
@@ -16,7 +17,9 @@ _STYLE = """
 --contact:#ff7b8a}}
 .rt .paper{fill:var(--paper)}.rt .tool{fill:var(--tool);stroke:var(--ink)}.rt .holder{fill:url(#rt-hatch);stroke:var(--ink)}
 .rt .edge{fill:none;stroke:var(--ink)}.rt .hidden{fill:none;stroke:var(--ink)}.rt .axis,.rt .line{fill:none;stroke:var(--soft)}
-.rt .arrow{fill:var(--soft)}.rt .contact{fill:none;stroke:var(--contact)}.rt text{fill:var(--ink);font-family:system-ui,sans-serif}
+.rt .arrow{fill:var(--soft)}.rt .contact{fill:none;stroke:var(--contact)}
+.rt text{fill:var(--ink);font-family:system-ui,sans-serif;paint-order:stroke;
+stroke:var(--paper);stroke-linejoin:round}
 .rt .small{fill:var(--soft)}.rt .joint{fill:var(--contact)}
 """
 #: Width of a character over the size of the letters, a little more than most fonts need.
@@ -35,6 +38,7 @@ class _Sheet:
 
     letters: float
     parts: list[str] = field(default_factory=list)
+    texts: list[str] = field(default_factory=list)
     top: float = 0.0
     bottom: float = 0.0
     left: float = 0.0
@@ -66,7 +70,8 @@ class _Sheet:
         self.reach(x + half * (anchor != "end"), y + 0.3 * self.letters)
         named = f' class="{kind}"' if kind else ""
         place = f'x="{_mm(x)}" y="{_mm(y)}" font-size="{_mm(size * self.letters)}" text-anchor="{anchor}"'
-        self.parts.append(f"<text{named} {place}>{_safe(text)}</text>")
+        # above all lines, with a rim of paper
+        self.texts.append(f'<text{named} {place} stroke-width="{_mm(0.25 * self.letters)}">{_safe(text)}</text>')
 
     def dimensions(self, lengths: Sequence[tuple[str, float, float]], y: float) -> None:
         """A chain of lengths between two places each, with arrows; texts that do not fit stand below, in rows that keep them apart."""
@@ -176,10 +181,13 @@ def _diameters(
         if segment.inner_diameter > 0.0 and x < nose:
             bores.append((middle, 500.0 * segment.inner_diameter, f"Ø{_figure(1e3 * segment.inner_diameter)}"))
     for x, segment in holder:
-        middle = x + 500.0 * segment.length
-        outer.append((middle, 250.0 * (segment.diameter + segment.end), _diameter(segment)))
-        if segment.inner_diameter > 0.0:
-            bores.append((middle, 500.0 * segment.inner_diameter, f"Ø{_figure(1e3 * segment.inner_diameter)}"))
+        outer.append((x + 500.0 * segment.length, 250.0 * (segment.diameter + segment.end), _diameter(segment)))
+    for bore, run in groupby(holder, key=lambda each: each[1].inner_diameter):
+        # one bore through several segments has one label
+        steps = list(run)
+        if bore > 0.0:
+            middle = 0.5 * (steps[0][0] + steps[-1][0] + 1e3 * steps[-1][1].length)
+            bores.append((middle, 500.0 * bore, f"Ø{_figure(1e3 * bore)}"))
     if 1e3 * tooling.cutter.diameter > 1e3 * max(tooling.assembly.tool[0].diameter, tooling.assembly.tool[0].end):
         outer.insert(0, (0.0, 500.0 * tooling.cutter.diameter, f"cutting Ø{_figure(1e3 * tooling.cutter.diameter)}"))
     _labels(sheet, outer, sheet.top - sheet.letters, -1.0)
@@ -252,6 +260,7 @@ def _page(sheet: _Sheet, tooling: Tooling, nose: float, flange: float) -> str:
         f"<defs>{hatch}</defs>",
         f'<rect class="paper" x="{_mm(x)}" y="{_mm(top)}" width="{_mm(width)}" height="{_mm(height)}"/>',
         *sheet.parts,
+        *sheet.texts,
         "</svg>",
     ]
     return "\n".join(lines) + "\n"

@@ -174,6 +174,14 @@ def test_nothing_leaves_the_paper_and_no_texts_of_a_row_meet(lengths, diameters,
         assert all(first[1] <= second[0] + 1e-3 for first, second in pairwise(spans))
 
 
+def test_one_bore_through_several_segments_has_one_label():
+    holder = tuple(
+        BeamSegment(0.01, d, STEEL, bore) for d, bore in ((0.03, 0.012), (0.04, 0.012), (0.05, 0.012), (0.05, 0.02), (0.05, 0.012))
+    )
+    tooling = Tooling("A", Cutter(2, 0.01), clamped((BeamSegment(0.05, 0.01, CARBIDE),), holder, 0.03, 0.02, None))
+    assert [text for text in texts(drawn(tooling)) if text in ("Ø12", "Ø20")] == ["Ø12", "Ø20", "Ø12"]
+
+
 def test_the_same_tooling_gives_the_same_drawing():
     assert tooling_svg(plain()) == tooling_svg(plain())
     assert "prefers-color-scheme:dark" in tooling_svg(plain())
