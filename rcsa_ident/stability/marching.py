@@ -7,7 +7,7 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.first_loss import first_loss
-from rcsa_ident.stability.period_map import RESIDUAL, Multiplier, PeriodMap
+from rcsa_ident.stability.period_map import RESIDUAL, Multiplier, PeriodMap, surely_stable
 from rcsa_ident.stability.result import StabilityLobes
 
 #: Share of the strongest mode's peak below which a mode does not decide on the length of a step.
@@ -56,13 +56,6 @@ def longest_step(cut: PeriodMap) -> float:
     return wave / _STEPS if cut.frozen else degree * wave / (_NODES * (1.0 + _LOW_DEGREE / degree**2))
 
 
-def surely_stable(cut: PeriodMap) -> float:
-    """A depth at which nothing can grow: the gain round the loop is below one at every frequency."""
-    c = cut.process.coefficients
-    teeth = max(1.0, np.ceil((cut.process.engagement.exit - cut.process.engagement.entry) / float(np.min(cut.process.cutter.pitch))))
-    return 0.9 / (2.0 * teeth * c.tangential * float(np.hypot(1.0, c.radial_ratio)) * cut.modes.largest)
-
-
 def islands_from(cut: PeriodMap) -> float:
     """The depth beyond which islands of instability may stand under the first limit.
 
@@ -83,7 +76,7 @@ def marched_lobes(
     limit = np.full(speeds.size, np.inf)
     chatter = np.full(speeds.size, np.nan)
     lobe, flip = np.full(speeds.size, -1, dtype=np.intp), np.zeros(speeds.size, dtype=bool)
-    low, lost = surely_stable(cut), 0
+    low, lost = surely_stable(cut.modes, cut.process), 0
     for i, speed in enumerate(speeds):
         depth, step, good = _limit(cut, float(speed), low, max_depth, intervals, tolerance)
         lost += not good

@@ -249,6 +249,13 @@ class PeriodMap:
         return np.abs(omega), np.linalg.norm(motion @ self.directions.T, axis=1)
 
 
+def surely_stable(modes: TipModes, process: MillingProcess) -> float:
+    """A depth at which nothing can grow: the gain round the loop is below one at every frequency [m]."""
+    c = process.coefficients
+    teeth = max(1.0, np.ceil((process.engagement.exit - process.engagement.entry) / float(np.min(process.cutter.pitch))))
+    return float(0.9 / (2.0 * teeth * c.tangential * np.hypot(1.0, c.radial_ratio) * modes.largest))
+
+
 def common_period(process: MillingProcess, spacing: float) -> float:
     """The rotation after which teeth and speed are as they were."""
     if process.speed_variation is None:

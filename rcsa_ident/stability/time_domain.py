@@ -13,7 +13,7 @@ from rcsa_ident.errors import InputError, positive
 from rcsa_ident.stability import _time_kernels as kernels
 from rcsa_ident.stability.first_loss import first_loss
 from rcsa_ident.stability.modes import TipModes, modes_of
-from rcsa_ident.stability.period_map import common_period
+from rcsa_ident.stability.period_map import common_period, surely_stable
 from rcsa_ident.stability.result import StabilityLobes
 
 #: Steps per wave of the highest mode that counts, and per tooth period at least.
@@ -95,7 +95,7 @@ class TimeDomain:
         limit = np.full(speeds.size, np.inf)
         chatter, lobe = np.full(speeds.size, np.nan), np.full(speeds.size, -1, dtype=np.intp)
         flip = np.zeros(speeds.size, dtype=bool)
-        low = surely_stable_depth(modes, process)
+        low = surely_stable(modes, process)
         for i, speed in enumerate(speeds):
             cut = _Cut(modes, process, float(speed), self.contact_loss)
             depth = first_loss(lambda d, cut=cut: cut.growth(d, self.periods), low, max_depth, self.tolerance, _RATIO)  # type: ignore[misc]
@@ -131,13 +131,6 @@ def milling_history(
     back = process.machine_from_feed.T
     angle = cut.step * (cut.per_turn + np.arange(samples.shape[0]))
     return MillingHistory(cut.time(angle), angle, samples[:, :2] @ back, samples[:, 2:4] @ back, samples[:, 4:] @ back)
-
-
-def surely_stable_depth(modes: TipModes, process: MillingProcess) -> float:
-    """A depth at which nothing can grow: the gain round the loop is below one at every frequency [m]."""
-    c = process.coefficients
-    teeth = max(1.0, np.ceil((process.engagement.exit - process.engagement.entry) / float(np.min(process.cutter.pitch))))
-    return float(0.9 / (2.0 * teeth * c.tangential * np.hypot(1.0, c.radial_ratio) * modes.largest))
 
 
 @dataclass(slots=True, eq=False)

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from rcsa_ident.stability.first_loss import first_loss
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
-from rcsa_ident.stability.marching import ROUGH, Growth, longest_step, surely_stable
+from rcsa_ident.stability.marching import ROUGH, Growth, longest_step
+from rcsa_ident.stability.period_map import surely_stable
 from tests.stability.mills import ONE, RPM, mill, tip
 
 
@@ -67,7 +68,7 @@ def test_lenses_of_random_mills():
         known.append((rows, process, rng.uniform(5000.0, 40_000.0, 6) * RPM))
     for rows, process, speeds in known:
         cut = method.cut(tip(rows), process)
-        grid = np.geomspace(surely_stable(cut), 40e-3, 220)
+        grid = np.geomspace(surely_stable(cut.modes, cut.process), 40e-3, 220)
         limits = stability_lobes(tip(rows), process, speeds, grid[-1], method).limit_depth
         for speed, limit in zip(speeds, limits, strict=True):
             growth = Growth(cut, speed, longest_step(cut), ROUGH)

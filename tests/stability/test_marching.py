@@ -11,7 +11,8 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
-from rcsa_ident.stability.marching import Growth, longest_step, surely_stable
+from rcsa_ident.stability.marching import Growth, longest_step
+from rcsa_ident.stability.period_map import surely_stable
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from tests.stability.mills import ONE, RPM, SKEWED, TWO, mill, tip
 
@@ -60,7 +61,7 @@ def test_the_limit_is_where_growth_begins():
 def test_nothing_grows_at_the_surely_stable_depth(immersion, teeth, rpm, ratio, constant):
     process = mill(teeth, immersion, coefficients=CuttingCoefficients(6e8, ratio), feed_angle=0.4)
     cut = FULL.cut(tip(SKEWED, residual=(constant, 0.5 * constant)), process)
-    assert Growth(cut, rpm * RPM, longest_step(cut))(surely_stable(cut)) < 0.0
+    assert Growth(cut, rpm * RPM, longest_step(cut))(surely_stable(cut.modes, cut.process)) < 0.0
 
 
 def test_depth_that_is_asked_for():
@@ -72,7 +73,7 @@ def test_depth_that_is_asked_for():
     np.testing.assert_allclose(found.limit_depth[~found.stable], full[~found.stable], rtol=3e-3)
     assert np.all(np.isnan(found.chatter_frequency[found.stable]))
     assert np.all(found.lobe[found.stable] == -1)
-    low = surely_stable(FULL.cut(tip(SKEWED), PROCESSES["slot"]))
+    low = surely_stable(tip(SKEWED), PROCESSES["slot"])
     for depth in (0.5 * low, 1e-3 * low):
         assert stability_lobes(tip(SKEWED), PROCESSES["slot"], SPEEDS, depth, FULL).stable.all()
 
