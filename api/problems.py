@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
@@ -80,6 +81,12 @@ def _short(text: str) -> str:
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
 
+def _allowed(app: FastAPI, path: str) -> str:
+    """Return all methods of a path; a route knows its own only."""
+    matching = (item for known, item in app.openapi()["paths"].items() if re.fullmatch(re.sub(r"\{\w+\}", "[^/]+", known), path))
+    return ", ".join(sorted({method.upper() for item in matching for method in item}))
+
+
 def install(app: FastAPI) -> None:
     """Answer every foreseen exception with a problem document."""
 
@@ -104,7 +111,8 @@ def install(app: FastAPI) -> None:
             405: "the path does not take this method",
         }
         detail = words.get(error.status_code, title(error.status_code))
-        return document(request, Problem(error.status_code, detail, headers=error.headers))
+        headers = {"Allow": _allowed(app, request.url.path)} if error.status_code == 405 else error.headers
+        return document(request, Problem(error.status_code, detail, headers=headers))
 
     app.add_exception_handler(Problem, known)
     app.add_exception_handler(InputError, unusable)

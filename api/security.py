@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import hmac
 import math
+import re
 import secrets
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ HEADER = "X-API-Key"
 LOCAL_GROUP = "local"
 #: A key is PREFIX_ID_SECRET.
 PREFIX = "ri"
-_LOCAL_NAMES = ("localhost", "127.0.0.1", "[::1]")
+_LOCAL_NAME = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:\d{1,5})?", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +77,7 @@ def caller_of(request: Request, parts: Parts) -> Caller:
     text = request.headers.get(HEADER, "")
     if not text and not parts.settings.asks_for_keys:
         # a page from elsewhere may reach loopback through a name of its own
-        host = request.headers.get("host", "").rsplit(":", 1)[0] if not request.headers.get("host", "").endswith("]") else "[::1]"
-        if host.lower() not in _LOCAL_NAMES:
+        if not _LOCAL_NAME.fullmatch(request.headers.get("host", "")):
             raise Problem(403, "without a key the service answers on localhost only")
         return Caller("local", LOCAL_GROUP, SCOPES)
     _, _, rest = text.partition("_")

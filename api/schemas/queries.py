@@ -19,15 +19,15 @@ from rcsa_ident.io.setups import FEED_DIRECTIONS
 _RPM = math.pi / 30.0
 MOST_TOOLINGS, MOST_SPEEDS = 12, 5000
 Method = Literal["zero-order", "multi-frequency", "semi-discretisation", "full-discretisation", "time-domain"]
-Angle = Annotated[float, Field(strict=False, ge=0.0, le=180.0)]
-Turn = Annotated[float, Field(strict=False, ge=-360.0, le=360.0)]
-Micrometre = Annotated[float, Field(strict=False, ge=-1000.0, le=1000.0)]
-Land = Annotated[float, Field(strict=False, ge=0.01, le=1000.0)]
-Pressure = Annotated[float, Field(strict=False, ge=1e9, le=1e17)]
-Percent = Annotated[float, Field(strict=False, ge=0.0, le=50.0)]
-Rpm = Annotated[float, Field(strict=False, ge=100.0, le=200_000.0)]
-Hertz = Annotated[float, Field(strict=False, ge=1.0, le=20_000.0)]
-Depth = Annotated[float, Field(strict=False, gt=0.0, le=500.0)]
+Angle = Annotated[float, Field(ge=0.0, le=180.0)]
+Turn = Annotated[float, Field(ge=-360.0, le=360.0)]
+Micrometre = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+Land = Annotated[float, Field(ge=0.01, le=1000.0)]
+Pressure = Annotated[float, Field(ge=1e9, le=1e17)]
+Percent = Annotated[float, Field(ge=0.0, le=50.0)]
+Rpm = Annotated[float, Field(ge=100.0, le=200_000.0)]
+Hertz = Annotated[float, Field(ge=1.0, le=20_000.0)]
+Depth = Annotated[float, Field(gt=0.0, le=500.0)]
 Tooling = Annotated[Name | ToolingKeys, Field(description="Name in the library, or the tooling itself.")]
 Spread = Annotated[Percent, Field(description="How well the tool-holder's stiffness is known [%]: part of the bands.")]
 
@@ -41,7 +41,7 @@ class TipQuery(Body):
     tooling: Tooling
     from_hz: Hertz = 100.0
     to_hz: Hertz | None = Field(None, description="By default the end of the identified band.")
-    step_hz: Annotated[float, Field(strict=False, ge=0.01, le=1000.0)] = 1.0
+    step_hz: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
     spindle_speed_rpm: Rpm | None = Field(None, description="For a machine that changes with it.")
     bands: bool = True
     stiffness_spread_percent: Spread = 0.05
@@ -66,21 +66,21 @@ class Cut(Body):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"immersion": 0.5, "strategy": "down"}]})
 
-    immersion: Annotated[float, Field(strict=False, ge=0.001, le=1.0, description="Radial depth over diameter; 1 is a slot.")] = 0.5
+    immersion: Annotated[float, Field(ge=0.001, le=1.0, description="Radial depth over diameter; 1 is a slot.")] = 0.5
     strategy: Literal["up", "down"] = "down"
     entry_deg: Annotated[Angle | None, Field(description="With exit_deg in place of immersion.")] = None
     exit_deg: Angle | None = None
     feed_direction: Annotated[Literal["+X", "-X", "+Y", "-Y"] | Turn, Field(description="Or degrees from +X.")] = "+X"
-    feed_per_tooth_mm: Annotated[float, Field(strict=False, gt=0.0, le=10.0)] | None = None
+    feed_per_tooth_mm: Annotated[float, Field(gt=0.0, le=10.0)] | None = None
     material: Annotated[Line | None, Field(description="Of the library of materials.")] = None
-    ktc_mpa: Annotated[float, Field(strict=False, ge=1.0, le=50_000.0)] | None = None
-    krc: Annotated[float, Field(strict=False, ge=-1.0, le=5.0)] | None = None
-    kte_n_per_mm: Annotated[float, Field(strict=False, ge=0.0, le=1000.0)] | None = None
-    kre_n_per_mm: Annotated[float, Field(strict=False, ge=0.0, le=1000.0)] | None = None
+    ktc_mpa: Annotated[float, Field(ge=1.0, le=50_000.0)] | None = None
+    krc: Annotated[float, Field(ge=-1.0, le=5.0)] | None = None
+    kte_n_per_mm: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    kre_n_per_mm: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
     runout_um: Annotated[list[Micrometre] | None, Field(max_length=100, description="Radial offset of each edge.")] = None
     wear_land_um: Annotated[Land | None, Field(description="Process damping, with indentation.")] = None
     indentation: Annotated[Pressure | None, Field(description="[N/m^3], 1e14 for aluminium.")] = None
-    friction: Annotated[float, Field(strict=False, ge=0.0, le=2.0)] = 0.3
+    friction: Annotated[float, Field(ge=0.0, le=2.0)] = 0.3
 
     def question(self) -> CutQuestion:
         """Return the cut in SI."""
@@ -120,7 +120,7 @@ class Speeds(Body):
 
     from_rpm: Rpm = 4000.0
     to_rpm: Rpm = 20_000.0
-    step_rpm: Annotated[float, Field(strict=False, ge=0.1, le=100_000.0)] = 50.0
+    step_rpm: Annotated[float, Field(ge=0.1, le=100_000.0)] = 50.0
 
     def question(self) -> tuple[float, ...]:
         """Return the speeds [rad/s], rising."""
@@ -219,12 +219,12 @@ class AdviceQuery(LobeQuery):
         }
     )
 
-    max_power_kw: Annotated[float, Field(strict=False, gt=0.0, le=10_000.0)] | None = None
-    max_torque_nm: Annotated[float, Field(strict=False, gt=0.0, le=1e6)] | None = None
+    max_power_kw: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = None
+    max_torque_nm: Annotated[float, Field(gt=0.0, le=1e6)] | None = None
     max_speed_rpm: Rpm | None = None
-    tolerance_percent: Annotated[float, Field(strict=False, ge=0.0, le=20.0)] = 1.0
-    probability_percent: Annotated[float, Field(strict=False, gt=0.0, le=100.0)] = 95.0
-    reserve_percent: Annotated[float, Field(strict=False, ge=0.0, le=90.0)] = 10.0
+    tolerance_percent: Annotated[float, Field(ge=0.0, le=20.0)] = 1.0
+    probability_percent: Annotated[float, Field(gt=0.0, le=100.0)] = 95.0
+    reserve_percent: Annotated[float, Field(ge=0.0, le=90.0)] = 10.0
     depth_mm: Depth | None = Field(None, description="At which speeds may one cut so deep?")
     planned: list[PlannedQuery] = Field(default=[], max_length=20, description="How far are these cuts from chatter?")
 

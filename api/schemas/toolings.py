@@ -8,7 +8,6 @@ from pydantic import ConfigDict, Field, StringConstraints
 
 from api.schemas.common import Answer, Body, Line
 
-Number = Annotated[float, Field(strict=False)]
 Text = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 MOST_SEGMENTS = 200
 
@@ -33,53 +32,53 @@ class CutterKeys(Body):
     """[cutter]"""
 
     teeth: int
-    diameter_mm: Number
-    helix_deg: Number = 0.0
-    pitch_deg: list[Number] | None = Field(None, max_length=100)
+    diameter_mm: float
+    helix_deg: float = 0.0
+    pitch_deg: list[float] | None = Field(None, max_length=100)
 
 
 class SegmentKeys(Body):
     """A segment of tool or holder, from the free end towards the flange."""
 
-    length_mm: Number
-    outer_diameter_mm: Number
-    inner_diameter_mm: Number = 0.0
-    end_diameter_mm: Number | None = None
+    length_mm: float
+    outer_diameter_mm: float
+    inner_diameter_mm: float = 0.0
+    end_diameter_mm: float | None = None
     material: Text
-    area_mm2: Number | None = None
-    second_moment_mm4: Number | None = None
+    area_mm2: float | None = None
+    second_moment_mm4: float | None = None
 
 
 class ToolKeys(Body):
     """[tool]"""
 
-    stickout_mm: Number
+    stickout_mm: float
     segments: list[SegmentKeys] = Field(min_length=1, max_length=MOST_SEGMENTS)
 
 
 class HolderKeys(Body):
     """[holder]"""
 
-    insertion_mm: Number
+    insertion_mm: float
     segments: list[SegmentKeys] = Field(min_length=1, max_length=MOST_SEGMENTS)
 
 
 class ContactKeys(Body):
     """[contact], per metre of insertion"""
 
-    translational_stiffness: Number
-    rotational_stiffness: Number
-    translational_damping: Number
-    rotational_damping: Number
+    translational_stiffness: float
+    rotational_stiffness: float
+    translational_damping: float
+    rotational_damping: float
 
 
 class MaterialKeys(Body):
     """[materials.NAME]"""
 
-    youngs_modulus_gpa: Number | None = None
-    density: Number | None = None
-    poisson: Number | None = None
-    loss_factor: Number | None = None
+    youngs_modulus_gpa: float | None = None
+    density: float | None = None
+    poisson: float | None = None
+    loss_factor: float | None = None
 
 
 class ToolingKeys(Body):

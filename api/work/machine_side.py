@@ -25,9 +25,9 @@ from rcsa_ident.workflows.lobes import LobeConditions, drawn_limits, tooling_lob
 from rcsa_ident.workflows.tip import TooltipResponse
 
 #: Largest change of a tip receptance between two nodes of the drawn machines, as a share; quintics go through six nodes.
-CHANGE = 0.2
-#: Widest distance of two such nodes, in lines.
-WIDEST = 16
+CHANGE = 0.05
+#: Widest distance of two such nodes, in lines, and how much it grows from line to line.
+WIDEST, GROWTH = 16.0, 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,9 +173,13 @@ def nodes_of(curves: Sequence[ComplexArray]) -> np.ndarray:
     for curve in curves:
         size = np.abs(curve)
         step = np.maximum(step, np.abs(np.diff(curve)) / np.maximum(np.maximum(size[1:], size[:-1]), 1e-300))
+    # lines from node to node; they grow gently, for a quintic's six nodes should stand at like distances
+    distance = np.clip(CHANGE / np.maximum(step, 1e-300), 1.0, WIDEST)
+    ramp = GROWTH * np.arange(step.size)
+    distance = np.minimum.accumulate(distance - ramp) + ramp
+    distance = (np.minimum.accumulate((distance + ramp)[::-1])[::-1]) - ramp
     # a share of a node for each line; its sum passes a whole number where a node stands
-    share = np.clip(step / CHANGE, 1.0 / WIDEST, 1.0)
-    count = np.concatenate([[0.0], np.cumsum(share)])
+    count = np.concatenate([[0.0], np.cumsum(1.0 / distance)])
     nodes = np.flatnonzero(np.diff(np.floor(count * (1.0 + 1e-12)), prepend=-1.0) > 0.0)
     return np.unique(np.concatenate([nodes, [count.size - 1]]))
 

@@ -1,0 +1,138 @@
+"""Who may do what."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+
+from api.client import Client
+from api.parts import Rates
+from api.security import SCOPES
+from tests.api.conftest import example, service
+from tests.api.test_machines import refused
+
+#: Method, path, body, scope.
+CALLS = [
+    ("POST", "/machines", {"name": "x"}, "upload"),
+    ("GET", "/machines", None, "read"),
+    ("GET", "/machines/m", None, "read"),
+    ("DELETE", "/machines/m", None, "upload"),
+    ("PUT", "/machines/m/identification", {}, "upload"),
+    ("GET", "/machines/m/identification", None, "read"),
+    ("GET", "/machines/m/identification/modes", None, "read"),
+    ("GET", "/machines/m/identification/frf", None, "read"),
+    ("PUT", "/toolings/t", example(), "upload"),
+    ("GET", "/toolings", None, "read"),
+    ("GET", "/toolings/t", None, "read"),
+    ("GET", "/toolings/t/drawing", None, "read"),
+    ("DELETE", "/toolings/t", None, "upload"),
+    ("POST", "/tooltip", {"machine": "m", "tooling": "t"}, "run"),
+    ("POST", "/lobes", {"machine": "m", "toolings": ["t"]}, "run"),
+    ("POST", "/advice", {"machine": "m", "toolings": ["t"], "cut": {"feed_per_tooth_mm": 0.1}}, "run"),
+    ("POST", "/keys", {"scopes": ["read"]}, "admin"),
+    ("GET", "/keys", None, "admin"),
+    ("DELETE", "/keys/k", None, "admin"),
+]
+
+
+def test_every_call_is_in_the_list(http):
+    operations = [
+        (method.upper(), path.removeprefix("/v1"))
+        for path, item in http.get("/openapi.json").json()["paths"].items()
+        for method in item
+        if path.startswith("/v1")
+    ]
+    patterns = {"m": "{id}", "k": "{id}", "t": "{name}"}
+    listed = [(m, "/".join(patterns.get(part, part) for part in p.split("/"))) for m, p, _, _ in CALLS]
+    assert sorted(operations) == sorted(listed)
+
+
+@pytest.mark.parametrize(("method", "path", "body", "scope"), CALLS, ids=lambda v: str(v)[:30])
+def test_a_call_needs_a_key_with_its_scope(guarded_http, method, path, body, scope):
+    http, keys = guarded_http
+
+    def status(key):
+        headers = {} if key is None else {"X-API-Key": key}
+        answer = http.request(method, f"/v1{path}", json=body, headers=headers)
+        assert answer.status_code != 500
+        if answer.status_code >= 400:
+            assert answer.headers["content-type"] == "application/problem+json"
+        return answer.status_code
+
+    read = keys["read"]
+    wrong = [None, "", "x", "ri__", read[:-1], read + "x", read.replace("ri_", "rj_"), "ri_" + "0" * 24 + "_" + "x" * 43, "é" * 9]
+    for key in wrong[:-1]:
+        assert status(key) == 401, key
+    for name in SCOPES:
+        allowed = name in (scope, "admin")
+        assert (status(keys[name]) not in (401, 403)) == allowed, name
+        assert (status(keys[name]) == 403) == (not allowed)
+
+
+def test_who_has_no_key_is_told_before_the_body_is_read(guarded_http):
+    http, _ = guarded_http
+    answer = http.post("/v1/machines", content=b"{" * 1000, headers={"Content-Type": "text/plain"})
+    assert answer.status_code == 401
+    assert answer.headers["www-authenticate"]
+
+
+def test_keys_are_made_listed_withdrawn_in_their_group(guarded_http):
+    http, keys = guarded_http
+    admin = Client(key=keys["admin"], http=http)
+    made = admin.make_key("read", "run", label="presetting")
+    assert (made.group, made.scopes, made.label) == ("A", ["read", "run"], "presetting")
+    fresh = Client(key=made.key, http=http)
+    assert list(fresh.machines()) == []
+    assert made.id in [k.id for k in admin.keys(limit=2)]
+    secret = made.key.rsplit("_", 1)[1]
+    assert secret not in http.get("/v1/keys", headers=admin.headers).text
+    other = Client(key=keys["other"], http=http)
+    assert [k.label for k in other.keys(limit=9)] == ["other"]
+    refused(404, other.withdraw_key, made.id)
+    admin.withdraw_key(made.id)
+    refused(401, fresh.machines().__next__)
+    refused(404, admin.withdraw_key, made.id)
+    refused(422, admin.make_key)
+    refused(422, admin.make_key, "root")
+
+
+def test_a_secret_is_nowhere_kept(store, tmp_path):
+    from api.security import make_key
+
+    key, text = make_key("A", ("admin",), "")
+    assert text.split("_", 2)[2] not in repr(key)
+    assert key.id == text.split("_")[1]
+
+
+def test_without_keys_only_localhost_is_answered(http):
+    for host in ("localhost:8000", "127.0.0.1", "127.0.0.1:80", "[::1]:8000", "[::1]"):
+        assert http.get("/v1/machines", headers={"Host": host}).status_code == 200, host
+    for host in ("evil.example", "localhost.evil.example", "10.0.0.1:8000", "evil]"):
+        assert http.get("/v1/machines", headers={"Host": host}).status_code == 403, host
+
+
+def test_a_bucket_of_tokens():
+    now = itertools.count(0.0, 0.5)
+    rates = Rates(60, 3, lambda: next(now))
+    waits = [rates.wait("a") for _ in range(8)]
+    # three at once and one a second; two queries a second
+    assert waits == [0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.5]
+    assert rates.wait("b") == 0.0
+
+
+def test_too_many_with_one_key_leave_another_alone(store, tmp_path):
+    from api.security import make_key
+
+    texts = []
+    for name in "ab":
+        key, text = make_key("A", ("read",), name)
+        store.keys.add(key)
+        texts.append({"X-API-Key": text})
+    with service(store, tmp_path, keys=True, requests_per_minute=1, burst=2) as http:
+        answers = [http.get("/v1/machines", headers=texts[0]) for _ in range(3)]
+        assert [a.status_code for a in answers] == [200, 200, 429]
+        assert 1 <= int(answers[2].headers["retry-after"]) <= 60
+        assert http.get("/v1/machines", headers=texts[1]).status_code == 200
+        # who watches the service is not counted
+        assert http.get("/health").status_code == 200

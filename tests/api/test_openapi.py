@@ -1,0 +1,138 @@
+"""OpenAPI is complete and true."""
+
+from __future__ import annotations
+
+import json
+import warnings
+
+import httpx2
+import pytest
+from fastapi.testclient import TestClient
+from hypothesis import HealthCheck, Phase, given, seed, settings
+from hypothesis import strategies as st
+from hypothesis.errors import Unsatisfiable
+
+from api.schemas.queries import AdviceQuery, LobeQuery, TipQuery
+from api.schemas.toolings import ToolingKeys
+from api.stores.memory import MemoryStore
+from tests.api.conftest import example, service
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")
+    import schemathesis
+    from schemathesis.checks import not_a_server_error
+    from schemathesis.specs.openapi.checks import (
+        content_type_conformance,
+        response_headers_conformance,
+        response_schema_conformance,
+        status_code_conformance,
+    )
+
+CHECKS = [
+    not_a_server_error,
+    status_code_conformance,
+    content_type_conformance,
+    response_headers_conformance,
+    response_schema_conformance,
+]
+BOUNDED = settings(max_examples=20, deadline=None, database=None, phases=[Phase.generate], suppress_health_check=list(HealthCheck))
+
+
+def operations(schema):
+    return [(path, method, o) for path, item in schema["paths"].items() for method, o in item.items()]
+
+
+def test_every_answer_has_a_schema_and_every_problem_is_a_problem_document(http):
+    schema = http.get("/openapi.json").json()
+    for path, method, operation in operations(schema):
+        for status, answer in operation["responses"].items():
+            if status in ("204", "304"):
+                assert "content" not in answer
+                continue
+            for kind, content in answer["content"].items():
+                assert content["schema"], (path, method, status)
+                if int(status) >= 400:
+                    assert kind == "application/problem+json"
+                    assert content["schema"] == {"$ref": "#/components/schemas/ProblemDocument"}
+        if path.startswith("/v1"):
+            assert {"401", "403", "429", "503"} <= set(operation["responses"])
+            assert operation["security"] == [{"key": []}]
+            assert operation["x-scope"] in ("read", "upload", "run", "admin")
+            if "requestBody" in operation:
+                assert {"413", "415", "422"} <= set(operation["responses"])
+            assert operation["summary"]
+
+
+def test_references_lead_somewhere(http):
+    schema = http.get("/openapi.json").json()
+
+    def walk(value):
+        if isinstance(value, dict):
+            if isinstance(value.get("$ref"), str):
+                name = value["$ref"].removeprefix("#/components/schemas/")
+                assert name in schema["components"]["schemas"], name
+            for inner in value.values():
+                walk(inner)
+        elif isinstance(value, list):
+            for inner in value:
+                walk(inner)
+
+    walk(schema)
+
+
+@pytest.mark.parametrize("model", [ToolingKeys, TipQuery, LobeQuery, AdviceQuery])
+def test_examples_are_what_they_show(model):
+    for shown in model.model_json_schema()["examples"]:
+        model.model_validate_json(json.dumps(shown))
+
+
+class Fuzzed:
+    """Cases of one operation, with ids and names that are there in the place of some."""
+
+    def __init__(self, operation, http: TestClient, machine: str) -> None:
+        self.operation, self.http, self.machine = operation, http, machine
+        self.statuses: set[int] = set()
+
+    def send(self, case, known: bool) -> None:
+        if known and "id" in (case.path_parameters or {}):
+            case.path_parameters["id"] = self.machine
+        if known and "name" in (case.path_parameters or {}):
+            case.path_parameters["name"] = "T1"
+        if known and isinstance(case.body, dict) and "machine" in case.body:
+            case.body["machine"] = self.machine
+        sent = case.as_transport_kwargs(base_url="http://localhost")
+        headers = {k: v for k, v in sent.get("headers", {}).items() if k.lower() not in ("host", "user-agent", "x-api-key")}
+        body = {"json": sent["json"]} if sent.get("json") is not None else {"content": sent.get("data") or b""}
+        if isinstance(body.get("content"), dict):
+            body = {"data": body["content"]}
+        try:
+            answer = self.http.request(sent["method"], sent["url"], params=sent.get("params"), headers=headers, **body)
+        except (UnicodeEncodeError, httpx2.InvalidURL, httpx2.LocalProtocolError, ValueError, TypeError):
+            # the client refuses to send it
+            return
+        self.statuses.add(answer.status_code)
+        case.validate_response(answer, checks=CHECKS)
+
+
+def test_the_api_keeps_to_its_description(tmp_path, result):
+    """Whatever is sent: no 5xx, no undocumented status, type or body. With a fixed seed, and so many cases for each operation."""
+    with service(MemoryStore(), tmp_path, requests_per_minute=10**8, burst=10**8, work_seconds=0.2) as http:
+        id = http.post("/v1/machines", json={"name": "m"}).json()["id"]
+        http.put(f"/v1/machines/{id}/identification", content=result, headers={"Content-Type": "application/json"})
+        schema = schemathesis.openapi.from_dict(http.get("/openapi.json").json())
+        found = [each.ok() for each in schema.get_all_operations()]
+        # what deletes comes last
+        found.sort(key=lambda operation: operation.method.upper() == "DELETE")
+        for operation in found:
+            http.put("/v1/toolings/T1", json=example())
+            fuzzed = Fuzzed(operation, http, id)
+            for mode in (schemathesis.GenerationMode.POSITIVE, schemathesis.GenerationMode.NEGATIVE):
+                strategy = operation.as_strategy(generation_mode=mode)
+
+                try:
+                    seed(20261121)(BOUNDED(given(case=strategy, known=st.booleans())(fuzzed.send)))()
+                except Unsatisfiable:
+                    # nothing about it can be wrong
+                    assert mode is schemathesis.GenerationMode.NEGATIVE
+            assert fuzzed.statuses, operation.label
+            assert operation.path in ("/health", "/ready", "/metrics") or len(fuzzed.statuses) > 1 or operation.path == "/v1/keys"

@@ -1,0 +1,107 @@
+"""Worker processes: full queues say so, a killed worker costs one answer, and none outlives the service."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from api.work.pool import Busy, Pool, guarded
+from rcsa_ident.errors import InputError
+
+
+def die():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def wrong():
+    raise InputError("field", "x", "y")
+
+
+@pytest.fixture(scope="module")
+def pool():
+    found = Pool(1, 1, 2)
+    found.start()
+    yield found
+    found.stop()
+
+
+def test_answers_and_refusals_come_back(pool):
+    assert asyncio.run(pool.run(pow, 3, 4)) == 81
+    assert asyncio.run(pool.run(os.getpid)) != os.getpid()
+    with pytest.raises(InputError, match="field: found x, allowed is y"):
+        asyncio.run(pool.run(wrong))
+    assert pool.waiting == 0
+    assert pool.ready
+
+
+def test_too_many_are_refused_at_once(pool):
+    async def three():
+        return await asyncio.gather(*(pool.run(time.sleep, 0.3) for _ in range(3)), return_exceptions=True)
+
+    found = asyncio.run(three())
+    # one at work, one waits
+    assert [type(each) for each in found] == [type(None), type(None), Busy]
+
+
+def test_a_killed_worker_is_replaced(pool):
+    with pytest.raises(Busy):
+        asyncio.run(pool.run(die))
+    assert asyncio.run(pool.run(pow, 2, 5)) == 32
+
+
+def test_a_pool_that_has_not_begun_refuses():
+    with pytest.raises(Busy):
+        asyncio.run(Pool(1, 1, 1).run(pow, 2, 2))
+
+
+def divide():
+    return 1 / 0
+
+
+def bug():
+    raise ValueError("a bug")
+
+
+def test_numbers_without_an_answer_are_bad_input_and_a_bug_stays_a_bug():
+    with pytest.raises(InputError, match="no finite answer"):
+        guarded(divide)
+    with pytest.raises(ValueError, match="a bug"):
+        guarded(bug)
+
+
+CODE = """
+import sys, time
+from api.work.pool import Pool
+import asyncio, os
+if __name__ == "__main__":
+    pool = Pool(1, 1, 1)
+    pool.start()
+    print(asyncio.run(pool.run(os.getpid)), flush=True)
+    time.sleep(60)
+"""
+
+
+def test_workers_end_with_the_service_however_it_ends(tmp_path):
+    script = tmp_path / "service.py"
+    script.write_text(CODE, encoding="utf-8")
+    root = Path(__file__).resolve().parents[2]
+    environment = {**os.environ, "PYTHONPATH": str(root)}
+    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env=environment) as service:
+        worker = int(service.stdout.readline())
+        service.kill()
+    for _ in range(200):
+        try:
+            # a zombie that nobody waits for counts as ended
+            if Path(f"/proc/{worker}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()[0] == "Z":
+                return
+        except OSError:
+            return
+        time.sleep(0.05)
+    pytest.fail("the worker lives on")

@@ -1,0 +1,154 @@
+"""The service as a process of its own: settings, keys, a restart, and what is not imported."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from api.client import Client
+from api.settings import Settings, from_environment
+from rcsa_ident.errors import InputError
+from tests.api.test_machines import refused
+from tests.cli import by_hand
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_settings_from_the_environment():
+    found = from_environment(
+        {"RCSA_IDENT_DATA": "/x", "RCSA_IDENT_PORT": "9000", "RCSA_IDENT_KEYS": "on", "RCSA_IDENT_WORKERS": " ", "PORT": "1"}
+    )
+    assert (str(found.data), found.port, found.asks_for_keys) == ("/x", 9000, True)
+    assert found.database_url == "sqlite:////x/service.db"
+    assert from_environment({"RCSA_IDENT_DATABASE": "postgresql://x"}).database_url == "postgresql://x"
+    assert from_environment({}).host == "127.0.0.1"
+    assert found.workers == Settings().workers
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("PORT", "x"), ("PORT", "70000"), ("WORKERS", "0"), ("KEYS", "maybe"), ("WORK_SECONDS", "nan"), ("QUEUE", "1.5")]
+)
+def test_a_setting_that_is_none_is_named(name, value):
+    with pytest.raises(InputError, match=f"RCSA_IDENT_{name}"):
+        from_environment({f"RCSA_IDENT_{name}": value})
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "192.168.0.7", "::", "example.org"])
+def test_keys_are_off_on_loopback_only(host):
+    assert from_environment({"RCSA_IDENT_HOST": host}).asks_for_keys
+    with pytest.raises(InputError, match="RCSA_IDENT_KEYS"):
+        from_environment({"RCSA_IDENT_HOST": host, "RCSA_IDENT_KEYS": "off"})
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2", "::1", "localhost"])
+def test_loopback_needs_none(host):
+    assert not Settings(host=host).asks_for_keys
+    assert Settings(host=host, keys=True).asks_for_keys
+
+
+def test_importing_does_nothing_and_the_service_stays_light():
+    """What is slow to import, or draws, stays out of the process that answers."""
+    heavy = ("control", "scipy.signal", "matplotlib", "pymoo", "filterpy", "h5py", "typer")
+    code = f"import sys, api.main, api.client; print([m for m in {heavy!r} if m in sys.modules])"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    assert found.stdout.strip() == "[]"
+    code = "import sys, api.serve; print([m for m in ('fastapi', 'numpy', 'sqlalchemy') if m in sys.modules])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
+    assert found.stdout.strip() == "[]"
+
+
+def command(folder: Path, *arguments: str, **settings: str) -> tuple[list[str], dict[str, str]]:
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "RCSA_IDENT_DATA": str(folder), "RCSA_IDENT_WORKERS": "1", **settings}
+    return [sys.executable, "-c", "from api.serve import main; main()", *arguments], environment
+
+
+def free_port() -> int:
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return int(found.getsockname()[1])
+
+
+@contextmanager
+def serving(folder: Path, log: Path, **settings: str) -> Iterator[tuple[str, subprocess.Popen]]:
+    port = free_port()
+    words, environment = command(folder, "--port", str(port), **settings)
+    with log.open("w") as told, subprocess.Popen(words, env=environment, stderr=told) as process:
+        url = f"http://127.0.0.1:{port}"
+        try:
+            for _ in range(600):
+                assert process.poll() is None, log.read_text()
+                try:
+                    if httpx2.get(f"{url}/ready").status_code == 200:
+                        break
+                except httpx2.TransportError:
+                    pass
+                time.sleep(0.1)
+            yield url, process
+        finally:
+            process.kill()
+
+
+def test_a_service_with_keys_killed_and_started_again(tmp_path, result):
+    words, environment = command(tmp_path / "data", "create-key", "--group", "hall 3", "--label", "first")
+    made = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
+    key = made.stdout.strip()
+    log = tmp_path / "log"
+    with serving(tmp_path / "data", log, RCSA_IDENT_KEYS="on") as (url, process), Client(url, key) as client:
+        id = client.make_machine("m", repeat="k").id
+        client.identify(id, result)
+        client.write_tooling("T1", by_hand.TOOLING)
+        first = client.lobes(id, "T1")
+        with Client(url) as nobody:
+            refused(401, nobody.machine, id)
+        # no farewell
+        process.kill()
+    assert key not in log.read_text()
+    log = tmp_path / "second log"
+    with serving(tmp_path / "data", log, RCSA_IDENT_KEYS="on") as (url, process), Client(url, key) as client:
+        assert client.make_machine("m", repeat="k").id == id
+        assert client.tooling_file("T1") == by_hand.TOOLING
+        # the same numbers to the last digit
+        assert client.lobes(id, "T1") == first
+        process.terminate()
+        assert process.wait(20) in (0, -15)
+    lines = [json.loads(line) for line in log.read_text().splitlines()]
+    (line,) = [line for line in lines if line.get("route", "").endswith("/lobes")]
+    assert line["status"] == 200
+    assert line["group"] == "hall 3"
+    assert key.rsplit("_", 1)[1].encode() not in (tmp_path / "data" / "service.db").read_bytes()
+
+
+def test_a_service_without_keys_says_so(tmp_path):
+    log = tmp_path / "log"
+    with serving(tmp_path / "data", log) as (url, _), Client(url) as client:
+        assert list(client.machines()) == []
+    assert any("no keys are asked for" in json.loads(line)["event"] for line in log.read_text().splitlines())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["create-key", "--scopes", "root"], "--scopes"),
+        (["create-key", "--group", "../x"], "--group"),
+        (["--port", "99999"], "RCSA_IDENT_PORT"),
+        (["--host", "0.0.0.0"], "RCSA_IDENT_KEYS"),
+    ],
+)
+def test_what_the_command_refuses(tmp_path, arguments, words):
+    further = {"RCSA_IDENT_KEYS": "off"} if "--host" in arguments else {}
+    line, environment = command(tmp_path / "data", *arguments, **further)
+    found = subprocess.run(line, env=environment, capture_output=True, text=True, check=False)
+    assert found.returncode == 2
+    assert words in found.stderr
+    assert "Traceback" not in found.stderr
