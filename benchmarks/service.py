@@ -1,0 +1,178 @@
+"""The web service under load on loopback: zero-order lobes of a new tooling each, and reads beside them.
+
+``run()`` starts the service as its command does, writes the identification of a machine into it, and asks from several clients at once,
+each over a connection of its own. The clients run on the same cores.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import random
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from http.client import HTTPConnection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.timing import row
+
+#: Seconds of each load, and clients at once.
+SECONDS, CLIENTS = 10.0, 2
+
+
+def run(result: Path | None = None) -> list[dict[str, Any]]:
+    """Lobes with bands and without, as a machine at the presetting station asks, and reads.
+
+    Parameters
+    ----------
+    result : Path, optional
+        RESULT.json; by default a machine of seven modes an axis with a full posterior.
+    """
+    text = machine_text() if result is None else result.read_text(encoding="utf-8")
+    rows = []
+    with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as port:
+        machine = ask(port, "POST", "/v1/machines", {"name": "m"})["id"]
+        ask(port, "PUT", f"/v1/machines/{machine}/identification", text)
+        for words, further in (
+            ("321 speeds with bands", {}),
+            ("161 speeds with bands", {"speeds": {"step_rpm": 100}}),
+            ("321 speeds without bands", {"bands": False}),
+        ):
+
+            def lobes(seed: int, further: dict[str, Any] = further) -> tuple[str, str, Any]:
+                return "POST", "/v1/lobes", {"machine": machine, "toolings": [new_tooling(seed)], **further}
+
+            # each worker meets the machine once
+            load(port, lobes, 2.0)
+            rate, p95 = load(port, lobes, SECONDS)
+            rows.append(row(f"zero-order lobes of a new tooling, {words}", rate, None, "1/s", "answers of the commands"))
+            rows.append(row(f"  the slowest of 20, {CLIENTS} clients", p95 * 1e3, None, "ms", ""))
+        rate, p95 = load(port, lambda _: ("GET", f"/v1/machines/{machine}", None), SECONDS)
+        rows.append(row("reads of a machine", rate, None, "1/s", ""))
+        rows.append(row(f"  the slowest of 20, {CLIENTS} clients", p95 * 1e3, None, "ms", ""))
+    return rows
+
+
+def new_tooling(seed: int) -> dict[str, Any]:
+    """Return a tooling that nobody has asked for: stickout, fluted part and collet of their own."""
+    rng = random.Random(seed)
+    stickout, fluted = rng.uniform(50.0, 90.0), rng.uniform(20.0, 35.0)
+    tool = [(fluted, rng.uniform(9.2, 10.0), "carbide"), (stickout + 40.0 - fluted, 12.0, "carbide")]
+    holder = [(rng.uniform(40.0, 50.0), rng.uniform(32.0, 50.0)), (30.0, 63.0)]
+    return {
+        "cutter": {"teeth": 4, "diameter_mm": 12.0},
+        "tool": {"stickout_mm": stickout, "segments": [_segment(*s) for s in tool]},
+        "holder": {"insertion_mm": 40.0, "segments": [_segment(*s, "steel") | {"inner_diameter_mm": 12.0} for s in holder]},
+        "contact": {
+            "translational_stiffness": 2e10, "rotational_stiffness": 6e5, "translational_damping": 6e4, "rotational_damping": 9.0,
+        },
+    }  # fmt: skip
+
+
+def _segment(length: float, diameter: float, material: str) -> dict[str, Any]:
+    return {"length_mm": length, "outer_diameter_mm": diameter, "material": material}
+
+
+def machine_text() -> str:
+    """Return RESULT.json of two axes, seven modes each, with the posterior of 56 unknowns and a rival that an identification has."""
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.identification.parameters import AxisLayout, pack, parameter_names, simple_axis
+    from rcsa_ident.identification.posterior import Posterior
+    from rcsa_ident.io.results import plain, spindle_to_json
+
+    natural = 2.0 * np.pi * np.array([620.0, 998.0, 1285.0, 1820.0, 2330.0, 3100.0, 3970.0])
+    psi = np.array([[0.1, 0.6], [0.15, 1.5], [0.2, -1.0], [0.25, 3.0], [0.2, -4.0], [0.12, 6.0], [0.15, 8.0]])
+    joint = np.log([3e9, 6e6, 2e3, 10.0])
+    axes = {}
+    for name, axis, shift in (("X", Dof.X, 1.0), ("Y", Dof.Y, 0.97)):
+        layout = AxisLayout(7)
+        damping = np.diag(np.sqrt(0.1 * shift * natural))
+        theta = np.concatenate([pack(simple_axis(shift * natural, psi, damping, np.diag([2e-5, 2e-5])), layout), joint])
+        few = AxisLayout(6)
+        rival = np.concatenate([pack(simple_axis(shift * natural[:6], psi[:6], damping[:6, :6], np.diag([3e-5, 3e-5])), few), joint])
+        rng = np.random.default_rng(1)
+        half = 0.003 * rng.standard_normal((theta.size, theta.size)) / np.sqrt(theta.size)
+        covariance = half @ half.T
+        known = Posterior(theta, 0.5 * (covariance + covariance.T), layout)
+        axes[name] = spindle_to_json(*known.machine(axis)) | {
+            "unknowns": theta, "rivals": [rival], "covariance": {"parameters": parameter_names(layout), "matrix": known.covariance},
+        }  # fmt: skip
+    data = {
+        "schema_version": 1, "status": "converged", "reasons": [], "seed": 1, "method": "default", "software": "by hand",
+        "campaign": {"name": "by hand", "cuts_used": 80, "cuts_left_out": []}, "sensors": {},
+        "workpiece": {"name": "EN AW-6082", "tangential_coefficient_mpa": 902.0, "radial_ratio": 0.26},
+        "band_hz": [500.0, 4300.0], "axes": axes, "delays": {},
+    }  # fmt: skip
+    return json.dumps(plain(data))
+
+
+def load(port: int, question: Callable[[int], tuple[str, str, Any]], seconds: float) -> tuple[float, float]:
+    """Ask from several clients for so long, and return answers per second and the time that 95 % stay below [s]."""
+    times: list[float] = []
+    numbers = iter(range(10**9))
+    lock = threading.Lock()
+    end = time.perf_counter() + seconds
+
+    def client() -> None:
+        connection = HTTPConnection("127.0.0.1", port, timeout=60)
+        while time.perf_counter() < end:
+            with lock:
+                asked = question(next(numbers))
+            start = time.perf_counter()
+            ask(port, *copy.deepcopy(asked), connection=connection)
+            times.append(time.perf_counter() - start)
+        connection.close()
+
+    threads = [threading.Thread(target=client) for _ in range(CLIENTS)]
+    start = time.perf_counter()
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return len(times) / (time.perf_counter() - start), float(np.quantile(times, 0.95))
+
+
+def ask(port: int, method: str, path: str, body: Any, connection: HTTPConnection | None = None) -> Any:
+    """Return the content of an answer below 300."""
+    own = HTTPConnection("127.0.0.1", port, timeout=60) if connection is None else connection
+    text = body if isinstance(body, str) else None if body is None else json.dumps(body)
+    own.request(method, path, text, {} if body is None else {"Content-Type": "application/json"})
+    answer = own.getresponse()
+    content = answer.read()
+    if connection is None:
+        own.close()
+    if answer.status >= 300:
+        raise RuntimeError(f"{method} {path}: {answer.status} {content[:300]!r}")
+    return json.loads(content)
+
+
+@contextmanager
+def serving(folder: Path) -> Iterator[int]:
+    """Run the service on a free port of loopback until it is ready, and end it."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = int(free.getsockname()[1])
+    settings = {"RCSA_IDENT_DATA": str(folder), "RCSA_IDENT_PORT": str(port), "RCSA_IDENT_WORKERS": "2"}
+    limits = {"RCSA_IDENT_REQUESTS_PER_MINUTE": "1000000", "RCSA_IDENT_BURST": "1000000"}
+    words = [sys.executable, "-c", "from api.serve import main; main()"]
+    with subprocess.Popen(words, env={**os.environ, **settings, **limits}, stderr=subprocess.DEVNULL) as process:
+        try:
+            for _ in range(600):
+                try:
+                    ask(port, "GET", "/ready", None)
+                    break
+                except (OSError, RuntimeError):
+                    time.sleep(0.1)
+            yield port
+        finally:
+            process.terminate()
