@@ -24,6 +24,7 @@ from rcsa_ident.cli import (  # noqa: E402
     lobes,
     machine,
     plan,
+    tools,
 )
 
 app = typer.Typer(
@@ -38,13 +39,13 @@ app = typer.Typer(
 #: In the order of the work, under headings.
 _COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
     "Identification": (demo.demo, identify.check, identify.identify, plan.plan, export.export),
-    "Any tool": (lobes.tooltip, lobes.lobes, advice.advise, cases.cases, forces.forces),
+    "Any tool": (lobes.tooltip, lobes.lobes, advice.advise, cases.cases, forces.forces, tools.import_tools, tools.draw),
     "Measurements beside": (calibrate.calibrate, calibrate.materials, compare.compare, decouple.decouple, contact.contact),
     "Virtual machine, set-up": (machine.simulate, machine.warm),
 }
 for _title, _commands in _COMMANDS.items():
     for _command in _commands:
-        app.command(_command.__name__, rich_help_panel=_title)(_command)
+        app.command(_command.__name__.replace("_", "-"), rich_help_panel=_title)(_command)
 
 
 def _version(asked: bool) -> None:
