@@ -88,8 +88,6 @@ def marched_lobes(
         # a quasi-periodic vibration may pass -1, too, but as one of a pair
         flip[i] = found.value.real < 0.0 and abs(found.value.imag) < 1e-6 * abs(found.value)
     doubts = [f"at {lost} of {speeds.size} speeds the limit is not converged to {100.0 * tolerance:g} %"] if lost else []
-    if not cut.process.cutter.equally_spaced or cut.process.speed_variation is not None:
-        doubts.append("forced vibration may lift teeth out of the cut where they differ or the speed swings: the time-domain method knows it")
     return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), method, tuple(doubts), flip)
 
 
