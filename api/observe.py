@@ -39,17 +39,21 @@ class Observed:
         id = given if _ID.fullmatch(given) else secrets.token_hex(8)
         request.state.request_id = id
         status, start = 0, time.perf_counter()
+        body = _Body(request, receive, self.parts.settings.max_body_bytes)
 
         async def observed(message: Message) -> None:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
                 extra = [(b"x-request-id", id.encode()), (b"x-content-type-options", b"nosniff")]
+                if not body.read:
+                    # what nobody will read any more need not be sent, least of all if it has no end
+                    extra.append((b"connection", b"close"))
                 message = {**message, "headers": [*message.get("headers", []), *extra]}
             await send(message)
 
         try:
-            await self.app(scope, self._limited(request, receive), observed)
+            await self.app(scope, body.receive, observed)
         except Exception as error:
             problem = _problem(error)
             log.error("unexpected" if problem.status == 500 else "unavailable", exc_info=error, extra={"fields": {"request_id": id}})
@@ -57,24 +61,6 @@ class Observed:
                 await document(request, problem)(scope, receive, observed)
         finally:
             self._told(scope, id, status, time.perf_counter() - start)
-
-    def _limited(self, request: Request, receive: Receive) -> Receive:
-        """Let no more of a body in than is allowed, whether its length is told before or not."""
-        most, seen = self.parts.settings.max_body_bytes, 0
-        told = request.headers.get("content-length", "")
-        too_large = HTTPException(413, f"at most {most} bytes")
-
-        async def limited() -> Message:
-            nonlocal seen
-            if told.isdecimal() and int(told[:20]) > most:
-                raise too_large
-            message = await receive()
-            seen += len(message.get("body", b""))
-            if seen > most:
-                raise too_large
-            return message
-
-        return limited
 
     def _told(self, scope: Scope, id: str, status: int, seconds: float) -> None:
         # the pattern, not the path: ids would make a counter each
@@ -85,6 +71,26 @@ class Observed:
         caller = scope.get("state", {}).get("caller")
         fields = {"request_id": id, "method": method, "route": route, "status": status, "seconds": round(seconds, 6)}
         log.info("request", extra={"fields": fields | ({} if caller is None else {"key": caller.id, "group": caller.group})})
+
+
+class _Body:
+    """A request's body, of which no more is let in than is allowed, whether its length is told before or not."""
+
+    def __init__(self, request: Request, receive: Receive, most: int) -> None:
+        self.source, self.most, self.seen = receive, most, 0
+        told = request.headers.get("content-length", "")
+        self.told = int(told[:20]) if told.isdecimal() and told.isascii() else 0
+        self.read = self.told == 0 and "transfer-encoding" not in request.headers
+
+    async def receive(self) -> Message:
+        """Return the next part."""
+        if self.told <= self.most:
+            message = await self.source()
+            self.seen += len(message.get("body", b""))
+            if self.seen <= self.most:
+                self.read = self.read or not message.get("more_body", False)
+                return message
+        raise HTTPException(413, f"at most {self.most} bytes")
 
 
 def _problem(error: Exception) -> Problem:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from api.work.machine_side import CHANGE, WIDEST, MachineSide, nodes_of
+from api.work.machine_side import CHANGE, GROWTH, WIDEST, MachineSide, nodes_of
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import MillingProcess
@@ -96,6 +96,13 @@ def test_nodes_leave_nothing_out(values):
     assert nodes[-1] == curve.size - 1
     assert np.all(np.diff(nodes) >= 1)
     assert np.all(np.diff(nodes) <= WIDEST + 1)
+    # from one distance to the next no more than growth, and the whole lines that nodes stand on
+    gaps = np.diff(nodes)
+    assert (
+        np.all(np.abs(np.diff(gaps)) <= GROWTH * (gaps[1:] + gaps[:-1]) + 2)
+        or gaps.size < 3
+        or np.all(np.abs(np.diff(gaps[:-1])) <= GROWTH * (gaps[1:-1] + gaps[:-2]) + 2)
+    )
     steep = np.abs(np.diff(curve)) / np.maximum(np.abs(curve[1:]), np.abs(curve[:-1])) >= CHANGE
     # between two steep lines there is a node at each end
     for k in np.flatnonzero(steep[:-1] & steep[1:]):

@@ -136,6 +136,26 @@ def test_a_service_without_keys_says_so(tmp_path):
     assert any("no keys are asked for" in json.loads(line)["event"] for line in log.read_text().splitlines())
 
 
+def test_a_body_without_an_end_is_cut_off(tmp_path):
+    """In chunks, whose sum nobody tells before; the connection ends when the limit is passed."""
+    with serving(tmp_path / "data", tmp_path / "log", RCSA_IDENT_MAX_BODY_BYTES="100000") as (url, _):
+        address = url.removeprefix("http://").split(":")
+        with socket.create_connection((address[0], int(address[1])), timeout=20) as link:
+            head = "POST /v1/machines HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
+            link.sendall(head.encode())
+            sent = 0
+            try:
+                while sent < 50_000_000:
+                    link.sendall(b"2710\r\n" + b" " * 10_000 + b"\r\n")
+                    sent += 10_000
+            except OSError:
+                pass
+            assert sent < 50_000_000
+        # it goes on for others
+        with Client(url) as client:
+            assert list(client.machines()) == []
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
