@@ -127,7 +127,7 @@ async def frf(
     step_hz: Annotated[float, Query(ge=0.01, le=1000.0, allow_inf_nan=False)] = 2.0,
 ) -> Frf:
     machine = await run_in_threadpool(known_machine, parts, caller.group, id)
-    return Frf.model_validate(await parts.work.run(answers.flange_frf, machine, from_hz, to_hz, step_hz))
+    return Frf.model_validate(await parts.work.run(answers.flange_frf, machine, (from_hz, to_hz, step_hz), parts.settings.work_seconds))
 
 
 def known_machine(parts: Parts, group: str, id: str) -> MachineText:

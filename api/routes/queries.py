@@ -33,7 +33,7 @@ CSV = "text/csv"
 async def tooltip(body: TipQuery, request: Request, parts: ThisService, caller: WhoAsks) -> Any:
     machine, (tooling,) = await _subject(parts, caller.group, body.machine, [body.tooling])
     csv = CSV in request.headers.get("accept", "")
-    answer = await parts.work.run(answers.tooltip, machine, tooling, body.question(), csv)
+    answer = await parts.work.run(answers.tooltip, machine, tooling, body.question(parts.settings.work_seconds), csv)
     return Response(answer, media_type=CSV) if csv else TipAnswer.model_validate(answer)
 
 

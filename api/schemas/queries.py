@@ -46,10 +46,11 @@ class TipQuery(Body):
     bands: bool = True
     stiffness_spread_percent: Spread = 0.05
 
-    def question(self) -> TipQuestion:
+    def question(self, work_seconds: float) -> TipQuestion:
         """Return the query in SI."""
         speed = None if self.spindle_speed_rpm is None else self.spindle_speed_rpm * _RPM
-        return TipQuestion(self.from_hz, self.to_hz, self.step_hz, speed, self.bands, self.stiffness_spread_percent / 100.0)
+        spread = self.stiffness_spread_percent / 100.0
+        return TipQuestion(self.from_hz, self.to_hz, self.step_hz, speed, self.bands, spread, work_seconds)
 
 
 class TipAnswer(Answer):

@@ -52,6 +52,8 @@ MOST_LINES = 20_000
 
 _MODE = ("natural_frequency_hz", "natural_frequency_std_hz", "damping_ratio", "damping_ratio_std", "phi_t", "phi_r")
 
+_ALLOWED = "at most {:g} s in one answer (fewer of them, no bands, zero-order): there are no jobs for longer work yet"
+
 _shelf = Shelf(4)
 
 
@@ -89,10 +91,11 @@ def modes(data: dict[str, Any]) -> dict[str, Any]:
     return {key: data.get(key, []) for key in ("status", "reasons", "notes", "band_hz")} | {"axes": axes}
 
 
-def flange_frf(machine: MachineText, low: float, high: float | None, step: float) -> dict[str, Any]:
+def flange_frf(machine: MachineText, lines: tuple[float, float | None, float], work_seconds: float) -> dict[str, Any]:
     """Return the spindle's receptance at its flange, translation over force, with the posterior's standard deviations."""
     known = _shelf.get(machine)
-    frequency = _lines(known, low, high, step)
+    frequency = _lines(known, *lines)
+    _affordable(known.spread_seconds(frequency.size), f"{frequency.size} frequencies", work_seconds)
     omega = 2.0 * np.pi * frequency
     curves, deviations = {}, {}
     for axis, part in known.machine.whole.items():
@@ -114,9 +117,11 @@ def tooltip(machine: MachineText, tooling: ToolingText, question: TipQuestion, c
     weigh(tool.assembly, float(frequency[-1]))
     omega = 2.0 * np.pi * frequency
     response: TooltipResponse
-    if known.steady and np.array_equal(omega, known.omega()):
+    if known.quick and np.array_equal(omega, known.omega()):
         response = known.side(question.bands).response(tool.assembly, question.bands, question.stiffness_spread)
     else:
+        if question.bands:
+            _affordable(known.spread_seconds(omega.size), f"{omega.size} frequencies with bands", question.work_seconds)
         own = known.machine.at(question.speed)
         response = tip_response(own, tool.assembly, omega, question.bands, question.speed, question.stiffness_spread)
     tips = {axis: response.tip(axis) for axis in response.coupled}
@@ -225,18 +230,23 @@ def _limits(known: Known, tool: Tooling, process: MillingProcess, question: Lobe
     cost *= float(np.sum(4000.0 / (speeds * _RPM)))
     if zero_order and np.ptp(process.cutter.pitch) > 1e-9:
         cost *= _PITCH_FACTOR
-    cost += 0.0 if known.steady else _CHANGING
-    if cost > question.work_seconds:
-        found = f"{speeds.size} speeds by {question.method}, about {cost:.0f} s of work"
-        allowed = f"at most {question.work_seconds:g} s in one answer (fewer speeds, zero-order): there are no jobs for longer work yet"
-        raise InputError("speeds", found, allowed)
+    quick = zero_order and known.quick
+    omega = known.omega(BEYOND if marching else 1.0)
+    if not quick:
+        cost += _CHANGING * (0.0 if known.steady else 1.0)
+        cost += known.spread_seconds(omega.size) if question.bands else 0.0
+    _affordable(cost, f"{speeds.size} speeds by {question.method}", question.work_seconds)
     conditions = LobeConditions(process, np.unique(speeds), question.max_depth, _METHODS[question.method]())
     draws = DRAWS if question.bands else 0
-    if zero_order and known.steady:
+    if quick:
         return known.side(question.bands).limits(tool.assembly, conditions, draws, question.stiffness_spread)
-    return machine_limits(
-        known.machine, tool.assembly, known.omega(BEYOND if marching else 1.0), conditions, draws, question.stiffness_spread
-    )
+    return machine_limits(known.machine, tool.assembly, omega, conditions, draws, question.stiffness_spread)
+
+
+def _affordable(seconds: float, what: str, most: float) -> None:
+    if seconds > most:
+        found = f"{what}, about {seconds:.0f} s of work"
+        raise InputError("speeds" if "speeds" in what else "step_hz", found, _ALLOWED.format(most))
 
 
 def _told(known: Known, limits: Limits, speeds: FloatArray) -> list[str]:

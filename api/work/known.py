@@ -19,6 +19,8 @@ from rcsa_ident.workflows.speeds import MachineOverSpeed
 
 #: As with `lobes`: lower end of the receptances that limits are computed from, and their step [Hz].
 LOWEST, STEP = 100.0, 1.0
+#: Seconds for a line and an unknown, and how many of both together are kept (100 bytes each).
+SPREAD_COST, MOST_KEPT = 1e-5, 1_000_000
 #: What the service takes; the largest campaigns stay far below.
 HIGHEST_HZ, MOST_MODES, MOST_UNKNOWNS, MOST_RIVALS, MOST_BANDS = 20_000.0, 60, 600, 20, 20
 
@@ -44,6 +46,21 @@ class Known:
     def steady(self) -> bool:
         """Whether it is the same at all speeds."""
         return not self.machine.bands and self.machine.speed_range is None
+
+    @property
+    def unknowns(self) -> int:
+        """Directions of the posterior of all axes of the machine that has most of them."""
+        machines = (self.machine.whole, *(band for _, band in self.machine.bands))
+        return max(sum(0 if part.posterior is None else part.posterior.theta.size for part in each.values()) for each in machines)
+
+    def spread_seconds(self, lines: int) -> float:
+        """Return about how long the posterior takes to a tip's receptance of so many lines without anything kept [s]."""
+        return SPREAD_COST * self.unknowns * lines
+
+    @property
+    def quick(self) -> bool:
+        """Whether the machine's side of the coupling can be kept: it is the same at all speeds, and not too large."""
+        return self.steady and self.unknowns * self.omega().size <= MOST_KEPT
 
     def omega(self, beyond: float = 1.0) -> FloatArray:
         """Return the frequencies [rad/s] of the receptances, up to so many times the highest that was identified."""

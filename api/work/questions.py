@@ -39,6 +39,8 @@ class TipQuestion:
     bands : bool
     stiffness_spread : float
         As a share.
+    work_seconds : float [s]
+        Longer work is refused.
     """
 
     low: float
@@ -47,6 +49,7 @@ class TipQuestion:
     speed: float | None
     bands: bool
     stiffness_spread: float
+    work_seconds: float
 
 
 @dataclass(frozen=True, slots=True)

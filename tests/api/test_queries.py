@@ -201,3 +201,20 @@ def test_numbers_that_lead_nowhere_are_told_not_thrown(shop):
     contact = {"translational_stiffness": 1e300, "rotational_stiffness": 1e300, "translational_damping": 1e308, "rotational_damping": 1e308}
     refused(422, client.lobes, id, example(contact=contact))
     refused(422, client.tooltip, id, example(contact=contact))
+
+
+def test_a_posterior_that_is_too_large_to_keep_is_weighed(shop, monkeypatch):
+    """The plain road gives the same limits; where it would take too long it is refused, and so are too many frequencies."""
+    from api.work import known
+
+    client, id = shop
+    quick = client.lobes(id, "T1", speeds=SPEEDS).toolings[0]
+    monkeypatch.setattr(known, "MOST_KEPT", 10)
+    slow = client.lobes(id, "T1", speeds=SPEEDS).toolings[0]
+    np.testing.assert_allclose(slow.limit_depth_low_mm, quick.limit_depth_low_mm, rtol=1e-4)
+    np.testing.assert_allclose(slow.limit_depth_mm, quick.limit_depth_mm, rtol=1e-9)
+    monkeypatch.setattr(known, "SPREAD_COST", 1.0)
+    assert refused(422, client.lobes, id, "T1", speeds=SPEEDS).errors[0].field == "speeds"
+    assert refused(422, client.tooltip, id, "T1").errors[0].field == "step_hz"
+    assert refused(422, client.frf, id).errors[0].field == "step_hz"
+    assert client.tooltip(id, "T1", bands=False).axes["X"].re_std is None
