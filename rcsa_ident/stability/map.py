@@ -176,13 +176,12 @@ def stability_map(
 
 
 def _beside_the_boundary(growth: FloatArray) -> NDArray[np.bool_]:
-    """Points with a neighbour of the other sign."""
-    grows = growth >= 0.0
-    beside = np.zeros(grows.shape, dtype=bool)
-    for axis in (0, 1):
-        change = np.diff(grows, axis=axis)
-        beside |= np.concatenate([change, np.zeros_like(np.take(grows, [0], axis=axis))], axis=axis)
-        beside |= np.concatenate([np.zeros_like(np.take(grows, [0], axis=axis)), change], axis=axis)
+    """Points with one of the other sign up to two rows and columns away: where lobes meet, gaps and tips are no wider than a point."""
+    grows = np.pad(growth >= 0.0, 2, mode="edge")
+    here, beside = grows[2:-2, 2:-2], np.zeros(growth.shape, dtype=bool)
+    for i in range(5):
+        for j in range(5):
+            beside |= grows[i : i + here.shape[0], j : j + here.shape[1]] != here
     return beside
 
 

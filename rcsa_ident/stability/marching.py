@@ -64,7 +64,7 @@ def islands_from(cut: PeriodMap) -> float:
     """
     process = cut.process
     in_cut = process.cutter.teeth * (process.engagement.exit - process.engagement.entry) / (2.0 * np.pi)
-    if process.cutter.helix == 0.0 or in_cut >= 1.0:
+    if process.cutter.helix < 1e-6 or in_cut >= 1.0:
         return np.inf
     return float(ISLANDS * np.pi * process.cutter.diameter / (process.cutter.teeth * np.tan(process.cutter.helix)))
 
