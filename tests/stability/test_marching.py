@@ -41,6 +41,17 @@ def test_limits_are_within_their_tolerance(name):
         np.testing.assert_allclose(found.limit_depth[deep], exact.limit_depth[deep], rtol=tolerance)
 
 
+def test_the_error_that_is_known_is_taken_off():
+    """A coarse semi-discretisation, whose last two steps give its limit to a tenth of what was asked for."""
+    speeds = np.array([5000.0, 10_000.0, 18_500.0]) * RPM
+    for process in (mill(2, 0.05), mill(2, 1.0)):
+        exact, found = (
+            stability_lobes(tip(ONE), process, speeds, 30e-3, m).limit_depth
+            for m in (FullDiscretisation(tolerance=1e-6), SemiDiscretisation(tolerance=1e-2))
+        )
+        np.testing.assert_allclose(found, exact, rtol=1.5e-3)
+
+
 def test_the_limit_is_where_growth_begins():
     process = PROCESSES["helix"]
     found = stability_lobes(tip(SKEWED), process, SPEEDS, 20e-3, FULL)

@@ -13,6 +13,8 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability import _cut_kernels as kernels
+from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.period_map import PeriodMap, common_period, lobatto
 from tests.oracles import naive
@@ -254,6 +256,27 @@ def test_waves():
     np.testing.assert_allclose(np.minimum(left, passing - left), 0.0, atol=1e-6 * passing)
     strongest = found.omega[np.argmax(found.motion)] / (2.0 * np.pi)
     assert np.min(np.abs(strongest / np.array([780.0, 930.0, 1350.0]) - 1.0)) < 0.1
+
+
+def test_amplitudes_are_those_of_the_motion():
+    """In a slot the vector holds the motion of the whole period: its lines are the tip's, also far from the modes."""
+    cut, speed = PeriodMap(tip(SKEWED), mill(2, 1.0), 6), 9000.0 * RPM
+    # at the limit, where nothing grows
+    depth = float(stability_lobes(tip(SKEWED), mill(2, 1.0), [speed], 20e-3, FullDiscretisation(tolerance=1e-7)).limit_depth[0])
+    found = cut.multiplier(speed, depth, 1e-4, waves=True, residual=1e-9)
+    ((_, h, steps, _, _),), *_, time = cut._laid_out(speed, depth, 1e-4)
+    motion = found.vector[2 * cut.pole.size :].reshape(-1, 2)
+    rate = np.log(found.value) / found.period
+    # frequencies of either sign: a line below zero is told by its size only
+    lines = {}
+    for k in range(-12, 12):
+        omega = rate.imag + 2.0 * np.pi * k / found.period
+        wave = np.exp(-(rate.real + 1j * omega) * time)[:, None] * motion
+        total = sum(h * cut.table[1] @ wave[6 * i : 6 * i + 7] for i in range(int(steps)))
+        lines[abs(omega)] = np.linalg.norm(total)
+    expected = np.array([min(lines.items(), key=lambda each: abs(each[0] - w))[1] for w in found.omega])
+    assert np.all([min(abs(w - each) for each in lines) < 1.0 for w in found.omega])
+    np.testing.assert_allclose(found.motion / found.motion.max(), expected / expected.max(), rtol=0, atol=2e-6)
 
 
 def test_common_period():

@@ -68,10 +68,12 @@ def test_a_cut_that_begins_with_a_tooth_in_it():
 def test_modes_that_die_before_the_next_tooth_cuts():
     """Heavily damped modes forget a push in the air: what carries a disturbance on is the surface."""
     heavy = ((0, 700.0, 0.9, 0.01), (0, 1500.0, 0.7, 0.02), (1, 800.0, 0.99, 0.01))
-    speeds = np.array([5000.0, 20_000.0]) * RPM
-    exact, found = (stability_lobes(tip(heavy), mill(2, 0.5), speeds, 60e-3, m).limit_depth for m in (FULL, LINEAR))
+    speeds = np.array([4300.0, 8000.0]) * RPM
+    exact, found = (
+        stability_lobes(tip(heavy), mill(2, 0.5), speeds, 60e-3, m).limit_depth for m in (FullDiscretisation(tolerance=1e-3), LINEAR)
+    )
     assert np.all(np.isfinite(exact))
-    np.testing.assert_allclose(found, exact, rtol=1e-2)
+    np.testing.assert_allclose(found, exact, rtol=1.2e-2)
 
 
 def test_rubbing_while_it_moves_in():

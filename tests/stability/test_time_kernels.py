@@ -16,7 +16,7 @@ CASES = {
     "half": mill(2, 0.5, feed_per_tooth=1e-4),
     "helix, edges, rubbing": mill(3, 0.4, helix=0.6, feed_per_tooth=5e-5, damping=ProcessDamping(3e13, 6e-5), feed_angle=0.5),
     "run-out": mill(2, 0.5, runout=[0.0, 60e-6], feed_per_tooth=5e-5),
-    "pitch": mill(3, 0.5, pitch=np.radians([100.0, 121.0, 139.0]), feed_per_tooth=5e-5),
+    "pitch": mill(3, 0.5, pitch=np.radians([100.4, 120.9, 138.7]), feed_per_tooth=5e-5),
     "a varying speed": mill(2, 0.5, feed_per_tooth=5e-5, speed_variation=SpeedVariation(0.3, 0.5)),
 }
 
@@ -90,8 +90,8 @@ def test_march(name, leaves):
             new = force_of(process, cut.step, here, velocity, path, number, run.lag, run.plan, speed)
         state, force = after, new
         order, tips = np.append(order, number), np.vstack([tips, here])
-        np.testing.assert_allclose(samples[i, :2], here, rtol=0, atol=3e-4 * np.abs(samples[:, :2]).max())
-        np.testing.assert_allclose(samples[i, 4:], new, rtol=0, atol=3e-3 * np.abs(samples[:, 4:]).max())
+        np.testing.assert_allclose(samples[i, :2], here, rtol=0, atol=1e-4 * np.abs(samples[:, :2]).max())
+        np.testing.assert_allclose(samples[i, 4:], new, rtol=0, atol=4e-4 * np.abs(samples[:, 4:]).max())
     np.testing.assert_allclose(run.state, state[:m], rtol=0, atol=1e-3 * np.abs(state).max())
     np.testing.assert_allclose(
         samples[:, 2:4], np.gradient(samples[:, :2], times[1:], axis=0), rtol=0, atol=0.1 * np.abs(samples[:, 2:4]).max()
