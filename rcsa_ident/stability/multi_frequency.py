@@ -74,7 +74,9 @@ class MultiFrequency:
             doubts.append("run-out is left out: the limit is that of equal teeth")
         if lost:
             doubts.append(f"at {lost} of {speeds.size} speeds the limit is not converged: it may be percents off")
-        return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), "multi-frequency", tuple(doubts))
+        # a flip vibrates at an odd multiple of half the tooth-passing frequency, and nothing else does to the last digit
+        flip = np.abs(chatter / (cutter.teeth * speeds) % 1.0 - 0.5) < 1e-9
+        return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), "multi-frequency", tuple(doubts), flip)
 
 
 def _doubts(tip: TipMotion, chatter: FloatArray) -> list[str]:

@@ -85,7 +85,7 @@ def test_keys_are_made_listed_withdrawn_in_their_group(guarded_http):
     fresh = Client(key=made.key, http=http)
     assert list(fresh.machines()) == []
     assert made.id in [k.id for k in admin.keys(limit=2)]
-    secret = made.key.rsplit("_", 1)[1]
+    secret = made.key.split("_", 2)[2]
     assert secret not in http.get("/v1/keys", headers=admin.headers).text
     other = Client(key=keys["other"], http=http)
     assert [k.label for k in other.keys(limit=9)] == ["other"]

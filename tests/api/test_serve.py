@@ -126,7 +126,7 @@ def test_a_service_with_keys_killed_and_started_again(tmp_path, result):
     (line,) = [line for line in lines if line.get("route", "").endswith("/lobes")]
     assert line["status"] == 200
     assert line["group"] == "hall 3"
-    assert key.rsplit("_", 1)[1].encode() not in (tmp_path / "data" / "service.db").read_bytes()
+    assert key.split("_", 2)[2].encode() not in (tmp_path / "data" / "service.db").read_bytes()
 
 
 def test_a_service_without_keys_says_so(tmp_path):

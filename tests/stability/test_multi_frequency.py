@@ -122,6 +122,7 @@ def test_flips_are_where_the_published_case_has_them():
     np.testing.assert_allclose(ratio[flips] % 1.0, 0.5, atol=1e-9)
     assert np.all(np.abs(ratio[~flips] % 1.0 - 0.5) > 1e-3)
     np.testing.assert_array_equal(found.lobe, np.floor(ratio))
+    np.testing.assert_array_equal(found.flip, flips)
 
 
 @pytest.mark.parametrize(
