@@ -62,8 +62,13 @@ def _documents(name: str) -> Table:
 identifications = _documents("identifications")
 toolings = _documents("toolings")
 
+
+def _missing_tables(connection: Connection) -> None:
+    metadata.create_all(connection)
+
+
 #: What turns a store of version k + 1 into one of version k + 2, in order; a released step is never edited.
-MIGRATIONS: tuple[Callable[[Connection], None], ...] = ()
+MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_missing_tables,)
 SCHEMA_VERSION = 1 + len(MIGRATIONS)
 
 

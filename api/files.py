@@ -1,0 +1,1 @@
+"""Files of uploads: written once, named by what they hold, never by a client."""

@@ -1,0 +1,1 @@
+"""Durable jobs: accepted is kept, killed is resumed, the same seed gives the same answer."""

@@ -1,0 +1,1 @@
+"""Live forces: a process of its own holds the observers, frames come and go over WebSockets."""
