@@ -6,6 +6,8 @@ import hashlib
 from dataclasses import dataclass
 from typing import Protocol
 
+from api.stores.campaigns import Campaigns, Recordings
+
 #: A digest that stands for "nothing must be there yet".
 ABSENT = "*absent"
 
@@ -118,7 +120,7 @@ class Machines(Protocol):
         """Return machines of a group behind an id, in the order of ids."""
 
     def delete(self, group: str, id: str) -> bool:
-        """Return whether there was one; its identification goes with it."""
+        """Return whether there was one; its identification and its campaigns go with it."""
 
 
 class Documents(Protocol):
@@ -153,6 +155,8 @@ class Store(Protocol):
     machines: Machines
     identifications: Documents
     toolings: Documents
+    campaigns: Campaigns
+    recordings: Recordings
 
     def check(self) -> None:
         """Raise `Unavailable` unless the store answers."""

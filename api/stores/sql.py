@@ -1,98 +1,37 @@
-"""The store in a database: SQLite in WAL mode beside the service, or PostgreSQL by URL, through the same statements."""
+"""The store in a database: every noun in a table of its own."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from typing import Any
 
-from sqlalchemy import Connection, Engine, Select, Table, create_engine, delete, event, insert, select, text, update
-from sqlalchemy.engine import make_url
-from sqlalchemy.exc import ArgumentError, DBAPIError, IntegrityError, NoSuchModuleError, OperationalError, TimeoutError
+from sqlalchemy import Connection, Engine, Select, Table, delete, insert, select, update
+from sqlalchemy.exc import IntegrityError
 
 from api.stores import tables
-from api.stores.records import ABSENT, Document, Documents, Key, Keys, Machine, Machines, Stale, Taken, Unavailable
-from rcsa_ident.errors import InputError
-
-#: How long an idempotency key is remembered.
-REMEMBERED = timedelta(days=1)
-_BUSY_MS = 5000
+from api.stores.campaigns import Campaigns, Recordings
+from api.stores.database import REMEMBERED, Database, open_engine
+from api.stores.records import ABSENT, Document, Documents, Key, Keys, Machine, Machines, Stale, Taken
+from api.stores.sql_campaigns import SqlCampaigns, SqlRecordings, delete_campaigns
 
 
 def open_store(url: str) -> SqlStore:
     """Return the store of a URL, made or brought to today's version where need be."""
-    try:
-        parsed = make_url(url)
-        engine = create_engine(parsed, pool_pre_ping=not url.startswith("sqlite"))
-    except (ArgumentError, NoSuchModuleError, ModuleNotFoundError) as error:
-        # the URL may hold a password: only what is wrong with it is told
-        allowed = "a URL as sqlite:///FILE or postgresql+psycopg://USER@HOST/NAME, with its driver installed"
-        raise InputError("RCSA_IDENT_DATABASE", type(error).__name__, allowed) from None
-    if engine.dialect.name == "sqlite":
-        event.listen(engine, "connect", _sqlite)
-        event.listen(engine, "begin", _begin)
-    try:
-        with engine.begin() as connection:
-            tables.migrate(connection)
-    except OperationalError:
-        raise InputError("RCSA_IDENT_DATABASE", "no answer", f"a database that can be opened ({parsed.render_as_string()})") from None
-    return SqlStore(engine)
+    return SqlStore(open_engine(url))
 
 
-def _sqlite(connection: Any, _record: Any) -> None:
-    """Readers do not wait for a writer; what is committed is on the disk, also after a loss of power."""
-    # transactions begin where SQLAlchemy says so, not before the first write
-    connection.isolation_level = None
-    for pragma in ("journal_mode=WAL", "synchronous=FULL", f"busy_timeout={_BUSY_MS}", "foreign_keys=ON"):
-        connection.execute(f"PRAGMA {pragma}")
-
-
-def _begin(connection: Connection) -> None:
-    wanted = "IMMEDIATE" if connection.get_execution_options().get("writes", True) else "DEFERRED"
-    connection.exec_driver_sql(f"BEGIN {wanted}")
-
-
-class SqlStore:
+class SqlStore(Database):
     """Everything in one database."""
 
     def __init__(self, engine: Engine) -> None:
-        self.engine = engine
+        super().__init__(engine)
         self.keys: Keys = SqlKeys(self)
         self.machines: Machines = SqlMachines(self)
         self.identifications: Documents = SqlDocuments(self, tables.identifications)
         self.toolings: Documents = SqlDocuments(self, tables.toolings)
-
-    @contextmanager
-    def writing(self) -> Iterator[Connection]:
-        """A transaction that writes; on SQLite one at a time."""
-        with self._answering(), self.engine.begin() as connection:
-            yield connection
-
-    @contextmanager
-    def reading(self) -> Iterator[Connection]:
-        """A transaction that only reads."""
-        with self._answering(), self.engine.connect() as connection:
-            yield connection.execution_options(writes=False)
-
-    @contextmanager
-    def _answering(self) -> Iterator[None]:
-        try:
-            yield
-        except IntegrityError:
-            raise
-        except (DBAPIError, TimeoutError) as error:
-            if isinstance(error, OperationalError | TimeoutError) or error.connection_invalidated:
-                raise Unavailable from error
-            raise
-
-    def check(self) -> None:
-        with self.reading() as connection:
-            connection.execute(text("SELECT 1"))
-
-    def close(self) -> None:
-        self.engine.dispose()
+        self.campaigns: Campaigns = SqlCampaigns(self)
+        self.recordings: Recordings = SqlRecordings(self)
 
 
 class SqlKeys:
@@ -176,10 +115,13 @@ class SqlMachines:
         return [Machine(**row._asdict()) for row in rows]
 
     def delete(self, group: str, id: str) -> bool:
-        t, i = tables.machines, tables.identifications
+        t, i, c = tables.machines, tables.identifications, tables.campaigns
         with self.store.writing() as connection:
+            # the machine first: nothing new is added to it from now on
+            there = connection.execute(delete(t).where(t.c.group == group, t.c.id == id)).rowcount > 0
             connection.execute(delete(i).where(i.c.group == group, i.c.name == id))
-            return connection.execute(delete(t).where(t.c.group == group, t.c.id == id)).rowcount > 0
+            delete_campaigns(connection, select(c.c.id).where(c.c.group == group, c.c.machine == id))
+            return there
 
 
 class SqlDocuments:

@@ -4,7 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from sqlalchemy import Column, Connection, Integer, MetaData, String, Table, Text, UniqueConstraint, insert, inspect, select, update
+from sqlalchemy import (
+    BigInteger,
+    Column,
+    Connection,
+    Index,
+    Integer,
+    MetaData,
+    String,
+    Table,
+    Text,
+    UniqueConstraint,
+    insert,
+    inspect,
+    select,
+    update,
+)
 
 from rcsa_ident.errors import InputError
 
@@ -61,6 +76,45 @@ def _documents(name: str) -> Table:
 
 identifications = _documents("identifications")
 toolings = _documents("toolings")
+_FileName = String(200).with_variant(String(200, collation="C"), "postgresql")
+campaigns = Table(
+    "campaigns",
+    metadata,
+    Column("id", _Name, primary_key=True),
+    Column("group", _Name, nullable=False),
+    Column("machine", _Name, nullable=False),
+    Column("name", String(200), nullable=False),
+    Column("text", Text, nullable=False),
+    Column("cuts", Integer, nullable=False),
+    Column("created", String(40), nullable=False),
+    Column("changes", Integer, nullable=False),
+    Column("settled", Integer, nullable=False),
+    Index("ix_campaigns_machine", "group", "machine"),
+)
+campaign_repeats = Table(
+    "campaign_idempotency_keys",
+    metadata,
+    Column("group", _Name, primary_key=True),
+    Column("key", String(200), primary_key=True),
+    Column("digest", String(64), nullable=False),
+    Column("id", _Name, nullable=False),
+    Column("created", String(40), nullable=False, index=True),
+)
+recordings = Table(
+    "recordings",
+    metadata,
+    Column("campaign", _Name, primary_key=True),
+    Column("name", _FileName, primary_key=True),
+    Column("group", _Name, nullable=False, index=True),
+    Column("role", String(8), nullable=False),
+    Column("size", BigInteger, nullable=False),
+    Column("sha256", String(64), nullable=False),
+    Column("normalised", String(64), nullable=False),
+    Column("found", Text, nullable=False),
+    Column("usable", Integer, nullable=False),
+    Column("judged_with", String(64), nullable=False),
+    Column("created", String(40), nullable=False),
+)
 
 
 def _missing_tables(connection: Connection) -> None:

@@ -1,4 +1,4 @@
-"""Services for tests: in this process with stores of both kinds, and computing where the test runs."""
+"""Services for tests: in this process with a store of their own, and computing where the test runs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from api.main import create_app
 from api.schemas.toolings import EXAMPLE
 from api.security import make_key
 from api.settings import Settings
-from api.stores.memory import MemoryStore
 from api.stores.records import Store
 from api.stores.sql import open_store
 from api.work.pool import guarded
@@ -52,10 +51,15 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> str:
     return result_text(tmp_path_factory.mktemp("result"))
 
 
+def embedded(folder: Path) -> Store:
+    """A store in a folder."""
+    return open_store(f"sqlite:///{folder / 'store.db'}")
+
+
 @pytest.fixture
-def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Store]:
-    """In memory, or in a file where a test's parameters say so."""
-    found: Store = open_store(f"sqlite:///{tmp_path / 'store.db'}") if getattr(request, "param", "") == "sqlite" else MemoryStore()
+def store(tmp_path: Path) -> Iterator[Store]:
+    """An embedded one."""
+    found = embedded(tmp_path)
     yield found
     found.close()
 

@@ -8,10 +8,9 @@ import json
 import pytest
 
 from api.problems import MEDIA_TYPE
-from api.stores.memory import MemoryStore
 from api.stores.records import Unavailable
 from api.work.pool import Busy
-from tests.api.conftest import Here, example, service
+from tests.api.conftest import Here, embedded, example, service
 
 JSON = {"Content-Type": "application/json"}
 LOBES = '{"machine": "m", "toolings": ["t"], "max_depth_mm": %s}'
@@ -25,7 +24,8 @@ POSTS = ("/machines", "/keys", "/tooltip", "/lobes", "/advice")
 @pytest.fixture(scope="module")
 def http(tmp_path_factory):
     """One service for all of them: none does it harm."""
-    with service(MemoryStore(), tmp_path_factory.mktemp("hostile")) as found:
+    folder = tmp_path_factory.mktemp("hostile")
+    with service(embedded(folder), folder) as found:
         yield found
 
 

@@ -12,8 +12,6 @@ from rcsa_ident.dynamics.coordinates import Dof
 from tests.api.conftest import result_text
 from tests.cli import by_hand
 
-pytestmark = pytest.mark.parametrize("store", ["memory", "sqlite"], indirect=True)
-
 
 def refused(status, call, *arguments, **further):
     with pytest.raises(ServiceError) as error:

@@ -14,8 +14,7 @@ from hypothesis.errors import Unsatisfiable
 
 from api.schemas.queries import AdviceQuery, LobeQuery, TipQuery
 from api.schemas.toolings import ToolingKeys
-from api.stores.memory import MemoryStore
-from tests.api.conftest import example, service
+from tests.api.conftest import embedded, example, service
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -116,7 +115,7 @@ class Fuzzed:
 
 def test_the_api_keeps_to_its_description(tmp_path, result):
     """Whatever is sent: no 5xx, no undocumented status, type or body. With a fixed seed, and so many cases for each operation."""
-    with service(MemoryStore(), tmp_path, requests_per_minute=10**8, burst=10**8, work_seconds=0.2) as http:
+    with service(embedded(tmp_path), tmp_path, requests_per_minute=10**8, burst=10**8, work_seconds=0.2) as http:
         id = http.post("/v1/machines", json={"name": "m"}).json()["id"]
         http.put(f"/v1/machines/{id}/identification", content=result, headers={"Content-Type": "application/json"})
         schema = schemathesis.openapi.from_dict(http.get("/openapi.json").json())

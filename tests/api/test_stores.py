@@ -1,4 +1,4 @@
-"""Both stores keep the same promises; the one on the disk keeps them through a restart."""
+"""What a store promises; the one on the disk keeps it through a restart."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from api.stores.records import ABSENT, Document, Machine, Stale, Taken, Unavaila
 from api.stores.sql import open_store
 from rcsa_ident.errors import InputError
 
-BOTH = pytest.mark.parametrize("store", ["memory", "sqlite"], indirect=True)
-
 
 def document(group="A", name="T1", words="x"):
     return Document(group, name, words, "{}", digest_of(words), now())
@@ -25,7 +23,6 @@ def machine(group="A", name="M"):
     return Machine(new_id(), group, name, "", now())
 
 
-@BOTH
 def test_documents_are_kept_replaced_and_told_in_order(store):
     kept = store.toolings
     assert kept.put(document(name="b"))
@@ -43,7 +40,6 @@ def test_documents_are_kept_replaced_and_told_in_order(store):
     assert not kept.delete("A", "a")
 
 
-@BOTH
 def test_a_writer_may_say_what_it_has_seen(store):
     kept = store.toolings
     kept.put(document(), ABSENT)
@@ -59,7 +55,6 @@ def test_a_writer_may_say_what_it_has_seen(store):
     assert kept.delete("A", "T1", digest_of("y"))
 
 
-@BOTH
 def test_groups_see_nothing_of_each_other(store):
     mine, theirs = machine("A"), machine("B")
     store.machines.add(mine)
@@ -80,7 +75,6 @@ def test_groups_see_nothing_of_each_other(store):
     assert store.keys.delete("B", key.id)
 
 
-@BOTH
 def test_a_name_is_there_once_and_a_repeated_query_too(store):
     first = machine()
     assert store.machines.add(first, ("k", "digest")) == first
@@ -95,7 +89,6 @@ def test_a_name_is_there_once_and_a_repeated_query_too(store):
     assert len(store.machines.list("A", "", 9)) == 2
 
 
-@BOTH
 def test_an_identification_goes_with_its_machine(store):
     one = machine()
     store.machines.add(one)
@@ -104,7 +97,6 @@ def test_an_identification_goes_with_its_machine(store):
     assert store.identifications.get("A", one.id) is None
 
 
-@BOTH
 def test_many_at_once_make_one(store):
     with ThreadPoolExecutor(8) as threads:
         made = list(threads.map(lambda _: store.machines.add(machine(), ("k", "d")), range(24)))
@@ -148,15 +140,16 @@ def test_an_earlier_store_is_brought_up_and_a_later_one_refused(tmp_path, monkey
     def step(connection):
         connection.execute(text("ALTER TABLE toolings ADD COLUMN note TEXT NOT NULL DEFAULT 'none'"))
 
-    monkeypatch.setattr(tables, "MIGRATIONS", (step,))
-    monkeypatch.setattr(tables, "SCHEMA_VERSION", 2)
+    later_version = tables.SCHEMA_VERSION + 1
+    monkeypatch.setattr(tables, "MIGRATIONS", (*tables.MIGRATIONS, step))
+    monkeypatch.setattr(tables, "SCHEMA_VERSION", later_version)
     for _ in range(2):
         later = open_store(url)
         with later.reading() as connection:
             assert connection.execute(text("SELECT note FROM toolings")).scalar() == "none"
         later.close()
     monkeypatch.undo()
-    with pytest.raises(InputError, match="schema version 2"):
+    with pytest.raises(InputError, match=f"schema version {later_version}"):
         open_store(url)
 
 
@@ -169,7 +162,7 @@ def test_a_store_that_can_not_be_opened_says_so(url):
 
 
 def test_a_store_that_is_locked_is_unavailable(tmp_path, monkeypatch):
-    monkeypatch.setattr("api.stores.sql._BUSY_MS", 50)
+    monkeypatch.setattr("api.stores.database._BUSY_MS", 50)
     url = f"sqlite:///{tmp_path / 's.db'}"
     one, other = open_store(url), open_store(url)
     with one.writing() as connection:

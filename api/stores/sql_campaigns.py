@@ -1,0 +1,188 @@
+"""Campaigns and recordings in tables."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import Connection, Select, delete, func, insert, select, update
+from sqlalchemy.exc import IntegrityError
+
+from api.stores import tables
+from api.stores.campaigns import Campaign, Counts, FileKey, Recording
+from api.stores.database import REMEMBERED, Database
+from api.stores.records import Taken
+
+_C, _R, _K = tables.campaigns, tables.recordings, tables.campaign_repeats
+_CAMPAIGN = [_C.c[name] for name in Campaign.__dataclass_fields__]
+_RECORDING = [_R.c[name] for name in Recording.__dataclass_fields__]
+
+
+class SqlCampaigns:
+    """Campaigns in a table."""
+
+    def __init__(self, store: Database) -> None:
+        self.store = store
+
+    def add(self, campaign: Campaign, repeat: tuple[str, str] | None = None) -> Campaign:
+        try:
+            with self.store.writing() as connection:
+                if repeat is not None:
+                    before = (datetime.now(UTC) - REMEMBERED).isoformat()
+                    connection.execute(delete(_K).where(_K.c.created < before))
+                    earlier = _earlier(connection, campaign.group, repeat)
+                    if earlier is not None:
+                        return earlier
+                    row = {"group": campaign.group, "key": repeat[0], "digest": repeat[1], "id": campaign.id, "created": campaign.created}
+                    connection.execute(insert(_K).values(row))
+                # held until the campaign is there: a machine that is deleted meanwhile takes it along
+                m = tables.machines
+                machine = select(m.c.id).where(m.c.group == campaign.group, m.c.id == campaign.machine).with_for_update(read=True)
+                if connection.execute(machine).first() is None:
+                    raise KeyError(campaign.machine)
+                connection.execute(insert(_C).values(asdict(campaign) | {"changes": 0, "settled": 0}))
+                return campaign
+        except IntegrityError:
+            # the same idempotency key came twice in one moment
+            return self.add(campaign, repeat)
+
+    def get(self, group: str, id: str) -> Campaign | None:
+        with self.store.reading() as connection:
+            row = connection.execute(select(*_CAMPAIGN).where(_C.c.group == group, _C.c.id == id)).first()
+        return None if row is None else Campaign(**row._asdict())
+
+    def unsettled(self) -> list[tuple[str, str]]:
+        with self.store.reading() as connection:
+            rows = connection.execute(select(_C.c.group, _C.c.id).where(_C.c.changes > _C.c.settled)).all()
+        return [(group, id) for group, id in rows]
+
+    def list(self, group: str, machine: str, after: str, limit: int) -> list[Campaign]:
+        here = (_C.c.group == group, _C.c.machine == machine, _C.c.id > after)
+        with self.store.reading() as connection:
+            rows = connection.execute(select(*_CAMPAIGN).where(*here).order_by(_C.c.id).limit(limit)).all()
+        return [Campaign(**row._asdict()) for row in rows]
+
+    def counts(self, group: str, ids: Sequence[str]) -> dict[str, Counts]:
+        found = select(_R.c.campaign, func.count(), func.sum(_R.c.usable)).group_by(_R.c.campaign)
+        with self.store.reading() as connection:
+            rows = connection.execute(found.where(_R.c.group == group, _R.c.campaign.in_(ids), _R.c.role == "cut")).all()
+        return {campaign: Counts(int(uploaded), int(usable)) for campaign, uploaded, usable in rows}
+
+    def delete(self, group: str, id: str) -> bool:
+        with self.store.writing() as connection:
+            return delete_campaigns(connection, select(_C.c.id).where(_C.c.group == group, _C.c.id == id)) > 0
+
+    def changes(self, group: str, id: str) -> int:
+        with self.store.reading() as connection:
+            return connection.execute(select(_C.c.changes).where(_C.c.group == group, _C.c.id == id)).scalar() or 0
+
+    def settle(self, group: str, id: str, changes: int) -> None:
+        with self.store.writing() as connection:
+            here = (_C.c.group == group, _C.c.id == id, _C.c.settled < changes)
+            connection.execute(update(_C).where(*here).values(settled=changes))
+
+
+def delete_campaigns(connection: Connection, wanted: Select[Any]) -> int:
+    """Delete campaigns with their recordings, and return how many there were."""
+    ids = list(connection.execute(wanted.with_for_update()).scalars())
+    for start in range(0, len(ids), 500):
+        part = ids[start : start + 500]
+        for table, column in ((_R, _R.c.campaign), (_K, _K.c.id), (_C, _C.c.id)):
+            connection.execute(delete(table).where(column.in_(part)))
+    return len(ids)
+
+
+def _earlier(connection: Connection, group: str, repeat: tuple[str, str]) -> Campaign | None:
+    row = connection.execute(select(_K).where(_K.c.group == group, _K.c.key == repeat[0])).first()
+    if row is None:
+        return None
+    if row.digest != repeat[1]:
+        raise Taken("idempotency key")
+    return Campaign(**connection.execute(select(*_CAMPAIGN).where(_C.c.id == row.id)).one()._asdict())
+
+
+class SqlRecordings:
+    """Recordings in a table."""
+
+    def __init__(self, store: Database) -> None:
+        self.store = store
+
+    def put(self, recording: Recording, replace: bool) -> Recording | None:
+        here = (_R.c.campaign == recording.campaign, _R.c.name == recording.name)
+        with self.store.writing() as connection:
+            # also holds the campaign: two uploads of one name come one after the other
+            _changed(connection, recording.group, recording.campaign)
+            row = connection.execute(select(*_RECORDING).where(*here)).first()
+            there = None if row is None else Recording(**row._asdict())
+            if there is None:
+                connection.execute(insert(_R).values(_row(recording)))
+            elif there.sha256 != recording.sha256:
+                if not replace:
+                    raise Taken("name")
+                connection.execute(update(_R).where(*here).values(_row(recording)))
+            return there
+
+    def judge(self, before: Recording, after: Recording) -> bool:
+        here = (_R.c.campaign == before.campaign, _R.c.name == before.name, _R.c.normalised == before.normalised)
+        same = (_R.c.judged_with == before.judged_with, _R.c.created == before.created)
+        with self.store.writing() as connection:
+            return connection.execute(update(_R).where(*here, *same).values(_row(after))).rowcount > 0
+
+    def get(self, group: str, campaign: str, name: str) -> Recording | None:
+        here = (_R.c.group == group, _R.c.campaign == campaign, _R.c.name == name)
+        with self.store.reading() as connection:
+            row = connection.execute(select(*_RECORDING).where(*here)).first()
+        return None if row is None else Recording(**row._asdict())
+
+    def of_machine(self, group: str, machine: str) -> list[FileKey]:
+        ids = select(_C.c.id).where(_C.c.group == group, _C.c.machine == machine)
+        with self.store.reading() as connection:
+            rows = connection.execute(select(_R.c.sha256, _R.c.normalised).where(_R.c.campaign.in_(ids))).all()
+        return _keys(rows)
+
+    def list(self, group: str, campaign: str, after: str, limit: int) -> list[Recording]:
+        here = (_R.c.group == group, _R.c.campaign == campaign, _R.c.name > after)
+        with self.store.reading() as connection:
+            rows = connection.execute(select(*_RECORDING).where(*here).order_by(_R.c.name).limit(limit)).all()
+        return [Recording(**row._asdict()) for row in rows]
+
+    def delete(self, group: str, campaign: str, name: str) -> Recording | None:
+        here = (_R.c.group == group, _R.c.campaign == campaign, _R.c.name == name)
+        with self.store.writing() as connection:
+            row = connection.execute(select(*_RECORDING).where(*here)).first()
+            if row is None:
+                return None
+            _changed(connection, group, campaign)
+            connection.execute(delete(_R).where(*here))
+        return Recording(**row._asdict())
+
+    def kept(self, group: str) -> set[FileKey]:
+        with self.store.reading() as connection:
+            return set(_keys(connection.execute(select(_R.c.sha256, _R.c.normalised).where(_R.c.group == group)).all()))
+
+    def groups(self) -> Iterator[str]:
+        with self.store.reading() as connection:
+            found = list(connection.execute(select(_R.c.group).distinct()).scalars())
+        yield from found
+
+
+def files_of(recording: Recording) -> list[FileKey]:
+    """Return what a recording refers to."""
+    return [("uploads", recording.sha256), ("normalised", recording.normalised)]
+
+
+def _keys(rows: Sequence[Any]) -> list[FileKey]:
+    return [key for sha256, normalised in rows for key in (("uploads", sha256), ("normalised", normalised))]
+
+
+def _row(recording: Recording) -> dict[str, Any]:
+    return asdict(recording) | {"usable": int(json.loads(recording.found)["verdict"]["usable"])}
+
+
+def _changed(connection: Connection, group: str, campaign: str) -> None:
+    here = (_C.c.group == group, _C.c.id == campaign)
+    if connection.execute(update(_C).where(*here).values(changes=_C.c.changes + 1)).rowcount == 0:
+        raise KeyError(campaign)
