@@ -34,6 +34,9 @@ def open_engine(url: str) -> Engine:
         event.listen(engine, "begin", _begin)
     try:
         with engine.begin() as connection:
+            if engine.dialect.name == "postgresql":
+                # service and workers may meet a new database in the same moment
+                connection.execute(text("SELECT pg_advisory_xact_lock(7243451)"))
             tables.migrate(connection)
     except OperationalError:
         raise InputError("RCSA_IDENT_DATABASE", "no answer", f"a database that can be opened ({parsed.render_as_string()})") from None

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from api.stores.campaigns import Campaigns, Recordings
+from api.stores.jobs import Jobs
 
 #: A digest that stands for "nothing must be there yet".
 ABSENT = "*absent"
@@ -120,7 +121,7 @@ class Machines(Protocol):
         """Return machines of a group behind an id, in the order of ids."""
 
     def delete(self, group: str, id: str) -> bool:
-        """Return whether there was one; its identification and its campaigns go with it."""
+        """Return whether there was one; its identification, campaigns and jobs go with it."""
 
 
 class Documents(Protocol):
@@ -157,6 +158,7 @@ class Store(Protocol):
     toolings: Documents
     campaigns: Campaigns
     recordings: Recordings
+    jobs: Jobs
 
     def check(self) -> None:
         """Raise `Unavailable` unless the store answers."""

@@ -12,8 +12,10 @@ from sqlalchemy.exc import IntegrityError
 from api.stores import tables
 from api.stores.campaigns import Campaigns, Recordings
 from api.stores.database import REMEMBERED, Database, open_engine
+from api.stores.jobs import Jobs
 from api.stores.records import ABSENT, Document, Documents, Key, Keys, Machine, Machines, Stale, Taken
 from api.stores.sql_campaigns import SqlCampaigns, SqlRecordings, delete_campaigns
+from api.stores.sql_jobs import SqlJobs, forget_jobs
 
 
 def open_store(url: str) -> SqlStore:
@@ -32,6 +34,7 @@ class SqlStore(Database):
         self.toolings: Documents = SqlDocuments(self, tables.toolings)
         self.campaigns: Campaigns = SqlCampaigns(self)
         self.recordings: Recordings = SqlRecordings(self)
+        self.jobs: Jobs = SqlJobs(self)
 
 
 class SqlKeys:
@@ -121,6 +124,7 @@ class SqlMachines:
             there = connection.execute(delete(t).where(t.c.group == group, t.c.id == id)).rowcount > 0
             connection.execute(delete(i).where(i.c.group == group, i.c.name == id))
             delete_campaigns(connection, select(c.c.id).where(c.c.group == group, c.c.machine == id))
+            forget_jobs(connection, group, id)
             return there
 
 

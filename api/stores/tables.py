@@ -8,6 +8,7 @@ from sqlalchemy import (
     BigInteger,
     Column,
     Connection,
+    Float,
     Index,
     Integer,
     MetaData,
@@ -114,6 +115,63 @@ recordings = Table(
     Column("usable", Integer, nullable=False),
     Column("judged_with", String(64), nullable=False),
     Column("created", String(40), nullable=False),
+)
+
+jobs = Table(
+    "jobs",
+    metadata,
+    Column("id", _Name, primary_key=True),
+    Column("group", _Name, nullable=False),
+    Column("kind", String(32), nullable=False),
+    Column("machine", _Name, nullable=False),
+    Column("campaign", _Name),
+    Column("request", Text, nullable=False),
+    Column("state", String(16), nullable=False, index=True),
+    Column("created", String(40), nullable=False),
+    Column("progress", Text),
+    Column("status", String(16)),
+    Column("problem", Text),
+    Column("started", String(40)),
+    Column("finished", String(40)),
+    Column("seconds", Float, nullable=False),
+    Column("attempts", Integer, nullable=False),
+    Column("worker", String(64)),
+    Column("events", Integer, nullable=False),
+    Index("ix_jobs_group", "group", "kind", "id"),
+)
+job_repeats = Table(
+    "job_idempotency_keys",
+    metadata,
+    Column("group", _Name, primary_key=True),
+    Column("key", String(200), primary_key=True),
+    Column("digest", String(64), nullable=False),
+    Column("id", _Name, nullable=False),
+    Column("created", String(40), nullable=False, index=True),
+)
+job_events = Table(
+    "job_events",
+    metadata,
+    Column("job", _Name, primary_key=True),
+    Column("number", Integer, primary_key=True),
+    Column("kind", String(16), nullable=False),
+    Column("data", Text, nullable=False),
+    Column("topic", String(32), nullable=False),
+)
+job_texts = Table(
+    "job_texts",
+    metadata,
+    Column("job", _Name, primary_key=True),
+    Column("name", String(32), primary_key=True),
+    Column("text", Text, nullable=False),
+)
+job_workers = Table(
+    "job_workers",
+    metadata,
+    Column("id", _Name, primary_key=True),
+    Column("place", String(64), nullable=False),
+    Column("process", String(64), nullable=False),
+    Column("token", String(64), nullable=False),
+    Column("beats", BigInteger, nullable=False),
 )
 
 

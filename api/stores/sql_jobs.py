@@ -1,0 +1,228 @@
+"""Jobs in tables: every change is one transaction, and none of a worker that the job is no longer given to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import Connection, delete, func, insert, select, update
+from sqlalchemy.exc import IntegrityError
+
+from api.stores import tables
+from api.stores.database import REMEMBERED, Database
+from api.stores.jobs import OPEN, Event, Full, Job, Outcome, Worker
+from api.stores.records import Taken
+
+
+class SqlJobs:
+    """Jobs in tables."""
+
+    def __init__(self, store: Database) -> None:
+        self.store = store
+
+    def add(self, job: Job, texts: Mapping[str, str], most: int, repeat: tuple[str, str] | None = None) -> Job:
+        t, r, x, m = tables.jobs, tables.job_repeats, tables.job_texts, tables.machines
+        try:
+            with self.store.writing() as connection:
+                if repeat is not None:
+                    connection.execute(delete(r).where(r.c.created < (datetime.now(UTC) - REMEMBERED).isoformat()))
+                    earlier = self._earlier(connection, job.group, repeat)
+                    if earlier is not None:
+                        return earlier
+                # nobody forgets the machine between this look and the end
+                there = select(m.c.id).where(m.c.group == job.group, m.c.id == job.machine).with_for_update()
+                if connection.execute(there).first() is None:
+                    raise KeyError(job.machine)
+                waiting = select(func.count()).where(t.c.group == job.group, t.c.state.in_(OPEN))
+                if connection.execute(waiting).scalar_one() >= most:
+                    raise Full
+                if repeat is not None:
+                    row = {"group": job.group, "key": repeat[0], "digest": repeat[1], "id": job.id, "created": job.created}
+                    connection.execute(insert(r).values(row))
+                connection.execute(insert(t).values(asdict(job)))
+                for name, text in texts.items():
+                    connection.execute(insert(x).values(job=job.id, name=name, text=text))
+                return job
+        except IntegrityError:
+            # the same key came twice in one moment
+            with self.store.reading() as connection:
+                earlier = None if repeat is None else self._earlier(connection, job.group, repeat)
+            if earlier is None:
+                raise
+            return earlier
+
+    def _earlier(self, connection: Connection, group: str, repeat: tuple[str, str]) -> Job | None:
+        r, t = tables.job_repeats, tables.jobs
+        row = connection.execute(select(r).where(r.c.group == group, r.c.key == repeat[0])).first()
+        if row is None:
+            return None
+        if row.digest != repeat[1]:
+            raise Taken("idempotency key")
+        found = connection.execute(select(t).where(t.c.id == row.id)).first()
+        return None if found is None else Job(**found._asdict())
+
+    def get(self, group: str, id: str) -> Job | None:
+        found = self.find(id)
+        return found if found is not None and found.group == group else None
+
+    def find(self, id: str) -> Job | None:
+        with self.store.reading() as connection:
+            row = connection.execute(select(tables.jobs).where(tables.jobs.c.id == id)).first()
+        return None if row is None else Job(**row._asdict())
+
+    def list(self, group: str, wanted: Mapping[str, str], before: str, limit: int) -> list[Job]:
+        t = tables.jobs
+        query = select(t).where(t.c.group == group, *(t.c[name] == value for name, value in wanted.items()))
+        if before:
+            query = query.where(t.c.id < before)
+        with self.store.reading() as connection:
+            rows = connection.execute(query.order_by(t.c.id.desc()).limit(limit)).all()
+        return [Job(**row._asdict()) for row in rows]
+
+    def cancel(self, group: str, id: str, when: str) -> tuple[Job, bool] | None:
+        t = tables.jobs
+        with self.store.writing() as connection:
+            here = (t.c.group == group, t.c.id == id)
+            found = connection.execute(select(t).where(*here).with_for_update()).first()
+            if found is None:
+                return None
+            cancelled = found.state in OPEN
+            if cancelled:
+                connection.execute(update(t).where(*here).values(state="cancelled", finished=when))
+                _append(connection, id, found.events, [Event(0, "end", "")])
+            return Job(**connection.execute(select(t).where(*here)).one()._asdict()), cancelled
+
+    def open(self) -> Sequence[Job]:
+        t = tables.jobs
+        with self.store.reading() as connection:
+            rows = connection.execute(select(t).where(t.c.state.in_(OPEN)).order_by(t.c.id)).all()
+        return [Job(**row._asdict()) for row in rows]
+
+    def begin(self, id: str, worker: str, when: str) -> Job | None:
+        t = tables.jobs
+        with self.store.writing() as connection:
+            found = connection.execute(select(t).where(t.c.id == id, t.c.state.in_(OPEN)).with_for_update()).first()
+            if found is None:
+                return None
+            values: dict[str, Any] = {"state": "running", "worker": worker, "attempts": found.attempts + 1}
+            connection.execute(update(t).where(t.c.id == id).values(values | {"started": found.started or when}))
+            _append(connection, id, found.events, [Event(0, "progress", "")])
+            return Job(**connection.execute(select(t).where(t.c.id == id)).one()._asdict())
+
+    def tell(self, id: str, worker: str, events: Sequence[Event], progress: str | None = None, further: bool = False) -> bool:
+        t = tables.jobs
+        with self.store.writing() as connection:
+            query = select(t.c.events).where(t.c.id == id, t.c.state == "running", t.c.worker == worker)
+            last = connection.execute(query.with_for_update()).scalar()
+            if last is None:
+                return False
+            values = ({} if progress is None else {"progress": progress}) | ({"attempts": 0} if further else {})
+            if values:
+                connection.execute(update(t).where(t.c.id == id).values(values))
+            _append(connection, id, last, [*events, *([] if progress is None else [Event(0, "progress", "", "progress")])])
+            return True
+
+    def finish(self, id: str, worker: str | None, outcome: Outcome) -> bool:
+        t, x, m = tables.jobs, tables.job_texts, tables.machines
+        with self.store.writing() as connection:
+            query = select(t).where(t.c.id == id, t.c.state.in_(OPEN))
+            found = connection.execute(query.with_for_update()).first()
+            if found is None or (worker is not None and found.worker != worker):
+                return False
+            names = ("state", "status", "problem", "finished", "seconds")
+            connection.execute(update(t).where(t.c.id == id).values({name: getattr(outcome, name) for name in names}))
+            for name, text in outcome.texts.items():
+                connection.execute(delete(x).where(x.c.job == id, x.c.name == name))
+                connection.execute(insert(x).values(job=id, name=name, text=text))
+            _append(connection, id, found.events, [Event(0, "end", "")])
+            # a machine that was forgotten meanwhile stays so
+            if outcome.applied is not None and connection.execute(select(m.c.id).where(m.c.id == found.machine).with_for_update()).first():
+                _apply(connection, found.group, found.machine, outcome)
+            return True
+
+    def events(self, id: str, after: int, limit: int) -> Sequence[Event]:
+        e = tables.job_events
+        with self.store.reading() as connection:
+            query = select(e.c.number, e.c.kind, e.c.data, e.c.topic).where(e.c.job == id, e.c.number > after)
+            rows = connection.execute(query.order_by(e.c.number).limit(limit)).all()
+        return [Event(*row) for row in rows]
+
+    def numbers(self, ids: Sequence[str]) -> dict[str, int]:
+        t = tables.jobs
+        with self.store.reading() as connection:
+            rows = connection.execute(select(t.c.id, t.c.events).where(t.c.id.in_(ids))).all()
+        return {row.id: row.events for row in rows}
+
+    def text(self, id: str, name: str) -> str | None:
+        x = tables.job_texts
+        with self.store.reading() as connection:
+            found: str | None = connection.execute(select(x.c.text).where(x.c.job == id, x.c.name == name)).scalar()
+        return found
+
+    def counts(self) -> Sequence[tuple[str, str, int, float]]:
+        t = tables.jobs
+        with self.store.reading() as connection:
+            query = select(t.c.kind, t.c.state, func.count(), func.sum(t.c.seconds)).group_by(t.c.kind, t.c.state)
+            rows = connection.execute(query).all()
+        return [(kind, state, int(count), float(seconds)) for kind, state, count, seconds in rows]
+
+    def workers(self) -> Sequence[Worker]:
+        with self.store.reading() as connection:
+            rows = connection.execute(select(tables.job_workers).order_by(tables.job_workers.c.id)).all()
+        return [Worker(**row._asdict()) for row in rows]
+
+    def claim(self, worker: Worker, dead: str | None) -> bool:
+        w = tables.job_workers
+        try:
+            with self.store.writing() as connection:
+                if dead is not None:
+                    gone = connection.execute(delete(w).where(w.c.id == worker.id, w.c.token == dead))
+                    if gone.rowcount == 0:
+                        return False
+                connection.execute(insert(w).values(asdict(worker)))
+                return True
+        except IntegrityError:
+            return False
+
+    def beat(self, id: str, token: str) -> bool:
+        w = tables.job_workers
+        with self.store.writing() as connection:
+            there = update(w).where(w.c.id == id, w.c.token == token).values(beats=w.c.beats + 1)
+            return connection.execute(there).rowcount > 0
+
+    def leave(self, id: str, token: str) -> None:
+        w = tables.job_workers
+        with self.store.writing() as connection:
+            connection.execute(delete(w).where(w.c.id == id, w.c.token == token))
+
+
+def _append(connection: Connection, job: str, last: int, events: Sequence[Event]) -> None:
+    e, t = tables.job_events, tables.jobs
+    if not events:
+        return
+    for topic in {event.topic for event in events if event.topic}:
+        connection.execute(delete(e).where(e.c.job == job, e.c.topic == topic))
+    # of a topic only the last is worth a row
+    lasting = [event for i, event in enumerate(events) if not event.topic or all(event.topic != later.topic for later in events[i + 1 :])]
+    rows = [asdict(event) | {"job": job, "number": last + 1 + i} for i, event in enumerate(lasting)]
+    connection.execute(insert(e), rows)
+    connection.execute(update(t).where(t.c.id == job).values(events=last + len(rows)))
+
+
+def _apply(connection: Connection, group: str, machine: str, outcome: Outcome) -> None:
+    i = tables.identifications
+    assert outcome.applied is not None
+    connection.execute(delete(i).where(i.c.group == group, i.c.name == machine))
+    row = asdict(outcome.applied) | {"group": group, "name": machine, "changed": outcome.finished}
+    connection.execute(insert(i).values(row))
+
+
+def forget_jobs(connection: Connection, group: str, machine: str) -> None:
+    """Forget all jobs of a machine, with what they told and found."""
+    t = tables.jobs
+    of = select(t.c.id).where(t.c.group == group, t.c.machine == machine)
+    for table in (tables.job_events, tables.job_texts):
+        connection.execute(delete(table).where(table.c.job.in_(of)))
+    connection.execute(delete(t).where(t.c.group == group, t.c.machine == machine))
