@@ -12,7 +12,7 @@ from fastapi.openapi.utils import get_openapi
 from api import problems
 from api.observe import Observed
 from api.parts import Metrics, Parts, Rates
-from api.routes import health, keys, machines, queries, toolings
+from api.routes import health, keys, machines, page, queries, toolings
 from api.schemas.common import ProblemDocument
 from api.security import HEADER
 from api.settings import Settings
@@ -53,12 +53,13 @@ def create_app(settings: Settings, store: Store | None = None, work: Work | None
         version=__version__,
         description=_ABOUT,
         lifespan=lifespan,
-        docs_url="/docs",
+        docs_url=None,
         redoc_url=None,
     )
     app.state.parts = parts
     problems.install(app)
     app.include_router(health.router)
+    app.include_router(page.router)
     for each in (keys, machines, toolings, queries):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(Observed, parts=parts)

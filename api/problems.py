@@ -111,7 +111,9 @@ def install(app: FastAPI) -> None:
             405: "the path does not take this method",
         }
         detail = words.get(error.status_code, title(error.status_code))
-        headers = {"Allow": _allowed(app, request.url.path)} if error.status_code == 405 else error.headers
+        headers = dict(error.headers or {})
+        if error.status_code == 405 and (methods := _allowed(app, request.url.path)):
+            headers["Allow"] = methods
         return document(request, Problem(error.status_code, detail, headers=headers))
 
     app.add_exception_handler(Problem, known)

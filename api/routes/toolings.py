@@ -20,6 +20,8 @@ from rcsa_ident.report.drawing import tooling_svg
 
 router = APIRouter(prefix="/toolings", tags=["toolings"], route_class=Guarded)
 TOML, JSON, SVG = "application/toml", "application/json", "image/svg+xml"
+#: Opened as a page of its own a drawing runs nothing and loads nothing.
+_ALONE = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'"}
 _BODY = {
     "required": True,
     "content": {
@@ -103,9 +105,27 @@ def drawing(name: ToolingName, request: Request, parts: ThisService, caller: Who
     document = found_or_404(parts.store.toolings.get(caller.group, name), "tooling")
     if unchanged(request, document.digest):
         return Response(status_code=304, headers=tagged(document.digest))
-    # opened as a page of its own it runs nothing and loads nothing
-    headers = tagged(document.digest) | {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'"}
+    headers = tagged(document.digest) | _ALONE
     return Response(tooling_svg(tooling_of(document.text)), media_type=SVG, headers=headers)
+
+
+@router.post(
+    "/drawing",
+    summary="A tooling that is in no library, to scale: SVG in millimetres",
+    openapi_extra=guard("read", requestBody=_BODY, **{"x-content-types": (JSON, TOML)}),
+    response_class=Response,
+    responses={200: {"description": "A drawing.", "content": {SVG: {"schema": {"type": "string"}}}}, **problems(*BODY)},
+)
+async def draw(request: Request) -> Response:
+    raw = await request.body()
+    if len(raw) > LARGEST:
+        raise Problem(413, f"a tooling has at most {LARGEST // 1000} kB")
+    is_toml = request.headers["content-type"].split(";")[0].strip().lower() == TOML
+
+    def drawn() -> str:
+        return tooling_svg(tooling_of(utf8(raw) if is_toml else toml_text(body_of(ToolingKeys, raw))))
+
+    return Response(await run_in_threadpool(drawn), media_type=SVG, headers=_ALONE)
 
 
 @router.delete("/{name}", status_code=204, summary="Forget a tooling", openapi_extra=guard("upload"), responses=problems(404, 412, 422))

@@ -1,0 +1,106 @@
+"""The page, its files, and the description of the API to read: all from here, nothing from elsewhere."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from fastapi import APIRouter, Request, Response
+
+from api.problems import Problem
+from api.routes.common import tagged, unchanged
+
+router = APIRouter(include_in_schema=False)
+FOLDER = Path(__file__).resolve().parents[1] / "web"
+_KINDS = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".json": "application/json",
+    ".svg": "image/svg+xml",
+}
+#: What a page of the service may load: its own files, and pictures that it makes itself.
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; font-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+_GUARDS = {
+    "Content-Security-Policy": _POLICY,
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
+}
+_MONTHS = "public, max-age=31536000, immutable"
+
+
+@dataclass(frozen=True, slots=True)
+class _File:
+    """A file as it is sent.
+
+    Parameters
+    ----------
+    kind : str
+    plain, packed : bytes
+        As it is, and with gzip.
+    digest : str
+    """
+
+    kind: str
+    plain: bytes
+    packed: bytes
+    digest: str
+
+
+@lru_cache(maxsize=1)
+def _names() -> dict[str, Path]:
+    """All files that there are, by the path that a browser asks for; what is not here is not looked for anywhere."""
+    return {path.relative_to(FOLDER).as_posix(): path for path in sorted(FOLDER.rglob("*")) if path.suffix in _KINDS}
+
+
+@lru_cache(maxsize=1)
+def _tag() -> str:
+    """Name of this state of all files: it stands in their addresses, so that browsers may keep them for ever."""
+    sums = (f"{name} {hashlib.sha256(path.read_bytes()).hexdigest()}" for name, path in _names().items())
+    return hashlib.sha256("\n".join(sums).encode()).hexdigest()[:16]
+
+
+@lru_cache(maxsize=256)
+def _file(name: str) -> _File:
+    path = _names()[name]
+    plain = path.read_bytes()
+    if path.suffix == ".html":
+        plain = plain.replace(b"{{tag}}", _tag().encode())
+    return _File(_KINDS[path.suffix], plain, gzip.compress(plain, 6, mtime=0), hashlib.sha256(plain).hexdigest()[:32])
+
+
+def _sent(request: Request, name: str, headers: dict[str, str]) -> Response:
+    file = _file(name)
+    packs = any(part.split(";")[0].strip().lower() == "gzip" for part in request.headers.get("accept-encoding", "").split(","))
+    small = packs and len(file.packed) < len(file.plain)
+    # two forms of one file are two entities
+    digest = file.digest + ("-gzip" if small else "")
+    told = tagged(digest) | {"Vary": "Accept-Encoding"} | headers
+    if unchanged(request, digest):
+        return Response(status_code=304, headers=told)
+    return Response(file.packed if small else file.plain, media_type=file.kind, headers=told | ({"Content-Encoding": "gzip"} if small else {}))
+
+
+@router.api_route("/", methods=["GET", "HEAD"])
+def index(request: Request) -> Response:
+    return _sent(request, "index.html", {"Cache-Control": "no-cache", **_GUARDS})
+
+
+@router.api_route("/docs", methods=["GET", "HEAD"])
+def docs(request: Request) -> Response:
+    return _sent(request, "docs.html", {"Cache-Control": "no-cache", **_GUARDS})
+
+
+@router.api_route("/static/{tag}/{name:path}", methods=["GET", "HEAD"])
+def static(tag: str, name: str, request: Request) -> Response:
+    if name not in _names() or name.endswith(".html"):
+        raise Problem(404, "there is no such file")
+    # a page from before an update asks for what is no more: it gets today's, and keeps it for no longer than it needs it
+    return _sent(request, name, {"Cache-Control": _MONTHS if tag == _tag() else "no-cache", **_GUARDS})

@@ -1,0 +1,73 @@
+// Addresses after the #: #/path/with/parts?query. A view is a function (args, query, place) that fills the place and may return what ends it.
+
+const routes = [];
+let ends = null;
+let turn = 0;
+
+/** Say which view belongs to a pattern as `campaigns/:id`. */
+export function route(pattern, section, view) {
+  const names = [...pattern.matchAll(/:(\w+)/g)].map((m) => m[1]);
+  const shape = new RegExp(`^${pattern.replace(/:\w+/g, "([^/]+)")}$`);
+  routes.push({ shape, names, section, view });
+}
+
+export function where() {
+  const [path, query = ""] = location.hash.replace(/^#\/?/, "").split("?");
+  return { path, query: new URLSearchParams(query) };
+}
+
+/** The address of a view. */
+export function to(path, query = {}) {
+  const search = new URLSearchParams();
+  for (const [name, value] of Object.entries(query)) {
+    for (const each of Array.isArray(value) ? value : [value]) if (each !== null && each !== undefined && each !== "") search.append(name, each);
+  }
+  const text = search.toString();
+  return `#/${path}${text ? `?${text}` : ""}`;
+}
+
+export function go(path, query) {
+  location.hash = to(path, query);
+}
+
+/** Write what a view shows into its address, without a step back for every keystroke. */
+export function remember(path, query) {
+  history.replaceState(null, "", to(path, query));
+}
+
+/** Show the view of the address now. */
+export async function show(place, onshow, onerror) {
+  const mine = (turn += 1);
+  const { path, query } = where();
+  ends?.();
+  ends = null;
+  for (const { shape, names, section, view } of routes) {
+    const found = shape.exec(path);
+    if (!found) continue;
+    const args = Object.fromEntries(names.map((name, i) => [name, decode(found[i + 1])]));
+    // views that take time fill a place of their own: one that was left does not overwrite the next one
+    const own = document.createElement("div");
+    own.className = "view";
+    place.replaceChildren(own);
+    onshow(section, args, query);
+    let end = null;
+    try {
+      end = await view(args, query, own);
+    } catch (error) {
+      if (mine === turn) onerror(own, error);
+    }
+    if (mine === turn) ends = typeof end === "function" ? end : null;
+    else if (typeof end === "function") end();
+    return;
+  }
+  onshow("", {}, query);
+  onerror(place, new Error("There is no such page."));
+}
+
+function decode(text) {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text;
+  }
+}
