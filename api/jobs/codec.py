@@ -1,0 +1,156 @@
+"""Nouns as JSON and back, to the last bit: what a job remembers of itself. No code is in it, and only known nouns come out of it."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import importlib
+import json
+import math
+from enum import Enum
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+#: Module and name of every noun that may be told; a later release may read what an earlier one wrote as long as its fields stay.
+NOUNS = (
+    "rcsa_ident.dynamics.coordinates.Dof",
+    "rcsa_ident.signals.verdict.Verdict",
+    "rcsa_ident.signals.measurement.AxisLines",
+    "rcsa_ident.signals.measurement.CutMeasurement",
+    "rcsa_ident.signals.measurement.Reading",
+    "rcsa_ident.identification.parameters.AxisLayout",
+    "rcsa_ident.identification.parameters.Layout",
+    "rcsa_ident.identification.misfit.Residual",
+    "rcsa_ident.identification.misfit.Linearisation",
+    "rcsa_ident.identification.misfit.Evaluation",
+    "rcsa_ident.identification.polish.Solution",
+    "rcsa_ident.identification.final.AxisSearch",
+    "rcsa_ident.cutting.conditions.Engagement",
+    "rcsa_ident.cutting.process.ProcessDamping",
+    "api.work.questions.MachineText",
+    "api.work.questions.ToolingText",
+    "api.work.questions.CutQuestion",
+    "api.work.questions.LobeQuestion",
+)
+_PLACES = {place.rpartition(".")[2]: place for place in NOUNS}
+
+
+class Unknown(ValueError):
+    """Something that is not among the known nouns, or no text of this module."""
+
+
+def encode(value: Any) -> str:
+    """Return a value as JSON.
+
+    Raises
+    ------
+    Unknown
+        It holds something else than numbers, texts, arrays of numbers, lists, tuples, tables and the nouns of `NOUNS`.
+    """
+    return json.dumps(_plain(value), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+
+
+def decode(text: str) -> Any:
+    """Return the value that `encode` has written: same types, same bits, arrays of the same layout in memory.
+
+    Raises
+    ------
+    Unknown
+        If it has not.
+    """
+    try:
+        return _value(json.loads(text))
+    except Unknown:
+        raise
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise Unknown(f"no text of a known noun ({type(error).__name__})") from error
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Enum):
+        return {"~enum": [_name(type(value)), value.value]}
+    if value is None or type(value) in (bool, int, str):
+        return value
+    if type(value) is float:
+        # JSON writes the shortest digits that lead back to the same number
+        return value if math.isfinite(value) else {"~float": str(value)}
+    if type(value) is complex:
+        return {"~complex": [_plain(value.real), _plain(value.imag)]}
+    if isinstance(value, np.ndarray):
+        return {"~array": _array(value)}
+    if isinstance(value, np.generic):
+        return {"~number": _array(np.asarray(value))}
+    if type(value) is list:
+        return [_plain(each) for each in value]
+    if type(value) is tuple:
+        return {"~tuple": [_plain(each) for each in value]}
+    if type(value) is dict:
+        return {"~table": [[_plain(key), _plain(each)] for key, each in value.items()]}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f"~{_name(type(value))}": {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}}
+    raise Unknown(f"a {type(value).__name__} can not be told")
+
+
+def _value(plain: Any) -> Any:
+    if isinstance(plain, list):
+        return [_value(each) for each in plain]
+    if not isinstance(plain, dict):
+        return plain
+    if len(plain) != 1:
+        raise Unknown(f"a table of {len(plain)} keys")
+    ((kind, content),) = plain.items()
+    if kind == "~float":
+        return float(content)
+    if kind == "~complex":
+        return complex(*(_value(each) for each in content))
+    if kind == "~array":
+        return _array_of(content)
+    if kind == "~number":
+        return _array_of(content)[()]
+    if kind == "~tuple":
+        return tuple(_value(each) for each in content)
+    if kind == "~table":
+        return {_value(key): _value(each) for key, each in content}
+    if kind == "~enum":
+        return _noun(content[0])(content[1])
+    if not kind.startswith("~"):
+        raise Unknown(f"the key {kind[:40]}")
+    return _noun(kind[1:])(**{name: _value(each) for name, each in content.items()})
+
+
+def _array(values: np.ndarray) -> list[Any]:
+    if values.dtype.kind not in "biufc" or type(values) is not np.ndarray:
+        raise Unknown(f"an array of {values.dtype}")
+    # sums over an array depend on how it lies in memory, in their last bits
+    order = "F" if values.flags.f_contiguous and not values.flags.c_contiguous else "C"
+    little = values.astype(values.dtype.newbyteorder("<"), copy=False)
+    return [little.dtype.str, list(values.shape), order, values.flags.writeable, base64.b64encode(little.tobytes(order)).decode("ascii")]
+
+
+def _array_of(content: list[Any]) -> np.ndarray:
+    kind, shape, order, writeable, text = content
+    dtype = np.dtype(str(kind))
+    if dtype.kind not in "biufc":
+        raise Unknown(f"an array of {dtype}")
+    values = np.frombuffer(base64.b64decode(text, validate=True), dtype=dtype).reshape(shape, order=order)
+    values = values.astype(dtype.newbyteorder("="), order="K", copy=True)
+    values.setflags(write=bool(writeable))
+    return values
+
+
+def _name(kind: type) -> str:
+    name = kind.__name__
+    if _PLACES.get(name) != f"{kind.__module__}.{name}":
+        raise Unknown(f"a {name} is none of the known nouns")
+    return name
+
+
+@cache
+def _noun(name: str) -> Any:
+    place = _PLACES.get(name)
+    if place is None:
+        raise Unknown(f"{name[:40]} is none of the known nouns")
+    module, _, own = place.rpartition(".")
+    return getattr(importlib.import_module(module), own)
