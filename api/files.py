@@ -1,1 +1,227 @@
-"""Files of uploads: written once, named by what they hold, never by a client."""
+"""Files of uploads: written once, named by what they hold, never by a client.
+
+A group has a folder of its own. What arrives goes to a part; a part that is complete is synced and takes its place under the hash
+of its content by one rename, so that a file that is there is whole. A row of the store refers to a file only after that.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import secrets
+import shutil
+import threading
+import time
+from collections.abc import Container, Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+#: What a file is: an upload as it came, or the samples that were read from one.
+UPLOADS, NORMALISED, PARTS = "uploads", "normalised", "parts"
+#: Age [s] at which a part that nobody goes on with is removed, and a file that no row refers to.
+STALE_PART, STALE_FILE = 86400.0, 600.0
+_KEY = re.compile(r"[0-9a-f]{64}")
+
+
+class TooLarge(Exception):
+    """More than the group may keep."""
+
+
+class Full(Exception):
+    """The disk has to keep what is left of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Partial:
+    """An upload that goes on.
+
+    Parameters
+    ----------
+    offset : int [bytes]
+        So many are on the disk.
+    length : int [bytes]
+        Of the whole.
+    """
+
+    offset: int
+    length: int
+
+
+class Part:
+    """A file that is being written.
+
+    Parameters
+    ----------
+    path : Path
+    offset : int
+        Bytes that are there already, which stay; what stands behind them goes.
+    """
+
+    def __init__(self, path: Path, offset: int = 0) -> None:
+        self.path, self.size = path, offset
+        self.hash: Any = hashlib.sha256() if offset == 0 else None
+        self.file = path.open("r+b" if path.exists() else "xb")
+        self.file.truncate(offset)
+        self.file.seek(offset)
+
+    def write(self, data: bytes | bytearray) -> None:
+        """Append."""
+        self.file.write(data)
+        self.size += len(data)
+        if self.hash is not None:
+            self.hash.update(data)
+
+    def sync(self) -> None:
+        """Return when everything written is on the disk."""
+        self.file.flush()
+        os.fsync(self.file.fileno())
+
+    def close(self) -> None:
+        """Let go of the file; it stays."""
+        self.file.close()
+
+    def drop(self) -> None:
+        """Remove the file."""
+        self.file.close()
+        self.path.unlink(missing_ok=True)
+
+    def sha256(self) -> str:
+        """Return the hash of the whole, hexadecimal."""
+        if self.hash is None:
+            self.file.flush()
+            with self.path.open("rb") as file:
+                self.hash = hashlib.file_digest(file, "sha256")
+        return str(self.hash.hexdigest())
+
+
+class Files:
+    """All files of all groups.
+
+    Parameters
+    ----------
+    folder : Path
+        Made at the first upload.
+    group_bytes : int
+        That a group may keep.
+    free_bytes : int
+        That stay free on the disk.
+    """
+
+    def __init__(self, folder: Path, group_bytes: int = 1 << 62, free_bytes: int = 0) -> None:
+        self.folder, self.group_bytes, self.free_bytes = folder, group_bytes, free_bytes
+        #: Held from a file's rename until its row stands, and while files without a row are removed.
+        self.lock = threading.Lock()
+
+    def of_group(self, group: str, kind: str) -> Path:
+        """Return a folder of a group, which is there then."""
+        folder = self.folder / _folder_name(group) / kind
+        if not folder.is_dir():
+            folder.mkdir(parents=True, exist_ok=True)
+            # also the names of the folders are on the disk before anything in them counts
+            for each in (folder.parent, self.folder, self.folder.parent):
+                _sync_folder(each)
+        return folder
+
+    def path(self, group: str, kind: str, key: str) -> Path:
+        """Return where a file is or will be."""
+        if not _KEY.fullmatch(key) or kind not in (UPLOADS, NORMALISED):
+            raise ValueError(f"no key of a file: {kind}/{key}")
+        return self.of_group(group, kind) / f"{key}{'.h5' if kind == NORMALISED else ''}"
+
+    def part(self, group: str) -> Part:
+        """Return a new part."""
+        return Part(self.spare(group))
+
+    def spare(self, group: str) -> Path:
+        """Return a path for a part, where nothing is."""
+        return self.of_group(group, PARTS) / f"{secrets.token_hex(16)}.part"
+
+    def check_space(self, group: str, more: int = 0) -> None:
+        """Raise `TooLarge` or `Full` if so many bytes more have no place."""
+        used = self.used(group)
+        if used + more > self.group_bytes:
+            raise TooLarge(f"the group keeps {used} bytes, and may keep {self.group_bytes}")
+        if shutil.disk_usage(self.of_group(group, PARTS)).free - more < self.free_bytes:
+            raise Full
+
+    def used(self, group: str) -> int:
+        """Return the bytes of all files of a group, parts among them."""
+        total = 0
+        for kind in (UPLOADS, NORMALISED, PARTS):
+            for entry in os.scandir(self.of_group(group, kind)):
+                try:
+                    total += entry.stat().st_size
+                except FileNotFoundError:
+                    continue
+        return total
+
+    def keep(self, group: str, kind: str, key: str, source: Path) -> None:
+        """Give a synced part its place; where the same is there already it is dropped. The caller holds `lock`."""
+        target = self.path(group, kind, key)
+        os.replace(source, target)
+        _sync_folder(target.parent)
+
+    def remove(self, group: str, keys: Iterable[tuple[str, str]]) -> None:
+        """Remove files. The caller holds `lock`, and knows that no row refers to them."""
+        for kind, key in keys:
+            self.path(group, kind, key).unlink(missing_ok=True)
+
+    def partial(self, group: str, name: str) -> tuple[Path, Partial | None]:
+        """Return where the parts of an upload of a campaign's recording are gathered, and how far it is."""
+        path = self.of_group(group, PARTS) / f"{hashlib.sha256(name.encode()).hexdigest()}.part"
+        try:
+            state = Partial(**json.loads(path.with_suffix(".json").read_text(encoding="utf-8")))
+            there = path.stat().st_size >= state.offset
+        except (OSError, ValueError, TypeError):
+            return path, None
+        return path, state if there else None
+
+    def note(self, path: Path, state: Partial) -> None:
+        """Keep how far an upload is; its bytes are synced before."""
+        target, new = path.with_suffix(".json"), path.with_suffix(".new")
+        with new.open("w", encoding="utf-8") as file:
+            json.dump(asdict(state), file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(new, target)
+        _sync_folder(target.parent)
+
+    def forget(self, path: Path) -> None:
+        """Remove what was gathered of an upload."""
+        for each in (path.with_suffix(".json"), path.with_suffix(".new"), path):
+            each.unlink(missing_ok=True)
+
+    def sweep(self, kept: Mapping[str, Container[tuple[str, str]]], now: float | None = None) -> int:
+        """Remove stale parts and files that no row refers to, and return how many.
+
+        Parameters
+        ----------
+        kept : mapping of group to files
+            That rows refer to.
+        """
+        now, count = time.time() if now is None else now, 0
+        known = {_folder_name(group): files for group, files in kept.items()}
+        for folder in self.folder.iterdir() if self.folder.is_dir() else ():
+            for kind, age in ((UPLOADS, STALE_FILE), (NORMALISED, STALE_FILE), (PARTS, STALE_PART)):
+                for entry in list(os.scandir(folder / kind)) if (folder / kind).is_dir() else ():
+                    # a row follows its file's last change by minutes at most
+                    referred = (kind, entry.name.removesuffix(".h5")) in known.get(folder.name, ())
+                    if not referred and now - entry.stat().st_mtime > age:
+                        Path(entry.path).unlink(missing_ok=True)
+                        count += 1
+        return count
+
+
+def _folder_name(group: str) -> str:
+    return hashlib.sha256(group.encode()).hexdigest()[:32]
+
+
+def _sync_folder(folder: Path) -> None:
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -14,7 +14,7 @@ from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 
-__all__ = ["READERS", "read_cut", "read_recording", "write_hdf5"]
+__all__ = ["READERS", "in_si", "read_cut", "read_recording", "read_signals", "write_hdf5"]
 
 Reader = Callable[[Path, Sequence[str], float | None], tuple[float, list[FloatArray]]]
 
@@ -49,20 +49,45 @@ def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: 
     InputError
         The file is broken, hostile or lacks a channel; nothing is half read.
     """
-    path = Path(path)
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        raise InputError("recording", f"suffix '{path.suffix}'", "one of " + ", ".join(READERS), str(path))
     if not sensors:
         raise InputError("sensors", "none", "at least one sensor", str(path))
+    rate, signals = read_signals(path, [sensor.name for sensor in sensors], default_rate)
+    return in_si(rate, signals, sensors)
+
+
+def read_signals(
+    path: str | Path, names: Sequence[str], default_rate: float | None = None, suffix: str | None = None
+) -> tuple[float, list[FloatArray]]:
+    """Return the sampling rate [Hz] and the named channels as they stand in a file, shape (n,) each.
+
+    Parameters
+    ----------
+    suffix : str or None
+        In place of the path's own.
+
+    Raises
+    ------
+    InputError
+        As `read_recording`.
+    """
+    path = Path(path)
+    suffix = path.suffix if suffix is None else suffix
+    reader = READERS.get(suffix.lower())
+    if reader is None:
+        raise InputError("recording", f"suffix '{suffix}'", "one of " + ", ".join(READERS), str(path))
     # what overflows or is no number is a lost sample, see below
     with np.errstate(all="ignore"):
         try:
-            rate, channels = reader(path, [sensor.name for sensor in sensors], default_rate)
+            return reader(path, names, default_rate)
         except InputError as error:
             raise (error if error.where else error.at(str(path))) from None
-        samples = np.empty((channels[0].size, len(sensors)))
-        for i, (sensor, values) in enumerate(zip(sensors, channels, strict=True)):
+
+
+def in_si(rate: float, signals: Sequence[FloatArray], sensors: tuple[Sensor, ...]) -> Recording:
+    """Return signals, shape (n,) each, divided by their sensors' sensitivities; a trigger stays as it is."""
+    samples = np.empty((signals[0].size, len(sensors)))
+    with np.errstate(all="ignore"):
+        for i, (sensor, values) in enumerate(zip(sensors, signals, strict=True)):
             samples[:, i] = values
             if sensor.quantity is not Quantity.TRIGGER:
                 samples[:, i] /= sensor.sensitivity

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -171,22 +171,45 @@ def read_campaign(folder: str | Path) -> Campaign:
     path = folder / CAMPAIGN_FILE
     if not folder.is_dir():
         raise InputError("campaign", "no such folder" if not folder.exists() else "a file", f"a folder with {CAMPAIGN_FILE}", str(folder))
-    top = Table(read_toml(path, "campaign"), str(path), known=_CAMPAIGN)
+    return campaign_of(
+        read_toml(path, "campaign"),
+        str(path),
+        folder.resolve().name,
+        lambda paths, key: read_tooling(_inside(folder, paths, key)),
+        lambda table, key: _inside(folder, table, key),
+    )
+
+
+def campaign_of(
+    data: Mapping[str, Any], where: str, name: str, tooling: Callable[[Table, str], Tooling], locate: Callable[[Table, str], Path]
+) -> Campaign:
+    """Return the campaign of a table of keys as `read_campaign` finds it in a file.
+
+    Parameters
+    ----------
+    name : str
+        Counts where the table has none.
+    tooling : callable
+        Given the table ``[toolings]`` and one of its keys, returns that tooling.
+    locate : callable
+        Given the table of a cut and its key ``cut`` or ``air``, returns the recording's file.
+    """
+    top = Table(data, where, known=_CAMPAIGN)
     head = top.table("campaign", ("name", "sampling_rate_hz"), {})
-    name = head.text("name", folder.resolve().name)
+    name = head.text("name", name)
     rate = head.number("sampling_rate_hz", "Hz", None, above=0.0, most=1e8)
     channels = top.table("sensors")
-    sensors = tuple(sensor_of(key, channels.data[key], str(path)) for key in channels)
+    sensors = tuple(sensor_of(key, channels.data[key], where) for key in channels)
     if not sensors:
         top.refuse("sensors", "an empty table", "at least one table [sensors.<channel>]")
     workpiece = workpiece_of(top.table("workpiece", WORKPIECE_KEYS))
-    paths = top.table("toolings")
-    toolings = {key: read_tooling(_inside(folder, paths, key)) for key in paths}
-    cuts = tuple(_cut(table, folder, toolings) for table in top.tables("cuts", _CUT))
+    named = top.table("toolings")
+    toolings = {key: tooling(named, key) for key in named}
+    cuts = tuple(_cut(table, toolings, locate) for table in top.tables("cuts", _CUT))
     seen: dict[str, int] = {}
     for i, cut in enumerate(cuts):
         if cut.id in seen:
-            raise InputError(f"cuts[{i}].id", f'"{cut.id}", the id of cuts[{seen[cut.id]}]', "an id of its own", str(path))
+            raise InputError(f"cuts[{i}].id", f'"{cut.id}", the id of cuts[{seen[cut.id]}]', "an id of its own", where)
         seen[cut.id] = i
     return Campaign(name, rate, sensors, workpiece, toolings, cuts)
 
@@ -214,7 +237,7 @@ def sensor_of(name: str, data: Any, where: str) -> Sensor:
     )
 
 
-def _cut(table: Table, folder: Path, toolings: Mapping[str, Tooling]) -> Cut:
+def _cut(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Table, str], Path]) -> Cut:
     entry = table.number("entry_angle_deg", "deg", least=0.0, most=180.0)
     exit_ = table.number("exit_angle_deg", "deg", least=0.0, most=180.0)
     if exit_ <= entry:
@@ -228,7 +251,7 @@ def _cut(table: Table, folder: Path, toolings: Mapping[str, Tooling]) -> Cut:
     )
     name = table.text("id")
     tooling = table.text("tooling", choices=tuple(toolings))
-    return Cut(name, tooling, conditions, _inside(folder, table, "cut"), _inside(folder, table, "air") if "air" in table else None)
+    return Cut(name, tooling, conditions, locate(table, "cut"), locate(table, "air") if "air" in table else None)
 
 
 def feed_angle_of(table: Table) -> float:

@@ -18,12 +18,14 @@ from rcsa_ident.signals.alignment import angle_to_air, trigger_delay
 from rcsa_ident.signals.frf import Estimator, LineEstimator, turned_air
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
-from rcsa_ident.signals.verdict import Verdict, chatter, raw_faults, silence, speed_faults, tooth_count_fault
+from rcsa_ident.signals.verdict import Verdict, chatter, implausible, raw_faults, silence, speed_faults, tooth_count_fault
 
 #: Highest line that is used [Hz].
 MAX_FREQUENCY = 4300.0
 #: Share of the largest force line below which a line says nothing.
 WEAKEST_FORCE = 1e-3
+#: An air cut may turn this much more slowly, and still needs the cut's highest line.
+_AIR_BEYOND = 1.02
 DEFAULT_ESTIMATOR = LineEstimator()
 #: Note on a cut without an air cut.
 NO_AIR = "no air cut: run-out and roundness of the flange are left in the lines that the teeth share with them"
@@ -142,25 +144,25 @@ def measure_cut(
     axes = measured_axes(cut)
     if not axes:
         raise InputError("sensors", "no displacement", "a displacement sensor for X or Y", cut_id)
-    programmed = conditions.spindle_speed
+    programmed, notes = conditions.spindle_speed, implausible(cut)
     faults = raw_faults(cut) + tuple(f"air cut: {fault}" for fault in (raw_faults(air) if air is not None else ()))
     if faults:
-        return Reading(Verdict(faults))
+        return Reading(Verdict(faults, notes))
     steady = _judged(cut, axes, programmed, max_frequency, cutter.teeth)
     if isinstance(steady, str):
-        return Reading(Verdict((steady,)))
-    still = None if air is None else _judged(air, axes, programmed, 1.02 * max_frequency, 1)
+        return Reading(Verdict((steady,), notes))
+    still = None if air is None else _judged(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
     if isinstance(still, str):
-        return Reading(Verdict((f"air cut: {still}",)))
+        return Reading(Verdict((f"air cut: {still}",), notes))
     harmonic = np.arange(cutter.teeth, steady.highest_order + 1, cutter.teeth)
     if harmonic.size == 0:
-        return Reading(Verdict((f"no tooth-passing line below {max_frequency:.0f} Hz",)))
+        return Reading(Verdict((f"no tooth-passing line below {max_frequency:.0f} Hz",), notes))
     angle, alignment_std = 0.0, 0.0
     if still is not None:
         angle, alignment_std = angle_to_air(steady, still, cutter.teeth)
     reasons = _cut_faults(steady, still, angle, harmonic, cutter, max_frequency)
     if reasons:
-        return Reading(Verdict(reasons))
+        return Reading(Verdict(reasons, notes))
     speed = steady.spindle_speed
     force, slope = force_and_slope(cutter, replace(conditions, spindle_speed=speed), coefficients, harmonic)
     strong = WEAKEST_FORCE * np.abs(force).max()
@@ -178,8 +180,25 @@ def measure_cut(
                 harmonic[k], harmonic[k] * speed, cut_points, air_points, variance, points.coherence[k, i], force_k, slope_k
             )
     measurement = CutMeasurement(cut_id, tooling, speed, result, alignment_std, *trigger_delay(cut, speed, cutter.teeth))
-    notes = () if air is not None else (NO_AIR,)
-    return Reading(Verdict((), notes), measurement)
+    return Reading(Verdict((), notes if air is not None else (*notes, NO_AIR)), measurement)
+
+
+def judge_air(air: Recording, conditions: CuttingConditions, max_frequency: float = MAX_FREQUENCY) -> Reading:
+    """Return the verdict on an air cut alone, as `measure_cut` judges it beside a cut.
+
+    Raises
+    ------
+    InputError
+        If no displacement channel is there.
+    """
+    axes, notes = measured_axes(air), implausible(air)
+    if not axes:
+        raise InputError("sensors", "no displacement", "a displacement sensor for X or Y")
+    faults = raw_faults(air)
+    if not faults:
+        still = _judged(air, axes, conditions.spindle_speed, _AIR_BEYOND * max_frequency, 1)
+        faults = (still,) if isinstance(still, str) else ()
+    return Reading(Verdict(faults, notes))
 
 
 def _judged(recording: Recording, axes: tuple[Dof, ...], programmed: float, max_frequency: float, teeth: int) -> SteadyRecord | str:

@@ -13,6 +13,8 @@ from rcsa_ident.signals.windows import hann
 
 #: Equal samples in a row that a live analogue channel does not produce.
 FROZEN_SAMPLES = 12
+#: Least and largest swing, peak to peak, of what a milling spindle does and a sensor tells.
+PLAUSIBLE = {Quantity.DISPLACEMENT: (2e-9, 2e-3, "m"), Quantity.ACCELERATION: (1e-4, 1e5, "m/s^2")}
 #: A peak off the spindle's orders is chatter above this share of the largest tooth-passing line.
 CHATTER_SHARE = 0.3
 #: A signal with fewer levels is too coarsely resolved to tell a limit from a peak.
@@ -73,6 +75,19 @@ def raw_faults(recording: Recording) -> tuple[str, ...]:
         k = _frozen(x[start], length)
         if k is not None:
             found.append(f"drop-outs: {sensor.name} is frozen for {length[k]} samples at {start[k] / recording.rate:.4g} s")
+    return tuple(found)
+
+
+def implausible(recording: Recording) -> tuple[str, ...]:
+    """Return what speaks for a wrong unit or sensitivity: motion that no spindle makes, or that no sensor resolves."""
+    found = []
+    for i, sensor in enumerate(recording.sensors):
+        least, most, unit = PLAUSIBLE.get(sensor.quantity, (0.0, np.inf, ""))
+        x = recording.samples[:, i]
+        x = x[np.isfinite(x)]
+        swing = float(np.ptp(x)) if x.size else 0.0
+        if swing > most or 0.0 < swing < least:
+            found.append(f"{sensor.name} swings by {swing:.3g} {unit}: are its unit and sensitivity right?")
     return tuple(found)
 
 

@@ -1,0 +1,42 @@
+"""Campaigns of the store as the rest of the project knows them: what an identification reads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from api.files import NORMALISED, Files
+from api.reading.declared import campaign_of_text
+from api.stores.records import Store
+from rcsa_ident.errors import InputError
+from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.signals.recording import Recording
+
+ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
+
+
+def load_campaign(store: Store, files: Files, group: str, campaign_id: str) -> tuple[Campaign, ReadCut]:
+    """Return a campaign with the cuts whose recordings are there, and what reads them; it crosses processes.
+
+    Raises
+    ------
+    InputError
+        The campaign is gone, or no cut of it is uploaded.
+    """
+    from api.reading.normalised import read_cut_normalised
+
+    row = store.campaigns.get(group, campaign_id)
+    if row is None:
+        raise InputError("campaign", f'"{campaign_id}"', "a campaign that is there")
+    keys = {each.name: each.normalised for each in store.recordings.list(group, campaign_id, "", 1_000_000)}
+
+    def locate(name: str) -> Path:
+        return files.path(group, NORMALISED, keys[name]) if name in keys else Path()
+
+    found = campaign_of_text(row.text, locate)
+    there = [cut for cut in found.cuts if cut.recording != Path()]
+    if not there:
+        raise InputError("campaign", "no recording of a cut", "a campaign with recordings")
+    cuts = tuple(replace(cut, air=None) if cut.air == Path() else cut for cut in there)
+    return replace(found, cuts=cuts), read_cut_normalised

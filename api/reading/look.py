@@ -1,0 +1,162 @@
+"""What the reader process does with an upload: read it, write its samples in one form, and tell what was found. Answers are plain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from api.reading.declared import campaign_of_text
+from api.reading.normalised import read_normalised, write_normalised
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.recordings import in_si, read_signals
+from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.report.rows import recording_rows
+from rcsa_ident.signals.measurement import MAX_FREQUENCY, Reading, judge_air, measure_cut
+from rcsa_ident.signals.recording import Recording, Sensor
+from rcsa_ident.signals.steady import measured_axes, steady_record
+from rcsa_ident.signals.verdict import Verdict, raw_faults
+
+_RPM = 30.0 / np.pi
+
+
+@dataclass(frozen=True, slots=True)
+class Upload:
+    """A file that came, and what it should be.
+
+    Parameters
+    ----------
+    path : Path
+        Where it is; its name says nothing.
+    name : str
+        As the campaign tells it: its suffix says the format.
+    target : Path
+        Where its samples are written; nothing is there.
+    """
+
+    path: Path
+    name: str
+    target: Path
+
+    def read(self, sensors: tuple[Sensor, ...], rate: float | None) -> Recording:
+        """Return the samples in SI, and write them; errors name the file as the client does."""
+        try:
+            rate, signals = read_signals(self.path, [sensor.name for sensor in sensors], rate, Path(self.name).suffix)
+            write_normalised(self.target, rate, signals, sensors)
+            return in_si(rate, signals, sensors)
+        except InputError as error:
+            raise self._told(error) from None
+        except RecursionError:
+            raise InputError("recording", "one that cannot be read (nested without end)", "a complete file", self.name) from None
+
+    def _told(self, error: InputError) -> InputError:
+        found = error.found.replace(str(self.path), self.name) if isinstance(error.found, str) else error.found
+        return InputError(error.field, found, error.allowed.replace(str(self.path), self.name), self.name)
+
+
+def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) -> dict[str, Any]:
+    """Read an upload of a campaign and return what was found in it.
+
+    Parameters
+    ----------
+    text : str
+        The campaign as declared.
+    cut_id, role : str
+        The cut that it belongs to, one of them where it is an air cut.
+    air : Path or None
+        Samples of the air cut, where the upload is a cut and they are there.
+    """
+    campaign = campaign_of_text(text)
+    cut = next(each for each in campaign.cuts if each.id == cut_id)
+    recording = upload.read(campaign.sensors, campaign.sampling_rate)
+    return told(recording) | {
+        "verdict": judged(campaign, cut, recording, None if air is None else read_normalised(air), role),
+        **lines_found(campaign, cut, recording, role),
+    }
+
+
+def judge(text: str, cut_id: str, cut: Path, air: Path | None) -> dict[str, Any]:
+    """Return the verdict on samples of a cut that are there already."""
+    campaign = campaign_of_text(text)
+    declared = next(each for each in campaign.cuts if each.id == cut_id)
+    return judged(campaign, declared, read_normalised(cut), None if air is None else read_normalised(air), "cut")
+
+
+def told(recording: Recording) -> dict[str, Any]:
+    """Return what needs no analysis."""
+    return {
+        "sampling_rate_hz": recording.rate,
+        "duration_s": recording.samples.shape[0] / recording.rate,
+        "channels": [sensor.name for sensor in recording.sensors],
+    }
+
+
+def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | None, role: str) -> dict[str, Any]:
+    """Return the verdict on a cut, beside its air cut where there is one, or on an air cut alone."""
+    cutter = campaign.toolings[cut.tooling].cutter
+    try:
+        with np.errstate(all="ignore"):
+            if role == "air":
+                reading = judge_air(recording, cut.conditions)
+            else:
+                coefficients = campaign.workpiece.coefficients
+                reading = measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, coefficients)
+    except InputError as error:
+        reading = Reading(Verdict((str(error),)))
+    except (ArithmeticError, np.linalg.LinAlgError):
+        reading = Reading(Verdict(("numbers of these samples have no finite answer",)))
+    (row,) = recording_rows([(cut, reading)])
+    return {
+        "usable": row.usable,
+        "reasons": list(row.reasons),
+        "notes": list(row.notes),
+        "spindle_speed_rpm": row.found_rpm,
+        "lines": row.lines,
+        "signal_to_noise_db": {axis: value for axis, value in row.signal_to_noise_db.items() if np.isfinite(value)},
+    }
+
+
+def lines_found(campaign: Campaign, cut: Cut, recording: Recording, role: str) -> dict[str, Any]:
+    """Return the speed that the record itself tells, and how many multiples of the tooth-passing frequency stand above the noise.
+
+    Of an air cut, multiples of the spindle's frequency.
+    """
+    axes, teeth = measured_axes(recording), 1 if role == "air" else campaign.toolings[cut.tooling].cutter.teeth
+    nothing = {"spindle_speed_rpm": None, "harmonics_above_noise": {axis.upper(): 0 for axis in axes}}
+    if not axes or raw_faults(recording):
+        return nothing
+    try:
+        with np.errstate(all="ignore"):
+            steady = steady_record(recording, axes, cut.conditions.spindle_speed, MAX_FREQUENCY, teeth)
+    except (InputError, ArithmeticError, np.linalg.LinAlgError):
+        return nothing
+    if isinstance(steady, str) or not np.isfinite(steady.spindle_speed):
+        return nothing
+    order = np.arange(teeth, steady.highest_order + 1, teeth)
+    ratio = np.abs(steady.flange[order]) ** 2 / np.maximum(2.0 * steady.variance[order], 1e-300)
+    # pure noise has a mean of 1, and its largest of n is rarely above log(n) + 7
+    count = np.sum(ratio > np.log(max(order.size, 1)) + 7.0, axis=0)
+    return {
+        "spindle_speed_rpm": steady.spindle_speed * _RPM,
+        "harmonics_above_noise": {axis.upper(): int(n) for axis, n in zip(axes, count, strict=True)},
+    }
+
+
+def warm() -> None:
+    """Judge a small record, so that what a verdict needs is imported and compiled."""
+    from rcsa_ident.cutting.coefficients import CuttingCoefficients
+    from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+    from rcsa_ident.cutting.cutter import Cutter
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.signals.recording import Quantity
+
+    rate, speed, rng = 20000.0, 200.0 * np.pi, np.random.default_rng(1)
+    time = np.arange(4000) / rate
+    wave = 1e-6 * np.sum([np.cos(m * speed * time) for m in range(1, 9)], axis=0)
+    both = (Sensor("x", Quantity.DISPLACEMENT, Dof.X), Sensor("y", Quantity.DISPLACEMENT, Dof.Y))
+    conditions = CuttingConditions(speed, 1e-4, 1e-4, Engagement.from_immersion(0.5, "down"))
+    for sensors in (both[:1], both):
+        made = Recording(rate, wave[:, None] + 1e-9 * rng.standard_normal((wave.size, len(sensors))), sensors)
+        measure_cut("warm", "warm", made, made, Cutter(2, 0.012), conditions, CuttingCoefficients(9e8, 0.3))

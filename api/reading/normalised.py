@@ -1,0 +1,97 @@
+"""Samples of an upload in one form, whatever it came as: signals of the campaign's sensors in HDF5, and the sensors beside them.
+
+Signals stay undivided by their sensitivities, as float32 where that holds every one of them, else as float64: what is read from here
+is to the last bit what the commands read from the upload. Chunks of a second let a part be read alone, each with a checksum.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.hdf5 import LARGEST_CHUNK, RATE
+from rcsa_ident.io.recordings import in_si, read_signals
+from rcsa_ident.machining_setup import Cut
+from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+
+_SENSORS = "sensors"
+
+
+def write_normalised(path: Path, rate: float, signals: Sequence[FloatArray], sensors: tuple[Sensor, ...]) -> None:
+    """Write signals, shape (n,) each, of sensors; all of it is on the disk then."""
+    with h5py.File(path, "w") as file:
+        file.attrs[RATE] = float(rate)
+        file.attrs[_SENSORS] = json.dumps([asdict(sensor) for sensor in sensors])
+        for i, signal in enumerate(signals):
+            data = _smallest(np.asarray(signal))
+            chunk = int(min(max(rate, 1.0), LARGEST_CHUNK // 8, data.size))
+            # a channel's name may be one that is none in HDF5
+            file.create_dataset(f"{i}", data=data, chunks=(chunk,), fletcher32=True, track_times=False)
+    with path.open("rb+") as written:
+        os.fsync(written.fileno())
+
+
+def _smallest(signal: np.ndarray) -> np.ndarray:
+    if signal.dtype == np.float32:
+        return signal
+    double = signal.astype(np.float64, copy=False)
+    with np.errstate(all="ignore"):
+        single = double.astype(np.float32)
+        same = np.array_equal(single.astype(np.float64), double, equal_nan=True)
+    return single if same else double
+
+
+def read_normalised(path: str | Path) -> Recording:
+    """Return the samples of an upload in SI.
+
+    Raises
+    ------
+    InputError
+        The file is gone or damaged.
+    """
+    sensors = _sensors(Path(path))
+    rate, signals = read_signals(path, [f"{i}" for i in range(len(sensors))], suffix=".h5")
+    return in_si(rate, signals, sensors)
+
+
+def read_cut_normalised(cut: Cut) -> tuple[Recording, Recording | None]:
+    """Return the recordings of a cut whose files are normalised ones."""
+    return read_normalised(cut.recording), None if cut.air is None else read_normalised(cut.air)
+
+
+def blocks(path: Path, samples: int) -> Iterator[tuple[int, Recording]]:
+    """Yield first sample and recording of parts of so many samples, one after the other."""
+    sensors = _sensors(path)
+    with h5py.File(path, "r", locking=False) as file:
+        rate, datasets = float(file.attrs[RATE]), [file[f"{i}"] for i in range(len(sensors))]
+        for start in range(0, datasets[0].size, samples):
+            yield start, in_si(rate, [dataset[start : start + samples] for dataset in datasets], sensors)
+
+
+def length(path: Path) -> tuple[float, int]:
+    """Return rate [Hz] and number of samples."""
+    with h5py.File(path, "r", locking=False) as file:
+        return float(file.attrs[RATE]), int(file["0"].size)
+
+
+def _sensors(path: Path) -> tuple[Sensor, ...]:
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            return tuple(_sensor(each) for each in json.loads(file.attrs[_SENSORS]))
+    except (OSError, KeyError, ValueError):
+        raise InputError("recording", "samples that are gone or damaged", "a recording that is uploaded") from None
+
+
+def _sensor(data: dict[str, Any]) -> Sensor:
+    axis = None if data["axis"] is None else Dof(data["axis"])
+    return Sensor(**data | {"quantity": Quantity(data["quantity"]), "axis": axis})
