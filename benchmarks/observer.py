@@ -60,6 +60,8 @@ class VirtualCut:
     cut, air : Recording
     force : array, shape (n, 2) [N]
         On the tool, X and Y, below 10 kHz.
+    angle, air_angle : float [rad]
+        Of tooth 1 at the first sample.
     tooling : Tooling
     spindle : VirtualSpindle
     """
@@ -71,6 +73,7 @@ class VirtualCut:
     spindle_speed: float
     tooling: Tooling
     spindle: VirtualSpindle
+    air_angle: float = 0.0
 
     def true_cross(self, omega: np.ndarray) -> np.ndarray:
         """Return flange displacement per tip force from the full equations, X and Y, shape (n, 2) [m/N]."""
@@ -118,7 +121,7 @@ def virtual_cut(conditions: CuttingConditions = CASE, teeth: int = 2, duration: 
         Recording(suite.rate, np.stack([each[s.name] / s.sensitivity for s in own_sensors], axis=1), tuple(own_sensors))
         for each in channels
     )
-    return VirtualCut(cut, air, force, angles[0], speeds[0], tooling, machine.spindle)
+    return VirtualCut(cut, air, force, angles[0], speeds[0], tooling, machine.spindle, angles[1])
 
 
 def identified(result: Path | None = None) -> tuple[MachineOverSpeed, tuple[float, float]]:

@@ -45,8 +45,11 @@ class RunOut:
 
     def signals(self, first: int, count: int, step: float) -> tuple[FloatArray, FloatArray]:
         """Return gap and acceleration at `count` samples from the `first`, shape (count,) each."""
-        turn = np.remainder(np.arange(first, first + count) * (self.spindle_speed * step / (2.0 * np.pi)), 1.0)
-        gap, acceleration = np.zeros(count), np.zeros(count)
+        return self.at(np.remainder(np.arange(first, first + count) * (self.spindle_speed * step / (2.0 * np.pi)), 1.0))
+
+    def at(self, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return gap and acceleration at angles of the spindle [turns], 0 where the record began, shape (n,) each."""
+        gap, acceleration = np.zeros(turn.size), np.zeros(turn.size)
         once = np.exp(2j * np.pi * turn)
         # a power by multiplication costs a tenth of an exponential
         wave, power = np.ones_like(once), 0
@@ -195,6 +198,9 @@ class ForceObserver:
         acceleration : array, shape (n, a) [m/s^2], optional
             Of the sensors' fixture.
         """
+        return self._scan(state, gap, acceleration, lost=False)
+
+    def _scan(self, state: ObserverState, gap: FloatArray, acceleration: FloatArray | None, lost: bool) -> tuple[ObserverState, ForceBlock]:
         gap = np.asarray(gap, dtype=float)
         if gap.ndim != 2 or gap.shape[1] != len(self.axes) or (acceleration is not None and np.shape(acceleration) != gap.shape):
             raise InputError("samples", np.shape(gap), f"one column for each of {len(self.axes)} axes, accelerations alike")
@@ -205,11 +211,24 @@ class ForceObserver:
             after, measured = _displacement(
                 each, state.axes[i], state.count, gap[:, i], None if acceleration is None else acceleration[:, i]
             )
-            filter_state, result = each.kalman.run(after.filter, measured)
+            filter_state, result = each.kalman.predict(after.filter, measured.size) if lost else each.kalman.run(after.filter, measured)
             states.append(replace(after, filter=filter_state))
             results.append(result)
         joined = np.stack(results, axis=1) if gap.shape[0] else np.zeros((0, len(self.axes), 3))
         return ObserverState(state.count + gap.shape[0], tuple(states)), ForceBlock(*(joined[:, :, c] for c in range(3)))
+
+    def bridge(self, state: ObserverState, gap: FloatArray, acceleration: FloatArray | None = None) -> tuple[ObserverState, ForceBlock]:
+        """Return the state after samples that were lost, and what was to be expected at them.
+
+        The Kalman filter predicts and corrects nothing: oscillators go on as they were. The filters before it need an input and
+        get the substitutes; what is wrong with those they forget within a few periods of the high-pass.
+
+        Parameters
+        ----------
+        gap, acceleration : arrays, shape (n, a) [m], [m/s^2]
+            In place of the lost samples.
+        """
+        return self._scan(state, gap, acceleration, lost=True)
 
     def observe(self, gap: FloatArray, acceleration: FloatArray | None = None, smooth: bool = False) -> ForceEstimate:
         """Return the forces of a whole record.

@@ -71,6 +71,15 @@ class KalmanFilter:
         kalman_steps(*self._arrays(), self.gain, state.count, measured, modes, result)
         return FilterState(state.count + measured.size, modes, state.waiting), result
 
+    def predict(self, state: FilterState, count: int) -> tuple[FilterState, FloatArray]:
+        """Return the state after samples that nobody has measured, and the same at them as `run`, innovations 0, shape (n, 3)."""
+        modes, result = np.array(state.modes), np.empty((count, 3))
+        # an innovation that corrects nothing
+        still = frozen(np.zeros((1, *modes.shape)))
+        kalman_steps(*self._arrays(), still, 0, np.zeros(count), modes, result)
+        result[:, 2] = 0.0
+        return FilterState(state.count + count, modes, state.waiting), result
+
     def run_lagged(self, state: FilterState, measured: FloatArray, weight: FloatArray) -> tuple[FilterState, FloatArray]:
         """Return the state after a block, and the force `weight.size` samples before each sample, as far as there is one.
 
