@@ -9,7 +9,7 @@ import json
 import math
 from enum import Enum
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -124,7 +124,7 @@ def _array(values: np.ndarray) -> list[Any]:
     if values.dtype.kind not in "biufc" or type(values) is not np.ndarray:
         raise Unknown(f"an array of {values.dtype}")
     # sums over an array depend on how it lies in memory, in their last bits
-    order = "F" if values.flags.f_contiguous and not values.flags.c_contiguous else "C"
+    order: Literal["F", "C"] = "F" if values.flags.f_contiguous and not values.flags.c_contiguous else "C"
     little = values.astype(values.dtype.newbyteorder("<"), copy=False)
     return [little.dtype.str, list(values.shape), order, values.flags.writeable, base64.b64encode(little.tobytes(order)).decode("ascii")]
 

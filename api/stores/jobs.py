@@ -179,6 +179,9 @@ class Jobs(Protocol):
     def begin(self, id: str, worker: str, when: str) -> Job | None:
         """Let a worker take a job up, and return it as it is then; None where it is over."""
 
+    def take(self, id: str, dead: str | None, worker: str) -> bool:
+        """Note that a worker sees to it that a job of a dead one goes on; False where somebody else was first."""
+
     def tell(self, id: str, worker: str, events: Sequence[Event], progress: str | None = None, further: bool = False) -> bool:
         """Add events (their numbers are given here) and the progress, and return whether the job is still this worker's to carry out.
 
@@ -213,4 +216,4 @@ class Jobs(Protocol):
         """Live on; False where the name is another's."""
 
     def leave(self, id: str, token: str) -> None:
-        """Give the name back."""
+        """Give the name back; that its jobs go on elsewhere says nothing against them."""

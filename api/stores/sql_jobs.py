@@ -111,6 +111,12 @@ class SqlJobs:
             _append(connection, id, found.events, [Event(0, "progress", "")])
             return Job(**connection.execute(select(t).where(t.c.id == id)).one()._asdict())
 
+    def take(self, id: str, dead: str | None, worker: str) -> bool:
+        t = tables.jobs
+        before = t.c.worker.is_(None) if dead is None else t.c.worker == dead
+        with self.store.writing() as connection:
+            return connection.execute(update(t).where(t.c.id == id, before).values(worker=worker)).rowcount > 0
+
     def tell(self, id: str, worker: str, events: Sequence[Event], progress: str | None = None, further: bool = False) -> bool:
         t = tables.jobs
         with self.store.writing() as connection:
@@ -193,8 +199,9 @@ class SqlJobs:
             return connection.execute(there).rowcount > 0
 
     def leave(self, id: str, token: str) -> None:
-        w = tables.job_workers
+        w, t = tables.job_workers, tables.jobs
         with self.store.writing() as connection:
+            connection.execute(update(t).where(t.c.worker == token, t.c.state == "running").values(attempts=0))
             connection.execute(delete(w).where(w.c.id == id, w.c.token == token))
 
 

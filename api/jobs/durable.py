@@ -1,0 +1,102 @@
+"""The durable engine: DBOS, on a file of its own or in the service's database. Nothing else imports it."""
+
+from __future__ import annotations
+
+import json
+import logging
+import sqlite3
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from dbos import DBOS, DBOSClient, DBOSConfig
+from dbos import Serializer as _Serializer
+
+from api.jobs.backend import Carried, Carry
+
+#: What an unfinished job remembers belongs to this version: raise it when steps change their order, names or texts.
+PROTOCOL = "1"
+QUEUE = "jobs"
+#: Seconds between two looks for a job.
+POLL = 0.5
+_NAME = "rcsa-ident"
+_STATES = {"ENQUEUED": "waiting", "DELAYED": "waiting", "PENDING": "running"}
+
+
+class Json(_Serializer):
+    """Plain values alone, so that what is read runs nothing."""
+
+    def serialize(self, data: Any) -> str:
+        return json.dumps(data, default=lambda other: f"a {type(other).__name__}")
+
+    def deserialize(self, serialized_data: str) -> Any:
+        return json.loads(serialized_data)
+
+    def name(self) -> str:
+        return "rcsa_ident_json"
+
+
+class Durable:
+    """DBOS in this process; a process has one.
+
+    Parameters
+    ----------
+    url : str
+        Of the engine's tables, as of the store.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+        self.client: DBOSClient | None = None
+
+    def start(self, executor: str, carry: Carry) -> None:
+        if self.url.startswith("sqlite:///"):
+            # kept by the file: readers and writers do not wait for each other
+            with sqlite3.connect(self.url.removeprefix("sqlite:///")) as connection:
+                connection.execute("PRAGMA journal_mode=WAL")
+            connection.close()
+        config: DBOSConfig = {
+            "name": _NAME,
+            "system_database_url": self.url,
+            "executor_id": executor,
+            "application_version": PROTOCOL,
+            "serializer": Json(),
+            "log_level": "WARNING",
+            "use_listen_notify": False,
+            "sys_db_pool_size": 5,
+        }
+        DBOS(config=config)
+        # one place for logs
+        log = logging.getLogger("dbos")
+        log.handlers.clear()
+        log.propagate = True
+
+        @DBOS.workflow(name="carry", max_recovery_attempts=None)
+        def workflow(job: str) -> None:
+            carry(job, _remember)
+
+        DBOS.listen_queues([QUEUE])
+        DBOS.launch()
+        DBOS.register_queue(QUEUE, worker_concurrency=1, polling_interval_sec=POLL)
+        self.client = DBOSClient(system_database_url=self.url, serializer=Json(), application_name=_NAME, system_database_pool_size=2)
+
+    def submit(self, job: str, priority: int) -> None:
+        assert self.client is not None
+        options: Any = {"workflow_name": "carry", "queue_name": QUEUE, "workflow_id": job, "app_version": PROTOCOL, "priority": priority}
+        self.client.enqueue(options, job)
+
+    def carried(self) -> Sequence[Carried]:
+        assert self.client is not None
+        rows = self.client.list_workflows(name="carry", load_input=False, load_output=False)
+        return [Carried(row.workflow_id, _STATES.get(row.status, "over"), row.executor_id, row.app_version == PROTOCOL) for row in rows]
+
+    def resume(self, job: str) -> None:
+        assert self.client is not None
+        self.client.resume_workflow(job, queue_name=QUEUE)
+
+    def forget(self, jobs: Sequence[str]) -> None:
+        assert self.client is not None
+        self.client.delete_workflows(list(jobs))
+
+
+def _remember(name: str, compute: Callable[[], str]) -> str:
+    return DBOS.run_step({"name": name}, compute)

@@ -1,0 +1,225 @@
+"""A process that carries out jobs: it takes a name, lives on, takes over from the dead, and hands jobs to the engine."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import secrets
+import socket
+import threading
+import time
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from api.jobs.backend import JobBackend, Remember
+from api.jobs.desk import Desk, Faulty, Stopped
+from api.stores.jobs import Job, Jobs, Outcome, Worker
+from api.stores.records import Unavailable
+from rcsa_ident.errors import InputError
+
+log = logging.getLogger("rcsa_ident.jobs")
+#: Seconds between two looks for new jobs, between two signs of life, between two looks at everything, and after which a worker
+#: without a sign is dead.
+LOOK, BEAT, ROUND, LEASE = 0.5, 2.0, 3.0, 15.0
+#: Jobs that somebody waits for at the screen come first.
+PRIORITY = {"lobes": 1}
+#: Carries out a job of one kind and returns how it ended, seconds left out.
+Carrier = Callable[[Job, Desk], Outcome]
+
+
+def carry(
+    jobs: Jobs,
+    carriers: Mapping[str, Carrier],
+    token: str,
+    attempts: int,
+    id: str,
+    remember: Remember,
+    leave: Callable[[int], Any] = os._exit,
+) -> None:
+    """Carry out a job and note how it ended; whatever happens, it ends or the process does.
+
+    Parameters
+    ----------
+    attempts : int
+        Times that a job may be taken up without coming further.
+    """
+    try:
+        job = jobs.begin(id, token, _now())
+        if job is None:
+            return
+        start = time.monotonic()
+        outcome = _worn(attempts) if job.attempts > attempts else _outcome(jobs, carriers[job.kind], job, token, remember, leave)
+        if outcome is not None:
+            seconds = job.seconds + time.monotonic() - start
+            names = ("state", "status", "problem", "texts", "applied")
+            jobs.finish(id, token, Outcome(finished=_now(), seconds=seconds, **{name: getattr(outcome, name) for name in names}))
+    except Unavailable as error:
+        log.error("the store is away", exc_info=error, extra={"fields": {"job": id}})
+        leave(1)
+
+
+def _outcome(jobs: Jobs, carrier: Carrier, job: Job, token: str, remember: Remember, leave: Callable[[int], Any]) -> Outcome | None:
+    """How the job ended; None where it was stopped."""
+    try:
+        with Desk(jobs, job.id, token, remember, leave) as desk:
+            return carrier(job, desk)
+    except Stopped:
+        return None
+    except InputError as error:
+        found = error.found if isinstance(error.found, str) else repr(error.found)
+        where = f"{error.where}: " if error.where else ""
+        return failed(f"{where}{error.field}: found {found}, allowed is {error.allowed}", (error.field, found, error.allowed))
+    except Unavailable:
+        raise
+    except Faulty:
+        return failed("something unexpected happened; the log has it under this job's id")
+    except Exception as error:
+        log.error("unexpected", exc_info=error, extra={"fields": {"job": job.id}})
+        return failed("something unexpected happened; the log has it under this job's id")
+
+
+def failed(detail: str, *errors: tuple[str, str, str]) -> Outcome:
+    """Return how a job ends that came to nothing."""
+    entries = [dict(zip(("field", "found", "allowed"), error, strict=True)) for error in errors]
+    return Outcome("failed", "", problem=json.dumps({"detail": detail, "errors": entries}))
+
+
+def _worn(attempts: int) -> Outcome:
+    return failed(f"its process has died {attempts} times at the same step: perhaps it needs more memory than there is")
+
+
+class JobWorker:
+    """The one worker of a process.
+
+    Parameters
+    ----------
+    jobs : Jobs
+    backend : JobBackend
+    carriers : mapping of kind to Carrier
+    attempts : int
+    """
+
+    def __init__(self, jobs: Jobs, backend: JobBackend, carriers: Mapping[str, Carrier], attempts: int) -> None:
+        self.jobs, self.backend, self.carriers, self.attempts = jobs, backend, carriers, attempts
+        self.token, self.place = secrets.token_hex(12), place()
+        self.id = ""
+        self.submitted: set[str] = set()
+        self.seen: dict[str, tuple[int, float]] = {}
+        self.stop = threading.Event()
+
+    def run(self, ready: Callable[[], None] = lambda: None) -> None:
+        """Work until `stop` is set; what runs then goes on elsewhere, or after the next start."""
+        while not self._claim():
+            if self.stop.wait(LOOK):
+                return
+        self.backend.start(self.id, lambda id, remember: carry(self.jobs, self.carriers, self.token, self.attempts, id, remember))
+        log.info("job worker", extra={"fields": {"worker": self.id}})
+        ready()
+        last_beat = last_round = 0.0
+        while not self.stop.wait(LOOK):
+            now = time.monotonic()
+            try:
+                if now - last_beat >= BEAT:
+                    if not self.jobs.beat(self.id, self.token):
+                        # frozen for so long that another has taken over: what runs here is its now
+                        log.error("taken for dead", extra={"fields": {"worker": self.id}})
+                        os._exit(3)
+                    last_beat = now
+                self.look()
+                if now - last_round >= ROUND:
+                    self.round()
+                    last_round = now
+            except Unavailable as error:
+                log.warning("the store is away", exc_info=error)
+        self.jobs.leave(self.id, self.token)
+
+    def look(self) -> None:
+        """Hand all jobs to the engine that were accepted: also those between whose row and whose hand-over somebody died."""
+        open = {job.id: job for job in self.jobs.open()}
+        for id, job in open.items():
+            if id not in self.submitted:
+                self.backend.submit(id, PRIORITY.get(job.kind, 10))
+        self.submitted = set(open)
+
+    def round(self) -> None:
+        """Take over from the dead, forget what is over, and start again what the engine has lost."""
+        # in this order: a job that is accepted in between is open, and not yet carried
+        carried = {each.job: each for each in self.backend.carried()}
+        open = {job.id: job for job in self.jobs.open()}
+        rows = self._living()
+        names, tokens = {row.id for row in rows}, {row.token for row in rows} - {self.token}
+        for id, each in carried.items():
+            orphan = each.state == "running" and each.executor not in names and id in open and open[id].worker not in tokens
+            # of several that have seen it one takes it over
+            if orphan and self.jobs.take(id, open[id].worker, self.token):
+                log.warning("taken over", extra={"fields": {"job": id, "from": each.executor, "worker": self.id}})
+                self.backend.resume(id)
+        done = {
+            id
+            for id, each in carried.items()
+            if each.state == "over" or (each.state == "waiting" and id not in open) or not (each.current or each.executor in names)
+        }
+        if done:
+            self.backend.forget(sorted(done))
+        # the row is what counts: the engine's own tables may be younger or older than it, or gone
+        self.submitted &= set(carried) - done
+
+    def _claim(self) -> bool:
+        """Take the first name of this place that is free, or whose bearer is dead."""
+        living = {row.id for row in self._living()}
+        rows = {row.id: row for row in self.jobs.workers()}
+        number = 1
+        while f"{self.place}-{number}" in living:
+            number += 1
+        name = f"{self.place}-{number}"
+        row = Worker(name, self.place, process(os.getpid()), self.token)
+        if not self.jobs.claim(row, rows[name].token if name in rows else None):
+            return False
+        self.id = name
+        return True
+
+    def _living(self) -> list[Worker]:
+        """Workers that live, as far as one can see: clocks differ from place to place, so that only changes count."""
+        now, found = time.monotonic(), []
+        for row in self.jobs.workers():
+            beats, since = self.seen.get(row.token, (-1, now))
+            if beats != row.beats:
+                since = now
+            self.seen[row.token] = (row.beats, since)
+            if now - since <= LEASE and not (row.place == self.place and gone(row.process)):
+                found.append(row)
+        return found
+
+
+def place() -> str:
+    """Return what processes share that can see each other: the machine, since its start, and the container in it."""
+    parts = [socket.gethostname()]
+    for name in ("/proc/sys/kernel/random/boot_id", "/proc/self/ns/pid"):
+        try:
+            parts.append(os.readlink(name) if "ns" in name else Path(name).read_text(encoding="ascii").strip())
+        except OSError:
+            parts.append("")
+    return "w" + hashlib.sha256("\n".join(parts).encode()).hexdigest()[:12]
+
+
+def process(number: int) -> str:
+    """Return what tells a process from a later one of the same number, as far as the system says."""
+    try:
+        # behind the name in parentheses, which may hold anything: the third field is the state, the 22nd the start
+        fields = Path(f"/proc/{number}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+    except OSError:
+        return f"{number}:"
+    return f"{number}:" if fields[0] == "Z" else f"{number}:{fields[19]}"
+
+
+def gone(told: str) -> bool:
+    """Whether a process of this place has certainly ended."""
+    return not told.endswith(":") and process(int(told.partition(":")[0])) != told
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
