@@ -22,9 +22,11 @@ _KINDS = {
     ".json": "application/json",
     ".svg": "image/svg+xml",
 }
+#: Hash of an empty style element: Plotly makes one, and writes its rules into it as a script may.
+_EMPTY = "'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='"
 #: What a page of the service may load: its own files, and pictures that it makes itself.
 _POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; font-src 'self'; "
+    f"default-src 'none'; script-src 'self'; style-src 'self' {_EMPTY}; img-src 'self' data: blob:; connect-src 'self'; font-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 _GUARDS = {
@@ -85,7 +87,9 @@ def _sent(request: Request, name: str, headers: dict[str, str]) -> Response:
     told = tagged(digest) | {"Vary": "Accept-Encoding"} | headers
     if unchanged(request, digest):
         return Response(status_code=304, headers=told)
-    return Response(file.packed if small else file.plain, media_type=file.kind, headers=told | ({"Content-Encoding": "gzip"} if small else {}))
+    return Response(
+        file.packed if small else file.plain, media_type=file.kind, headers=told | ({"Content-Encoding": "gzip"} if small else {})
+    )
 
 
 @router.api_route("/", methods=["GET", "HEAD"])

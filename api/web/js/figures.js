@@ -1,0 +1,126 @@
+// What the charts of a tool change show: lobes with bands, tooltip FRFs with bands.
+import { axis, colour, DASHES, SERIES } from "./charts.js";
+import { factor, plain, text, unit } from "./units.js";
+
+const seriesOf = (i) => SERIES[i % SERIES.length];
+
+/** Material removed per depth and speed [cm^3/min per mm and rev/min]. */
+export function removalPer(tooling, immersion, feed) {
+  return (tooling.diameter_mm * immersion * tooling.teeth * feed) / 1000;
+}
+
+/** Lobes of several toolings above, and below the frequency at which each would chatter. */
+export function lobeFigure(lobes, { maxDepth, removal, marks = true }) {
+  const times = factor("depth");
+  const data = [];
+  const annotations = [];
+  let highest = 0;
+  lobes.forEach((each, i) => {
+    const name = seriesOf(i);
+    const ink = colour(name);
+    const x = each.spindle_speed_rpm;
+    // null is stable up to the depth that was asked for: drawn at that depth
+    const shown = (values) => values.map((v) => (v ?? maxDepth) * times);
+    const y = shown(each.limit_depth_mm);
+    highest = Math.max(highest, ...y);
+    if (each.limit_depth_low_mm) {
+      const common = { x, mode: "lines", line: { width: 0 }, hoverinfo: "skip", type: "scatter" };
+      data.push({ ...common, y: shown(each.limit_depth_low_mm) });
+      data.push({ ...common, y: shown(each.limit_depth_high_mm), fill: "tonexty", fillcolor: colour(name, 0.28) });
+      highest = Math.max(highest, ...shown(each.limit_depth_high_mm).map((v) => Math.min(v, maxDepth * times)));
+    }
+    const told = x.map((rpm, k) => {
+      const depth = each.limit_depth_mm[k];
+      const low = each.limit_depth_low_mm?.[k] ?? null;
+      const band = each.limit_depth_low_mm && low !== null ? ` (95 %: ${text("depth", low)})` : "";
+      const limit = depth === null ? `stable up to ${text("depth", maxDepth)}` : `${text("depth", depth)}${band}`;
+      const rate = removal[i] ? ` · ${text("removal", removal[i] * rpm * (depth ?? maxDepth))}` : "";
+      const chatter = each.chatter_frequency_hz[k];
+      return `${limit}${rate}${chatter === null ? "" : ` · ${plain(chatter)} Hz`}`;
+    });
+    data.push({
+      x, y, name: each.tooling, text: told, type: "scatter", mode: "lines", line: { color: ink, width: 2.2, dash: DASHES[Math.floor(i / SERIES.length)] },
+      fill: lobes.length === 1 ? "tozeroy" : "none", fillcolor: colour(name, 0.07), hovertemplate: "%{text}",
+    });
+    data.push({
+      x, y: each.chatter_frequency_hz, name: each.tooling, yaxis: "y2", type: "scatter", mode: "markers", marker: { color: ink, size: 3.2 }, hoverinfo: "skip",
+    });
+    if (!marks) return;
+    const best = each.best_speeds.slice(0, lobes.length > 3 ? 1 : 3);
+    data.push({
+      x: best.map((b) => b.spindle_speed_rpm), y: best.map((b) => (b.limit_depth_mm ?? maxDepth) * times), type: "scatter", mode: "markers",
+      marker: { color: colour("paper"), size: 10, symbol: "diamond", line: { color: ink, width: 2.4 } }, hoverinfo: "skip",
+    });
+    best.forEach((b, k) => annotations.push({
+      x: b.spindle_speed_rpm, y: (b.limit_depth_mm ?? maxDepth) * times, text: plain(b.spindle_speed_rpm), showarrow: false, yshift: 14,
+      font: { color: ink, size: k === 0 ? 15 : 12, weight: k === 0 ? 700 : 400 }, bgcolor: colour("paper", 0.75), borderpad: 1,
+    }));
+  });
+  const top = Math.min(highest * 1.16, maxDepth * times * 1.1) || 1;
+  const layout = {
+    hovermode: "x unified", annotations,
+    xaxis: axis("Spindle speed [rev/min]", { anchor: "y2", tickformat: ",d", hoverformat: ",.0f", unifiedhovertitle: { text: "%{x} rev/min" } }),
+    yaxis: axis(`Depth limit [${unit("depth")}]`, { domain: [0.33, 1], range: [0, top], fixedrange: false }),
+    yaxis2: axis("Chatter [Hz]", { domain: [0, 0.25], rangemode: "normal", nticks: 4 }),
+  };
+  const words = lobes.map((l) => {
+    const best = l.best_speeds[0];
+    return best ? `${l.tooling}: deepest pocket at ${plain(best.spindle_speed_rpm)} rev/min, ${text("depth", best.limit_depth_mm ?? maxDepth)}` : l.tooling;
+  });
+  return { data, layout, say: `Stability lobes. ${words.join("; ")}.` };
+}
+
+const PARTS = {
+  magnitude: { of: (re, im) => Math.hypot(re, im), spread: (re, im, a, b) => Math.hypot(re * a, im * b) / (Math.hypot(re, im) || 1) },
+  phase: { of: (re, im) => (Math.atan2(im, re) * 180) / Math.PI, spread: () => 0 },
+  real: { of: (re) => re, spread: (re, im, a) => a },
+  imaginary: { of: (re, im) => im, spread: (re, im, a, b) => b },
+};
+
+function wrapped(curve, part) {
+  const { of, spread } = PARTS[part];
+  const y = curve.re.map((re, k) => of(re, curve.im[k]));
+  const band = part !== "phase" && curve.re_std ? curve.re.map((re, k) => 1.96 * spread(re, curve.im[k], curve.re_std[k], curve.im_std[k])) : null;
+  return { y, band };
+}
+
+/** FRFs: answers of /tooltip or of a machine's flange, as [{name, frequency_hz, axes}]. */
+export function frfFigure(answers, { parts, shown }) {
+  const data = [];
+  const times = factor("receptance");
+  const log = parts === "polar";
+  const [upper, lower] = log ? ["magnitude", "phase"] : ["real", "imaginary"];
+  answers.forEach((answer, i) => {
+    Object.entries(answer.axes).forEach(([name, curve], k) => {
+      if (shown !== "both" && shown !== name) return;
+      const series = answers.length === 1 ? seriesOf(k) : seriesOf(i);
+      const dash = answers.length === 1 ? "solid" : DASHES[k];
+      const label = answers.length === 1 ? name : `${answer.tooling} ${name}`;
+      for (const [part, yaxis] of [[upper, "y"], [lower, "y2"]]) {
+        const { y, band } = wrapped(curve, part);
+        const scale = part === "phase" ? 1 : times;
+        const x = answer.frequency_hz;
+        if (band) {
+          const common = { x, yaxis, mode: "lines", line: { width: 0 }, hoverinfo: "skip", type: "scatter" };
+          // a logarithm has no room for what may be nothing
+          const least = part === "magnitude" ? 0.02 : -Infinity;
+          data.push({ ...common, y: y.map((v, j) => Math.max(v - band[j], least * Math.abs(v)) * scale) });
+          data.push({ ...common, y: y.map((v, j) => (v + band[j]) * scale), fill: "tonexty", fillcolor: colour(series, 0.22) });
+        }
+        const shownUnit = part === "phase" ? "°" : ` ${unit("receptance")}`;
+        data.push({
+          x, y: y.map((v) => v * scale), yaxis, name: label, type: "scatter", mode: "lines", line: { color: colour(series), width: 1.8, dash },
+          hovertemplate: `${label} %{y:.4~g}${shownUnit}<extra></extra>`,
+        });
+      }
+    });
+  });
+  const u = unit("receptance");
+  const layout = {
+    hovermode: "x unified",
+    xaxis: axis("Frequency [Hz]", { anchor: "y2", tickformat: ",d", unifiedhovertitle: { text: "%{x:,.0f} Hz" } }),
+    yaxis: axis(log ? `Magnitude [${u}]` : `Real [${u}]`, { domain: [log ? 0.38 : 0.53, 1], type: log ? "log" : "linear", dtick: log ? 1 : undefined, exponentformat: "none" }),
+    yaxis2: axis(log ? "Phase [°]" : `Imag. [${u}]`, { domain: [0, log ? 0.3 : 0.46], ...(log ? { tickvals: [-180, -90, 0, 90, 180], range: [-190, 190] } : {}) }),
+  };
+  return { data, layout, say: `Frequency response of ${answers.map((a) => a.tooling).join(", ")}, ${log ? "magnitude and phase" : "real and imaginary part"}.` };
+}

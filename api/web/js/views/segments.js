@@ -1,0 +1,83 @@
+// A table of segments that one writes into; rows are added, moved and taken away with keys or pointer.
+import { h } from "../dom.js";
+import { quantityInput, u } from "../units.js";
+
+const COLUMNS = [
+  ["length_mm", "Length", null],
+  ["outer_diameter_mm", "Diameter", null],
+  ["end_diameter_mm", "Diameter at its end", "as the other"],
+  ["inner_diameter_mm", "Bore", "none"],
+];
+const MATERIALS = ["carbide", "steel", "aluminium"];
+
+/** The table, and `rows()`: the segments as the service wants them. */
+export function segmentsTable(caption, name, segments, onchange) {
+  const body = h("tbody");
+  const known = [...new Set([...MATERIALS, ...segments.map((s) => s.material)])];
+  for (const segment of segments) body.append(row(segment));
+  number();
+
+  function cell(tr, key, label, placeholder, segment) {
+    const input = quantityInput("length", key === "inner_diameter_mm" && segment[key] === 0 ? null : (segment[key] ?? null), { "aria-label": label, placeholder: placeholder ?? "" });
+    tr.inputs[key] = input;
+    return h("td", { "data-field": "" }, input, h("div", { class: "fault", hidden: true }));
+  }
+
+  function row(segment) {
+    const tr = h("tr");
+    tr.segment = segment;
+    tr.inputs = {};
+    const material = h("select", { "aria-label": "Material" }, known.map((m) => h("option", { value: m, selected: m === segment.material }, m)));
+    tr.inputs.material = material;
+    tr.append(h("th", { scope: "row" }),
+      ...COLUMNS.map(([key, label, placeholder]) => cell(tr, key, label, placeholder, segment)),
+      h("td", { "data-field": "" }, material, h("div", { class: "fault", hidden: true })),
+      h("td", { class: "nowrap" },
+        act("↑", "Move up", () => tr.previousElementSibling?.before(tr), tr),
+        act("↓", "Move down", () => tr.nextElementSibling?.after(tr), tr),
+        act("+", "Add one below", () => {
+          const next = row(values(tr));
+          tr.after(next);
+          next.querySelector("input").focus();
+        }, tr),
+        act("✕", "Take away", () => {
+          if (body.children.length > 1) tr.remove();
+        }, tr)));
+    return tr;
+  }
+
+  function act(sign, words, work, tr) {
+    return h("button", { type: "button", class: "quiet", "aria-label": words, title: words, onclick: (event) => {
+      work();
+      number();
+      onchange();
+      if (tr.isConnected && document.activeElement === document.body) event.currentTarget.focus();
+      if (!tr.isConnected) body.querySelector("button").focus();
+    } }, sign);
+  }
+
+  function number() {
+    [...body.children].forEach((tr, i) => {
+      tr.firstChild.replaceChildren(String(i + 1));
+      Object.entries(tr.inputs).forEach(([key, input]) => {
+        input.parentElement.dataset.field = `${name}.${i}.${key}`;
+        input.nextElementSibling.id = `${name}.${i}.${key}-fault`.replaceAll(".", "-");
+      });
+    });
+  }
+
+  function values(tr) {
+    const found = { ...tr.segment, material: tr.inputs.material.value };
+    for (const [key] of COLUMNS) {
+      const { base } = tr.inputs[key];
+      if (base === null && key !== "length_mm" && key !== "outer_diameter_mm") delete found[key];
+      else found[key] = base;
+    }
+    return found;
+  }
+
+  const box = h("div", { class: "scrolls", tabindex: "0", role: "region", "aria-label": caption },
+    h("table", { class: "segments" }, h("caption", null, caption),
+      h("thead", null, h("tr", null, h("th", { scope: "col" }, "#"), COLUMNS.map(([, label]) => h("th", { scope: "col" }, label, h("span", { class: "unit" }, u("length")))), h("th", { scope: "col" }, "Material"), h("th", { scope: "col" }, h("span", { class: "unseen" }, "Change")))), body));
+  return { box, rows: () => [...body.children].map(values) };
+}
