@@ -17,6 +17,7 @@ from api.stores.records import Unavailable
 from rcsa_ident.errors import InputError
 
 log = logging.getLogger("rcsa_ident.jobs")
+Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 #: Seconds between two deliveries of what was told, and between two words or two curves of one axis.
 DELIVERY, WORD, CURVE = 0.4, 0.1, 1.0
 #: Words of one job after which they come half as often, again and again.
@@ -114,13 +115,17 @@ class Desk:
             log.error("a step has failed", exc_info=error, extra={"fields": {"job": self.job, "step": name}})
             return encode({})
 
-    def map(self, function: Callable[[Any], Any], tasks: Iterable[Any], name: str, spread: Callable[..., Iterable[Any]] = map) -> list[Any]:
+    def map(
+        self, function: Callable[[Any], Any], tasks: Iterable[Any], name: str, stage: str, spread: Callable[..., Any] = map
+    ) -> list[Any]:
         """Return the results of all tasks in order, each a step of its own.
 
         Parameters
         ----------
         name : str
             Of this call: the same each time that the job is carried out, and no other call's.
+        stage : str
+            What the job is told to be at meanwhile.
         spread : callable
             The builtin, or a pool's: those that have no result yet go through it together.
         """
@@ -135,7 +140,9 @@ class Desk:
                     running = iter(spread(function, waiting[i:]))
                 return next(running)
 
+            self.progress(stage, i, len(waiting))
             found.append(self.remember(f"{name}.{i}", compute))
+        self.progress(stage, len(waiting), len(waiting))
         return found
 
     def progress(self, stage: str, done: int, total: int) -> None:
@@ -154,14 +161,16 @@ class Desk:
                 self.events.append(Event(0, kind, json.dumps(data, allow_nan=False)))
         self.check()
 
-    def curve(self, topic: str, data: Callable[[], dict[str, Any]]) -> None:
-        """Tell a curve, which takes the place of the one before; at most one a second is computed."""
+    def curve(self, topic: str, data: Callable[[], dict[str, Any] | None]) -> None:
+        """Tell a curve, which takes the place of the one before; at most one a second is computed, None is not told."""
         now = time.monotonic()
         if now - self.last.get(topic, 0.0) >= CURVE:
             self.last[topic] = now
-            told = json.dumps(data(), allow_nan=False)
-            with self.lock:
-                self.events.append(Event(0, "fit", told, topic))
+            found = data()
+            if found is not None:
+                told = json.dumps(found, allow_nan=False)
+                with self.lock:
+                    self.events.append(Event(0, "fit", told, topic))
         self.check()
 
     def _deliver(self) -> None:

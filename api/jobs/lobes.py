@@ -1,0 +1,31 @@
+"""Stability lobes that take long, as a job: one step for each tooling."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+from api.jobs.codec import decode, encode
+from api.jobs.desk import Desk
+from api.stores.jobs import Job, Outcome
+from api.work import answers
+from api.work.pool import guarded
+from api.work.questions import LobeQuestion, MachineText, ToolingText
+
+
+def asked(machine: MachineText, toolings: Sequence[ToolingText], question: LobeQuestion) -> str:
+    """Return the text of a job: machine and toolings as they are now, whatever becomes of them while it waits."""
+    return encode((machine, tuple(toolings), question))
+
+
+def carry(job: Job, desk: Desk) -> Outcome:
+    """Compute the lobes of all toolings, whose questions are the job's text ``question``."""
+    machine, toolings, question = decode(str(desk.jobs.text(job.id, "question")))
+    found: list[dict[str, Any]] = []
+    for i, tooling in enumerate(toolings):
+        desk.progress("lobes", i, len(toolings))
+        found.append(desk.remember(f"lobes.{i}", partial(guarded, answers.lobes, machine, tooling, question)))
+    desk.progress("lobes", len(toolings), len(toolings))
+    return Outcome("done", "", texts={"answer": json.dumps({"machine": job.machine, "toolings": found}, allow_nan=False)})
