@@ -1,1 +1,134 @@
-export async function intake() {}
+// What was dropped: a campaign and its toolings and recordings are recognised by what is in them, and taken in after one look.
+import { getText, part, post, Problem, send } from "../api.js";
+import { add, card, fill, h, note, table, tell, waiting } from "../dom.js";
+import { busy, field, select, showProblem } from "../forms.js";
+import { go, remember, to } from "../router.js";
+import { allMachines, choose, knownMachines, machine } from "../state.js";
+import { queueFor } from "../uploads.js";
+import { keepFiles } from "./campaign_form.js";
+
+const RECORDING = /\.(h5|hdf5|tdms|uff|unv|wav|mat|parquet|csv)$/i;
+const last = (path) => path.split(/[\\/]/).at(-1);
+
+/** Sort files into campaign, toolings, recordings and others, by their content where the name does not say enough. */
+export async function sorted(files) {
+  const found = { campaign: null, toolings: [], recordings: [], others: [] };
+  for (const file of files) {
+    if (/\.toml$/i.test(file.name) && file.size < 4e6) {
+      const text = await file.text();
+      if (/^\s*\[(campaign|\[cuts\])\]/m.test(text)) found.campaign = { file, text };
+      else if (/^\s*\[cutter\]/m.test(text)) found.toolings.push({ file, text });
+      else found.others.push(file);
+    } else if (RECORDING.test(file.name)) found.recordings.push(file);
+    else if (!file.name.startsWith(".")) found.others.push(file);
+  }
+  return found;
+}
+
+/** Which key of [toolings] names which file, by a look that leaves the reading to the service. */
+export function keysOfToolings(text) {
+  const keys = new Map();
+  const block = /^\s*\[toolings\][^\n]*\n([\s\S]*?)(?=^\s*\[|$(?![\s\S]))/m.exec(text)?.[1] ?? "";
+  for (const line of block.split("\n")) {
+    const [, bare, one, two, path] = /^\s*(?:([A-Za-z0-9_-]+)|"([^"]+)"|'([^']+)')\s*=\s*["']([^"']+\.toml)["']/.exec(line) ?? [];
+    if (path) keys.set(last(path), bare ?? one ?? two);
+  }
+  return keys;
+}
+
+const nameIn = (text) => /^\s*\[campaign\][^[]*?^\s*name\s*=\s*["']([^"']*)["']/ms.exec(text)?.[1] ?? "";
+const asName = (text) => text.replace(/[^A-Za-z0-9 ._+()-]/g, " ").replace(/^[^A-Za-z0-9]+/, "").trim().slice(0, 64) || "Machine 1";
+
+/** Show what was dropped, and take it in where the person says so. */
+export async function intake(place, files) {
+  fill(place, waiting("looking at the files …"));
+  const found = await sorted(files);
+  if (!found.campaign) {
+    if (found.recordings.length) {
+      keepFiles(found.recordings);
+      fill(place, card("Recordings without a campaign", null, note("doubt", `There is no campaign.toml among the ${files.length} files: nobody has said yet at which speed and with which tooling each one was cut.`),
+        h("p", null, h("a", { class: "button primary", href: to("campaigns/new") }, "Describe the cuts here"))));
+      return;
+    }
+    const only = found.toolings.length ? ["These are toolings. Drop them on the toolings' page."] : ["Nothing among these files is a campaign.toml, a tooling or a recording.", "Recordings are HDF5, TDMS, UFF 58, WAV, MATLAB, Parquet or CSV files."];
+    fill(place, note("doubt", ...only));
+    return;
+  }
+  const keys = keysOfToolings(found.campaign.text);
+  const toolings = await Promise.all(found.toolings.map(async ({ file, text }) => {
+    const key = keys.get(file.name) ?? file.name.replace(/\.toml$/i, "");
+    return { key, text, there: await libraryText(key) };
+  }));
+  offer(place, found, toolings, [...keys.values()]);
+}
+
+/** A tooling of the library as its file, or null where there is none. */
+async function libraryText(name) {
+  try {
+    return await getText(`toolings/${part(name)}`, "application/toml");
+  } catch (error) {
+    if (error instanceof Problem && (error.status === 404 || error.status === 422)) return null;
+    throw error;
+  }
+}
+
+function offer(place, found, toolings, wanted) {
+  const title = nameIn(found.campaign.text);
+  const here = machine();
+  const which = select([...knownMachines().map((m) => [m.id, m.name]), ["", "A new machine"]], here?.id ?? "");
+  const called = h("input", { autocomplete: "off", maxlength: 64 });
+  called.value = asName(title);
+  const naming = field("Its name", called, { name: "name" });
+  naming.hidden = which.value !== "";
+  which.addEventListener("change", () => (naming.hidden = which.value !== ""));
+  const differing = toolings.filter((t) => t.there !== null && t.there !== t.text);
+  const missing = wanted.filter((key) => !toolings.some((t) => t.key === key));
+  const choice = select([["file", "take the dropped files, in the library, too"], ["library", "use what is in the library"]], "file");
+  const button = h("button", { class: "primary" }, "Take it in");
+  const said = h("div", { role: "status" });
+  const form = h("form", { novalidate: true, class: "view" },
+    h("dl", { class: "facts" }, fact("Campaign", title || found.campaign.file.name), fact("Toolings", toolings.map((t) => t.key).join(", ") || "of the library"), fact("Recordings", String(found.recordings.length)), found.others.length ? fact("Left aside", `${found.others.length} other files`) : null),
+    h("div", { class: "fields" }, field("Machine", which), naming, differing.length ? field(`${differing.map((t) => t.key).join(", ")}: in the library, but different`, choice) : null),
+    missing.length ? note("", `Not among the files, so taken from the library: ${missing.join(", ")}.`) : null,
+    h("div", { class: "row-of-buttons" }, button, h("button", { type: "button", onclick: () => fill(place) }, "Leave it")), said);
+  form.addEventListener("submit", busy(button, async () => {
+    try {
+      fill(said, waiting("writing toolings and campaign …"));
+      const machineId = which.value || (await made(called.value.trim()));
+      for (const tooling of toolings) {
+        if (tooling.there === tooling.text || (tooling.there !== null && choice.value === "library")) continue;
+        await send("PUT", `toolings/${part(tooling.key)}`, { body: tooling.text, headers: { "Content-Type": "application/toml" } }).catch((error) => {
+          throw named(error, `tooling ${tooling.key}`);
+        });
+      }
+      const answer = await send("POST", `machines/${machineId}/campaigns`, { body: found.campaign.text, headers: { "Content-Type": "application/toml" } }).catch((error) => {
+        throw named(error, "campaign.toml");
+      });
+      const campaign = await answer.json();
+      choose(machineId);
+      await allMachines(true);
+      queueFor(campaign.id).add(campaign, found.recordings);
+      go(`campaigns/${campaign.id}`);
+    } catch (error) {
+      fill(said);
+      if (!(error instanceof Problem)) throw error;
+      showProblem(form, error);
+    }
+  }));
+  fill(place, card("This is what was found", null, form));
+  button.focus();
+  place.scrollIntoView({ block: "nearest" });
+}
+
+const fact = (name, value) => h("div", null, h("dt", null, name), h("dd", null, value));
+
+/** The problem of a file, said with the file's name: its keys are no fields of this form. */
+function named(error, what) {
+  if (!(error instanceof Problem)) return error;
+  const errors = error.errors.map((e) => ({ ...e, field: `${what}: ${e.field}` }));
+  return new Problem(error.status, { detail: `${what}: ${error.message}`, errors });
+}
+
+async function made(name) {
+  return (await post("machines", { name, description: "" })).id;
+}
