@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
@@ -10,9 +11,13 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
 from api import problems
+from api.files import Files
 from api.observe import Observed
 from api.parts import Metrics, Parts, Rates
-from api.routes import health, keys, machines, page, queries, toolings
+from api.reading.reader import Limits, Reader, Reading
+from api.reading.uploads import Uploads
+from api.routes import campaigns, health, keys, machines, page, queries, recordings, toolings
+from api.schemas.campaigns import NewCampaign
 from api.schemas.common import ProblemDocument
 from api.security import HEADER
 from api.settings import Settings
@@ -26,25 +31,35 @@ _ABOUT = """Tooltip FRFs and stability lobes of any tooling on machines that wer
 Lengths are millimetres, speeds rev/min, coefficients MPa, receptances m/N. Errors are problem documents (RFC 9457)."""
 
 
-def create_app(settings: Settings, store: Store | None = None, work: Work | None = None) -> FastAPI:
+def create_app(settings: Settings, store: Store | None = None, work: Work | None = None, reader: Reading | None = None) -> FastAPI:
     """Return the service.
 
     Parameters
     ----------
     settings : Settings
-    store, work : optional
+    store, work, reader : optional
         In place of the database and the processes that the settings name.
     """
     if store is None and not settings.database:
         settings.data.mkdir(parents=True, exist_ok=True)
     kept = open_store(settings.database_url) if store is None else store
     workers = Pool(settings.workers, settings.queue, settings.kept_machines) if work is None else work
-    parts = Parts(settings, kept, workers, Rates(settings.requests_per_minute, settings.burst), Metrics(lambda: float(workers.waiting)))
+    files = Files(settings.data / "files", settings.group_bytes, settings.free_bytes)
+    limits = Limits(settings.reader_memory, settings.reader_seconds, settings.reader_wall_seconds, settings.reader_calls)
+    readers = Reader(limits, 2 * settings.uploads) if reader is None else reader
+    uploads = Uploads(kept, files, readers, settings.uploads)
+    rates, metrics = Rates(settings.requests_per_minute, settings.burst), Metrics(lambda: float(workers.waiting))
+    parts = Parts(settings, kept, workers, files, readers, uploads, rates, metrics)
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         workers.start()
+        readers.start()
+        attending = asyncio.create_task(uploads.attend())
         yield
+        attending.cancel()
+        await asyncio.gather(attending, return_exceptions=True)
+        readers.stop()
         workers.stop()
         kept.close()
 
@@ -60,7 +75,7 @@ def create_app(settings: Settings, store: Store | None = None, work: Work | None
     problems.install(app)
     app.include_router(health.router)
     app.include_router(page.router)
-    for each in (keys, machines, toolings, queries):
+    for each in (keys, machines, toolings, campaigns, recordings, queries):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(Observed, parts=parts)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
@@ -72,9 +87,11 @@ def _openapi(app: FastAPI) -> dict[str, Any]:
     if app.openapi_schema is None:
         schema = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
         components = schema.setdefault("components", {})
-        problem = ProblemDocument.model_json_schema(ref_template="#/components/schemas/{model}")
-        components.setdefault("schemas", {}).update(problem.pop("$defs"))
-        components["schemas"]["ProblemDocument"] = problem
+        # bodies that a route reads itself, and the answer that every route may give
+        for model in (ProblemDocument, NewCampaign):
+            described = model.model_json_schema(ref_template="#/components/schemas/{model}")
+            components.setdefault("schemas", {}).update(described.pop("$defs"))
+            components["schemas"][model.__name__] = described
         components["securitySchemes"] = {"key": {"type": "apiKey", "in": "header", "name": HEADER}}
         for path in schema["paths"].values():
             for operation in path.values():

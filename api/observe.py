@@ -39,7 +39,8 @@ class Observed:
         id = given if _ID.fullmatch(given) else secrets.token_hex(8)
         request.state.request_id = id
         status, start = 0, time.perf_counter()
-        body = _Body(request, receive, self.parts.settings.max_body_bytes)
+        # routes that stream to the disk let more in
+        request.state.body = body = _Body(request, receive, self.parts.settings.max_body_bytes)
 
         async def observed(message: Message) -> None:
             nonlocal status

@@ -11,6 +11,9 @@ from typing import Annotated
 from fastapi import Depends, Request
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram
 
+from api.files import Files
+from api.reading.reader import Reading
+from api.reading.uploads import Uploads
 from api.settings import Settings
 from api.stores.records import Store
 from api.work.pool import Work
@@ -59,11 +62,14 @@ class Metrics:
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Settings, store, workers, limits, metrics."""
+    """Settings, store, workers, files and what reads them, limits, metrics."""
 
     settings: Settings
     store: Store
     work: Work
+    files: Files
+    reader: Reading
+    uploads: Uploads
     rates: Rates = field(repr=False)
     metrics: Metrics = field(repr=False)
 

@@ -40,6 +40,24 @@ class Settings:
         Estimated work of one query; a longer one is refused.
     kept_machines : int
         Machines whose receptances each worker keeps.
+    max_upload_bytes : int
+        Of one uploaded recording.
+    uploads : int
+        Uploads at once.
+    group_bytes : int
+        That all uploads of a group may take, what is read from them included.
+    free_bytes : int
+        That uploads leave free on the disk.
+    upload_seconds, upload_idle_seconds : float [s]
+        Of a whole upload, and without a byte of it.
+    upload_bytes_per_second : int
+        Below which an upload is given up, after the first `upload_idle_seconds`.
+    reader_memory : int [MiB]
+        For reading one upload.
+    reader_seconds, reader_wall_seconds : float [s]
+        Of a core and by the clock, for reading one upload.
+    reader_calls : int
+        After which the process that reads uploads is replaced.
     """
 
     data: Path = field(default_factory=lambda: Path("rcsa-ident-data"))
@@ -54,11 +72,25 @@ class Settings:
     burst: int = 600
     work_seconds: float = 20.0
     kept_machines: int = 4
+    max_upload_bytes: int = 2000 * MEGABYTE
+    uploads: int = 16
+    group_bytes: int = 200_000 * MEGABYTE
+    free_bytes: int = 1000 * MEGABYTE
+    upload_seconds: float = 3600.0
+    upload_idle_seconds: float = 30.0
+    upload_bytes_per_second: int = 10_000
+    reader_memory: int = 2048
+    reader_seconds: float = 60.0
+    reader_wall_seconds: float = 120.0
+    reader_calls: int = 200
 
     def __post_init__(self) -> None:
         for name, least, most in (
             ("port", 0, 65535), ("workers", 1, 256), ("queue", 0, 100_000), ("max_body_bytes", 1000, 10**9),
             ("requests_per_minute", 1, 10**9), ("burst", 1, 10**9), ("work_seconds", 0.1, 3600.0), ("kept_machines", 1, 1000),
+            ("max_upload_bytes", 1000, 10**12), ("uploads", 1, 1000), ("group_bytes", 1000, 10**15), ("free_bytes", 0, 10**15),
+            ("upload_seconds", 1.0, 10**6), ("upload_idle_seconds", 0.1, 3600.0), ("upload_bytes_per_second", 0, 10**9),
+            ("reader_memory", 512, 10**6), ("reader_seconds", 0.1, 10**4), ("reader_wall_seconds", 0.1, 10**5), ("reader_calls", 1, 10**6),
         ):  # fmt: skip
             if not least <= getattr(self, name) <= most:
                 raise InputError(PREFIX + name.upper(), getattr(self, name), f"a number from {least:g} to {most:g}")
@@ -87,6 +119,7 @@ class Settings:
 def from_environment(environment: Mapping[str, str]) -> Settings:
     """Return the settings of ``RCSA_IDENT_DATA``, ``RCSA_IDENT_PORT`` and so on; what is not there keeps its default."""
     readers: dict[str, Callable[[str], Any]] = {"data": Path, "database": str, "host": str, "keys": _switch, "work_seconds": float}
+    readers |= dict.fromkeys(("upload_seconds", "upload_idle_seconds", "reader_seconds", "reader_wall_seconds"), float)
     given: dict[str, Any] = {}
     for name in Settings.__dataclass_fields__:
         text = environment.get(PREFIX + name.upper(), "").strip()

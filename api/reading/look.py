@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from api.reading.calls import Upload
 from api.reading.declared import campaign_of_text
 from api.reading.normalised import read_normalised, write_normalised
 from rcsa_ident.errors import InputError
@@ -22,38 +22,27 @@ from rcsa_ident.signals.verdict import Verdict, raw_faults
 _RPM = 30.0 / np.pi
 
 
-@dataclass(frozen=True, slots=True)
-class Upload:
-    """A file that came, and what it should be.
+def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) -> Recording:
+    """Return the samples of an upload in SI, and write them; errors name the file as the client does.
 
     Parameters
     ----------
-    path : Path
-        Where it is; its name says nothing.
-    name : str
-        As the campaign tells it: its suffix says the format.
-    target : Path
-        Where its samples are written; nothing is there.
+    rate : float or None [Hz]
+        For a file that carries none.
     """
+    try:
+        found, signals = read_signals(upload.path, [sensor.name for sensor in sensors], rate, Path(upload.name).suffix)
+        write_normalised(upload.target, found, signals, sensors)
+        return in_si(found, signals, sensors)
+    except InputError as error:
+        raise _told(error, upload) from None
+    except RecursionError:
+        raise InputError("recording", "one that cannot be read (nested without end)", "a complete file", upload.name) from None
 
-    path: Path
-    name: str
-    target: Path
 
-    def read(self, sensors: tuple[Sensor, ...], rate: float | None) -> Recording:
-        """Return the samples in SI, and write them; errors name the file as the client does."""
-        try:
-            rate, signals = read_signals(self.path, [sensor.name for sensor in sensors], rate, Path(self.name).suffix)
-            write_normalised(self.target, rate, signals, sensors)
-            return in_si(rate, signals, sensors)
-        except InputError as error:
-            raise self._told(error) from None
-        except RecursionError:
-            raise InputError("recording", "one that cannot be read (nested without end)", "a complete file", self.name) from None
-
-    def _told(self, error: InputError) -> InputError:
-        found = error.found.replace(str(self.path), self.name) if isinstance(error.found, str) else error.found
-        return InputError(error.field, found, error.allowed.replace(str(self.path), self.name), self.name)
+def _told(error: InputError, upload: Upload) -> InputError:
+    found = error.found.replace(str(upload.path), upload.name) if isinstance(error.found, str) else error.found
+    return InputError(error.field, found, error.allowed.replace(str(upload.path), upload.name), upload.name)
 
 
 def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) -> dict[str, Any]:
@@ -70,9 +59,14 @@ def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) ->
     """
     campaign = campaign_of_text(text)
     cut = next(each for each in campaign.cuts if each.id == cut_id)
-    recording = upload.read(campaign.sensors, campaign.sampling_rate)
+    recording = read_upload(upload, campaign.sensors, campaign.sampling_rate)
+    try:
+        beside = None if air is None else read_normalised(air)
+    except InputError:
+        # it went in this moment: the verdict is looked at once more anyway
+        beside = None
     return told(recording) | {
-        "verdict": judged(campaign, cut, recording, None if air is None else read_normalised(air), role),
+        "verdict": judged(campaign, cut, recording, beside, role),
         **lines_found(campaign, cut, recording, role),
     }
 

@@ -23,6 +23,7 @@ _WHY = {
     401: "No key, or not a valid one.",
     403: "The key has not the scope.",
     404: "Nothing is there, or it is another group's.",
+    408: "The body comes too slowly.",
     409: "The name, or the idempotency key with another body, is in use.",
     412: "What is there is not what If-Match or If-None-Match expects.",
     413: "The body is too large.",

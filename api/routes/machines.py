@@ -54,10 +54,14 @@ def get(id: MachineId, parts: ThisService, caller: WhoAsks) -> MachineAnswer:
 
 
 @router.delete(
-    "/{id}", status_code=204, summary="Forget a machine and its identification", openapi_extra=guard("upload"), responses=problems(404, 422)
+    "/{id}",
+    status_code=204,
+    summary="Forget a machine, its identification and its campaigns",
+    openapi_extra=guard("upload"),
+    responses=problems(404, 422),
 )
 def forget(id: MachineId, parts: ThisService, caller: WhoAsks) -> Response:
-    if not parts.store.machines.delete(caller.group, id):
+    if not parts.uploads.forget_machine(caller.group, id):
         raise Problem(404, "there is no such machine")
     return Response(status_code=204)
 

@@ -65,7 +65,7 @@ def store(tmp_path: Path) -> Iterator[Store]:
 
 
 def service(store: Store, tmp_path: Path, **settings: Any) -> TestClient:
-    return TestClient(create_app(Settings(data=tmp_path, **settings), store, Here()), base_url=URL, raise_server_exceptions=False)
+    return TestClient(create_app(Settings(data=tmp_path, **settings), store, Here(), Here()), base_url=URL, raise_server_exceptions=False)
 
 
 @pytest.fixture

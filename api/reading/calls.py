@@ -1,0 +1,54 @@
+"""What the reader process is asked for, by functions that import nothing here: only there are formats and signals loaded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Upload:
+    """A file that came, and what it should be.
+
+    Parameters
+    ----------
+    path : Path
+        Where it is; its name says nothing.
+    name : str
+        As the client calls it: its suffix says the format.
+    target : Path
+        Where its samples are written; nothing is there.
+    """
+
+    path: Path
+    name: str
+    target: Path
+
+
+def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) -> dict[str, Any]:
+    """Return what was found in an upload, see `look.look`."""
+    from api.reading import look
+
+    return look.look(upload, text, cut_id, role, air)
+
+
+def judge(text: str, cut_id: str, cut: Path, air: Path | None) -> dict[str, Any]:
+    """Return the verdict on samples that are there, see `look.judge`."""
+    from api.reading import look
+
+    return look.judge(text, cut_id, cut, air)
+
+
+def envelope(path: Path, points: int) -> dict[str, Any]:
+    """Return the outline of a recording, see `pictures.envelope`."""
+    from api.reading import pictures
+
+    return pictures.envelope(path, points)
+
+
+def spectrum(path: Path, speed_rpm: float | None, points: int) -> dict[str, Any]:
+    """Return the amplitudes of a recording, see `pictures.spectrum`."""
+    from api.reading import pictures
+
+    return pictures.spectrum(path, speed_rpm, points)

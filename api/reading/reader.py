@@ -1,0 +1,237 @@
+"""One process that reads uploads, with limits: what costs more than them is refused, and the process is replaced."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any, Protocol
+
+from api.work.pool import Busy
+from rcsa_ident.errors import InputError
+
+log = logging.getLogger("rcsa_ident.reading")
+MEBIBYTE = 1 << 20
+#: For the start of a process, imports and compiling [s].
+_START = 300.0
+
+
+class Reading(Protocol):
+    """Where uploads are read."""
+
+    async def run(self, call: Callable[..., Any], *arguments: Any) -> Any:
+        """Return what a call answers, in JSON's types; raises `Busy` where too many wait, `InputError` where the upload is at fault."""
+
+    @property
+    def waiting(self) -> int:
+        """Calls that have no answer yet."""
+
+    def start(self) -> None:
+        """Start the process."""
+
+    def stop(self) -> None:
+        """End the process."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What one call may cost.
+
+    Parameters
+    ----------
+    memory : int [MiB]
+        Address space beyond what the process takes before it reads anything.
+    seconds : float [s]
+        Of one core.
+    wall_seconds : float [s]
+        By the clock.
+    calls : int
+        After so many the process is replaced.
+    """
+
+    memory: int = 2048
+    seconds: float = 60.0
+    wall_seconds: float = 120.0
+    calls: int = 200
+
+    @property
+    def costly(self) -> InputError:
+        """What is told of an upload that costs more."""
+        found = f"a file that costs more than {self.memory} MiB or {self.seconds:g} s to read"
+        return InputError("recording", found, "a recording that takes less: fewer samples, or a plainer format")
+
+
+class Reader:
+    """A spawned process that serves one call at a time.
+
+    Parameters
+    ----------
+    limits : Limits
+    queue : int
+        Calls that may wait beyond the one at work.
+    """
+
+    def __init__(self, limits: Limits, queue: int) -> None:
+        self.limits, self.queue, self.waiting = limits, queue, 0
+        self.threads: ThreadPoolExecutor | None = None
+        self.child: _Child | None = None
+
+    def start(self) -> None:
+        self.threads = ThreadPoolExecutor(1, "reader")
+        self.child = _Child(self.limits)
+
+    async def run(self, call: Callable[..., Any], *arguments: Any) -> Any:
+        if self.threads is None or self.waiting > self.queue:
+            raise Busy
+        self.waiting += 1
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self.threads, self._ask, call, arguments)
+        finally:
+            self.waiting -= 1
+
+    def _ask(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        for _ in range(2):
+            child = self.child or _Child(self.limits)
+            self.child = child
+            try:
+                kind, answer = child.ask(call, arguments)
+            except InputError:
+                self._replace()
+                raise
+            except _Killed:
+                # not by its own doing: somebody, or the system for want of memory, has ended it
+                self._replace()
+                continue
+            if child.calls >= self.limits.calls or kind == "costly":
+                self._replace()
+            if kind == "answer":
+                return answer
+            if kind == "costly":
+                raise self.limits.costly
+            if kind == "refused":
+                raise InputError(*answer)
+            log.error("a call of the reader has failed", extra={"fields": {"error": answer}})
+            raise InputError("recording", "one that cannot be read", "a complete file of its format")
+        raise Busy
+
+    def _replace(self) -> None:
+        if self.child is not None:
+            self.child.end()
+        self.child = None if self.threads is None else _Child(self.limits)
+
+    def stop(self) -> None:
+        threads, self.threads = self.threads, None
+        if self.child is not None:
+            # a call at work ends with its process
+            self.child.process.kill()
+        if threads is not None:
+            threads.shutdown(wait=True, cancel_futures=True)
+        if self.child is not None:
+            self.child.end()
+        self.child = None
+
+
+class _Killed(Exception):
+    """The process has ended for no reason of its own."""
+
+
+class _Child:
+    """A process and the line to it."""
+
+    def __init__(self, limits: Limits) -> None:
+        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+            os.environ.setdefault(name, "1")
+        context = multiprocessing.get_context("spawn")
+        self.limits, self.calls, self.ready = limits, 0, False
+        self.line, theirs = context.Pipe()
+        self.process = context.Process(target=_serve, args=(theirs, limits), daemon=True, name="reader")
+        self.process.start()
+        theirs.close()
+
+    def ask(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
+        """Return kind and content of the answer."""
+        if not self.ready:
+            self._receive(_START)
+            self.ready = True
+        self.calls += 1
+        try:
+            self.line.send((call, arguments))
+        except OSError:
+            raise _Killed from None
+        kind, answer = self._receive(self.limits.wall_seconds)
+        return kind, answer
+
+    def _receive(self, seconds: float) -> Any:
+        # what comes back is parsed as data: the process may be in the hands of what it has read
+        if not self.line.poll(seconds):
+            self.process.kill()
+            raise self.limits.costly
+        try:
+            return json.loads(self.line.recv_bytes())
+        except (EOFError, OSError):
+            self.process.join(10.0)
+            if self.process.exitcode == -signal.SIGKILL or not self.ready:
+                raise _Killed from None
+            raise self.limits.costly from None
+
+    def end(self) -> None:
+        """Have it ended."""
+        self.line.close()
+        self.process.join(0.5)
+        if self.process.is_alive():
+            self.process.kill()
+            self.process.join()
+        self.process.close()
+
+
+def _serve(line: Connection, limits: Limits) -> None:
+    """In the process: answer calls until the line ends, and end with the service, however that ends."""
+    import resource
+
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def follow() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
+    from api.reading.look import warm
+    from rcsa_ident.io.hdf5 import LARGEST_DATA
+
+    warm()
+    taken = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (taken + limits.memory * MEBIBYTE,) * 2)
+    # no core of somebody's data, and no file larger than what it may write
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_DATA + LARGEST_DATA // 8,) * 2)
+    line.send_bytes(b"{}")
+    while True:
+        try:
+            call, arguments = line.recv()
+        except EOFError:
+            return
+        # counted from the start of the process; the system ends it at the limit
+        resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time() + limits.seconds) + 1, resource.RLIM_INFINITY))
+        line.send_bytes(json.dumps(_answer(call, arguments), allow_nan=False).encode())
+
+
+def _answer(call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
+    try:
+        return "answer", call(*arguments)
+    except InputError as error:
+        return "refused", (error.field, error.found if isinstance(error.found, str) else repr(error.found), error.allowed, error.where)
+    except MemoryError:
+        return "costly", None
+    except Exception as error:
+        return "failed", f"{type(error).__name__}: {error}"

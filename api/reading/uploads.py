@@ -1,0 +1,258 @@
+"""From a file that has come to a recording that is kept: read, stored, and judged with what is there."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+import logging
+import weakref
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from api.files import NORMALISED, UPLOADS, Files
+from api.reading import calls
+from api.reading.declared import files_of
+from api.reading.reader import Reading
+from api.stores.campaigns import Campaign, FileKey, Recording
+from api.stores.records import Store, Taken, Unavailable
+from api.work.pool import Busy
+from rcsa_ident.errors import InputError
+
+log = logging.getLogger("rcsa_ident.reading")
+#: Between two looks at what nobody refers to [s].
+_ROUND = 3600.0
+#: Of the form that samples are written in.
+_FORM = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """A file that has come as a whole, and is on the disk."""
+
+    path: Path
+    size: int
+    sha256: str
+
+
+class Uploads:
+    """Recordings on their way in and out.
+
+    Parameters
+    ----------
+    store : Store
+    files : Files
+    reader : Reading
+    most : int
+        Uploads at once.
+    """
+
+    def __init__(self, store: Store, files: Files, reader: Reading, most: int) -> None:
+        self.store, self.files, self.reader, self.most = store, files, reader, most
+        self.running = 0
+        self.writing: set[tuple[str, str]] = set()
+        self.settling: weakref.WeakValueDictionary[str, asyncio.Lock] = weakref.WeakValueDictionary()
+
+    @contextmanager
+    def admitted(self) -> Iterator[None]:
+        """Count an upload while it runs; raises `Busy` where too many do, before anything of it is read."""
+        if self.running >= self.most:
+            raise Busy
+        self.running += 1
+        try:
+            yield
+        finally:
+            self.running -= 1
+
+    async def take(self, campaign: Campaign, name: str, received: Received, replacing: bool = False) -> tuple[int, Recording]:
+        """Keep a file as a recording that the campaign names; return 201, or 200 where it was there, and the recording.
+
+        Raises
+        ------
+        Taken
+            Another content is there.
+        InputError
+            It cannot be read; nothing is kept.
+        KeyError
+            The campaign is gone.
+        """
+        file = files_of(campaign.text)[name]
+        there = await asyncio.to_thread(self.store.recordings.get, campaign.group, campaign.id, name)
+        if there is not None and there.sha256 != received.sha256 and not replacing:
+            raise Taken("name")
+        if there is not None and there.sha256 == received.sha256:
+            status, kept = 200, there
+        else:
+            status, kept = await self._read(campaign, name, file.role, file.cuts[0], received, replacing)
+        await self.settle(campaign)
+        again = await asyncio.to_thread(self.store.recordings.get, campaign.group, campaign.id, name)
+        return status, again or kept
+
+    async def _read(self, campaign: Campaign, name: str, role: str, cut: str, received: Received, replacing: bool) -> tuple[int, Recording]:
+        air = await asyncio.to_thread(self._air, campaign, cut) if role == "cut" else None
+        target = self.files.spare(campaign.group)
+        try:
+            upload = calls.Upload(received.path, name, target)
+            found = await self.reader.run(calls.look, upload, campaign.text, cut, role, self._path(air))
+            recording = Recording(
+                campaign.group,
+                campaign.id,
+                name,
+                role,
+                received.size,
+                received.sha256,
+                normalised_key(campaign.text, name, received.sha256),
+                json.dumps(found, allow_nan=False),
+                "" if air is None else air.normalised,
+                datetime.now(UTC).isoformat(timespec="milliseconds"),
+            )
+            before = await asyncio.to_thread(self._keep, recording, received.path, target, replacing)
+        finally:
+            target.unlink(missing_ok=True)
+        return (200, before) if before is not None and before.sha256 == recording.sha256 else (201, recording)
+
+    def _keep(self, recording: Recording, upload: Path, samples: Path, replacing: bool) -> Recording | None:
+        """First the files, then the row: what a row names is whole and on the disk."""
+        group = recording.group
+        with self.files.lock:
+            self.files.keep(group, UPLOADS, recording.sha256, upload)
+            self.files.keep(group, NORMALISED, recording.normalised, samples)
+            before = None
+            try:
+                before = self.store.recordings.put(recording, replacing)
+            except (Taken, KeyError):
+                self._release(group, files_named(recording))
+                raise
+            if before is not None:
+                self._release(group, {*files_named(before), *files_named(recording)})
+            return before
+
+    def _release(self, group: str, keys: Iterable[FileKey]) -> None:
+        """Remove files that no row refers to any more; the lock is held."""
+        self.files.remove(group, set(keys) - self.store.recordings.kept(group))
+
+    def _air(self, campaign: Campaign, cut: str) -> Recording | None:
+        name = next((name for name, file in files_of(campaign.text).items() if file.role == "air" and cut in file.cuts), None)
+        return None if name is None else self.store.recordings.get(campaign.group, campaign.id, name)
+
+    def _path(self, recording: Recording | None) -> Path | None:
+        return None if recording is None else self.files.path(recording.group, NORMALISED, recording.normalised)
+
+    async def settle(self, campaign: Campaign) -> None:
+        """Judge every cut again whose air cut has come or gone since."""
+        lock = self.settling.setdefault(campaign.id, asyncio.Lock())
+        async with lock:
+            for _ in range(10):
+                changes = await asyncio.to_thread(self.store.campaigns.changes, campaign.group, campaign.id)
+                stale = await asyncio.to_thread(self._stale, campaign)
+                for cut, recording, air in stale:
+                    try:
+                        await self._judge(campaign, cut, recording, air)
+                    except Busy:
+                        # the recording is kept all the same; the next round judges it
+                        return
+                if not stale:
+                    await asyncio.to_thread(self.store.campaigns.settle, campaign.group, campaign.id, changes)
+                    return
+
+    def _stale(self, campaign: Campaign) -> list[tuple[str, Recording, Recording | None]]:
+        rows = {row.name: row for row in self.store.recordings.list(campaign.group, campaign.id, "", 1_000_000)}
+        found = []
+        for cut in json.loads(campaign.text)["cuts"]:
+            row, air = rows.get(cut["cut"]), rows.get(cut.get("air", ""))
+            if row is not None and row.judged_with != ("" if air is None else air.normalised):
+                found.append((cut["id"], row, air))
+        return found
+
+    async def _judge(self, campaign: Campaign, cut: str, recording: Recording, air: Recording | None) -> None:
+        path = self._path(recording)
+        assert path is not None
+        try:
+            verdict = await self.reader.run(calls.judge, campaign.text, cut, path, self._path(air))
+        except InputError as error:
+            verdict = refused_verdict(str(error))
+        text = json.dumps(json.loads(recording.found) | {"verdict": verdict}, allow_nan=False)
+        after = replace(recording, found=text, judged_with="" if air is None else air.normalised)
+        await asyncio.to_thread(self.store.recordings.judge, recording, after)
+
+    async def forget(self, campaign: Campaign, name: str) -> bool:
+        """Remove a recording, or what has come of one; return whether there was anything."""
+
+        def remove() -> bool:
+            with self.files.lock:
+                path, partial = self.files.partial(campaign.group, partial_name(campaign.id, name))
+                self.files.forget(path)
+                row = self.store.recordings.delete(campaign.group, campaign.id, name)
+                if row is not None:
+                    self._release(campaign.group, files_named(row))
+                return row is not None or partial is not None
+
+        there = await asyncio.to_thread(remove)
+        await self.settle(campaign)
+        return there
+
+    def forget_campaign(self, campaign: Campaign) -> bool:
+        """Remove a campaign with everything that was uploaded for it."""
+        with self.files.lock:
+            rows = self.store.recordings.list(campaign.group, campaign.id, "", 1_000_000)
+            there = self.store.campaigns.delete(campaign.group, campaign.id)
+            for name in files_of(campaign.text):
+                self.files.forget(self.files.partial(campaign.group, partial_name(campaign.id, name))[0])
+            self._release(campaign.group, [key for row in rows for key in files_named(row)])
+        return there
+
+    def forget_machine(self, group: str, machine: str) -> bool:
+        """Remove a machine with its campaigns and everything that was uploaded for them."""
+        with self.files.lock:
+            keys = self.store.recordings.of_machine(group, machine)
+            there = self.store.machines.delete(group, machine)
+            if keys:
+                self._release(group, keys)
+        return there
+
+    def sweep(self) -> int:
+        """Remove files that a crash has left without a row, and stale parts."""
+        with self.files.lock:
+            kept = {group: self.store.recordings.kept(group) for group in list(self.store.recordings.groups())}
+            return self.files.sweep(kept)
+
+    async def attend(self) -> None:
+        """At the start and every hour: sweep, and judge what a crash has left without its verdict."""
+        while True:
+            try:
+                swept = await asyncio.to_thread(self.sweep)
+                if swept:
+                    log.info("swept", extra={"fields": {"files": swept}})
+                for group, id in await asyncio.to_thread(self.store.campaigns.unsettled):
+                    campaign = await asyncio.to_thread(self.store.campaigns.get, group, id)
+                    if campaign is not None:
+                        await self.settle(campaign)
+            except (Unavailable, OSError) as error:
+                log.warning("uploads are looked after later", extra={"fields": {"error": type(error).__name__}})
+            await asyncio.sleep(_ROUND)
+
+
+def files_named(recording: Recording) -> list[FileKey]:
+    """Return the files that a recording refers to."""
+    return [(UPLOADS, recording.sha256), (NORMALISED, recording.normalised)]
+
+
+def partial_name(campaign: str, name: str) -> str:
+    """Return what an upload in parts is known by."""
+    return f"{campaign}/{name}"
+
+
+def normalised_key(text: str, name: str, sha256: str) -> str:
+    """Return what names the samples of an upload: what came, and everything of the campaign that decides how it is read."""
+    data = json.loads(text)
+    basis = [_FORM, sha256, Path(name).suffix.lower(), data["sensors"], data.get("campaign", {}).get("sampling_rate_hz")]
+    return hashlib.sha256(json.dumps(basis, sort_keys=False).encode()).hexdigest()
+
+
+def refused_verdict(reason: str) -> dict[str, Any]:
+    """Return the verdict on what cannot be judged."""
+    return {"usable": False, "reasons": [reason], "notes": [], "spindle_speed_rpm": None, "lines": 0, "signal_to_noise_db": {}}

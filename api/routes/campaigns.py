@@ -1,0 +1,216 @@
+"""Campaigns of a machine: what was cut, with which toolings, measured by which sensors."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zipfile
+from collections.abc import Iterator
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import StreamingResponse
+
+from api.files import UPLOADS
+from api.parts import Parts, ThisService
+from api.problems import Problem
+from api.reading.declared import LARGEST, declare, toml_text
+from api.routes.common import BODY, After, Limit, MachineId, found_or_404, guard, page, problems, utf8
+from api.routes.machines import Repeat
+from api.schemas.campaigns import EXAMPLE, CampaignAnswer, CampaignSummary, CutAnswer, FileState, NewCampaign, VerdictAnswer
+from api.schemas.common import ID_PATTERN, Page, body_of
+from api.security import Guarded, WhoAsks, new_id, now
+from api.stores.campaigns import Campaign, Counts, Recording
+from api.stores.records import Taken
+from api.work.toolings import parsed, toml_of
+
+router = APIRouter(tags=["campaigns"], route_class=Guarded)
+TOML, JSON, ZIP = "application/toml", "application/json", "application/zip"
+CampaignId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a campaign.")]
+_EXAMPLE_TOML = toml_of({key: value for key, value in EXAMPLE.items() if key != "cuts"}) + "".join(
+    f"[[cuts]]\n{toml_of(cut)}" for cut in EXAMPLE["cuts"]
+)
+_BODY = {
+    "required": True,
+    "content": {
+        JSON: {"schema": {"$ref": "#/components/schemas/NewCampaign"}, "example": EXAMPLE},
+        TOML: {"schema": {"type": "string"}, "example": _EXAMPLE_TOML},
+    },
+}
+_BLOCK = 1 << 20
+
+
+@router.post(
+    "/machines/{id}/campaigns",
+    status_code=201,
+    summary="Make a campaign: campaign.toml, or the same keys as JSON",
+    description="Toolings are copied: what happens to the library later does not change the campaign. "
+    "Recordings are named by the last part of their paths.",
+    openapi_extra=guard("upload", requestBody=_BODY, **{"x-content-types": (JSON, TOML)}),
+    responses=problems(404, 409, *BODY),
+)
+async def make(
+    id: MachineId, request: Request, response: Response, parts: ThisService, caller: WhoAsks, repeat: Repeat = None
+) -> CampaignAnswer:
+    raw = await request.body()
+    if len(raw) > LARGEST:
+        raise Problem(413, f"the body is too large: a campaign has at most {LARGEST // 1000} kB")
+    is_toml = request.headers["content-type"].split(";")[0].strip().lower() == TOML
+
+    def keep() -> Campaign:
+        found_or_404(parts.store.machines.get(caller.group, id), "machine")
+        data = parsed(utf8(raw)) if is_toml else body_of(NewCampaign, raw).model_dump(exclude_unset=True, exclude_none=True)
+        name, text, cuts = declare(data, lambda name: _tooling(parts, caller.group, name))
+        campaign = Campaign(new_id(), caller.group, id, name, text, cuts, now())
+        digest = hashlib.sha256(json.dumps([id, is_toml]).encode() + raw).hexdigest()
+        return parts.store.campaigns.add(campaign, None if repeat is None else (repeat, digest))
+
+    try:
+        campaign = await run_in_threadpool(keep)
+    except Taken as taken:
+        what, fault = str(taken), {"found": str(repeat), "allowed": f"an {taken} of its own"}
+        raise Problem(409, f"the {what} is in use", [{"field": what, **fault}]) from None
+    except KeyError:
+        raise Problem(404, "there is no such machine") from None
+    response.headers["Location"] = f"/v1/campaigns/{campaign.id}"
+    return await run_in_threadpool(_answer, parts, campaign)
+
+
+def _tooling(parts: Parts, group: str, name: str) -> str | None:
+    document = parts.store.toolings.get(group, name)
+    return None if document is None else document.text
+
+
+@router.get("/machines/{id}/campaigns", summary="List campaigns of a machine", openapi_extra=guard("read"), responses=problems(404, 422))
+def list_campaigns(id: MachineId, parts: ThisService, caller: WhoAsks, after: After = "", limit: Limit = 50) -> Page[CampaignSummary]:
+    found_or_404(parts.store.machines.get(caller.group, id), "machine")
+    rows, following = page(parts.store.campaigns.list(caller.group, id, after, limit + 1), limit, lambda row: row.id)
+    counts = parts.store.campaigns.counts(caller.group, [row.id for row in rows])
+    items = []
+    for row in rows:
+        count = counts.get(row.id, Counts(0, 0))
+        common = {name: getattr(row, name) for name in ("id", "machine", "name", "created", "cuts")}
+        items.append(CampaignSummary(**common, uploaded=count.uploaded, usable=count.usable))
+    return Page(items=items, next=following)
+
+
+@router.get(
+    "/campaigns/{id}",
+    summary="A campaign, as JSON or as campaign.toml (Accept: application/toml)",
+    openapi_extra=guard("read"),
+    response_class=Response,
+    responses={
+        200: {"model": CampaignAnswer, "description": "A campaign.", "content": {TOML: {"schema": {"type": "string"}}}},
+        **problems(404, 422),
+    },
+)
+def get(id: CampaignId, request: Request, parts: ThisService, caller: WhoAsks) -> Response:
+    campaign = known_campaign(parts, caller.group, id)
+    headers = {"Vary": "Accept"}
+    if TOML in request.headers.get("accept", ""):
+        return Response(toml_text(campaign.text).encode(), media_type=TOML, headers=headers)
+    return Response(_answer(parts, campaign).model_dump_json(), media_type=JSON, headers=headers)
+
+
+@router.get(
+    "/campaigns/{id}/archive",
+    summary="What `rcsa-ident identify` takes: campaign.toml, toolings and the recordings as they came, ZIP",
+    description="Cuts whose recording is not there are left out.",
+    openapi_extra=guard("read"),
+    response_class=StreamingResponse,
+    responses={
+        200: {"description": "A folder.", "content": {ZIP: {"schema": {"type": "string", "format": "binary"}}}},
+        **problems(404, 409, 422),
+    },
+)
+def archive(id: CampaignId, parts: ThisService, caller: WhoAsks) -> StreamingResponse:
+    campaign = known_campaign(parts, caller.group, id)
+    rows = {row.name: row for row in parts.store.recordings.list(caller.group, id, "", 1_000_000)}
+    if not any(row.role == "cut" for row in rows.values()):
+        raise Problem(409, "no recording of a cut is uploaded yet")
+    headers = {"Content-Disposition": f'attachment; filename="campaign-{campaign.id}.zip"'}
+    return StreamingResponse(_zipped(parts, campaign, rows), media_type=ZIP, headers=headers)
+
+
+@router.delete(
+    "/campaigns/{id}",
+    status_code=204,
+    summary="Forget a campaign and its recordings",
+    openapi_extra=guard("upload"),
+    responses=problems(404, 422),
+)
+def forget(id: CampaignId, parts: ThisService, caller: WhoAsks) -> Response:
+    if not parts.uploads.forget_campaign(known_campaign(parts, caller.group, id)):
+        raise Problem(404, "there is no such campaign")
+    return Response(status_code=204)
+
+
+def known_campaign(parts: Parts, group: str, id: str) -> Campaign:
+    """Return a campaign that is there."""
+    return found_or_404(parts.store.campaigns.get(group, id), "campaign")
+
+
+def _answer(parts: Parts, campaign: Campaign) -> CampaignAnswer:
+    data = json.loads(campaign.text)
+    rows = {row.name: row for row in parts.store.recordings.list(campaign.group, campaign.id, "", 1_000_000)}
+    cuts = [_cut(cut, rows) for cut in data["cuts"]]
+    return CampaignAnswer(
+        id=campaign.id,
+        machine=campaign.machine,
+        name=campaign.name,
+        created=campaign.created,
+        sampling_rate_hz=data.get("campaign", {}).get("sampling_rate_hz"),
+        sensors=data["sensors"],
+        workpiece=data["workpiece"],
+        toolings=list(data["toolings"]),
+        usable=sum(cut.verdict is not None and cut.verdict.usable for cut in cuts),
+        cuts=cuts,
+    )
+
+
+def _cut(cut: dict[str, Any], rows: dict[str, Recording]) -> CutAnswer:
+    row, air = rows.get(cut["cut"]), cut.get("air")
+    verdict = None if row is None else VerdictAnswer.model_validate(json.loads(row.found)["verdict"])
+    files = {
+        "cut": FileState(name=cut["cut"], uploaded=row is not None),
+        "air": None if air is None else FileState(name=air, uploaded=air in rows),
+    }
+    return CutAnswer(**cut | files, verdict=verdict)
+
+
+class _Stream:
+    """A file that only takes in, and hands on."""
+
+    def __init__(self) -> None:
+        self.parts: list[bytes] = []
+
+    def write(self, data: bytes) -> int:
+        self.parts.append(bytes(data))
+        return len(data)
+
+    def flush(self) -> None:
+        """Nothing waits."""
+
+    def taken(self) -> bytes:
+        """Return what has come since."""
+        found, self.parts = b"".join(self.parts), []
+        return found
+
+
+def _zipped(parts: Parts, campaign: Campaign, rows: dict[str, Recording]) -> Iterator[bytes]:
+    """Yield a ZIP archive while it is made: measured signals hardly shrink, so nothing is packed."""
+    stream = _Stream()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED, allowZip64=True) as out:  # type: ignore[call-overload]
+        out.writestr("campaign.toml", toml_text(campaign.text, rows.__contains__))
+        for name, text in json.loads(campaign.text)["toolings"].items():
+            out.writestr(f"toolings/{name}.toml", text)
+        for name, row in rows.items():
+            with (
+                parts.files.path(campaign.group, UPLOADS, row.sha256).open("rb") as file,
+                out.open(f"recordings/{name}", "w", force_zip64=True) as entry,
+            ):
+                while block := file.read(_BLOCK):
+                    entry.write(block)
+                    yield stream.taken()
+    yield stream.taken()

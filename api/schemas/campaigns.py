@@ -1,0 +1,234 @@
+"""Campaigns, as in campaign.toml, and the recordings that are uploaded for them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, StringConstraints
+
+from api.schemas.common import Answer, Body, Fault, Line
+from api.schemas.toolings import EXAMPLE as TOOLING
+from api.schemas.toolings import Text, ToolingKeys
+
+FileName = Annotated[str, StringConstraints(min_length=1, max_length=1000)]
+
+EXAMPLE: dict[str, Any] = {
+    "campaign": {"name": "HPM 800U, 2026-11", "sampling_rate_hz": 51200.0},
+    "sensors": {
+        "flange_x": {"quantity": "displacement", "axis": "X", "sensitivity": 10000.0},
+        "fixture_x": {"quantity": "acceleration", "axis": "X", "sensitivity": 0.0011094},
+    },
+    "workpiece": {"name": "EN AW-6082", "tangential_coefficient_mpa": 902.0, "radial_ratio": 0.26},
+    "toolings": {"S1-ER32": TOOLING},
+    "cuts": [
+        {
+            "id": "S1-ER32-00",
+            "tooling": "S1-ER32",
+            "spindle_speed_rpm": 8000.0,
+            "axial_depth_mm": 0.4,
+            "feed_per_tooth_mm": 0.1,
+            "entry_angle_deg": 90.0,
+            "exit_angle_deg": 180.0,
+            "feed_direction": "+X",
+            "cut": "S1-ER32_00_cut.h5",
+            "air": "S1-ER32_00_air.h5",
+        }
+    ],
+}
+
+
+class HeadKeys(Body):
+    """[campaign]"""
+
+    name: Line | None = None
+    sampling_rate_hz: float | None = Field(None, description="For files that carry none.")
+
+
+class SensorKeys(Body):
+    """[sensors.CHANNEL]; the key is the channel's name in the recordings"""
+
+    quantity: Literal["displacement", "acceleration", "trigger", "force"]
+    axis: Literal["X", "Y", "Z"] | None = None
+    sensitivity: float | None = Field(None, description="V/m, V/(m/s^2), V/N; 1 where the file is in SI.")
+    delay_s: float | None = None
+    bandwidth_hz: float | None = None
+    pulses_per_revolution: int | None = None
+    tooth_angle_deg: float | None = None
+
+
+class WorkpieceKeys(Body):
+    """[workpiece]"""
+
+    name: Text
+    tangential_coefficient_mpa: float
+    radial_ratio: float
+    axial_ratio: float | None = None
+    tangential_edge_n_per_mm: float | None = None
+    radial_edge_n_per_mm: float | None = None
+    axial_edge_n_per_mm: float | None = None
+    tangential_coefficient_spread_percent: float | None = None
+    radial_ratio_spread_percent: float | None = None
+    edge_spread_percent: float | None = None
+
+
+class CutKeys(Body):
+    """[[cuts]]"""
+
+    id: Text
+    tooling: Text
+    spindle_speed_rpm: float
+    axial_depth_mm: float
+    feed_per_tooth_mm: float
+    entry_angle_deg: float
+    exit_angle_deg: float
+    feed_direction: str | float = Field(description="+X, -X, +Y, -Y, or an angle from +X in degrees.")
+    cut: FileName = Field(description="The recording; of a path the last part counts, and its suffix says the format.")
+    air: FileName | None = Field(None, description="The same speed without cutting; may serve several cuts.")
+
+
+class NewCampaign(Body):
+    """A campaign to make, with the keys of campaign.toml."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE]})
+
+    campaign: HeadKeys | None = None
+    sensors: dict[str, SensorKeys]
+    workpiece: WorkpieceKeys
+    toolings: dict[str, ToolingKeys | str] | None = Field(
+        None,
+        description="For each name that the cuts use: a name of the library, the keys of a tooling, or a path that ends in .toml, "
+        "which means the library's tooling of that very name. Left out, all names are the library's.",
+    )
+    cuts: list[CutKeys] = Field(min_length=1)
+
+
+class VerdictAnswer(Answer):
+    """Whether a recording is used."""
+
+    usable: bool
+    reasons: list[str] = Field(description="Why it is not.")
+    notes: list[str] = Field(description="What one should know though it is.")
+    spindle_speed_rpm: float | None = Field(description="From the record, of a usable cut.")
+    lines: int = Field(description="Points of the cross FRF, all axes together.")
+    signal_to_noise_db: dict[str, float] = Field(description="Median over the lines, for each axis.")
+
+
+class FileState(Answer):
+    """A recording that a cut names."""
+
+    name: str
+    uploaded: bool
+
+
+class CutAnswer(Answer):
+    """A cut of a campaign."""
+
+    id: str
+    tooling: str
+    spindle_speed_rpm: float
+    axial_depth_mm: float
+    feed_per_tooth_mm: float
+    entry_angle_deg: float
+    exit_angle_deg: float
+    feed_direction: str | float
+    cut: FileState
+    air: FileState | None
+    verdict: VerdictAnswer | None = Field(description="With what is there so far; null until the cut's recording is.")
+
+
+class CampaignAnswer(Answer):
+    """A campaign."""
+
+    id: str
+    machine: str
+    name: str
+    created: str
+    sampling_rate_hz: float | None
+    sensors: dict[str, dict[str, Any]]
+    workpiece: dict[str, Any]
+    toolings: list[str]
+    usable: int = Field(description="Cuts that an identification would use.")
+    cuts: list[CutAnswer]
+
+
+class CampaignSummary(Answer):
+    """A campaign in short."""
+
+    id: str
+    machine: str
+    name: str
+    created: str
+    cuts: int
+    uploaded: int = Field(description="Cuts whose recording is there.")
+    usable: int
+
+
+class RecordingAnswer(Answer):
+    """An uploaded recording, and what was found in it."""
+
+    name: str
+    role: Literal["cut", "air"]
+    cuts: list[str]
+    size_bytes: int
+    sha256: str = Field(description="Of the file as it came.")
+    sampling_rate_hz: float
+    duration_s: float
+    channels: list[str]
+    spindle_speed_rpm: float | None = Field(description="As the record itself tells.")
+    harmonics_above_noise: dict[str, int] = Field(
+        description="For each axis: multiples of the tooth-passing frequency, of an air cut of the spindle's, that stand above the noise."
+    )
+    verdict: VerdictAnswer
+    created: str
+
+
+class ItemProblem(Answer):
+    """Why a part of an upload was not kept."""
+
+    detail: str
+    errors: list[Fault] | None
+
+
+class UploadItem(Answer):
+    """One file of an upload of several."""
+
+    name: str
+    status: int = Field(description="201 kept, 200 was there already, or the status that the same upload alone would have met.")
+    recording: RecordingAnswer | None
+    problem: ItemProblem | None
+
+
+class UploadAnswer(Answer):
+    """What has become of each file."""
+
+    items: list[UploadItem]
+
+
+class ChannelSpectrum(Answer):
+    """Amplitudes of a channel."""
+
+    unit: str
+    amplitude: list[float]
+
+
+class SpectrumAnswer(Answer):
+    """Amplitudes over frequency."""
+
+    frequency_hz: list[float]
+    channels: dict[str, ChannelSpectrum]
+    harmonics_hz: list[float] = Field(description="Multiples of the spindle's frequency.")
+
+
+class ChannelOutline(Answer):
+    """Extremes of a channel; null where all samples of a stretch were lost."""
+
+    unit: str
+    low: list[float | None]
+    high: list[float | None]
+
+
+class SignalAnswer(Answer):
+    """A recording's outline over time."""
+
+    time_s: list[float]
+    channels: dict[str, ChannelOutline]
