@@ -36,6 +36,9 @@ export function colour(name, alpha = 1) {
 export const SERIES = ["s1", "s2", "s3", "s4", "s5", "s6"];
 export const DASHES = ["solid", "dash", "dot", "dashdot"];
 
+/** A name as text: Plotly reads some tags in what it writes. */
+export const safe = (name) => String(name).replaceAll("&", "&amp;").replaceAll("<", "&lt;");
+
 /** Everything that all axes share. */
 export function axis(title, more = {}) {
   const line = colour("line");

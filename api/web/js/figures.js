@@ -1,5 +1,5 @@
 // What the charts of a tool change show: lobes with bands, tooltip FRFs with bands.
-import { axis, colour, DASHES, SERIES } from "./charts.js";
+import { axis, colour, DASHES, safe, SERIES } from "./charts.js";
 import { factor, plain, text, unit } from "./units.js";
 
 const seriesOf = (i) => SERIES[i % SERIES.length];
@@ -39,11 +39,11 @@ export function lobeFigure(lobes, { maxDepth, removal, marks = true }) {
       return `${limit}${rate}${chatter === null ? "" : ` · ${plain(chatter)} Hz`}`;
     });
     data.push({
-      x, y, name: each.tooling, text: told, type: "scatter", mode: "lines", line: { color: ink, width: 2.2, dash: DASHES[Math.floor(i / SERIES.length)] },
+      x, y, name: safe(each.tooling), text: told, type: "scatter", mode: "lines", line: { color: ink, width: 2.2, dash: DASHES[Math.floor(i / SERIES.length)] },
       fill: lobes.length === 1 ? "tozeroy" : "none", fillcolor: colour(name, 0.07), hovertemplate: "%{text}",
     });
     data.push({
-      x, y: each.chatter_frequency_hz, name: each.tooling, yaxis: "y2", type: "scatter", mode: "markers", marker: { color: ink, size: 3.2 }, hoverinfo: "skip",
+      x, y: each.chatter_frequency_hz, name: safe(each.tooling), yaxis: "y2", type: "scatter", mode: "markers", marker: { color: ink, size: 3.2 }, hoverinfo: "skip",
     });
     if (!marks) return;
     const best = each.best_speeds.slice(0, lobes.length > 3 ? 1 : 3);
@@ -95,7 +95,7 @@ export function frfFigure(answers, { parts, shown }) {
       if (shown !== "both" && shown !== name) return;
       const series = answers.length === 1 ? seriesOf(k) : seriesOf(i);
       const dash = answers.length === 1 ? "solid" : DASHES[k];
-      const label = answers.length === 1 ? name : `${answer.tooling} ${name}`;
+      const label = safe(answers.length === 1 ? name : `${answer.tooling} ${name}`);
       for (const [part, yaxis] of [[upper, "y"], [lower, "y2"]]) {
         const { y, band } = wrapped(curve, part);
         const scale = part === "phase" ? 1 : times;

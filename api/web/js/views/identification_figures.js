@@ -1,5 +1,5 @@
 // What the charts of a running identification show.
-import { axis, colour, SERIES } from "../charts.js";
+import { axis, colour, safe, SERIES } from "../charts.js";
 import { factor, unit } from "../units.js";
 
 const ORDER = ["X", "Y"];
@@ -11,7 +11,7 @@ export function costFigure(trace) {
   for (const [name, points] of trace) {
     const ink = inkOf(name);
     data.push({
-      x: points.map((p) => p.seconds), y: points.map((p) => p.cost), name, text: points.map((p) => p.stage), type: "scatter", mode: "lines", line: { color: ink, width: 2, shape: "hv" },
+      x: points.map((p) => p.seconds), y: points.map((p) => p.cost), name, text: points.map((p) => safe(p.stage)), type: "scatter", mode: "lines", line: { color: ink, width: 2, shape: "hv" },
       hovertemplate: `${name} %{y:.4~g}, %{text}<extra></extra>`,
     });
     const turns = points.filter((p, k) => k > 0 && p.stage !== points[k - 1].stage);
@@ -29,7 +29,7 @@ export function fitFigure(fits) {
   const times = factor("receptance");
   for (const [name, fit] of fits) {
     data.push({
-      x: fit.frequency_hz, y: fit.measured_abs.map((v) => v * times), name: `${name} measured`, type: "scatter", mode: "markers", marker: { color: inkOf(name, 0.5), size: 4.5 }, text: fit.tooling,
+      x: fit.frequency_hz, y: fit.measured_abs.map((v) => v * times), name: `${name} measured`, type: "scatter", mode: "markers", marker: { color: inkOf(name, 0.5), size: 4.5 }, text: fit.tooling?.map(safe),
       hovertemplate: `${name} measured %{y:.3~g}${fit.tooling ? " (%{text})" : ""}<extra></extra>`,
     });
     // one line a tooling: the model of each is another
@@ -38,7 +38,7 @@ export function fitFigure(fits) {
       data.push({
         x: which.map((k) => fit.frequency_hz[k]), y: which.map((k) => fit.model_abs[k] * times), name: `${name} model`, type: "scatter",
         mode: fit.tooling ? "lines" : "markers", line: { color: inkOf(name), width: 1.8 }, marker: { color: inkOf(name), size: 4, symbol: "x-thin-open" },
-        hovertemplate: `${name} model %{y:.3~g}${tooling ? ` (${tooling.replaceAll("<", "&lt;")})` : ""}<extra></extra>`,
+        hovertemplate: `${name} model %{y:.3~g}${tooling ? ` (${safe(tooling)})` : ""}<extra></extra>`,
       });
     }
   }

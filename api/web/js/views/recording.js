@@ -1,7 +1,7 @@
 // One recording: its signal, its spectrum with the harmonics marked, and what was found in it.
 import { get, getBlob, part } from "../api.js";
 import { add, card, choices, fill, h, head, link, note, save } from "../dom.js";
-import { axis, chart, colour, legend, SERIES } from "../charts.js";
+import { axis, chart, colour, legend, safe, SERIES } from "../charts.js";
 import { failed } from "../forms.js";
 import { to } from "../router.js";
 import { plain } from "../units.js";
@@ -81,8 +81,8 @@ function sides(units, more = {}) {
 function spectrumFigure({ frequency_hz: x, channels, harmonics_hz: harmonics }, names) {
   const { units, axisOf } = unitsOf(channels, names);
   const data = names.map((name, i) => ({
-    x, y: channels[name].amplitude, name, mode: "lines", type: "scatter", line: { color: colour(SERIES[i % SERIES.length]), width: 1.2 }, yaxis: axisOf(name),
-    hovertemplate: `${name} %{y:.3~g} ${channels[name].unit}<extra></extra>`,
+    x, y: channels[name].amplitude, name: safe(name), mode: "lines", type: "scatter", line: { color: colour(SERIES[i % SERIES.length]), width: 1.2 }, yaxis: axisOf(name),
+    hovertemplate: `${safe(name)} %{y:.3~g} ${channels[name].unit}<extra></extra>`,
   }));
   const line = { color: colour("soft", 0.55), width: 1, dash: "dot" };
   const shapes = harmonics.slice(0, 400).map((f) => ({ type: "line", x0: f, x1: f, y0: 0, y1: 1, yref: "paper", line, layer: "below" }));

@@ -1,0 +1,183 @@
+// Forces as they come: a data logger's stream that is watched, or a recording that is played.
+import { get, Problem } from "../api.js";
+import { add, card, empty, fill, h, head, link, mark, note, table } from "../dom.js";
+import { colour, legend, SERIES, uplot } from "../charts.js";
+import { field, select } from "../forms.js";
+import { to } from "../router.js";
+import { open, Window } from "../stream.js";
+import { factor, plain, q, unit } from "../units.js";
+import { ground, recordingPicker, tabs } from "./forces.js";
+
+/** Buckets a second that a chart of this width has a use for, and the seconds that it shows. */
+const PER_SECOND = 500;
+const SECONDS = 4;
+
+export async function view(_args, query, place) {
+  const here = await ground(place, "Live forces");
+  if (!here) return undefined;
+  const picker = await recordingPicker(here, query, { air: true });
+  const rate = select([["0.25", "a quarter as fast"], ["1", "as recorded"], ["4", "four times as fast"]], "1");
+  const streams = h("div");
+  const stop = h("button", { type: "button", hidden: true }, "Stop");
+  const freeze = h("button", { type: "button", hidden: true, "aria-pressed": "false" }, "Hold the picture");
+  const fault = h("div", { role: "alert" });
+  const board = h("dl", { class: "facts" });
+  const chartBox = h("div", { class: "live-chart", role: "img", "aria-label": "Force over the last seconds" });
+  const keys = h("div");
+  const screen = h("section", { class: "card", hidden: true }, h("header", null, h("h2", null, "Force now"), h("span", { class: "row-of-buttons" }, freeze, stop)), board, keys, chartBox);
+  const play = h("button", { class: "primary" }, "Play");
+  const form = h("form", { class: "card", novalidate: true }, h("h2", null, "Play a recording as if it were live"),
+    picker.any ? h("div", { class: "fields" }, picker.fields, field("Speed of playing", rate)) : empty("No recordings yet", "Upload a campaign, or connect a data logger.", link(to("recordings"), "To the recordings", "button")), picker.any ? h("p", null, play) : null);
+  add(place, head("Live forces", here.name, tabs("forces/live")), fault, screen, h("div", { class: "columns" }, streams, form));
+
+  let close = null;
+  let plot = null;
+  let held = false;
+  let frames = null;
+  async function start(hello, about) {
+    end();
+    fill(fault);
+    screen.hidden = false;
+    stop.hidden = freeze.hidden = false;
+    fill(board, fact("State", mark("busy", "settling")), fact("Of", about));
+    const uPlot = await uplot();
+    let data = null;
+    let dirty = false;
+    const told = (event) => {
+      if (event.event === "ready") {
+        const bucket = event.envelope ?? hello.envelope;
+        data = new Window(event.axes, event.sampling_rate_hz, bucket, SECONDS);
+        fill(keys, legend(event.axes.map((a, k) => ({ name: `F${a.toLowerCase()}`, series: SERIES[k] }))));
+        plot?.destroy();
+        plot = chartOf(uPlot, chartBox, event.axes, () => data);
+      } else if (event.event === "status") fill(board, status(event, about));
+    };
+    const draw = () => {
+      frames = requestAnimationFrame(draw);
+      if (!dirty || held || !plot || document.hidden) return;
+      dirty = false;
+      plot.setData(data.columns(factor("force")), false);
+      plot.setScale("x", { min: data.last - SECONDS, max: data.last });
+    };
+    frames = requestAnimationFrame(draw);
+    close = open(hello, {
+      told,
+      forces: (buffer) => {
+        data?.take(buffer);
+        dirty = true;
+      },
+      over: (reason) => {
+        close = null;
+        stop.hidden = true;
+        if (reason) fill(fault, note("bad", reason));
+        board.querySelector(".mark")?.replaceWith(mark(reason ? "bad" : "idle", reason ? "broken off" : "over"));
+        cancelAnimationFrame(frames);
+        list();
+      },
+    });
+  }
+  function end() {
+    close?.();
+    close = null;
+    cancelAnimationFrame(frames);
+    stop.hidden = true;
+  }
+  stop.addEventListener("click", () => {
+    end();
+    board.querySelector(".mark")?.replaceWith(mark("idle", "stopped"));
+  });
+  freeze.addEventListener("click", () => {
+    held = !held;
+    freeze.setAttribute("aria-pressed", String(held));
+    freeze.replaceChildren(held ? "Go on" : "Hold the picture");
+  });
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const recording = await get(`campaigns/${picker.which.value}/recordings/${encodeURIComponent(picker.recording.value)}`).catch(() => null);
+    const times = Number(rate.value);
+    const envelope = Math.max(1, Math.round(((recording?.sampling_rate_hz ?? 25_600) * Math.min(1, times)) / PER_SECOND));
+    start({ replay: { campaign: picker.which.value, recording: picker.recording.value, rate: times }, machine: here.id, envelope }, picker.recording.value);
+  });
+
+  async function list() {
+    try {
+      const { items } = await get("forces/streams");
+      fill(streams, card("Streams that are open", null, items.length ? table("Open streams", [
+        { name: "Stream", cell: (s) => s.name || s.session },
+        { name: "Tooling", cell: (s) => s.tooling },
+        { name: "Samples", number: true, cell: (s) => plain(s.samples) },
+        { name: "Lost", number: true, cell: (s) => plain(s.lost) },
+        { name: "", cell: (s) => h("button", { type: "button", onclick: () => start({ watch: s.session, envelope: Math.max(1, Math.round(s.sampling_rate_hz / PER_SECOND)) }, s.name || s.tooling) }, "Watch") },
+      ], items) : h("p", { class: "soft" }, "No data logger sends at the moment. One that does appears here by itself; how it sends is described under API.")));
+    } catch (error) {
+      fill(streams, note("bad", error.message));
+      if (!(error instanceof Problem)) console.error(error);
+    }
+  }
+  await list();
+  const poll = setInterval(() => !document.hidden && list(), 5000);
+  const again = () => plot?.repaint();
+  window.addEventListener("theme", again);
+  window.addEventListener("units", again);
+  return () => {
+    clearInterval(poll);
+    end();
+    window.removeEventListener("theme", again);
+    window.removeEventListener("units", again);
+    plot?.destroy();
+  };
+}
+
+const fact = (name, ...value) => h("div", null, h("dt", null, name), h("dd", null, value));
+
+function status(event, about) {
+  const live = event.stage === "live";
+  return [
+    fact("State", mark(live ? "good" : event.stage === "ended" ? "idle" : "busy", event.stage)), fact("Of", about),
+    ...Object.entries(event.rms_n).map(([axis, n]) => fact(`F${axis.toLowerCase()}, RMS`, q("force", n))),
+    fact("Samples", plain(event.samples)), fact("Lost", h("span", { class: event.lost ? "fault" : null }, plain(event.lost))), fact("Dropped", h("span", { class: event.dropped ? "fault" : null }, plain(event.dropped))),
+    fact("Delay", `${plain(event.delay_ms, 1, 1)} ms`), fact("Waiting", plain(event.backlog)),
+    event.notes?.length ? fact("Notes", h("span", { class: "small" }, event.notes.join("; "))) : null,
+  ];
+}
+
+/** A chart of uPlot with a band for each axis. */
+function chartOf(uPlot, box, axes, data) {
+  let plot = null;
+  function make() {
+    const line = colour("line");
+    const words = { stroke: colour("ink"), grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: "13px system-ui, sans-serif", labelFont: "13px system-ui, sans-serif" };
+    const series = axes.flatMap((_, k) => ["low", "high"].map(() => ({ stroke: colour(SERIES[k]), width: 1, points: { show: false }, spanGaps: false })));
+    const options = {
+      width: box.clientWidth || 600, height: box.clientHeight || 320, legend: { show: false }, cursor: { show: false }, pxAlign: false,
+      scales: { x: { time: false } },
+      axes: [{ ...words, label: "Time [s]" }, { ...words, label: `Force [${unit("force")}]`, size: 64 }],
+      series: [{}, ...series], bands: axes.map((_, k) => ({ series: [2 + 2 * k, 1 + 2 * k], fill: colour(SERIES[k], 0.45) })),
+    };
+    plot?.destroy();
+    box.replaceChildren();
+    plot = new uPlot(options, data().columns(factor("force")), box);
+  }
+  make();
+  const observer = new ResizeObserver(() => plot.setSize({ width: box.clientWidth, height: box.clientHeight }));
+  observer.observe(box);
+  return {
+    setData: (columns, scales) => {
+      plot.setData(columns, scales);
+      plot.setScale("y", { min: Math.min(...reach(columns, 1)), max: Math.max(...reach(columns, 2)) });
+    },
+    setScale: (key, range) => plot.setScale(key, range),
+    repaint: make,
+    destroy: () => {
+      observer.disconnect();
+      plot.destroy();
+    },
+  };
+}
+
+/** Extremes with a little room, of every second column from the given one. */
+function reach(columns, from) {
+  const found = [0];
+  for (let c = from; c < columns.length; c += 2) for (const v of columns[c]) if (v !== null && Number.isFinite(v)) found.push(v * 1.08);
+  return [found.reduce((a, b) => Math.min(a, b)), found.reduce((a, b) => Math.max(a, b))];
+}
