@@ -16,7 +16,7 @@ from api.observe import Observed
 from api.parts import Metrics, Parts, Rates
 from api.reading.reader import Limits, Reader, Reading
 from api.reading.uploads import Uploads
-from api.routes import campaigns, health, keys, machines, page, queries, recordings, toolings
+from api.routes import campaigns, health, keys, machines, page, queries, recordings, resumed, together, toolings
 from api.schemas.campaigns import NewCampaign
 from api.schemas.common import ProblemDocument
 from api.security import HEADER
@@ -75,7 +75,7 @@ def create_app(settings: Settings, store: Store | None = None, work: Work | None
     problems.install(app)
     app.include_router(health.router)
     app.include_router(page.router)
-    for each in (keys, machines, toolings, campaigns, recordings, queries):
+    for each in (keys, machines, toolings, campaigns, recordings, resumed, together, queries):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(Observed, parts=parts)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]

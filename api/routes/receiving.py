@@ -124,6 +124,13 @@ async def complete(part: Part) -> Received:
         return await run_in_threadpool(finish)
 
 
+def plain(request: Request) -> None:
+    """Refuse what would have to be unpacked."""
+    coding = request.headers.get("content-encoding", "identity").strip().lower()
+    if coding not in ("", "identity"):
+        raise Problem(415, f"found content encoding {coding[:80]}, allowed is none: send the file as it is")
+
+
 def told_length(request: Request) -> int:
     """Return the length that a request tells, 0 where it does not."""
     text = request.headers.get("content-length", "")

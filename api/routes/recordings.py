@@ -20,7 +20,7 @@ from api.reading.declared import File, files_of
 from api.reading.uploads import Received
 from api.routes.campaigns import CampaignId, known_campaign
 from api.routes.common import BODY, Limit, found_or_404, guard, page, problems, tagged, unchanged
-from api.routes.receiving import append, arriving, check_digest, complete, room, told_digest, told_length
+from api.routes.receiving import append, arriving, check_digest, complete, plain, room, told_digest, told_length
 from api.schemas.campaigns import RecordingAnswer, SignalAnswer, SpectrumAnswer
 from api.schemas.common import Page
 from api.security import Guarded, WhoAsks
@@ -53,7 +53,7 @@ _STREAM = 1 << 20
 async def put(
     id: CampaignId, name: RecordingName, request: Request, response: Response, parts: ThisService, caller: WhoAsks, replace: Replace = False
 ) -> RecordingAnswer:
-    campaign, name, _ = await run_in_threadpool(_named, parts, caller.group, id, name)
+    campaign, name, _ = await run_in_threadpool(named, parts, caller.group, id, name)
     digest = told_digest(request, "Repr-Digest", "Content-Digest")
     plain(request)
     with parts.uploads.admitted():
@@ -76,13 +76,6 @@ async def take(parts: Parts, campaign: Campaign, name: str, received: Received, 
         raise Problem(409, "another content is there under this name", [fault]) from None
     except KeyError:
         raise Problem(404, "there is no such campaign") from None
-
-
-def plain(request: Request) -> None:
-    """Refuse what would have to be unpacked."""
-    coding = request.headers.get("content-encoding", "identity").strip().lower()
-    if coding not in ("", "identity"):
-        raise Problem(415, f"found content encoding {coding[:80]}, allowed is none: send the file as it is")
 
 
 @router.get("", summary="List recordings", openapi_extra=guard("read"), responses=problems(404, 422))
@@ -154,7 +147,7 @@ async def signal(id: CampaignId, name: RecordingName, parts: ThisService, caller
     responses=problems(404, 422),
 )
 async def forget(id: CampaignId, name: RecordingName, parts: ThisService, caller: WhoAsks) -> Response:
-    campaign, name, _ = await run_in_threadpool(_named, parts, caller.group, id, name)
+    campaign, name, _ = await run_in_threadpool(named, parts, caller.group, id, name)
     if not await parts.uploads.forget(campaign, name):
         raise Problem(404, "there is no such recording")
     return Response(status_code=204)
@@ -164,7 +157,7 @@ def _form(name: str) -> str:
     return unicodedata.normalize("NFC", name)
 
 
-def _named(parts: Parts, group: str, id: str, name: str) -> tuple[Campaign, str, File]:
+def named(parts: Parts, group: str, id: str, name: str) -> tuple[Campaign, str, File]:
     """Return a campaign and a recording that it names."""
     campaign = known_campaign(parts, group, id)
     found = files_of(campaign.text).get(_form(name))

@@ -27,6 +27,21 @@ CALLS = [
     ("GET", "/toolings/t", None, "read"),
     ("GET", "/toolings/t/drawing", None, "read"),
     ("DELETE", "/toolings/t", None, "upload"),
+    ("POST", "/machines/m/campaigns", {}, "upload"),
+    ("GET", "/machines/m/campaigns", None, "read"),
+    ("GET", "/campaigns/c", None, "read"),
+    ("GET", "/campaigns/c/archive", None, "read"),
+    ("DELETE", "/campaigns/c", None, "upload"),
+    ("GET", "/campaigns/c/recordings", None, "read"),
+    ("POST", "/campaigns/c/recordings", None, "upload"),
+    ("PUT", "/campaigns/c/recordings/n", None, "upload"),
+    ("PATCH", "/campaigns/c/recordings/n", None, "upload"),
+    ("HEAD", "/campaigns/c/recordings/n", None, "upload"),
+    ("GET", "/campaigns/c/recordings/n", None, "read"),
+    ("GET", "/campaigns/c/recordings/n/file", None, "read"),
+    ("GET", "/campaigns/c/recordings/n/spectrum", None, "read"),
+    ("GET", "/campaigns/c/recordings/n/signal", None, "read"),
+    ("DELETE", "/campaigns/c/recordings/n", None, "upload"),
     ("POST", "/tooltip", {"machine": "m", "tooling": "t"}, "run"),
     ("POST", "/lobes", {"machine": "m", "toolings": ["t"]}, "run"),
     ("POST", "/advice", {"machine": "m", "toolings": ["t"], "cut": {"feed_per_tooth_mm": 0.1}}, "run"),
@@ -43,7 +58,7 @@ def test_every_call_is_in_the_list(http):
         for method in item
         if path.startswith("/v1")
     ]
-    patterns = {"m": "{id}", "k": "{id}", "t": "{name}"}
+    patterns = {"m": "{id}", "k": "{id}", "c": "{id}", "t": "{name}", "n": "{name}"}
     listed = [(m, "/".join(patterns.get(part, part) for part in p.split("/"))) for m, p, _, _ in CALLS]
     assert sorted(operations) == sorted(listed)
 
