@@ -162,7 +162,8 @@ class LiveObserver:
         return self._scan(state, gap, shaken, lost=True)[0]
 
     def _scan(self, state: LiveState, gap: FloatArray, shaken: FloatArray, lost: bool) -> tuple[LiveState, ForceBlock]:
-        observer, angle, blocks, begin = state.observer, state.angle, [], 0
+        observer, angle, begin = state.observer, state.angle, 0
+        blocks: list[ForceBlock] = []
         step = self.observer.bridge if lost else self.observer.run
         while begin < gap.shape[0] or not blocks:
             first = state.count + begin

@@ -1,0 +1,247 @@
+"""Forces of a recording, and the first message of a stream."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import ConfigDict, Field, StringConstraints
+
+from api.schemas.common import Answer, Body, Id, Line
+from api.schemas.queries import Angle, Depth, Percent, Tooling, Turn
+from api.schemas.toolings import EXAMPLE
+from api.work.forces import ForceQuestion, WornQuestion
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.setups import FEED_DIRECTIONS
+from rcsa_ident.signals.recording import Quantity, Sensor
+
+_RPM = math.pi / 30.0
+MOST_CHANNELS = 32
+#: Rates that a stream may have [Hz]; a file's own may be higher.
+LEAST_RATE, MOST_RATE = 1000.0, 500_000.0
+Rate = Annotated[float, Field(ge=LEAST_RATE, le=10_000_000.0)]
+Speed = Annotated[float | None, Field(ge=100.0, le=200_000.0, description="As programmed, to 1 %; null: from the trigger.")]
+Method = Literal["resonators", "paper"]
+#: Last part of a path, as campaigns name their recordings; no control characters.
+FileName = Annotated[str, StringConstraints(min_length=1, max_length=255, pattern=r"^[^\x00-\x1f\x7f/\\]+$")]
+Axis = Literal["X", "Y"]
+
+
+class SensorKeys(Body):
+    """A sensor as in campaign.toml."""
+
+    quantity: Literal["displacement", "acceleration", "trigger", "force"]
+    axis: Literal["X", "Y", "Z"] | None = None
+    sensitivity: Annotated[float, Field(ge=-1e12, le=1e12, description="Signal per quantity: V/m, V/(m/s^2), V/N.")] = 1.0
+    delay_s: Annotated[float, Field(ge=-1.0, le=1.0)] = 0.0
+    bandwidth_hz: Annotated[float | None, Field(gt=0.0, le=1e9)] = None
+    pulses_per_revolution: Annotated[int, Field(ge=1, le=10_000)] = 1
+    tooth_angle_deg: Annotated[float | None, Field(ge=-360.0, le=360.0)] = None
+
+    def sensor(self, name: str) -> Sensor:
+        """Return the sensor."""
+        angle = None if self.tooth_angle_deg is None else math.radians(self.tooth_angle_deg)
+        axis = None if self.axis is None else Dof(self.axis.lower())
+        return Sensor(
+            name, Quantity(self.quantity), axis, self.sensitivity, self.delay_s, self.bandwidth_hz, self.pulses_per_revolution, angle
+        )
+
+
+Sensors = Annotated[
+    dict[Line, SensorKeys] | None,
+    Field(min_length=1, max_length=MOST_CHANNELS, description="By channel; null: those of the machine's identification."),
+]
+
+
+class WornCut(Body):
+    """The cut whose cutting coefficients are asked, revolution by revolution."""
+
+    axial_depth_mm: Depth
+    feed_per_tooth_mm: Annotated[float, Field(gt=0.0, le=10.0)]
+    immersion: Annotated[float, Field(ge=0.001, le=1.0)] = 0.5
+    strategy: Literal["up", "down"] = "down"
+    entry_deg: Annotated[Angle | None, Field(description="With exit_deg in place of immersion.")] = None
+    exit_deg: Angle | None = None
+    feed_direction: Literal["+X", "-X", "+Y", "-Y"] | Turn = "+X"
+
+    def question(self) -> WornQuestion:
+        """Return the cut in SI."""
+        if (self.entry_deg is None) != (self.exit_deg is None):
+            raise InputError("cut.exit_deg" if self.exit_deg is None else "cut.entry_deg", "nothing", "both angles, or neither")
+        engagement = Engagement.from_immersion(self.immersion, self.strategy)
+        if self.entry_deg is not None and self.exit_deg is not None:
+            if self.exit_deg - self.entry_deg < 0.1:
+                raise InputError("cut.exit_deg", self.exit_deg, f"at least 0.1 above entry_deg, {self.entry_deg:g} [deg]")
+            engagement = Engagement(math.radians(self.entry_deg), math.radians(self.exit_deg))
+        direction = self.feed_direction
+        angle = FEED_DIRECTIONS[direction] if isinstance(direction, str) else math.radians(direction)
+        return WornQuestion(self.axial_depth_mm * 1e-3, self.feed_per_tooth_mm * 1e-3, engagement, float(angle))
+
+
+class ForceKeys(Body):
+    """What both forms of the query share."""
+
+    machine: Id
+    spindle_speed_rpm: Speed = None
+    method: Annotated[Method, Field(description="Oscillators at the spindle's orders, or the paper's random walk.")] = "resonators"
+    smooth: Annotated[bool, Field(description="Each sample given the whole record, instead of as it would be live.")] = False
+    idle_percent: Annotated[
+        Percent | None, Field(gt=0.0, description="Share of the time in which no tooth cuts, at least: it gives the mean force away.")
+    ] = None
+    cut: Annotated[WornCut | None, Field(description="For cutting coefficients over time.")] = None
+
+    def question(self, programmed: float | None = None) -> ForceQuestion:
+        """Return the query in SI; `programmed` [rad/s] is the campaign's speed."""
+        speed = programmed if self.spindle_speed_rpm is None else self.spindle_speed_rpm * _RPM
+        idle = None if self.idle_percent is None else self.idle_percent / 100.0
+        return ForceQuestion(speed, self.method, self.smooth, idle, None if self.cut is None else self.cut.question())
+
+
+class ForceUpload(ForceKeys):
+    """Beside a file: the part `query` of a form."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"machine": "m1", "tooling": EXAMPLE, "spindle_speed_rpm": 12000.0, "smooth": True}]}
+    )
+
+    tooling: Tooling
+    sensors: Sensors = None
+    sampling_rate_hz: Annotated[Rate | None, Field(description="Of a recording that carries none.")] = None
+
+
+class ForceQuery(ForceKeys):
+    """Forces of a recording of a campaign; its air cut is the campaign's."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"machine": "m1", "campaign": "c1", "recording": "S1-ER32-00_cut.h5"}]})
+
+    campaign: Id
+    recording: FileName
+    tooling: Annotated[Tooling | None, Field(description="null: the cut's own.")] = None
+
+
+class AxisForces(Answer):
+    """Forces along an axis [N]."""
+
+    std_n: float = Field(description="Standard deviation of a sample of the estimate.")
+    mean_n: float | None = Field(description="null: the sensors do not show it.")
+    rms_n: float = Field(description="Without the mean.")
+    peak_n: float
+    low: list[float] = Field(description="Lowest of each bucket.")
+    high: list[float]
+
+
+class Harmonic(Answer):
+    """A line of the force."""
+
+    order: int = Field(description="Multiple of the spindle's frequency.")
+    frequency_hz: float
+    amplitude_n: float
+
+
+class Coefficient(Answer):
+    """A cutting coefficient over the record."""
+
+    mean: float
+    std: float
+    trend_per_s: float
+    trend_std_per_s: float
+    unit: str
+
+
+class Wear(Answer):
+    """Cutting coefficients."""
+
+    coefficients: dict[str, Coefficient]
+    separable: bool = Field(description="Whether the harmonics in the band tell them from each other.")
+    misfit: float
+
+
+class ForceAnswer(Answer):
+    """Forces of a recording, as a picture of at most 2000 buckets; every sample with Accept: text/csv."""
+
+    spindle_speed_rpm: float
+    sampling_rate_hz: float
+    band_hz: list[float]
+    notes: list[str]
+    axes: dict[str, AxisForces]
+    time_s: list[float] = Field(description="Of each bucket's first sample.")
+    harmonics: dict[str, list[Harmonic]]
+    wear: Wear | None
+
+
+class StreamSummary(Answer):
+    """A stream that is open."""
+
+    session: str
+    name: str
+    machine: str
+    tooling: str
+    started: str
+    stage: str
+    sampling_rate_hz: float
+    axes: list[str]
+    samples: int
+    lost: int
+    dropped: int
+
+
+class StreamsAnswer(Answer):
+    """All open streams of the group."""
+
+    items: list[StreamSummary]
+
+
+class AirCut(Body):
+    """An uploaded air cut."""
+
+    campaign: Id
+    recording: FileName
+
+
+class Replay(AirCut):
+    """An uploaded recording, played."""
+
+    rate: Annotated[float, Field(ge=0.1, le=100.0, description="So many times as fast as it was recorded.")] = 1.0
+
+
+class Hello(Body):
+    """The first message of every stream: what it brings, or what it wants to see."""
+
+    key: Annotated[str, StringConstraints(max_length=300)] | None = None
+    format: Literal["float32", "json"] = "float32"
+    envelope: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
+
+
+class StreamHello(Hello):
+    """A data logger."""
+
+    machine: Id
+    tooling: Tooling
+    spindle_speed_rpm: Speed = None
+    sampling_rate_hz: Annotated[float, Field(ge=LEAST_RATE, le=MOST_RATE)]
+    channels: list[Line] = Field(min_length=1, max_length=MOST_CHANNELS)
+    axes: Annotated[list[Axis] | None, Field(min_length=1, max_length=2)] = None
+    sensors: Sensors = None
+    name: Line = ""
+    settle_s: Annotated[float, Field(ge=0.2, le=5.0)] = 1.0
+    begins: Literal["air", "cut"] = "cut"
+    air: AirCut | None = None
+    method: Method = "resonators"
+
+
+class ReplayHello(Hello):
+    """A recording in the place of a data logger."""
+
+    replay: Replay
+    machine: Id | None = None
+    tooling: Tooling | None = None
+    name: Line = ""
+    method: Method = "resonators"
+
+
+class WatchHello(Hello):
+    """A viewer of another client's stream."""
+
+    watch: Id

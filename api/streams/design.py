@@ -1,0 +1,122 @@
+"""The observer of a stream, made by a worker from the stream's first second, or from the recording that is replayed."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from api.streams.engine import Column, Plan
+from api.work.forces import ReadBoth, observed
+from api.work.known import read
+from api.work.questions import MachineText, ToolingText
+from api.work.toolings import tooling_of
+from rcsa_ident.errors import InputError
+from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+
+_RPM = 30.0 / math.pi
+
+
+@dataclass(frozen=True, slots=True)
+class StreamQuestion:
+    """What a stream brings.
+
+    Parameters
+    ----------
+    rate : float [Hz]
+    speed : float or None [rad/s]
+        None: from the trigger.
+    sensors : tuple of Sensor
+        Of the channels, in their order.
+    axes : tuple of str
+        In the order of the answer's columns.
+    begins : str
+        air: the spindle turns in air at first, which shows its run-out; cut: it does not.
+    method : str
+    """
+
+    rate: float
+    speed: float | None
+    sensors: tuple[Sensor, ...]
+    axes: tuple[str, ...]
+    begins: str
+    method: str
+
+
+def design(
+    machine: MachineText, tooling: ToolingText, question: StreamQuestion, first: int, raw: bytes, air: ReadBoth | None
+) -> tuple[bytes, dict[str, Any]]:
+    """Return the plan of a stream, pickled for the process of the streams, and what its client is told.
+
+    Parameters
+    ----------
+    first : int
+        Index of the first sample.
+    raw : bytes
+        float64[samples, channels], as they came.
+    air : callable or None
+        Reads an uploaded air cut.
+    """
+    samples = np.frombuffer(raw, "<f8").reshape(-1, len(question.sensors))
+    recording = Recording(question.rate, samples / np.array([s.sensitivity for s in question.sensors]), question.sensors)
+    still = recording if question.begins == "air" else None if air is None else air()[0]
+    return _planned(machine, tooling, question, first, recording, still, follow=True)
+
+
+def design_replay(machine: MachineText, tooling: ToolingText, question: StreamQuestion, source: ReadBoth) -> tuple[bytes, dict[str, Any]]:
+    """Return the same for a recording: its forces are those of the recording as a whole, to the last digit.
+
+    Parameters
+    ----------
+    question : StreamQuestion
+        The sensors are those of the recording, the samples in SI.
+    source : callable
+        Reads the recording and its air cut.
+    """
+    recording, air = source()
+    return _planned(machine, tooling, question, 0, recording, air, follow=False)
+
+
+def _planned(
+    machine: MachineText,
+    tooling: ToolingText,
+    question: StreamQuestion,
+    first: int,
+    recording: Recording,
+    air: Recording | None,
+    follow: bool,
+) -> tuple[bytes, dict[str, Any]]:
+    from rcsa_ident.workflows.live import live_observer
+
+    known, tool = read(machine.text), tooling_of(tooling.text)
+    found = observed(known, tool, recording, air, question.speed, question.method)
+    axes = tuple(axis.upper() for axis in found.estimate.axes)
+    if set(axes) != set(question.axes):
+        raise InputError("axes", list(question.axes), f"{' and '.join(axes)}: the axes with a displacement sensor and an identification")
+    kinds = [(sensor.quantity, None if sensor.axis is None else sensor.axis.upper()) for sensor in question.sensors]
+
+    def column(quantity: Quantity, axis: str) -> Column | None:
+        # a replay's samples are in SI already
+        place = next((i for i, kind in enumerate(kinds) if kind == (quantity, axis)), None)
+        return None if place is None else Column(place, question.sensors[place].sensitivity if follow else 1.0)
+
+    gap = tuple(c for c in (column(Quantity.DISPLACEMENT, axis) for axis in axes) if c is not None)
+    shaken = tuple(column(Quantity.ACCELERATION, axis) for axis in axes)
+    order = tuple(axes.index(axis) for axis in question.axes)
+    plan = Plan(live_observer(found, recording, follow), gap, shaken, len(kinds), first, order)
+    deviation = found.estimate.standard_deviation
+    delay = max(found.response[axis].delay_at_lines for axis in found.response) * recording.rate
+    told = {
+        "axes": list(question.axes),
+        "sampling_rate_hz": recording.rate,
+        "spindle_speed_rpm": found.spindle_speed * _RPM,
+        "band_hz": [w / (2.0 * math.pi) for w in found.band],
+        "delay_samples": round(float(delay), 3),
+        "std_n": {axis: float(deviation[-1, axes.index(axis)]) for axis in question.axes},
+        "first": first,
+        "notes": list(found.notes),
+    }
+    return pickle.dumps(plan), told

@@ -1,0 +1,292 @@
+"""A session: samples that wait, blocks that are computed, and those who listen."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from api.streams.counts import Counts
+from api.streams.envelope import Envelope
+from api.streams.frames import packed
+from rcsa_ident.arrays import FloatArray
+
+#: Samples of a block that is computed at once, and blocks that are on their way at once: nobody waits long behind another.
+BLOCK, FLYING = 4096, 4
+#: Bytes and texts that wait for a slow reader.
+WAITING_BYTES, WAITING_TEXTS = 4_000_000, 32
+
+
+class Stage(StrEnum):
+    """How far a session is."""
+
+    SETTLING = "settling"
+    DESIGNING = "designing"
+    LIVE = "live"
+    ENDED = "ended"
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """Why a session is over.
+
+    Parameters
+    ----------
+    code : int
+        Of the WebSocket's close.
+    status : int
+        Of the problem document; 0: nothing went wrong.
+    detail : str
+    errors : tuple of {field, found, allowed}
+    """
+
+    code: int = 1000
+    status: int = 0
+    detail: str = ""
+    errors: tuple[Mapping[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """What a session is of.
+
+    Parameters
+    ----------
+    id, group, name, machine, tooling, started : str
+    rate : float [Hz]
+    axes : tuple of str
+    channels : int
+    most_waiting : int
+        Samples that may wait; older ones are dropped.
+    """
+
+    id: str
+    group: str
+    name: str
+    machine: str
+    tooling: str
+    started: str
+    rate: float
+    axes: tuple[str, ...]
+    channels: int
+    most_waiting: int
+
+
+class Listener:
+    """Who gets a session's forces, never more of them than fit.
+
+    Parameters
+    ----------
+    axes : int
+    text : bool
+        JSON in place of bytes.
+    size : int or None
+        Samples of a bucket, in place of every sample.
+    """
+
+    def __init__(self, axes: int, text: bool, size: int | None) -> None:
+        self.text, self.envelope = text, None if size is None else Envelope(size, axes)
+        self.frames: deque[tuple[int, str | bytes]] = deque()
+        self.texts: deque[str] = deque(maxlen=WAITING_TEXTS)
+        self.bytes, self.unread = 0, 0
+        self.awake = asyncio.Event()
+
+    def forces(self, first: int, values: FloatArray) -> None:
+        """Take forces; the oldest that nobody has read make way and are counted."""
+        runs = [(first, values)] if self.envelope is None else self.envelope.add(first, values)
+        for begin, rows in runs:
+            frame = json.dumps({"first": begin, "samples": rows.tolist()}) if self.text else packed(begin, rows)
+            count = rows.shape[0] * (1 if self.envelope is None else self.envelope.size)
+            self.frames.append((count, frame))
+            self.bytes += len(frame)
+        while self.bytes > WAITING_BYTES:
+            count, frame = self.frames.popleft()
+            self.bytes -= len(frame)
+            self.unread += count
+        self.awake.set()
+
+    def tell(self, event: str, **further: Any) -> None:
+        """Take an event."""
+        self.texts.append(json.dumps({"event": event, **further}, allow_nan=False))
+        self.awake.set()
+
+    def taken(self) -> list[str | bytes]:
+        """Return what waits, events first, and forget it."""
+        found: list[str | bytes] = [*self.texts]
+        self.texts.clear()
+        # one frame at a time, so that the rest can still make way
+        if self.frames:
+            frame = self.frames.popleft()[1]
+            self.bytes -= len(frame)
+            found.append(frame)
+        if not self.frames:
+            self.awake.clear()
+        return found
+
+
+@dataclass(slots=True, eq=False)
+class Second:
+    """What was seen since the last status.
+
+    Parameters
+    ----------
+    delays : list of float [s]
+    count : int
+    total, square : arrays, shape (a,) [N], [N^2]
+    """
+
+    total: FloatArray
+    square: FloatArray
+    delays: list[float] = field(default_factory=list)
+    count: int = 0
+
+    @classmethod
+    def of(cls, axes: int) -> Second:
+        """Return one that has seen nothing."""
+        return cls(np.zeros(axes), np.zeros(axes))
+
+
+class Session:
+    """A stream of one client.
+
+    Parameters
+    ----------
+    about : About
+    number : int
+        Its name towards the process.
+    """
+
+    def __init__(self, about: About, number: int) -> None:
+        self.about, self.number = about, number
+        self.stage, self.end = Stage.SETTLING, End()
+        self.counts, self.waiting = Counts(), deque[tuple[int, FloatArray, float]]()
+        self.flying: deque[int] = deque()
+        self.listeners: list[Listener] = []
+        self.ready: dict[str, Any] = {}
+        self.plan = b""
+        self.touched = time.monotonic()
+        self.drift, self.known, self.notes = 0.0, True, list[str]()
+        self.second = Second.of(len(about.axes))
+        self.room, self.over, self.drained, self.arrived = (asyncio.Event() for _ in range(4))
+        self.room.set()
+        self.finishing, self.frames = False, 0
+
+    @property
+    def held(self) -> int:
+        """Samples that wait here, those on their way not among them."""
+        return self.counts.backlog - sum(self.flying)
+
+    def offer(self, first: int, samples: FloatArray, now: float) -> int:
+        """Take a frame, shape (n, c), and return how many older samples had to make way."""
+        late = self.counts.take(first, samples.shape[0])
+        if late == samples.shape[0]:
+            return 0
+        self.touched = now
+        self.arrived.set()
+        self.waiting.append((first + late, samples[late:], now))
+        dropped = 0
+        while self.held > self.about.most_waiting and len(self.waiting) > 1:
+            dropped += self.waiting[0][1].shape[0]
+            self.counts.drop(self.waiting.popleft()[1].shape[0])
+        if self.held > self.about.most_waiting // 2:
+            self.room.clear()
+        return dropped
+
+    def window(self, count: int) -> tuple[int, FloatArray] | None:
+        """Return first index and samples of the earliest `count` ones that wait without a gap, or None."""
+        begin, parts, have = 0, list[FloatArray](), 0
+        for first, samples, _ in self.waiting:
+            if not parts or first != begin + have:
+                begin, parts, have = first, [], 0
+            parts.append(samples)
+            have += samples.shape[0]
+            if have >= count:
+                return begin, np.concatenate(parts)[:count]
+        return None
+
+    def skip(self, index: int) -> int:
+        """Throw away what waits before an index, and return how many samples that was."""
+        dropped = 0
+        while self.waiting and self.waiting[0][0] < index:
+            first, samples, arrived = self.waiting.popleft()
+            keep = samples[max(index - first, 0) :]
+            dropped += samples.shape[0] - keep.shape[0]
+            if keep.shape[0]:
+                self.waiting.appendleft((index, keep, arrived))
+                break
+        self.counts.drop(dropped)
+        return dropped
+
+    def block(self) -> tuple[int, FloatArray, float] | None:
+        """Return the next block for the process without gaps, or None where nothing waits or enough is on its way."""
+        if not self.waiting or len(self.flying) >= FLYING:
+            return None
+        first, samples, arrived = self.waiting.popleft()
+        parts, have = [samples], samples.shape[0]
+        while self.waiting and have < BLOCK and self.waiting[0][0] == first + have:
+            _, more, _ = self.waiting.popleft()
+            parts.append(more)
+            have += more.shape[0]
+        whole = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        if have > BLOCK:
+            self.waiting.appendleft((first + BLOCK, whole[BLOCK:], arrived))
+            whole = whole[:BLOCK]
+        self.flying.append(whole.shape[0])
+        if self.held <= self.about.most_waiting // 2:
+            self.room.set()
+        return first, whole, arrived
+
+    def forces(self, first: int, values: FloatArray, delay: float) -> None:
+        """Take the forces of the block that was on its way longest."""
+        self.counts.done(self.flying.popleft())
+        self.second.delays.append(delay)
+        self.second.count += values.shape[0]
+        self.second.total += values.sum(axis=0)
+        self.second.square += (values**2).sum(axis=0)
+        for listener in self.listeners:
+            listener.forces(first, values)
+        if self.finishing and self.counts.backlog == 0:
+            self.drained.set()
+
+    def lost_process(self) -> int:
+        """Count what was on its way to a process that has died as dropped, and return how many samples that was."""
+        count = sum(self.flying)
+        self.flying.clear()
+        self.counts.drop(count)
+        return count
+
+    def status(self) -> dict[str, Any]:
+        """Return what was so in the last second, and forget it."""
+        seen, self.second = self.second, Second.of(len(self.about.axes))
+        n, counts, delays = max(seen.count, 1), self.counts, np.array(seen.delays or [0.0]) * 1e3
+        rms = np.sqrt(np.maximum(seen.square / n - (seen.total / n) ** 2, 0.0))
+        return {
+            "stage": str(self.stage),
+            "samples": counts.samples,
+            "lost": counts.lost,
+            "late": counts.late,
+            "dropped": counts.dropped,
+            "backlog": counts.backlog,
+            "delay_ms": round(float(np.median(delays)), 3),
+            "delay_max_ms": round(float(delays.max()), 3),
+            "speed_drift_percent": round(100.0 * self.drift, 5),
+            "angle_known": self.known,
+            "rms_n": dict(zip(self.about.axes, rms.round(6).tolist(), strict=True)),
+            "notes": self.notes,
+        }
+
+    def finish(self, end: End) -> None:
+        """End; the first reason stands."""
+        if self.stage is not Stage.ENDED:
+            self.stage, self.end = Stage.ENDED, end
+            for event in (self.over, self.room, self.arrived, self.drained):
+                event.set()
+            for listener in self.listeners:
+                listener.awake.set()

@@ -1,0 +1,197 @@
+"""What a worker answers of forces: those of a recording, and the observer that a stream begins with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from api.work.known import Known, read
+from api.work.questions import MachineText, ToolingText
+from api.work.toolings import tooling_of, weigh
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.errors import InputError
+from rcsa_ident.signals.recording import Recording, Sensor
+
+_RPM = 30.0 / math.pi
+#: Buckets of an answer's picture, and samples that one answer may take.
+BUCKETS, MOST_SAMPLES = 2000, 8_000_000
+#: The commands' options are other fields here.
+_FIELDS = {"--speed-rpm": "spindle_speed_rpm", "speed": "spindle_speed_rpm", "--idle-percent": "idle_percent", "idle share": "idle_percent"}
+
+ReadBoth = Callable[[], tuple[Recording, Recording | None]]
+
+
+@dataclass(frozen=True, slots=True)
+class WornQuestion:
+    """Of which cut the cutting coefficients are asked, revolution by revolution: depth and feed [m], angles [rad]."""
+
+    axial_depth: float
+    feed_per_tooth: float
+    engagement: Engagement
+    feed_angle: float
+
+
+@dataclass(frozen=True, slots=True)
+class ForceQuestion:
+    """Forces of a recording.
+
+    Parameters
+    ----------
+    speed : float or None [rad/s]
+        None: from the trigger.
+    method : str
+        resonators or paper.
+    smooth : bool
+    idle : float or None
+        Share of the time in which no tooth cuts, at least.
+    wear : WornQuestion or None
+    """
+
+    speed: float | None
+    method: str = "resonators"
+    smooth: bool = False
+    idle: float | None = None
+    wear: WornQuestion | None = None
+
+
+def sensors_of(text: str) -> tuple[Sensor, ...]:
+    """Return the sensors that a RESULT.json remembers."""
+    import json
+
+    from rcsa_ident.io.forces import sensors_of_result
+
+    try:
+        return sensors_of_result(json.loads(text), "")
+    except InputError as error:
+        if error.field != "sensors":
+            raise
+        found = "none, and the identification of the machine remembers none"
+        raise InputError("sensors", found, "a table of sensors, as in campaign.toml") from None
+
+
+def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, source: ReadBoth, csv: Path | None = None) -> Any:
+    """Return the forces of a recording as an answer, or write FORCES.csv and return None.
+
+    Parameters
+    ----------
+    source : callable
+        Reads the recording and its air cut.
+    csv : Path, optional
+    """
+    from rcsa_ident.io.forces import write_forces_csv
+    from rcsa_ident.observer.force import lifted
+
+    known, tool = read(machine.text), tooling_of(tooling.text)
+    cut, air = source()
+    found = observed(known, tool, cut, air, question.speed, question.method, question.smooth)
+    estimate, level = found.estimate, None
+    settled = min(max(each.kalman.gain.shape[0] for each in found.observer.axes), estimate.force.shape[0] // 2)
+    if question.idle is not None:
+        estimate, level = lifted(estimate, question.idle, settled)
+    if csv is not None:
+        columns = (
+            {axis.upper(): values[:, i] for i, axis in enumerate(estimate.axes)} for values in (estimate.force, estimate.standard_deviation)
+        )
+        write_forces_csv(csv, estimate.time, *columns)
+        return None
+    size = max(-(-estimate.force.shape[0] // BUCKETS), 1)
+    begin = np.arange(0, estimate.force.shape[0], size)
+    low, high = np.minimum.reduceat(estimate.force, begin), np.maximum.reduceat(estimate.force, begin)
+    axes, lines = {}, {}
+    for i, axis in enumerate(estimate.axes):
+        force = estimate.force[settled:, i]
+        axes[axis.upper()] = {
+            "std_n": float(np.median(estimate.standard_deviation[settled:, i])),
+            "mean_n": None if level is None else float(level[i]),
+            "rms_n": float(np.std(force)),
+            "peak_n": float(np.max(np.abs(force))),
+            "low": low[:, i].tolist(),
+            "high": high[:, i].tolist(),
+        }
+        lines[axis.upper()] = _harmonics(force, cut.rate, found.spindle_speed, found.band)
+    answer = {
+        "spindle_speed_rpm": found.spindle_speed * _RPM,
+        "sampling_rate_hz": cut.rate,
+        "band_hz": [w / (2.0 * math.pi) for w in found.band],
+        "notes": [*_doubts(known), *found.notes],
+        "axes": axes,
+        "time_s": (begin * estimate.step).tolist(),
+        "harmonics": lines,
+        "wear": None if question.wear is None else _wear(found, tool, question.wear),
+    }
+    _check_finite(answer)
+    return answer
+
+
+def observed(known: Known, tool: Any, cut: Recording, air: Recording | None, speed: float | None, method: str, smooth: bool = False) -> Any:
+    """Return a `MonitoredCut`; errors name fields of the query."""
+    from rcsa_ident.observer.tuning import PaperWalk, Resonators
+    from rcsa_ident.workflows.monitor import observe
+
+    samples = cut.samples.shape[0] + (0 if air is None else air.samples.shape[0])
+    if samples > MOST_SAMPLES:
+        raise InputError("recording", f"{samples} samples", f"at most {MOST_SAMPLES} in one answer, the air cut's among them")
+    low, high = known.data["band_hz"]
+    weigh(tool.assembly, 1.3 * high)
+    band = 2.0 * math.pi * low, 2.0 * math.pi * high
+    how = PaperWalk() if method == "paper" else Resonators()
+    try:
+        return observe(known.machine, tool.assembly, tool.cutter.teeth, cut, air, band, speed, how, None, smooth)
+    except InputError as error:
+        allowed = error.allowed.replace(" with --speed-rpm", "")
+        raise InputError(_FIELDS.get(error.field, error.field), error.found, allowed, error.where) from None
+
+
+def _harmonics(force: Any, rate: float, speed: float, band: tuple[float, float]) -> list[dict[str, Any]]:
+    """Amplitudes at the spindle's orders in the band."""
+    from rcsa_ident.signals.spectra import line_spectrum
+
+    if force.size < 4.0 * 2.0 * np.pi / speed * rate:
+        return []
+    amplitude = np.abs(line_spectrum(force[:, None], rate, speed, band[1] / (2.0 * np.pi)).amplitude[:, 0])
+    order = np.arange(amplitude.size)
+    inside = order[(order * speed >= band[0]) & (order * speed <= band[1])]
+    return [{"order": int(m), "frequency_hz": float(m * speed / (2.0 * np.pi)), "amplitude_n": float(amplitude[m])} for m in inside]
+
+
+def _wear(found: Any, tool: Any, question: WornQuestion) -> dict[str, Any]:
+    from rcsa_ident.cutting.conditions import CuttingConditions
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.workflows.monitor import wear_of
+
+    if set(found.estimate.axes) != {Dof.X, Dof.Y}:
+        raise InputError("cut", f"forces of axis {', '.join(found.estimate.axes)} alone", "wear from forces of both axes, X and Y")
+    cut = CuttingConditions(found.spindle_speed, question.axial_depth, question.feed_per_tooth, question.engagement, question.feed_angle)
+    worn = wear_of(found, tool.cutter, cut)
+    slope, slope_std = worn.trend()
+    rows = {}
+    for c, name in enumerate(worn.names):
+        unit, factor = ("MPa", 1e-6) if name.endswith("c") else ("N/mm", 1e-3)
+        rows[name] = {
+            "mean": float(np.mean(worn.coefficient[:, c])) * factor,
+            "std": float(np.median(worn.standard_deviation[:, c])) * factor,
+            "trend_per_s": float(slope[c]) * factor,
+            "trend_std_per_s": float(slope_std[c]) * factor,
+            "unit": unit,
+        }
+    return {"coefficients": rows, "separable": bool(worn.separable), "misfit": float(worn.misfit)}
+
+
+def _doubts(known: Known) -> list[str]:
+    data = known.data
+    return [] if data["status"] == "converged" else [f"the identification is {data['status']}: {'; '.join(data['reasons'])}"]
+
+
+def _check_finite(value: Any) -> None:
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list):
+        for each in value:
+            _check_finite(each)
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise InputError("recording", "forces that are not finite", "signals whose forces are finite")
