@@ -54,7 +54,7 @@ function layoutOf(given) {
     font: { family: "system-ui, sans-serif", size: Math.round(root * 0.82), color: colour("ink") },
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 56, r: 14, t: 12, b: 44 }, showlegend: false, separators: ".\u202f",
     hoverlabel: { bgcolor: colour("raised"), bordercolor: colour("strong-line"), font: { color: colour("ink"), size: Math.round(root * 0.82) } },
-    dragmode: "zoom", ...given,
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("strong-line"), activecolor: colour("accent") }, dragmode: "zoom", ...given,
   };
 }
 

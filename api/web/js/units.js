@@ -102,7 +102,12 @@ export function quantityInput(kind, value, props = {}) {
   return input;
 }
 
-const trimmed = (value) => String(Number(value.toPrecision(7)));
+/** As a person would type it: few digits, powers of ten where zeros are hard to count. */
+function trimmed(value) {
+  const short = Number(value.toPrecision(7));
+  const size = Math.abs(short);
+  return size >= 1e6 || (size > 0 && size < 1e-4) ? short.toExponential().replace("e+", "e") : String(short);
+}
 
 /** Choose, and turn over everything that is shown. */
 export function setInch(next) {

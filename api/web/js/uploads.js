@@ -35,8 +35,10 @@ class Queue extends EventTarget {
   add(campaign, files) {
     const names = new Set(campaign.cuts.flatMap((cut) => [cut.cut.name, cut.air?.name]).filter(Boolean));
     this.strangers = files.filter((file) => !names.has(file.name)).map((file) => file.name);
-    for (const file of files) {
-      if (!names.has(file.name) || this.items.get(file.name)?.state === "sending") continue;
+    const given = new Map(files.map((file) => [file.name, file]));
+    // in the campaign's order: verdicts come from the top
+    for (const file of [...names].map((name) => given.get(name)).filter(Boolean)) {
+      if (this.items.get(file.name)?.state === "sending") continue;
       this.items.set(file.name, { name: file.name, file, state: "waiting", sent: 0, problem: null, recording: null, replace: false });
     }
     this.changed();

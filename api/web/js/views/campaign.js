@@ -74,14 +74,14 @@ export async function view({ id }, query, place) {
     fill(list, shown.length ? table("Verdict of every cut", [
       { name: "Cut", cell: ({ cut }) => (cut.cut.uploaded ? h("button", { type: "button", class: "link", dataset: { cut: cut.id }, "aria-expanded": String(open === cut.id), onclick: (event) => { event.stopPropagation(); toggle(cut); } }, cut.id) : cut.id) },
       { name: "Verdict", cell: ({ state }) => mark(state.kind, state.words) },
-      { name: "Why, and what else", cell: ({ cut, state }) => h("div", { class: "why" }, said(state, cut)) },
+      { name: "Tooling", cell: ({ cut }) => cut.tooling },
       { name: "Speed", unit: "rev/min", number: true, cell: ({ cut }) => plain(cut.spindle_speed_rpm) },
       { name: "Measured", unit: "rev/min", number: true, cell: ({ cut }) => plain(cut.verdict?.spindle_speed_rpm ?? null, 1, 1) },
       { name: "Depth", number: true, cell: ({ cut }) => q("depth", cut.axial_depth_mm) },
       { name: "Lines", number: true, cell: ({ cut }) => (cut.verdict ? String(cut.verdict.lines) : "–") },
       { name: "S/N X", unit: "dB", number: true, cell: ({ cut }) => plain(cut.verdict?.signal_to_noise_db?.X ?? null) },
       { name: "S/N Y", unit: "dB", number: true, cell: ({ cut }) => plain(cut.verdict?.signal_to_noise_db?.Y ?? null) },
-      { name: "Tooling", cell: ({ cut }) => cut.tooling },
+      { name: "Why, and what else", cell: ({ cut, state }) => h("div", { class: "why" }, said(state, cut)) },
     ], shown, { tall: true, row: ({ cut }) => ({ class: cut.cut.uploaded ? "pick" : null, "aria-selected": open === cut.id ? "true" : null, onclick: () => cut.cut.uploaded && toggle(cut) }) }) : h("p", { class: "soft" }, filter === "all" ? "The campaign names no cuts." : "None."));
     const scroller = list.querySelector(".scrolls");
     if (scroller) scroller.scrollTop = kept;

@@ -18,7 +18,7 @@ export function costFigure(trace) {
     data.push({ x: turns.map((p) => p.seconds), y: turns.map((p) => p.cost), text: turns.map((p) => p.stage), type: "scatter", mode: "markers", marker: { color: ink, size: 8, symbol: "line-ns-open" }, hoverinfo: "skip" });
   }
   return {
-    data, layout: { hovermode: "closest", xaxis: axis("Time [s]", { rangemode: "tozero" }), yaxis: axis("Misfit", { type: "log", exponentformat: "power" }) },
+    data, layout: { hovermode: "closest", xaxis: axis("Time [s]", { rangemode: "tozero" }), yaxis: axis("Misfit", { type: "log", exponentformat: "e" }) },
     say: `Misfit over time: ${[...trace].map(([name, points]) => `${name} now ${points.at(-1)?.cost.toPrecision(3)}`).join(", ")}.`,
   };
 }

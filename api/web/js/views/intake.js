@@ -1,5 +1,5 @@
 // What was dropped: a campaign and its toolings and recordings are recognised by what is in them, and taken in after one look.
-import { getText, part, post, Problem, send } from "../api.js";
+import { all, getText, part, post, Problem, send } from "../api.js";
 import { add, card, fill, h, note, table, tell, waiting } from "../dom.js";
 import { busy, field, select, showProblem } from "../forms.js";
 import { go, remember, to } from "../router.js";
@@ -55,21 +55,12 @@ export async function intake(place, files) {
     return;
   }
   const keys = keysOfToolings(found.campaign.text);
+  const library = new Set((await all("toolings")).map((t) => t.name));
   const toolings = await Promise.all(found.toolings.map(async ({ file, text }) => {
     const key = keys.get(file.name) ?? file.name.replace(/\.toml$/i, "");
-    return { key, text, there: await libraryText(key) };
+    return { key, text, there: library.has(key) ? await getText(`toolings/${part(key)}`, "application/toml") : null };
   }));
   offer(place, found, toolings, [...keys.values()]);
-}
-
-/** A tooling of the library as its file, or null where there is none. */
-async function libraryText(name) {
-  try {
-    return await getText(`toolings/${part(name)}`, "application/toml");
-  } catch (error) {
-    if (error instanceof Problem && (error.status === 404 || error.status === 422)) return null;
-    throw error;
-  }
 }
 
 function offer(place, found, toolings, wanted) {

@@ -18,13 +18,12 @@ export function modesCards(modes) {
     const rows = found.modes.map((mode, i) => ({ mode, i }));
     return card(`Modes, ${axis} direction`, found.misfit_per_point === null ? null : h("span", { class: "soft small" }, `misfit per point ${significant(found.misfit_per_point, 3)}`),
       table(`Modes in ${axis}`, [
-        { name: "Mode", cell: (r) => String(r.i + 1) },
+        { name: "Mode", cell: (r) => [String(r.i + 1), within(r.mode, modes.band_hz) ? null : h("span", { class: "soft small" }, " outside")] },
         { name: "Frequency", unit: "Hz", number: true, cell: ({ mode }) => withSpread(mode.natural_frequency_hz, mode.natural_frequency_std_hz) },
         { name: "Damping", unit: "%", number: true, cell: ({ mode }) => withSpread(mode.damping_ratio, mode.damping_ratio_std, 100) },
         { name: "Translation", unit: "√(s/kg)", number: true, cell: ({ mode }) => significant(size(mode.phi_t), 3) },
-        { name: "Slope", unit: "1/m √(s/kg)", number: true, cell: ({ mode }) => significant(size(mode.phi_r), 3) },
-        { name: "", cell: ({ mode }) => (within(mode, modes.band_hz) ? "" : h("span", { class: "soft small nowrap" }, "outside the excited band")) },
       ], rows, { row: ({ mode }) => ({ class: within(mode, modes.band_hz) ? null : "soft" }) }),
+      rows.some(({ mode }) => !within(mode, modes.band_hz)) ? h("p", { class: "small soft" }, `Outside: not in the band that the cuts excited, ${plain(modes.band_hz[0])} to ${plain(modes.band_hz[1])} Hz.`) : null,
       joint(found.joint));
   });
   return h("div", { class: "view" }, cards, notes(modes));

@@ -4,7 +4,7 @@ import { add, card, choices, fill, h, head, link, note, save } from "../dom.js";
 import { axis, chart, colour, legend, safe, SERIES } from "../charts.js";
 import { failed } from "../forms.js";
 import { to } from "../router.js";
-import { plain } from "../units.js";
+import { factor, plain, unit } from "../units.js";
 import { sizeOf } from "./machines.js";
 
 export async function view({ id, name }, _query, place) {
@@ -25,12 +25,12 @@ export function recordingPanel(campaign, cut, first = null) {
 
 async function shown(box, id, name) {
   const where = `campaigns/${part(id)}/recordings/${part(name)}`;
-  const signal = chart(`Signal of ${name}`, "small");
+  const signal = chart(`Signal of ${name}`, "small tall");
   const spectrum = chart(`Spectrum of ${name}`, "small tall");
   const facts = h("dl", { class: "facts" });
   const keys = h("div");
   const place = h("div");
-  fill(box, facts, keys, h("h3", null, "Signal"), signal, h("h3", null, "Spectrum"), spectrum, place);
+  fill(box, facts, keys, h("h3", null, "Signal"), signal, h("h3", null, "Spectrum, multiples of the spindle's frequency dotted"), spectrum, place);
   try {
     const recording = await get(where);
     fill(facts, fact("Length", `${plain(recording.duration_s, 2)} s`), fact("Sampling rate", `${plain(recording.sampling_rate_hz)} Hz`),
@@ -45,7 +45,7 @@ async function shown(box, id, name) {
       } }, sizeOf(recording.size_bytes)))));
     const [time, lines] = await Promise.all([get(`${where}/signal?points=1000`), get(`${where}/spectrum`)]);
     const names = Object.keys(time.channels);
-    fill(keys, legend(names.map((each, i) => ({ name: `${each} [${time.channels[each].unit}]`, series: SERIES[i % SERIES.length] }))));
+    fill(keys, legend(names.map((each, i) => ({ name: each, series: SERIES[i % SERIES.length] }))));
     signal.draw(() => signalFigure(time, names));
     spectrum.draw(() => spectrumFigure(lines, names));
   } catch (error) {
@@ -55,41 +55,46 @@ async function shown(box, id, name) {
 
 const fact = (name, value) => h("div", null, h("dt", null, name), h("dd", null, value));
 
-/** Channels of another unit than the first have an axis of their own, on the right. */
-function unitsOf(channels, names) {
+/** Channels grouped by their unit, a panel each: displacements in micrometres, as people say them. */
+function panels(channels, names) {
   const units = [...new Set(names.map((name) => channels[name].unit))];
-  return { units, axisOf: (name) => (units.indexOf(channels[name].unit) === 0 ? "y" : "y2") };
+  const gap = 0.1;
+  const height = (1 - gap * (units.length - 1)) / units.length;
+  return units.map((given, k) => {
+    const [kind, times] = given === "m" ? ["displacement", 1e6 * factor("displacement")] : [null, 1];
+    const end = 1 - k * (height + gap);
+    return { names: names.filter((name) => channels[name].unit === given), yaxis: k ? `y${k + 1}` : "y", layoutKey: k ? `yaxis${k + 1}` : "yaxis", times, title: kind ? unit(kind) : given.replace("^2", "²"), domain: [Math.max(0, end - height), end] };
+  });
 }
+
+const inkOf = (names, name, alpha = 1) => colour(SERIES[names.indexOf(name) % SERIES.length], alpha);
 
 function signalFigure({ time_s: x, channels }, names) {
-  const { units, axisOf } = unitsOf(channels, names);
-  const data = names.flatMap((name, i) => {
-    const { low, high } = channels[name];
-    const line = { color: colour(SERIES[i % SERIES.length]), width: 0.8 };
-    const common = { x, mode: "lines", type: "scatter", line, yaxis: axisOf(name), hoverinfo: "skip" };
-    return [{ ...common, y: low }, { ...common, y: high, fill: "tonexty", fillcolor: colour(SERIES[i % SERIES.length], 0.45) }];
+  const layout = { xaxis: axis("Time [s]") };
+  const data = panels(channels, names).flatMap((panel, k, all) => {
+    layout[panel.layoutKey] = axis(`[${panel.title}]`, { domain: panel.domain });
+    if (k === all.length - 1) layout.xaxis.anchor = panel.yaxis;
+    return panel.names.flatMap((name) => {
+      const times = (values) => values.map((v) => (v === null ? null : v * panel.times));
+      const common = { x, mode: "lines", type: "scatter", line: { color: inkOf(names, name), width: 0.8 }, yaxis: panel.yaxis, hoverinfo: "skip" };
+      return [{ ...common, y: times(channels[name].low) }, { ...common, y: times(channels[name].high), fill: "tonexty", fillcolor: inkOf(names, name, 0.4) }];
+    });
   });
-  return { data, layout: { xaxis: axis("Time [s]"), ...sides(units) } };
-}
-
-function sides(units, more = {}) {
-  const found = { yaxis: axis(`[${units[0]}]`, more) };
-  if (units.length > 1) found.yaxis2 = axis(`[${units.slice(1).join(", ")}]`, { overlaying: "y", side: "right", showgrid: false, ...more });
-  return found;
+  return { data, layout };
 }
 
 function spectrumFigure({ frequency_hz: x, channels, harmonics_hz: harmonics }, names) {
-  const { units, axisOf } = unitsOf(channels, names);
-  const data = names.map((name, i) => ({
-    x, y: channels[name].amplitude, name: safe(name), mode: "lines", type: "scatter", line: { color: colour(SERIES[i % SERIES.length]), width: 1.2 }, yaxis: axisOf(name),
-    hovertemplate: `${safe(name)} %{y:.3~g} ${channels[name].unit}<extra></extra>`,
-  }));
-  const line = { color: colour("soft", 0.55), width: 1, dash: "dot" };
+  const line = { color: colour("soft", 0.45), width: 1, dash: "dot" };
   const shapes = harmonics.slice(0, 400).map((f) => ({ type: "line", x0: f, x1: f, y0: 0, y1: 1, yref: "paper", line, layer: "below" }));
   const last = harmonics.at(-1);
-  const range = last ? [0, Math.min(x.at(-1), last * 1.15)] : undefined;
-  return {
-    data, layout: { hovermode: "x", shapes, xaxis: axis("Frequency [Hz]", { tickformat: ",d", range }), ...sides(units, { type: "log", exponentformat: "power", dtick: 1 }) },
-    say: `Spectrum with ${harmonics.length} tooth-passing harmonics marked.`,
-  };
+  const layout = { hovermode: "x unified", shapes, xaxis: axis("Frequency [Hz]", { tickformat: ",d", range: last ? [0, Math.min(x.at(-1), last * 1.1)] : undefined, showgrid: false, unifiedhovertitle: { text: "%{x:,.1f} Hz" } }) };
+  const data = panels(channels, names).flatMap((panel, k, all) => {
+    layout[panel.layoutKey] = axis(`[${panel.title}]`, { domain: panel.domain, type: "log", exponentformat: "none", dtick: 1, tickformat: ".0e", nticks: 5 });
+    if (k === all.length - 1) layout.xaxis.anchor = panel.yaxis;
+    return panel.names.map((name) => ({
+      x, y: channels[name].amplitude.map((v) => v * panel.times), name: safe(name), mode: "lines", type: "scatter", line: { color: inkOf(names, name), width: 1.2 }, yaxis: panel.yaxis,
+      hovertemplate: `${safe(name)} %{y:.3~g} ${safe(panel.title)}<extra></extra>`,
+    }));
+  });
+  return { data, layout, say: `Spectrum with ${harmonics.length} multiples of the spindle's frequency marked.` };
 }
