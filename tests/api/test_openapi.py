@@ -12,9 +12,12 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 from hypothesis.errors import Unsatisfiable
 
+from api.schemas.campaigns import EXAMPLE as CAMPAIGN
+from api.schemas.campaigns import NewCampaign
 from api.schemas.queries import AdviceQuery, LobeQuery, TipQuery
 from api.schemas.toolings import ToolingKeys
 from tests.api.conftest import embedded, example, service
+from tests.api.recordings import recording
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -79,7 +82,7 @@ def test_references_lead_somewhere(http):
     walk(schema)
 
 
-@pytest.mark.parametrize("model", [ToolingKeys, TipQuery, LobeQuery, AdviceQuery])
+@pytest.mark.parametrize("model", [ToolingKeys, NewCampaign, TipQuery, LobeQuery, AdviceQuery])
 def test_examples_are_what_they_show(model):
     for shown in model.model_json_schema()["examples"]:
         model.model_validate_json(json.dumps(shown))
@@ -88,15 +91,15 @@ def test_examples_are_what_they_show(model):
 class Fuzzed:
     """Cases of one operation, with ids and names that are there in the place of some."""
 
-    def __init__(self, operation, http: TestClient, machine: str) -> None:
+    def __init__(self, operation, http: TestClient, machine: str, known: dict[str, dict[str, str]]) -> None:
         self.operation, self.http, self.machine = operation, http, machine
+        #: What paths that begin so take for what is there.
+        self.known = next((values for begin, values in known.items() if operation.path.startswith(begin)), {"id": machine, "name": "T1"})
         self.statuses: set[int] = set()
 
     def send(self, case, known: bool) -> None:
-        if known and "id" in (case.path_parameters or {}):
-            case.path_parameters["id"] = self.machine
-        if known and "name" in (case.path_parameters or {}):
-            case.path_parameters["name"] = "T1"
+        if known:
+            case.path_parameters.update({key: value for key, value in self.known.items() if key in (case.path_parameters or {})})
         if known and isinstance(case.body, dict) and "machine" in case.body:
             case.body["machine"] = self.machine
         sent = case.as_transport_kwargs(base_url="http://localhost")
@@ -118,13 +121,18 @@ def test_the_api_keeps_to_its_description(tmp_path, result):
     with service(embedded(tmp_path), tmp_path, requests_per_minute=10**8, burst=10**8, work_seconds=0.2) as http:
         id = http.post("/v1/machines", json={"name": "m"}).json()["id"]
         http.put(f"/v1/machines/{id}/identification", content=result, headers={"Content-Type": "application/json"})
+        campaign = http.post(f"/v1/machines/{id}/campaigns", json=CAMPAIGN).json()["id"]
+        name = CAMPAIGN["cuts"][0]["cut"]
+        upload = {"content": recording(CAMPAIGN, tmp_path), "headers": {"Content-Type": "application/octet-stream"}}
+        assert http.put(f"/v1/campaigns/{campaign}/recordings/{name}", **upload).status_code == 201
+        known = {"/v1/campaigns/": {"id": campaign, "name": name}}
         schema = schemathesis.openapi.from_dict(http.get("/openapi.json").json())
         found = [each.ok() for each in schema.get_all_operations()]
         # what deletes comes last
         found.sort(key=lambda operation: operation.method.upper() == "DELETE")
         for operation in found:
             http.put("/v1/toolings/T1", json=example())
-            fuzzed = Fuzzed(operation, http, id)
+            fuzzed = Fuzzed(operation, http, id, known)
             for mode in (schemathesis.GenerationMode.POSITIVE, schemathesis.GenerationMode.NEGATIVE):
                 strategy = operation.as_strategy(generation_mode=mode)
 
