@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -17,17 +17,16 @@ from api.jobs.desk import Desk, Spread
 from api.stores.jobs import Applied, Job, Outcome
 from api.stores.records import digest_of
 from api.work import answers
+from api.work.known import posteriors
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.default import SMOOTH_ERROR, DefaultMethod
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.paper import PaperGeneticAlgorithm
 from rcsa_ident.identification.parameters import Layout
-from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import Identification
-from rcsa_ident.io.identifications import identification_to_json, machine_from_json
+from rcsa_ident.io.identifications import identification_to_json
 from rcsa_ident.io.results import check_result, layout, plain
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.signals.measurement import Reading
@@ -127,22 +126,6 @@ def _method(name: str, start: str | None, desk: Desk, job: Job) -> Method:
         return PaperGeneticAlgorithm()
     known = None if start is None else posteriors(json.loads(start))
     return _Telling(DefaultMethod(start=known), desk, datetime.fromisoformat(str(job.started)))
-
-
-def posteriors(data: dict[str, Any]) -> Mapping[Dof, Posterior]:
-    """Return the posteriors of an earlier answer.
-
-    Raises
-    ------
-    InputError
-        It holds none, as with the published method.
-    """
-    machine = machine_from_json(data, "")
-    for axis, part in machine.items():
-        if part.posterior is None:
-            allowed = "a result of the default method, with unknowns and covariance of each axis"
-            raise InputError("start", f"axis {axis.upper()} without a covariance (method {data['method']})", allowed)
-    return {axis: part.posterior for axis, part in machine.items() if part.posterior is not None}
 
 
 class _Steps:

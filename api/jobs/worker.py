@@ -109,18 +109,17 @@ class JobWorker:
         self.id = ""
         self.submitted: set[str] = set()
         self.seen: dict[str, tuple[int, float]] = {}
-        self.stop = threading.Event()
 
-    def run(self, ready: Callable[[], None] = lambda: None) -> None:
+    def run(self, ready: Callable[[], None], stop: threading.Event) -> None:
         """Work until `stop` is set; what runs then goes on elsewhere, or after the next start."""
         while not self._claim():
-            if self.stop.wait(LOOK):
+            if stop.wait(LOOK):
                 return
         self.backend.start(self.id, lambda id, remember: carry(self.jobs, self.carriers, self.token, self.attempts, id, remember))
         log.info("job worker", extra={"fields": {"worker": self.id}})
         ready()
         last_beat = last_round = 0.0
-        while not self.stop.wait(LOOK):
+        while not stop.wait(LOOK):
             now = time.monotonic()
             try:
                 if now - last_beat >= BEAT:

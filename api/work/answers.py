@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from api.work.known import Known, Shelf, parsed, read
-from api.work.questions import AdviceQuestion, CutQuestion, LobeQuestion, MachineText, TipQuestion, ToolingText
+from api.work.questions import AdviceQuestion, CutQuestion, LobeQuestion, MachineText, TipQuestion, ToolingText, TooLong
 from api.work.toolings import tooling_of, weigh
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.materials import material
@@ -52,7 +52,7 @@ MOST_LINES = 20_000
 
 _MODE = ("natural_frequency_hz", "natural_frequency_std_hz", "damping_ratio", "damping_ratio_std", "phi_t", "phi_r")
 
-_ALLOWED = "at most {:g} s in one answer (fewer of them, no bands, zero-order): there are no jobs for longer work yet"
+_ALLOWED = "at most {:g} s (fewer of them, no bands, zero-order)"
 
 _shelf = Shelf(4)
 
@@ -246,7 +246,7 @@ def _limits(known: Known, tool: Tooling, process: MillingProcess, question: Lobe
 def _affordable(seconds: float, what: str, most: float) -> None:
     if seconds > most:
         found = f"{what}, about {seconds:.0f} s of work"
-        raise InputError("speeds" if "speeds" in what else "step_hz", found, _ALLOWED.format(most))
+        raise TooLong("speeds" if "speeds" in what else "step_hz", found, _ALLOWED.format(most), seconds=seconds)
 
 
 def _told(known: Known, limits: Limits, speeds: FloatArray) -> list[str]:
@@ -312,4 +312,5 @@ def _number(value: float) -> float | None:
 
 
 def _numbers(values: FloatArray) -> list[float | None]:
-    return [_number(value) for value in values.tolist()]
+    known: list[float | None] = values.tolist()
+    return known if np.all(np.isfinite(values)) else [_number(value) for value in values.tolist()]

@@ -12,7 +12,9 @@ import numpy as np
 from api.work.machine_side import MachineSide
 from api.work.questions import MachineText
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
+from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.io.identifications import machine_from_json, speed_bands_from_json
 from rcsa_ident.io.results import check_result
 from rcsa_ident.workflows.speeds import MachineOverSpeed
@@ -140,6 +142,23 @@ def read(text: str) -> Known:
         if not finite:
             raise InputError("axes", "unknowns or modes without a finite receptance", "a machine that the reader of results can compute")
     return known
+
+
+def posteriors(data: dict[str, Any]) -> dict[Dof, Posterior]:
+    """Return what an identification may go on from.
+
+    Raises
+    ------
+    InputError
+        There is none, as with the published method.
+    """
+    found = {}
+    for axis, part in machine_from_json(data, "").items():
+        if part.posterior is None:
+            allowed = "a result of the default method, with unknowns and covariance of each axis"
+            raise InputError("start", f"axis {axis.upper()} without a covariance (method {data['method']})", allowed)
+        found[axis] = part.posterior
+    return found
 
 
 def _limits(data: dict[str, Any]) -> None:

@@ -6,6 +6,25 @@ from dataclasses import dataclass, field
 
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import ProcessDamping
+from rcsa_ident.errors import InputError
+
+
+class TooLong(InputError):
+    """Work that is too much for one answer.
+
+    Parameters
+    ----------
+    seconds : float [s]
+        That it takes, estimated.
+    """
+
+    def __init__(self, field: str, found: object, allowed: str, where: str = "", seconds: float = 0.0) -> None:
+        super().__init__(field, found, allowed, where)
+        self.seconds = seconds
+
+    def __reduce__(self) -> tuple[type[TooLong], tuple[str, object, str, str, float]]:  # type: ignore[override]
+        return type(self), (self.field, self.found, self.allowed, self.where, self.seconds)
+
 
 METHODS = ("zero-order", "multi-frequency", "semi-discretisation", "full-discretisation", "time-domain")
 
