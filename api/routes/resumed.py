@@ -55,6 +55,7 @@ def head(id: CampaignId, name: RecordingName, parts: ThisService, caller: WhoAsk
 @router.patch(
     "/{name}",
     summary="Upload a part of a recording",
+    response_model=RecordingAnswer,
     description="Parts follow each other; HEAD tells where to go on. What has come is kept when the connection breaks, and through "
     "restarts, for a day. The last part answers as an upload at once does.",
     openapi_extra=guard("upload", requestBody=_PART, parameters=_DIGESTS, **{"x-content-types": (BINARY,)}),
@@ -80,7 +81,8 @@ async def patch(
     plain(request)
     key = (campaign.id, name)
     if key in parts.uploads.writing:
-        raise Problem(409, "another query is writing this recording")
+        # perhaps the same client's, whose connection is not yet known to be lost
+        raise Problem(503, "another query is writing this recording", headers={"Retry-After": "2"})
     parts.uploads.writing.add(key)
     try:
         with parts.uploads.admitted():
