@@ -10,7 +10,7 @@ export function removalPer(tooling, immersion, feed) {
 }
 
 /** Lobes of several toolings above, and below the frequency at which each would chatter. */
-export function lobeFigure(lobes, { maxDepth, removal, marks = true }) {
+export function lobeFigure(lobes, { maxDepth, removal, recommended = [] }) {
   const times = factor("depth");
   const data = [];
   const annotations = [];
@@ -45,12 +45,17 @@ export function lobeFigure(lobes, { maxDepth, removal, marks = true }) {
     data.push({
       x, y: each.chatter_frequency_hz, name: safe(each.tooling), yaxis: "y2", type: "scatter", mode: "markers", marker: { color: ink, size: 3.2 }, hoverinfo: "skip",
     });
-    if (!marks) return;
     const best = each.best_speeds.slice(0, lobes.length > 3 ? 1 : 3);
     data.push({
       x: best.map((b) => b.spindle_speed_rpm), y: best.map((b) => (b.limit_depth_mm ?? maxDepth) * times), type: "scatter", mode: "markers",
       marker: { color: colour("paper"), size: 10, symbol: "diamond", line: { color: ink, width: 2.4 } }, hoverinfo: "skip",
     });
+    const cut = recommended[i];
+    if (cut) {
+      data.push({
+        x: [cut.spindle_speed_rpm], y: [cut.axial_depth_mm * times], type: "scatter", mode: "markers", marker: { color: ink, size: 11, symbol: "circle", line: { color: colour("paper"), width: 1.5 } }, hoverinfo: "skip",
+      });
+    }
     best.forEach((b, k) => annotations.push({
       x: b.spindle_speed_rpm, y: (b.limit_depth_mm ?? maxDepth) * times, text: plain(b.spindle_speed_rpm), showarrow: false, yshift: 14,
       font: { color: ink, size: k === 0 ? 15 : 12, weight: k === 0 ? 700 : 400 }, bgcolor: colour("paper", 0.75), borderpad: 1,

@@ -46,7 +46,7 @@ export function plain(value, digits = 0, least = 0) {
 export function significant(value, digits = 3) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const size = Math.abs(value);
-  if (size !== 0 && (size >= 1e6 || size < 1e-4)) return value.toExponential(digits - 1).replace("-", "−").replace("e+", "e").replace("e", " × 10^");
+  if (size !== 0 && (size >= 1e6 || size < 1e-4)) return value.toExponential(digits - 1).replace(/e\+?(-?\d+)$/, (_, power) => `·10${[...power].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("")}`).replace("-", "−");
   const decimals = size === 0 ? 0 : Math.max(0, digits - 1 - Math.floor(Math.log10(size)));
   return plain(value, decimals, decimals);
 }

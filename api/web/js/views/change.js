@@ -58,11 +58,15 @@ export async function view(_args, query, place) {
   const ask = h("button", { class: "primary" }, "Compute");
   const picks = toolingPicks(toolings, chosen, () => changed(true));
 
+  // on a phone the answer stands higher than the conditions, which are told in a line
+  const inShort = h("span", { class: "soft" });
+  const conditions = h("details", { class: "conditions", open: matchMedia("(min-width: 1100px)").matches }, h("summary", null, h("strong", null, "Cut and speeds"), inShort),
+    h("fieldset", null, h("legend", { class: "unseen" }, "Cut"),
+      h("div", { class: "fields" }, fields.im, field("Strategy", strategy, { name: "cut.strategy" }), fields.fz, field("Feed direction", direction, { name: "cut.feed_direction" }))),
+    h("fieldset", null, h("legend", { class: "unseen" }, "Speeds"), h("div", { class: "fields" }, fields.from, fields.to, fields.step)));
   const form = h("form", { class: "card change-form", novalidate: true },
     h("fieldset", { "data-field": "toolings" }, h("legend", null, "Toolings"), picks, h("div", { class: "fault", id: "toolings-fault", hidden: true })),
-    h("fieldset", null, h("legend", null, "Cut"),
-      h("div", { class: "fields" }, fields.im, field("Strategy", strategy, { name: "cut.strategy" }), fields.fz, field("Feed direction", direction, { name: "cut.feed_direction" }))),
-    h("fieldset", null, h("legend", null, "Speeds"), h("div", { class: "fields" }, fields.from, fields.to, fields.step)),
+    conditions,
     h("details", null, h("summary", null, "Material, spindle, method"),
       h("div", { class: "fields" }, fields.ktc, fields.krc, fields.power, fields.torque, fields.deep, field("Method", method, { name: "method" })),
       h("p", { class: "small soft" }, "Empty coefficients are those of the identification's workpiece.")),
@@ -79,6 +83,8 @@ export async function view(_args, query, place) {
 
   async function compute() {
     remember("change", state());
+    const shown = (key, kind) => text(kind, fields[key].input.base);
+    fill(inShort, `${strategy.selectedOptions[0].textContent}, ${shown("im", "percent")} immersion, ${shown("fz", "feed")} per tooth, ${text("speed", fields.from.input.base, { bare: true })} to ${shown("to", "speed")}`);
     running?.abort();
     running = new AbortController();
     const { signal } = running;

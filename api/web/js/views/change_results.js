@@ -23,7 +23,8 @@ export function results(place, found, { toolings, body }) {
 
 /** What to set, said first: a speed, a depth, and why. */
 function headline(found, removal, question) {
-  const cards = found.lobes.map((lobes, i) => {
+  const cards = found.lobes.length;
+  const articles = found.lobes.map((lobes, i) => {
     const advice = found.advice?.[i];
     const best = advice?.highest_removal[0];
     const pocket = lobes.best_speeds[0];
@@ -43,10 +44,16 @@ function headline(found, removal, question) {
         ? h("p", null, q("removal", best.removal_rate_cm3_per_min), " · ", q("power", best.power_kw), " · ", q("torque", best.torque_nm), ` · ${bounds(best.bound)}`)
         : h("p", null, "The limit itself, without a reserve."),
       further.length ? h("p", { class: "soft" }, "Or ", further.map(([speed, deep], k) => [k ? " and " : "", `${plain(speed)} rev/min at `, q("depth", deep)])) : null,
-      best ? h("p", { class: "soft small" }, `10 % below the limit that 95 % of the machines allowed by the records reach, speed right within 1 %.${pocket ? ` The deepest pocket itself: ${plain(pocket.spindle_speed_rpm)} rev/min, ` : ""}`, pocket ? q("depth", pocket.limit_depth_mm ?? question.max_depth_mm) : null, pocket ? "." : null) : null,
+      best && cards === 1 ? reserve(pocket, question) : null,
       drawing);
   });
-  return h("section", { class: `bests${cards.length === 1 ? " one" : ""}`, "aria-label": "Best speeds" }, cards);
+  return h("section", { class: `bests${cards === 1 ? " one" : ""}`, "aria-label": "Best speeds" }, articles);
+}
+
+/** How sure the recommendation is, and what it stays away from. */
+function reserve(pocket, question) {
+  return h("p", { class: "soft small" }, "10 % below the limit that 95 % of the machines allowed by the records reach, with the speed right within 1 %.",
+    pocket ? [` The deepest pocket itself: ${plain(pocket.spindle_speed_rpm)} rev/min, `, q("depth", pocket.limit_depth_mm ?? question.max_depth_mm), "."] : null);
 }
 
 const bounds = (bound) => ({ chatter: "chatter stands against more", power: "the spindle's power stands against more", torque: "the spindle's torque stands against more", speed: "the highest speed", depth: "the deepest cut that was asked for" })[bound] ?? bound;
@@ -67,7 +74,7 @@ function at(lobes, rpm) {
 
 function lobesCard(found, removal, question) {
   const picture = chart("Stability lobes", "lobes");
-  picture.draw(() => lobeFigure(found.lobes, { maxDepth: question.max_depth_mm, removal }));
+  picture.draw(() => lobeFigure(found.lobes, { maxDepth: question.max_depth_mm, removal, recommended: found.advice?.map((a) => a.highest_removal[0]) }));
   const first = found.lobes[0];
   const start = found.advice?.[0]?.highest_removal[0]?.spindle_speed_rpm ?? first.best_speeds[0]?.spindle_speed_rpm ?? first.spindle_speed_rpm[0];
   const speed = quantity("At a speed of", "speed", start);
@@ -95,7 +102,7 @@ function lobesCard(found, removal, question) {
   return card("Stability lobes", csv,
     several(found) ? legend(found.lobes.map((l, i) => ({ name: l.tooling, series: SERIES[i % SERIES.length] }))) : null,
     picture,
-    h("p", { class: "small soft" }, "Stable below the line. Shaded around it: where 95 % of the machines lie that the records allow. Diamonds: the deepest pockets. Hover for depth, removal rate and chatter frequency; drag to look closer, double click to come back."),
+    h("p", { class: "small soft" }, "Stable below the line. Shaded around it: where 95 % of the machines lie that the records allow. Diamonds: the deepest pockets. Dot: what is recommended. Hover for depth, removal rate and chatter frequency; drag to look closer, double click to come back."),
     h("div", { class: "reader" }, speed, read));
 }
 
@@ -130,14 +137,16 @@ function comparison(found, summaries, removal, question) {
   const deepest = found.lobes.map((l) => l.best_speeds[0] ?? null);
   const rows = found.lobes.map((lobes, i) => ({ lobes, i, tooling: summaries[i], best: found.advice?.[i]?.highest_removal[0] ?? null, pocket: deepest[i] }));
   const top = Math.max(...rows.map((r) => r.best?.removal_rate_cm3_per_min ?? 0));
-  return card("Side by side", null, table("Toolings side by side", [
+  const box = card("Side by side", null, table("Toolings side by side", [
     { name: "Tooling", cell: (r) => [h("span", { class: `key line ${SERIES[r.i % SERIES.length]}`, "aria-hidden": "true" }), r.lobes.tooling, r.best && r.best.removal_rate_cm3_per_min === top ? h("span", { class: "soft small" }, " removes most") : null] },
     { name: "Stickout", number: true, cell: (r) => (r.tooling ? q("length", r.tooling.stickout_mm, { digits: 1 }) : "–") },
     { name: "Stable at every speed", number: true, cell: (r) => q("depth", r.lobes.absolute_limit_mm) },
     { name: "Deepest pocket", number: true, cell: (r) => (r.pocket ? [q("depth", r.pocket.limit_depth_mm ?? question.max_depth_mm), " at ", q("speed", r.pocket.spindle_speed_rpm, { bare: true })] : "–") },
     { name: "Recommended", number: true, cell: (r) => (r.best ? [q("speed", r.best.spindle_speed_rpm), ", ", q("depth", r.best.axial_depth_mm)] : "–") },
     { name: "Removal", number: true, cell: (r) => (r.best ? q("removal", r.best.removal_rate_cm3_per_min) : "–") },
-  ], rows));
+  ], rows), found.advice ? reserve(null, question) : null);
+  box.classList.add("wide");
+  return box;
 }
 
 function lobesCsv(lobes) {

@@ -22,7 +22,7 @@ export async function view({ id }, _query, place) {
   const trace = new Map();
   const fits = new Map();
   const axesKey = () => legend(["X", "Y"].flatMap((axis, k) => [{ name: `${axis} measured`, series: SERIES[k], kind: "dots" }, { name: `${axis} model`, series: SERIES[k] }]));
-  const costCard = card("Misfit over time", null, legend(["X", "Y"].map((axis, k) => ({ name: axis, series: SERIES[k] }))), cost);
+  const costCard = card("Misfit over time", null, legend(["X", "Y", "both"].map((axis, k) => ({ name: axis === "both" ? "both axes" : axis, series: SERIES[k] }))), cost);
   add(place, head("Identification", null, reports, cancel), fault, state,
     h("div", { class: "split live" }, costCard, card("Measured points and model", null, axesKey(), fit)), result);
   cancel.addEventListener("click", busy(cancel, async () => {
@@ -92,8 +92,8 @@ export async function view({ id }, _query, place) {
       const [modes, frf] = await Promise.all([get(`identifications/${id}/modes`), get(`identifications/${id}/frf`)]);
       fit.draw(() => fitFigure(measured(frf)));
       if (job.status !== "failed") await allMachines(true);
-      fill(result, outcome(job, modes), modesCards(modes));
-      fill(reports, files(id, fault));
+      fill(result, outcome(modes), modesCards(modes));
+      fill(reports, job.status === "failed" ? null : link(to("change", { machine: job.machine }), "Change the tool", "button primary"), files(id, fault));
     } catch (error) {
       failed(fault, error);
       if (!(error instanceof Problem)) console.error(error);
@@ -106,11 +106,10 @@ export async function view({ id }, _query, place) {
   };
 }
 
-function outcome(job, modes) {
+function outcome(modes) {
   if (modes.status === "failed") return note("bad", h("strong", null, "Nothing was identified"), ...modes.reasons);
   return [
     modes.reasons.length ? note("doubt", h("strong", null, `The result is ${modes.status}`), ...modes.reasons) : null,
-    h("p", null, link(to("change", { machine: job.machine }), "Change the tool: lobes and best speeds", "button primary")),
   ];
 }
 

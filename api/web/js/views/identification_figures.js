@@ -1,25 +1,43 @@
 // What the charts of a running identification show.
-import { axis, colour, safe, SERIES } from "../charts.js";
+import { axis, colour, safe } from "../charts.js";
 import { factor, unit } from "../units.js";
 
-const ORDER = ["X", "Y"];
-const inkOf = (name, alpha = 1) => colour(SERIES[Math.max(0, ORDER.indexOf(name))], alpha);
+const INKS = { X: "s1", Y: "s2", both: "s3" };
+const inkOf = (name, alpha = 1) => colour(INKS[name] ?? "s4", alpha);
 
-/** Cost over seconds, an axis each; where a stage ends the line is marked. */
+/** Runs of one stage each: their costs are of different kinds, and are not joined. */
+function stagesOf(points) {
+  const found = [];
+  for (const point of points) {
+    if (found.at(-1)?.stage !== point.stage) found.push({ stage: point.stage, points: [] });
+    found.at(-1).points.push(point);
+  }
+  return found;
+}
+
+/** Misfit over seconds: every try as a point, the best so far of each stage as a line. */
 export function costFigure(trace) {
   const data = [];
-  for (const [name, points] of trace) {
+  const annotations = [];
+  for (const [name, all] of trace) {
     const ink = inkOf(name);
-    data.push({
-      x: points.map((p) => p.seconds), y: points.map((p) => p.cost), name, text: points.map((p) => safe(p.stage)), type: "scatter", mode: "lines", line: { color: ink, width: 2, shape: "hv" },
-      hovertemplate: `${name} %{y:.4~g}, %{text}<extra></extra>`,
-    });
-    const turns = points.filter((p, k) => k > 0 && p.stage !== points[k - 1].stage);
-    data.push({ x: turns.map((p) => p.seconds), y: turns.map((p) => p.cost), text: turns.map((p) => p.stage), type: "scatter", mode: "markers", marker: { color: ink, size: 8, symbol: "line-ns-open" }, hoverinfo: "skip" });
+    for (const { stage, points } of stagesOf(all)) {
+      // a stage that counts otherwise, below nothing too, has no place on this scale
+      const shown = points.filter((p) => p.cost > 0);
+      const common = { x: shown.map((p) => p.seconds), name, type: "scatter", hovertemplate: `${safe(name)}, ${safe(stage)} %{y:.4~g}<extra></extra>` };
+      let best = Infinity;
+      const lowest = shown.map((p) => (best = Math.min(best, p.cost)));
+      data.push({ ...common, y: shown.map((p) => p.cost), mode: "markers", marker: { color: inkOf(name, 0.45), size: 5 } });
+      data.push({ ...common, y: lowest, mode: "lines", line: { color: ink, width: 2.2, shape: "hv" }, hoverinfo: "skip", hovertemplate: undefined });
+      const length = points.at(-1).seconds - points[0].seconds;
+      if (length > 1.5 || stage === "search") {
+        annotations.push({ x: points[0].seconds, y: 1, yref: "paper", yanchor: "bottom", xanchor: "left", yshift: name === "Y" ? 0 : 15, text: safe(`${name}: ${stage}`), showarrow: false, font: { size: 11, color: ink } });
+      }
+    }
   }
   return {
-    data, layout: { hovermode: "closest", xaxis: axis("Time [s]", { rangemode: "tozero" }), yaxis: axis("Misfit", { type: "log", exponentformat: "e" }) },
-    say: `Misfit over time: ${[...trace].map(([name, points]) => `${name} now ${points.at(-1)?.cost.toPrecision(3)}`).join(", ")}.`,
+    data, layout: { hovermode: "closest", annotations, margin: { l: 56, r: 14, t: 40, b: 44 }, xaxis: axis("Time [s]", { rangemode: "tozero" }), yaxis: axis("Misfit", { type: "log", exponentformat: "e", dtick: 1 }) },
+    say: `Misfit over time: ${[...trace].map(([name, points]) => `${name}, ${points.at(-1)?.stage}, ${points.at(-1)?.cost.toPrecision(3)}`).join("; ")}.`,
   };
 }
 

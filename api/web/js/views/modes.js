@@ -21,12 +21,12 @@ export function modesCards(modes) {
         { name: "Mode", cell: (r) => [String(r.i + 1), within(r.mode, modes.band_hz) ? null : h("span", { class: "soft small" }, " outside")] },
         { name: "Frequency", unit: "Hz", number: true, cell: ({ mode }) => withSpread(mode.natural_frequency_hz, mode.natural_frequency_std_hz) },
         { name: "Damping", unit: "%", number: true, cell: ({ mode }) => withSpread(mode.damping_ratio, mode.damping_ratio_std, 100) },
-        { name: "Translation", unit: "√(s/kg)", number: true, cell: ({ mode }) => significant(size(mode.phi_t), 3) },
+        { name: "Translation", unit: "10⁻³ √(s/kg)", number: true, cell: ({ mode }) => significant(size(mode.phi_t) * 1e3, 3) },
       ], rows, { row: ({ mode }) => ({ class: within(mode, modes.band_hz) ? null : "soft" }) }),
       rows.some(({ mode }) => !within(mode, modes.band_hz)) ? h("p", { class: "small soft" }, `Outside: not in the band that the cuts excited, ${plain(modes.band_hz[0])} to ${plain(modes.band_hz[1])} Hz.`) : null,
       joint(found.joint));
   });
-  return h("div", { class: "view" }, cards, notes(modes));
+  return h("div", { class: "modes" }, cards, notes(modes));
 }
 
 function joint(values) {

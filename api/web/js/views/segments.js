@@ -5,7 +5,7 @@ import { quantityInput, u } from "../units.js";
 const COLUMNS = [
   ["length_mm", "Length", null],
   ["outer_diameter_mm", "Diameter", null],
-  ["end_diameter_mm", "Diameter at its end", "as the other"],
+  ["end_diameter_mm", "End diameter", "same"],
   ["inner_diameter_mm", "Bore", "none"],
 ];
 const MATERIALS = ["carbide", "steel", "aluminium"];
