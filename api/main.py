@@ -12,17 +12,36 @@ from fastapi.openapi.utils import get_openapi
 
 from api import problems
 from api.files import Files
+from api.jobs.crew import Crew
+from api.jobs.feeds import Feeds
 from api.observe import Observed
-from api.parts import Metrics, Parts, Rates
+from api.parts import JobCounts, Metrics, Parts, Rates
 from api.reading.reader import Limits, Reader, Reading
 from api.reading.uploads import Uploads
-from api.routes import campaigns, health, keys, machines, page, queries, recordings, resumed, together, toolings
+from api.routes import (
+    campaigns,
+    forces,
+    health,
+    identifications,
+    keys,
+    machines,
+    page,
+    queries,
+    recordings,
+    resumed,
+    streams,
+    together,
+    toolings,
+)
 from api.schemas.campaigns import NewCampaign
 from api.schemas.common import ProblemDocument
+from api.schemas.forces import ForceQuery, ForceUpload
 from api.security import HEADER
 from api.settings import Settings
 from api.stores.records import Store
 from api.stores.sql import open_store
+from api.streams.hub import Hub, StreamLimits
+from api.streams.process import Host, StreamProcess
 from api.work.pool import Pool, Work
 from rcsa_ident import __version__
 
@@ -31,14 +50,23 @@ _ABOUT = """Tooltip FRFs and stability lobes of any tooling on machines that wer
 Lengths are millimetres, speeds rev/min, coefficients MPa, receptances m/N. Errors are problem documents (RFC 9457)."""
 
 
-def create_app(settings: Settings, store: Store | None = None, work: Work | None = None, reader: Reading | None = None) -> FastAPI:
+def create_app(
+    settings: Settings,
+    store: Store | None = None,
+    work: Work | None = None,
+    reader: Reading | None = None,
+    host: Host | None = None,
+    crew: Crew | None = None,
+) -> FastAPI:
     """Return the service.
 
     Parameters
     ----------
     settings : Settings
-    store, work, reader : optional
+    store, work, reader, host : optional
         In place of the database and the processes that the settings name.
+    crew : Crew, optional
+        Who carries out jobs; without one they wait for workers that run elsewhere.
     """
     if store is None and not settings.database:
         settings.data.mkdir(parents=True, exist_ok=True)
@@ -49,16 +77,25 @@ def create_app(settings: Settings, store: Store | None = None, work: Work | None
     readers = Reader(limits, 2 * settings.uploads) if reader is None else reader
     uploads = Uploads(kept, files, readers, settings.uploads)
     rates, metrics = Rates(settings.requests_per_minute, settings.burst), Metrics(lambda: float(workers.waiting))
-    parts = Parts(settings, kept, workers, files, readers, uploads, rates, metrics)
+    hub = Hub(StreamProcess() if host is None else host, _stream_limits(settings), metrics)
+    metrics.streams.set_function(lambda: float(len(hub.sessions)))
+    parts = Parts(settings, kept, workers, files, readers, uploads, rates, metrics, hub, Feeds(kept.jobs, settings.watchers), crew)
+    metrics.registry.register(JobCounts(kept.jobs))
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         workers.start()
         readers.start()
+        await hub.start()
+        if crew is not None:
+            crew.start()
         attending = asyncio.create_task(uploads.attend())
         yield
+        await hub.stop()
         attending.cancel()
         await asyncio.gather(attending, return_exceptions=True)
+        if crew is not None:
+            await asyncio.to_thread(crew.stop)
         readers.stop()
         workers.stop()
         kept.close()
@@ -75,11 +112,15 @@ def create_app(settings: Settings, store: Store | None = None, work: Work | None
     problems.install(app)
     app.include_router(health.router)
     app.include_router(page.router)
-    for each in (keys, machines, toolings, campaigns, recordings, resumed, together, queries):
+    for each in (keys, machines, toolings, campaigns, recordings, resumed, together, queries, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(Observed, parts=parts)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
     return app
+
+
+def _stream_limits(settings: Settings) -> StreamLimits:
+    return StreamLimits(settings.streams, settings.streams_per_group, settings.stream_listeners, settings.stream_idle_seconds)
 
 
 def _openapi(app: FastAPI) -> dict[str, Any]:
@@ -88,7 +129,7 @@ def _openapi(app: FastAPI) -> dict[str, Any]:
         schema = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
         components = schema.setdefault("components", {})
         # bodies that a route reads itself, and the answer that every route may give
-        for model in (ProblemDocument, NewCampaign):
+        for model in (ProblemDocument, NewCampaign, ForceQuery, ForceUpload):
             described = model.model_json_schema(ref_template="#/components/schemas/{model}")
             components.setdefault("schemas", {}).update(described.pop("$defs"))
             components["schemas"][model.__name__] = described

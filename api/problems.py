@@ -45,11 +45,15 @@ def title(status: int) -> str:
 
 def document(request: Request, problem: Problem) -> JSONResponse:
     """Return a problem as the answer to a request."""
+    return JSONResponse(told(problem, getattr(request.state, "request_id", "")), problem.status, problem.headers, MEDIA_TYPE)
+
+
+def told(problem: Problem, request_id: str) -> dict[str, Any]:
+    """Return a problem as a document."""
     content: dict[str, Any] = {"type": "about:blank", "title": title(problem.status), "status": problem.status, "detail": problem.detail}
     if problem.errors:
         content["errors"] = problem.errors
-    content["request_id"] = getattr(request.state, "request_id", "")
-    return JSONResponse(content, problem.status, problem.headers, MEDIA_TYPE)
+    return content | {"request_id": request_id}
 
 
 def of_input(error: InputError) -> Problem:

@@ -15,6 +15,7 @@ from typing import Annotated, Any
 from fastapi import Depends, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
+from starlette.requests import HTTPConnection
 
 from api.parts import Parts, parts_of
 from api.problems import Problem
@@ -72,9 +73,15 @@ def hash_of(secret: str) -> str:
     return hashlib.sha256(secret.encode("utf-8", "replace")).hexdigest()
 
 
-def caller_of(request: Request, parts: Parts) -> Caller:
-    """Return who asks; without a key only where none is asked for."""
-    text = request.headers.get(HEADER, "")
+def caller_of(request: HTTPConnection, parts: Parts, given: str | None = None) -> Caller:
+    """Return who asks; without a key only where none is asked for.
+
+    Parameters
+    ----------
+    given : str, optional
+        A key that came otherwise than in the header: a page can set none on a WebSocket.
+    """
+    text = request.headers.get(HEADER, "") or given or ""
     if not text and not parts.settings.asks_for_keys:
         # a page from elsewhere may reach loopback through a name of its own
         if not _LOCAL_NAME.fullmatch(request.headers.get("host", "")):

@@ -5,8 +5,10 @@ from __future__ import annotations
 import logging
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from threading import Event
+from typing import Annotated, Any
 
 import typer
 
@@ -72,19 +74,65 @@ def create_key(
     typer.echo(text)
 
 
-def _run(settings: object) -> None:
-    import uvicorn
+@app.command("worker")
+def worker(
+    context: typer.Context,
+    count: Annotated[int | None, typer.Option(min=1, max=256, help="Processes (RCSA_IDENT_JOB_WORKERS).", show_default=False)] = None,
+) -> None:
+    """Carry out jobs of a service that runs elsewhere: with the same database, and the same folder for recordings."""
+    import signal
+    import threading
 
-    from api.main import create_app
+    from api.jobs.crew import Crew
+
+    settings = context.obj
+    _log()
+    crew = Crew(count or max(settings.job_workers, 1), job_worker, settings)
+    ended = threading.Event()
+    for each in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(each, lambda *_: ended.set())
+    crew.start()
+    ended.wait()
+    crew.stop()
+
+
+def job_worker(settings: Any, ready: Callable[[], None], stop: Event) -> None:
+    """Carry out jobs until told to stop: what each process for jobs does."""
+    from functools import partial
+
+    from api.files import Files
+    from api.jobs import identification, lobes
+    from api.jobs.durable import Durable
+    from api.jobs.worker import Carrier, JobWorker
+    from api.reading.campaigns import load_campaign
+    from api.stores.sql import open_store
+
+    _log()
+    store = open_store(settings.database_url)
+    load = partial(load_campaign, store, Files(settings.data / "files", settings.group_bytes, settings.free_bytes))
+    carriers: dict[str, Carrier] = {"identification": partial(identification.carry, load), "lobes": lobes.carry}
+    JobWorker(store.jobs, Durable(settings.engine_url), carriers, settings.job_attempts).run(ready, stop)
+
+
+def _log() -> None:
     from api.observe import JsonLines
-    from api.settings import Settings
 
-    assert isinstance(settings, Settings)
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(JsonLines())
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
+
+
+def _run(settings: object) -> None:
+    import uvicorn
+
+    from api.jobs.crew import Crew
+    from api.main import create_app
+    from api.settings import Settings
+
+    assert isinstance(settings, Settings)
+    _log()
     try:
-        service = create_app(settings)
+        service = create_app(settings, crew=Crew(settings.job_workers, job_worker, settings))
     except InputError as error:
         _fail(error)
     except OSError as error:
@@ -94,7 +142,10 @@ def _run(settings: object) -> None:
     log.info("starting", extra={"fields": told | {"address": f"http://{settings.host}:{settings.port}"}})
     if not settings.asks_for_keys:
         log.warning("no keys are asked for: everybody on this machine may do everything (RCSA_IDENT_KEYS=on asks for them)")
-    uvicorn.run(service, host=settings.host, port=settings.port, log_config=None, access_log=False, server_header=False)
+    # streams of events and forces would keep it from ending
+    # samples are noise to the last bits: packing them costs a core and gains nothing
+    limits: dict[str, Any] = {"timeout_graceful_shutdown": 3, "ws_per_message_deflate": False}
+    uvicorn.run(service, host=settings.host, port=settings.port, log_config=None, access_log=False, server_header=False, **limits)
 
 
 def _fail(error: InputError) -> None:

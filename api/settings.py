@@ -40,6 +40,12 @@ class Settings:
         Estimated work of one query; a longer one is refused.
     kept_machines : int
         Machines whose receptances each worker keeps.
+    streams, streams_per_group, stream_listeners : int
+        Force streams at once; of each, viewers beside its client.
+    stream_idle_seconds : float [s]
+        Without a sample, after which a stream ends.
+    stream_buffer_seconds : float [s]
+        Samples of a stream that may wait; older ones are dropped, and counted.
     max_upload_bytes : int
         Of one uploaded recording.
     uploads : int
@@ -58,6 +64,18 @@ class Settings:
         Of a core and by the clock, for reading one upload.
     reader_calls : int
         After which the process that reads uploads is replaced.
+    job_workers : int
+        Processes that carry out jobs beside the service; 0 where they run elsewhere.
+    job_queue : int
+        Jobs of a group that may wait or run.
+    job_attempts : int
+        Times that a job is taken up again without coming further before it is given up.
+    job_work_seconds : float [s]
+        Estimated work of lobes as a job; longer ones are refused.
+    watchers : int
+        Event streams of jobs at once.
+    watch_seconds : float [s]
+        After which such a stream ends; clients go on from its last event.
     """
 
     data: Path = field(default_factory=lambda: Path("rcsa-ident-data"))
@@ -72,6 +90,11 @@ class Settings:
     burst: int = 600
     work_seconds: float = 20.0
     kept_machines: int = 4
+    streams: int = 16
+    streams_per_group: int = 8
+    stream_listeners: int = 16
+    stream_idle_seconds: float = 30.0
+    stream_buffer_seconds: float = 15.0
     max_upload_bytes: int = 2000 * MEGABYTE
     uploads: int = 16
     group_bytes: int = 200_000 * MEGABYTE
@@ -83,14 +106,24 @@ class Settings:
     reader_seconds: float = 60.0
     reader_wall_seconds: float = 120.0
     reader_calls: int = 200
+    job_workers: int = 1
+    job_queue: int = 50
+    job_attempts: int = 10
+    job_work_seconds: float = 4.0 * 3600.0
+    watchers: int = 200
+    watch_seconds: float = 3600.0
 
     def __post_init__(self) -> None:
         for name, least, most in (
             ("port", 0, 65535), ("workers", 1, 256), ("queue", 0, 100_000), ("max_body_bytes", 1000, 10**9),
             ("requests_per_minute", 1, 10**9), ("burst", 1, 10**9), ("work_seconds", 0.1, 3600.0), ("kept_machines", 1, 1000),
+            ("streams", 0, 1000), ("streams_per_group", 0, 1000), ("stream_listeners", 0, 1000), ("stream_idle_seconds", 1.0, 3600.0),
+            ("stream_buffer_seconds", 6.0, 120.0),
             ("max_upload_bytes", 1000, 10**12), ("uploads", 1, 1000), ("group_bytes", 1000, 10**15), ("free_bytes", 0, 10**15),
             ("upload_seconds", 1.0, 10**6), ("upload_idle_seconds", 0.1, 3600.0), ("upload_bytes_per_second", 0, 10**9),
             ("reader_memory", 512, 10**6), ("reader_seconds", 0.1, 10**4), ("reader_wall_seconds", 0.1, 10**5), ("reader_calls", 1, 10**6),
+            ("job_workers", 0, 256), ("job_queue", 1, 10**6), ("job_attempts", 1, 1000), ("job_work_seconds", 1.0, 10**7),
+            ("watchers", 1, 10**5), ("watch_seconds", 0.1, 10**6),
         ):  # fmt: skip
             if not least <= getattr(self, name) <= most:
                 raise InputError(PREFIX + name.upper(), getattr(self, name), f"a number from {least:g} to {most:g}")
@@ -115,11 +148,18 @@ class Settings:
         """Where the store is."""
         return self.database or f"sqlite:///{self.data / 'service.db'}"
 
+    @property
+    def engine_url(self) -> str:
+        """Where the durable engine keeps what jobs remember."""
+        return self.database or f"sqlite:///{self.data / 'jobs.db'}"
+
 
 def from_environment(environment: Mapping[str, str]) -> Settings:
     """Return the settings of ``RCSA_IDENT_DATA``, ``RCSA_IDENT_PORT`` and so on; what is not there keeps its default."""
     readers: dict[str, Callable[[str], Any]] = {"data": Path, "database": str, "host": str, "keys": _switch, "work_seconds": float}
     readers |= dict.fromkeys(("upload_seconds", "upload_idle_seconds", "reader_seconds", "reader_wall_seconds"), float)
+    readers |= dict.fromkeys(("job_work_seconds", "watch_seconds"), float)
+    readers |= {"stream_idle_seconds": float, "stream_buffer_seconds": float}
     given: dict[str, Any] = {}
     for name in Settings.__dataclass_fields__:
         text = environment.get(PREFIX + name.upper(), "").strip()

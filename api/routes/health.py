@@ -31,6 +31,8 @@ def ready(parts: ThisService) -> State:
     parts.store.check()
     if not parts.work.ready:
         raise Problem(503, "workers are starting", headers={"Retry-After": "2"})
+    if parts.crew is not None and not parts.crew.ready:
+        raise Problem(503, "no worker for jobs is alive: those that are accepted wait", headers={"Retry-After": "5"})
     return State(status="ok")
 
 
@@ -40,5 +42,5 @@ def ready(parts: ThisService) -> State:
     response_class=Response,
     responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}, "description": "Counters since the start."}},
 )
-async def metrics(parts: ThisService) -> Response:
+def metrics(parts: ThisService) -> Response:
     return Response(generate_latest(parts.metrics.registry), media_type=CONTENT_TYPE_LATEST)

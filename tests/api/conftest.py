@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,9 +18,11 @@ from api.security import make_key
 from api.settings import Settings
 from api.stores.records import Store
 from api.stores.sql import open_store
+from api.streams.engine import HEADER, Engine, Message
 from api.work.pool import guarded
 from rcsa_ident.io.identifications import identification_to_json
 from rcsa_ident.io.results import layout, plain
+from tests.api.postgres import postgres, postgres_server  # noqa: F401  (fixtures)
 from tests.cli import by_hand
 
 URL = "http://localhost"
@@ -40,6 +43,34 @@ class Here:
         pass
 
 
+class Near:
+    """The engine of the streams in this very process; what it is sent waits while it is `slow`."""
+
+    def __init__(self) -> None:
+        self.engine, self.ready, self.slow = Engine(), True, False
+        self.waiting: list[Message] = []
+
+    async def start(self, deliver: Any, anew: Any) -> None:
+        self.deliver, self.anew = deliver, anew
+
+    async def stop(self) -> None:
+        pass
+
+    def post(self, message: Message) -> None:
+        self.waiting.append(message)
+        if not self.slow:
+            asyncio.get_running_loop().call_soon(self.work)
+
+    def work(self) -> None:
+        """Answer what waits, as its bytes tell it."""
+        while self.waiting:
+            raw = self.waiting.pop(0).packed()
+            *fields, length = HEADER.unpack_from(raw)
+            answer = self.engine.answer(Message(*fields, raw[HEADER.size : HEADER.size + length]))
+            if answer is not None:
+                self.deliver(answer)
+
+
 def result_text(folder: Path, softening: bool = False, **changed: Any) -> str:
     """RESULT.json of a machine made by hand."""
     data = identification_to_json(by_hand.identification(softening), by_hand.campaign(folder), by_hand.LEFT_OUT)
@@ -51,21 +82,34 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> str:
     return result_text(tmp_path_factory.mktemp("result"))
 
 
+SQLITE, POSTGRESQL = "sqlite", "postgresql"
+#: For tests of what both databases promise.
+BOTH = pytest.mark.parametrize("store", [SQLITE, POSTGRESQL], indirect=True)
+
+
+def database(request: pytest.FixtureRequest, kind: str, folder: Path) -> str:
+    """The URL of a new database."""
+    url: str = request.getfixturevalue("postgres")() if kind == POSTGRESQL else f"sqlite:///{folder / 'store.db'}"
+    return url
+
+
 def embedded(folder: Path) -> Store:
     """A store in a folder."""
     return open_store(f"sqlite:///{folder / 'store.db'}")
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    """An embedded one."""
-    found = embedded(tmp_path)
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Store]:
+    """An embedded one, or one on PostgreSQL where a test's parameters say so."""
+    found = open_store(database(request, getattr(request, "param", SQLITE), tmp_path))
     yield found
     found.close()
 
 
 def service(store: Store, tmp_path: Path, **settings: Any) -> TestClient:
-    return TestClient(create_app(Settings(data=tmp_path, **settings), store, Here(), Here()), base_url=URL, raise_server_exceptions=False)
+    return TestClient(
+        create_app(Settings(data=tmp_path, **settings), store, Here(), Here(), Near()), base_url=URL, raise_server_exceptions=False
+    )
 
 
 @pytest.fixture

@@ -1,0 +1,123 @@
+"""Forces of a recording: one that comes with the query, or one of a campaign."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import AsyncIterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import FileResponse
+from starlette.background import BackgroundTask
+
+from api.parts import Parts, ThisService
+from api.problems import Problem
+from api.reading.calls import Upload
+from api.reading.declared import FORMATS
+from api.reading.plain import read_plain
+from api.reading.uploads import Received
+from api.routes.common import BODY, guard, problems
+from api.routes.forms import FORM, form
+from api.routes.machines import known_machine
+from api.routes.openings import given_sensors, reader, uploaded
+from api.routes.queries import tooling_text
+from api.schemas.common import body_of
+from api.schemas.forces import ForceAnswer, ForceQuery, ForceUpload
+from api.security import Guarded, WhoAsks
+from api.work.forces import ForceQuestion, ReadBoth, forces, sensors_of
+from api.work.questions import MachineText, ToolingText
+from rcsa_ident.errors import InputError
+from rcsa_ident.signals.recording import Sensor
+
+router = APIRouter(tags=["forces"], route_class=Guarded)
+CSV, JSON = "text/csv", "application/json"
+_BODY = {
+    "required": True,
+    "content": {
+        JSON: {"schema": {"$ref": "#/components/schemas/ForceQuery"}},
+        FORM: {
+            "schema": {
+                "type": "object",
+                "required": ["query", "recording"],
+                "properties": {
+                    "query": {"$ref": "#/components/schemas/ForceUpload"},
+                    "recording": {"type": "string", "format": "binary", "description": "Its file name's suffix says the format."},
+                    "air": {"type": "string", "format": "binary", "description": "Of an air cut with the same clamping and speed."},
+                },
+                "additionalProperties": False,
+            },
+            "encoding": {"query": {"contentType": JSON}},
+        },
+    },
+}
+
+
+@router.post(
+    "/forces",
+    summary="Forces of a recording; Accept: text/csv for FORCES.csv",
+    description="Either a form with the recording, or JSON that names one of a campaign. Without an air cut run-out stays in the forces.",
+    openapi_extra=guard("run", requestBody=_BODY, **{"x-content-types": (JSON, FORM)}),
+    response_model=ForceAnswer,
+    responses={200: {"description": "Forces.", "content": {CSV: {"schema": {"type": "string"}}}}, **problems(404, 408, *BODY)},
+)
+async def estimate(request: Request, parts: ThisService, caller: WhoAsks) -> Any:
+    csv = CSV in request.headers.get("accept", "")
+    if request.headers["content-type"].split(";")[0].strip().lower() == JSON:
+        query = body_of(ForceQuery, await request.body())
+        return await _answered(parts, caller.group, *await run_in_threadpool(_of_campaign, parts, caller.group, query), csv)
+    with parts.uploads.admitted():
+        async with form(request, parts, caller.group, ("query",), ("recording", "air")) as (texts, files):
+            missing = "query" if "query" not in texts else "recording" if "recording" not in files else ""
+            if missing:
+                raise Problem(422, f"the form has no {missing}", [{"field": missing, "found": "nothing", "allowed": "a part of this name"}])
+            upload = body_of(ForceUpload, texts["query"])
+            machine, tooling, question, sensors = await run_in_threadpool(_of_upload, parts, caller.group, upload)
+            async with _read(parts, caller.group, files, sensors, upload.sampling_rate_hz) as source:
+                return await _answered(parts, caller.group, machine, tooling, question, source, csv)
+
+
+def _of_campaign(parts: Parts, group: str, query: ForceQuery) -> tuple[MachineText, ToolingText, ForceQuestion, ReadBoth]:
+    found = uploaded(parts, group, query.campaign, query.recording)
+    tooling = found.tooling if query.tooling is None else tooling_text(parts, group, query.tooling)
+    return known_machine(parts, group, query.machine), tooling, query.question(found.speed), reader(found.cut, found.air)
+
+
+def _of_upload(parts: Parts, group: str, upload: ForceUpload) -> tuple[MachineText, ToolingText, ForceQuestion, tuple[Sensor, ...]]:
+    machine = known_machine(parts, group, upload.machine)
+    sensors = given_sensors(upload.sensors) or sensors_of(machine.text)
+    return machine, tooling_text(parts, group, upload.tooling), upload.question(), sensors
+
+
+@contextlib.asynccontextmanager
+async def _read(
+    parts: Parts, group: str, files: Mapping[str, tuple[str, Received]], sensors: tuple[Sensor, ...], rate: float | None
+) -> AsyncIterator[ReadBoth]:
+    """What reads the samples of a form's files, which the reader process has taken from them; nothing is kept."""
+    targets: dict[str, Path] = {}
+    try:
+        for name, (file, received) in files.items():
+            if not file.lower().endswith(FORMATS):
+                raise InputError(name, file[-80:], f"a file that ends in one of {', '.join(FORMATS)}")
+            targets[name] = await run_in_threadpool(parts.files.spare, group)
+            await parts.reader.run(read_plain, Upload(received.path, file, targets[name]), sensors, rate)
+        yield reader(targets["recording"], targets.get("air"))
+    finally:
+        for path in targets.values():
+            path.unlink(missing_ok=True)
+
+
+async def _answered(
+    parts: Parts, group: str, machine: MachineText, tooling: ToolingText, question: ForceQuestion, source: ReadBoth, csv: bool
+) -> Any:
+    if not csv:
+        return ForceAnswer.model_validate(await parts.work.run(forces, machine, tooling, question, source))
+    path: Path = await run_in_threadpool(parts.files.spare, group)
+    try:
+        await parts.work.run(forces, machine, tooling, question, source, path)
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
+    name: Response = FileResponse(path, media_type=CSV, filename="FORCES.csv", background=BackgroundTask(path.unlink, missing_ok=True))
+    return name
