@@ -64,7 +64,7 @@ export function open(hello, on) {
   socket.onmessage = ({ data }) => {
     if (typeof data !== "string") return on.forces(data);
     const event = JSON.parse(data);
-    if (event.detail) reason = event.detail;
+    if (event.event === "problem") reason = event.problem.detail;
     return on.told(event);
   };
   socket.onclose = (event) => on.over(event.code === 1000 ? "" : reason || event.reason || "the connection was lost");

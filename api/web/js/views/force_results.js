@@ -41,7 +41,7 @@ function timeFigure(found, axes) {
 function linesFigure(found) {
   const times = factor("force");
   const data = Object.entries(found.harmonics).map(([name, rows], k) => ({
-    x: rows.map((r) => r.order), y: rows.map((r) => r.amplitude_n * times), text: rows.map((r) => `${plain(r.frequency_hz)} Hz`), type: "bar", marker: { color: colour(SERIES[k]) }, name: safe(name),
+    x: rows.map((r) => r.order), y: rows.map((r) => r.amplitude_n * times), text: rows.map((r) => `${plain(r.frequency_hz)} Hz`), type: "bar", textposition: "none", marker: { color: colour(SERIES[k]) }, name: safe(name),
     hovertemplate: `F${name.toLowerCase()} %{y:.3~g} ${unit("force")}, %{text}<extra></extra>`,
   }));
   return { data, layout: { barmode: "group", xaxis: axis("Multiple of the spindle's frequency"), yaxis: axis(`Amplitude [${unit("force")}]`, { rangemode: "tozero" }) } };

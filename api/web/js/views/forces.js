@@ -53,7 +53,7 @@ export async function view(_args, query, place) {
     const how = method();
     const smooth = h("input", { type: "checkbox", id: "smooth", checked: true });
     const button = h("button", { class: "primary" }, "Show forces");
-    const form = h("form", { class: "card", novalidate: true }, h("h2", null, "A recording of a campaign"), h("div", { class: "fields" }, picker.fields, field("Observer", how, { name: "method" })),
+    const form = h("form", { class: "card", novalidate: true }, h("h2", null, "A recording of a campaign"), h("div", { class: "fields broad" }, picker.fields, field("Observer", how, { name: "method" })),
       h("label", { class: "check", for: "smooth" }, smooth, "each sample given the whole record (a live one knows its past only)"), h("p", null, button));
     form.addEventListener("submit", busy(button, () => {
       remember("forces", { campaign: picker.which.value, recording: picker.recording.value, method: how.value });
@@ -89,7 +89,7 @@ function uploadForm(here, toolings, method, asked) {
   const rate = quantity("Sampling rate", "hertz", null, { name: "sampling_rate_hz", hint: "For files that carry none" });
   const button = h("button", null, "Upload and show");
   const form = h("form", { class: "card", novalidate: true }, h("h2", null, "A file"),
-    h("div", { class: "fields" }, field("Recording", recording, { name: "recording" }), field("In the air", air, { name: "air", hint: "Gives the run-out; may be left out" }), field("Tooling", tooling, { name: "tooling" }), speed, rate, field("Observer", method, { name: "method" })), h("p", null, button));
+    h("div", { class: "fields broad" }, field("Recording", recording, { name: "recording" }), field("In the air", air, { name: "air", hint: "Gives the run-out; may be left out" }), field("Tooling", tooling, { name: "tooling" }), speed, rate, field("Observer", method, { name: "method" })), h("p", null, button));
   form.addEventListener("submit", busy(button, () => {
     const file = recording.files[0];
     if (!file) return showProblem(form, problemOf(0, JSON.stringify({ detail: "no file", errors: [{ field: "recording", found: "nothing", allowed: "A recording is needed" }] })));

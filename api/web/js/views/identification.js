@@ -48,6 +48,7 @@ export async function view({ id }, _query, place) {
     if (!going) clearInterval(clock);
   }
 
+  let over = false;
   let due = new Set();
   let timer = null;
   function redraw(which) {
@@ -58,7 +59,7 @@ export async function view({ id }, _query, place) {
       const now = due;
       due = new Set();
       if (now.has("cost")) cost.draw(() => costFigure(trace));
-      if (now.has("fit")) fit.draw(() => fitFigure(fits));
+      if (now.has("fit") && !over) fit.draw(() => fitFigure(fits));
     }, 250);
   }
 
@@ -90,6 +91,7 @@ export async function view({ id }, _query, place) {
       if (!trace.size) costCard.hidden = true;
       if (job.state !== "done") return;
       const [modes, frf] = await Promise.all([get(`identifications/${id}/modes`), get(`identifications/${id}/frf`)]);
+      over = true;
       fit.draw(() => fitFigure(measured(frf)));
       if (job.status !== "failed") await allMachines(true);
       fill(result, outcome(modes), modesCards(modes));

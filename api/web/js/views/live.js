@@ -16,7 +16,7 @@ export async function view(_args, query, place) {
   const here = await ground(place, "Live forces");
   if (!here) return undefined;
   const picker = await recordingPicker(here, query, { air: true });
-  const rate = select([["0.25", "a quarter as fast"], ["1", "as recorded"], ["4", "four times as fast"]], "1");
+  const rate = select([["0.1", "ten times slower"], ["0.25", "four times slower"], ["1", "as recorded"], ["4", "four times faster"]], query.get("rate") ?? "1");
   const streams = h("div");
   const stop = h("button", { type: "button", hidden: true }, "Stop");
   const freeze = h("button", { type: "button", hidden: true, "aria-pressed": "false" }, "Hold the picture");
@@ -27,7 +27,7 @@ export async function view(_args, query, place) {
   const screen = h("section", { class: "card", hidden: true }, h("header", null, h("h2", null, "Force now"), h("span", { class: "row-of-buttons" }, freeze, stop)), board, keys, chartBox);
   const play = h("button", { class: "primary" }, "Play");
   const form = h("form", { class: "card", novalidate: true }, h("h2", null, "Play a recording as if it were live"),
-    picker.any ? h("div", { class: "fields" }, picker.fields, field("Speed of playing", rate)) : empty("No recordings yet", "Upload a campaign, or connect a data logger.", link(to("recordings"), "To the recordings", "button")), picker.any ? h("p", null, play) : null);
+    picker.any ? h("div", { class: "fields broad" }, picker.fields, field("Speed of playing", rate)) : empty("No recordings yet", "Upload a campaign, or connect a data logger.", link(to("recordings"), "To the recordings", "button")), picker.any ? h("p", null, play) : null);
   add(place, head("Live forces", here.name, tabs("forces/live")), fault, screen, h("div", { class: "columns" }, streams, form));
 
   let close = null;
@@ -43,21 +43,22 @@ export async function view(_args, query, place) {
     const uPlot = await uplot();
     let data = null;
     let dirty = false;
+    const seconds = SECONDS * Math.min(1, hello.replay?.rate ?? 1);
     const told = (event) => {
       if (event.event === "ready") {
         const bucket = event.envelope ?? hello.envelope;
-        data = new Window(event.axes, event.sampling_rate_hz, bucket, SECONDS);
+        data = new Window(event.axes, event.sampling_rate_hz, bucket, seconds);
         fill(keys, legend(event.axes.map((a, k) => ({ name: `F${a.toLowerCase()}`, series: SERIES[k] }))));
         plot?.destroy();
         plot = chartOf(uPlot, chartBox, event.axes, () => data);
-      } else if (event.event === "status") fill(board, status(event, about));
+      } else if (event.event === "status" || event.event === "end") fill(board, status(event, about));
+      else if (event.event === "settling" || event.event === "restarted") fill(fault, note("doubt", event.detail));
     };
     const draw = () => {
       frames = requestAnimationFrame(draw);
       if (!dirty || held || !plot || document.hidden) return;
       dirty = false;
-      plot.setData(data.columns(factor("force")), false);
-      plot.setScale("x", { min: data.last - SECONDS, max: data.last });
+      plot.show(data.columns(factor("force")), data.last - seconds, data.last);
     };
     frames = requestAnimationFrame(draw);
     close = open(hello, {
@@ -162,11 +163,12 @@ function chartOf(uPlot, box, axes, data) {
   const observer = new ResizeObserver(() => plot.setSize({ width: box.clientWidth, height: box.clientHeight }));
   observer.observe(box);
   return {
-    setData: (columns, scales) => {
-      plot.setData(columns, scales);
-      plot.setScale("y", { min: Math.min(...reach(columns, 1)), max: Math.max(...reach(columns, 2)) });
-    },
-    setScale: (key, range) => plot.setScale(key, range),
+    // all at once: one picture a frame
+    show: (columns, from, to) => plot.batch(() => {
+      plot.setData(columns, false);
+      plot.setScale("x", { min: from, max: to });
+      plot.setScale("y", reach(columns));
+    }),
     repaint: make,
     destroy: () => {
       observer.disconnect();
@@ -175,9 +177,11 @@ function chartOf(uPlot, box, axes, data) {
   };
 }
 
-/** Extremes with a little room, of every second column from the given one. */
-function reach(columns, from) {
-  const found = [0];
-  for (let c = from; c < columns.length; c += 2) for (const v of columns[c]) if (v !== null && Number.isFinite(v)) found.push(v * 1.08);
-  return [found.reduce((a, b) => Math.min(a, b)), found.reduce((a, b) => Math.max(a, b))];
+/** A range for all columns behind the first; the few moments in which an observer finds its feet do not set it. */
+function reach(columns) {
+  const values = Float64Array.from(columns.slice(1).flat().filter((v) => v !== null && !Number.isNaN(v))).sort();
+  if (!values.length) return { min: -1, max: 1 };
+  const [low, high] = [0.01, 0.99].map((share) => values[Math.round(share * (values.length - 1))]);
+  const room = 0.25 * (high - low) + 1e-3;
+  return { min: low - room, max: high + room };
 }
