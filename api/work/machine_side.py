@@ -8,26 +8,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.coupling._kernels import tip_changes, tips_over
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.identification.posterior import MachineAxis, spread
 from rcsa_ident.tool_holder.geometry import ToolAssembly, stiffened
-from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.tool_holder.model import tool_holder_poles
 from rcsa_ident.workflows.limits import Limits
 from rcsa_ident.workflows.lobes import LobeConditions, drawn_limits, tooling_lobes
 from rcsa_ident.workflows.tip import TooltipResponse
 
+Places = NDArray[np.intp]
 #: Largest change of a tip receptance between two nodes of the drawn machines, as a share; quintics go through six nodes.
-CHANGE = 0.05
+CHANGE = 0.065
 #: Widest distance of two such nodes, in lines, and how much it grows from line to line.
 WIDEST, GROWTH = 16.0, 0.1
+#: Of a tool-holder's receptances (translation and slope of the tip, then of the flange): tip, tip over flange, flange over tip, flange.
+_ENTRIES = ((0, 0), (0, 2), (0, 3), (2, 0), (3, 0), (2, 2), (2, 3), (3, 2), (3, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,8 +41,9 @@ class AxisSide:
     Parameters
     ----------
     nominal : complex array, shape (3, n)
-    ahead, behind : complex array, shape (p, 3, n)
-        At both ends of a step along each direction of the posterior; none without one.
+    ahead, behind : complex array, shape (n, p, 3)
+        At both ends of a step along each direction of the posterior; none without one. Asked for at some frequencies, all directions
+        of each: so they stand together in memory.
     weight : array, shape (p,)
         One standard deviation over the distance of both ends.
     rivals : complex array, shape (r, 3, n)
@@ -66,9 +71,9 @@ def axis_side(part: MachineAxis, axis: Dof, omega: FloatArray, bands: bool) -> A
         return np.stack([b33[:, 0, 0] + compliance[:, 0], 0.5 * (b33[:, 0, 1] + b33[:, 1, 0]), b33[:, 1, 1] + compliance[:, 1]])
 
     nominal = interface(*part.at(axis, None))
-    none = np.zeros((0, 3, omega.size), dtype=complex)
     if not bands or part.posterior is None:
-        return AxisSide(nominal, none, none, np.zeros(0), none, False)
+        none = np.zeros((omega.size, 0, 3), dtype=complex)
+        return AxisSide(nominal, none, none, np.zeros(0), np.zeros((0, 3, omega.size), dtype=complex), False)
     seen: list[ComplexArray] = []
 
     def record(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
@@ -81,7 +86,8 @@ def axis_side(part: MachineAxis, axis: Dof, omega: FloatArray, bands: bool) -> A
     steps = (len(seen) - 1 - rivals) // 2
     ends = np.array(seen[: 2 * steps]).reshape(steps, 2, 3, omega.size)
     last = np.array(seen[2 * steps + 1 :]).reshape(rivals, 3, omega.size)
-    return AxisSide(nominal, ends[:, 0].copy(), ends[:, 1].copy(), slopes[:steps], last, True)
+    ahead, behind = (np.ascontiguousarray(ends[:, k].transpose(2, 0, 1)) for k in (0, 1))
+    return AxisSide(nominal, ahead, behind, slopes[:steps], last, True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,7 +113,7 @@ class MachineSide:
         """Return the tip's response, as `workflows.tip.tooltip` does."""
         holder = _Holder(assembly, self.omega)
         tips = {axis: holder.tip(side.nominal) for axis, side in self.axes.items()}
-        return self._with_spread(tips, holder, assembly, slice(None), bands, stiffness_spread)
+        return self._with_spread(tips, holder, assembly, np.arange(self.omega.size), bands, stiffness_spread)
 
     def limits(self, assembly: ToolAssembly, conditions: LobeConditions, draws: int, stiffness_spread: float, seed: int = 1) -> Limits:
         """Return the limits by the zero-order method, as `workflows.limits.machine_limits` does.
@@ -129,17 +135,16 @@ class MachineSide:
         return Limits(found, conditions.max_depth, drawn_limits(response, conditions, draws, seed))
 
     def _with_spread(
-        self, tips: Mapping[Dof, ComplexArray], holder: _Holder, assembly: ToolAssembly, nodes: Any, bands: bool, stiffness_spread: float
+        self, tips: Mapping[Dof, ComplexArray], holder: _Holder, assembly: ToolAssembly, nodes: Places, bands: bool, stiffness_spread: float
     ) -> TooltipResponse:
         omega = self.omega[nodes]
         stiffer = _Holder(stiffened(assembly, stiffness_spread), omega) if bands and stiffness_spread > 0.0 else None
         changes = {}
         for axis, side in self.axes.items():
             if bands and side.known:
-                steps = holder.tip(side.ahead[..., nodes]) - holder.tip(side.behind[..., nodes])
-                rows = [side.weight[:, None] * steps, holder.tip(side.rivals[..., nodes]) - tips[axis]]
+                rows = [holder.changes(side, nodes), holder.tip(side.rivals, nodes) - tips[axis]]
                 if stiffer is not None:
-                    rows.append((stiffer.tip(side.nominal[:, nodes]) - tips[axis])[None])
+                    rows.append((stiffer.tip(side.nominal, nodes) - tips[axis])[None])
                 changes[axis] = np.concatenate(rows)
         return TooltipResponse(_receptances(omega, tips), changes)
 
@@ -148,26 +153,30 @@ class _Holder:
     """The tool-holder's receptances between tip and flange; C11 = A11 - A12 (A22 + W)^-1 A21 with a 2 x 2 inverse in closed form."""
 
     def __init__(self, assembly: ToolAssembly, omega: FloatArray) -> None:
-        free = tool_holder_receptance(assembly, omega)
-        to, back, flange = free["tip", "flange"][:, 0, :], free["flange", "tip"][:, :, 0], free["flange", "flange"]
-        self.tip_tip = free["tip", "tip"][:, 0, 0].copy()
-        self.flange = np.stack([flange[:, 0, 0], 0.5 * (flange[:, 0, 1] + flange[:, 1, 0]), flange[:, 1, 1]])
-        self.carried = np.stack([to[:, 0] * back[:, 0], to[:, 0] * back[:, 1] + to[:, 1] * back[:, 0], to[:, 1] * back[:, 1]])
+        free = tool_holder_poles(assembly, float(omega[-1])).entries(omega, _ENTRIES)
+        to, back = free[1:3], free[3:5]
+        self.tip_tip, self.flange = free[0].copy(), np.stack([free[5], 0.5 * (free[6] + free[7]), free[8]])
+        self.carried = np.stack([to[0] * back[0], to[0] * back[1] + to[1] * back[0], to[1] * back[1]])
 
-    def at(self, nodes: Any) -> _Holder:
+    def at(self, nodes: Places) -> _Holder:
         """Return the same at some of the frequencies."""
         part = object.__new__(_Holder)
         part.tip_tip, part.flange, part.carried = self.tip_tip[nodes], self.flange[:, nodes], self.carried[:, nodes]
         return part
 
-    def tip(self, behind: ComplexArray) -> ComplexArray:
-        """Return the tip-tip receptance for W, shape (..., 3, n) -> (..., n)."""
-        t, b, s = (behind[..., k, :] + self.flange[k] for k in range(3))
-        weighed = self.carried[0] * s - self.carried[1] * b + self.carried[2] * t
-        return self.tip_tip - weighed / (t * s - b * b)
+    def tip(self, behind: ComplexArray, nodes: Places | None = None) -> ComplexArray:
+        """Return the tip-tip receptance for W, shape (..., 3, n) -> (..., k), of the nodes alone where this holder stands at these."""
+        kept = np.ascontiguousarray(behind if nodes is None else behind[..., nodes])
+        found: ComplexArray = tips_over(self.tip_tip, self.flange, self.carried, kept.reshape(-1, *kept.shape[-2:]))
+        return found.reshape(*kept.shape[:-2], kept.shape[-1])
+
+    def changes(self, side: AxisSide, nodes: Places) -> ComplexArray:
+        """Return the tip-tip receptance's change along each direction of the posterior, shape (p, k)."""
+        found: ComplexArray = tip_changes(self.tip_tip, self.flange, self.carried, side.ahead, side.behind, side.weight, nodes)
+        return found
 
 
-def nodes_of(curves: Sequence[ComplexArray]) -> np.ndarray:
+def nodes_of(curves: Sequence[ComplexArray]) -> Places:
     """Return places between whose neighbours no curve changes by more than `CHANGE`, first and last among them."""
     step = np.zeros(curves[0].size - 1)
     for curve in curves:

@@ -26,6 +26,21 @@ def pole_sum(omega, pole, residue):
 
 
 @numba.njit(cache=True)
+def add_banded(total, band, x):
+    """Add to `total`, in place, the product of a banded matrix with x, shapes (d, k), (2 h + 1, d), (d, k).
+
+    Entry (i, j) of the matrix is band[h + i - j, j].
+    """
+    half, d = band.shape[0] // 2, band.shape[1]
+    for i in range(d):
+        for j in range(max(i - half, 0), min(i + half + 1, d)):
+            factor = band[half + i - j, j]
+            if factor != 0.0:
+                for c in range(x.shape[1]):
+                    total[i, c] += factor * x[j, c]
+
+
+@numba.njit(cache=True)
 def independent_columns(columns, tolerance):
     """Return an orthonormal basis of the columns, shape (d, m) -> (d, k), largest remainder first.
 

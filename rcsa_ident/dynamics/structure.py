@@ -9,7 +9,7 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.dynamics._kernels import independent_columns
+from rcsa_ident.dynamics._kernels import add_banded, independent_columns
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.modal import PoleModel
 from rcsa_ident.dynamics.receptance import Receptance
@@ -79,11 +79,8 @@ class _Bands:
 
     def times(self, band: ComplexArray, x: np.ndarray) -> np.ndarray:
         """Return the product of one of the matrices with x, shape (d, k)."""
-        d = x.shape[0]
         total = np.zeros(x.shape, dtype=np.result_type(band, x))
-        for offset in range(-self.half, self.half + 1):
-            i, j = max(offset, 0), max(-offset, 0)
-            total[i : d - j] += band[self.half + offset, j : d - i, None] * x[j : d - i]
+        add_banded(total, np.ascontiguousarray(band), np.ascontiguousarray(x))
         return total
 
 

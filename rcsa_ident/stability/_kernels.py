@@ -13,20 +13,40 @@ import numpy as np
 
 
 @numba.njit(cache=True)
-def between_nodes(omega, trace, determinant, k, w):
+def node_weights(omega):
+    """Return barycentric weights of the nodes around each interval, shape (n - 1, 6): omega[k - 2] to omega[k + 3], fewer at the ends."""
+    n = omega.size
+    weights = np.zeros((n - 1, 6))
+    for k in range(n - 1):
+        first, last = max(k - 2, 0), min(k + 3, n - 1)
+        # in intervals, so that no product leaves the range of numbers
+        scale = 1.0 / (omega[k + 1] - omega[k])
+        for i in range(first, last + 1):
+            below = 1.0
+            for j in range(first, last + 1):
+                if j != i:
+                    below *= (omega[i] - omega[j]) * scale
+            weights[k, i - k + 2] = 1.0 / below
+    return weights
+
+
+@numba.njit(cache=True)
+def between_nodes(omega, trace, determinant, weights, k, w):
     """Return trace and determinant at w in [omega[k], omega[k+1]], on the quintic through six nodes (fewer at the ends)."""
-    first = max(k - 2, 0)
-    last = min(k + 3, omega.size - 1)
-    t, d = 0.0 + 0.0j, 0.0 + 0.0j
-    for i in range(first, last + 1):
-        above, below = 1.0, 1.0
-        for j in range(first, last + 1):
-            if j != i:
-                above *= w - omega[j]
-                below *= omega[i] - omega[j]
-        t += above / below * trace[i]
-        d += above / below * determinant[i]
-    return t, d
+    total = 0.0
+    t_real, t_imag, d_real, d_imag = 0.0, 0.0, 0.0, 0.0
+    for i in range(max(k - 2, 0), min(k + 4, omega.size)):
+        gap = w - omega[i]
+        if gap == 0.0:
+            return trace[i], determinant[i]
+        share = weights[k, i - k + 2] / gap
+        total += share
+        # by parts: a product with a complex number would make the share complex first
+        t_real += share * trace[i].real
+        t_imag += share * trace[i].imag
+        d_real += share * determinant[i].real
+        d_imag += share * determinant[i].imag
+    return complex(t_real / total, t_imag / total), complex(d_real / total, d_imag / total)
 
 
 @numba.njit(cache=True)
@@ -39,10 +59,10 @@ def nearest_root(trace, determinant, guess):
 
 
 @numba.njit(cache=True)
-def eigenvalue_at(omega, trace, determinant, root, sign, k, w):
+def eigenvalue_at(omega, trace, determinant, weights, root, sign, k, w):
     """Return the eigenvalue on one branch at w in [omega[k], omega[k+1]]; root[k], root[k+1] tell the branch."""
     x = (w - omega[k]) / (omega[k + 1] - omega[k])
-    t, d = between_nodes(omega, trace, determinant, k, w)
+    t, d = between_nodes(omega, trace, determinant, weights, k, w)
     return 0.5 * t + sign * nearest_root(t, d, (1.0 - x) * root[k] + x * root[k + 1])
 
 
@@ -61,7 +81,7 @@ def roots_along(trace, determinant):
 @numba.njit(cache=True)
 def largest_real_part(omega, trace, determinant):
     """Return the largest Re mu over both branches and all frequencies, and its frequency."""
-    root = roots_along(trace, determinant)
+    root, weights = roots_along(trace, determinant), node_weights(omega)
     best, place = -np.inf, omega[0]
     for sign in (1.0, -1.0):
         peak = 0
@@ -74,8 +94,8 @@ def largest_real_part(omega, trace, determinant):
             low, high = omega[k], omega[k + 1]
             for _ in range(40):
                 third = (high - low) / 3.0
-                left = eigenvalue_at(omega, trace, determinant, root, sign, k, low + third).real
-                right = eigenvalue_at(omega, trace, determinant, root, sign, k, high - third).real
+                left = eigenvalue_at(omega, trace, determinant, weights, root, sign, k, low + third).real
+                right = eigenvalue_at(omega, trace, determinant, weights, root, sign, k, high - third).real
                 if left < right:
                     low += third
                 else:
@@ -99,18 +119,22 @@ def phase_steps(trace, root, sign):
         # where one direction is rigid an eigenvalue is zero up to rounding
         if abs(mu[k]) < 1e-12 * abs(trace[k]):
             mu[k] = 0.0
+    # a node with a positive real part ends one interval and starts the next at the same angle
+    for k in range(n):
+        if mu[k].real > 0.0:
+            angle = math.atan2(mu[k].real, -mu[k].imag)
+            if k > 0:
+                end[k - 1] = angle
+            if k < n - 1:
+                start[k] = angle
     for k in range(n - 1):
-        one, two = mu[k], mu[k + 1]
-        if one.real <= 0.0 and two.real <= 0.0:
-            continue
-        step = two * one.conjugate()
-        turn = math.atan2(step.imag, step.real)
-        if one.real > 0.0:
-            start[k] = math.atan2(one.real, -one.imag)
-            end[k] = start[k] + turn
-        else:
-            end[k] = math.atan2(two.real, -two.imag)
-            start[k] = end[k] - turn
+        if (mu[k].real > 0.0) != (mu[k + 1].real > 0.0):
+            step = mu[k + 1] * mu[k].conjugate()
+            turn = math.atan2(step.imag, step.real)
+            if mu[k].real > 0.0:
+                end[k] = start[k] + turn
+            else:
+                start[k] = end[k] - turn
     return mu, start, end
 
 
@@ -126,6 +150,38 @@ def envelope(omega, trace, determinant, stiffness, teeth, speeds):
     teeth : int
     speeds : array, shape (m,) [rad/s], ascending, above 0
     """
+    return lowest_lobes(omega, trace, determinant, node_weights(omega), stiffness, teeth, speeds)
+
+
+@numba.njit(cache=True)
+def envelopes(omega, x, y, alpha, stiffness, teeth, speeds):
+    """Return the limit depths of many tips without cross receptances, shape (d, m), NaN where a tip is not finite.
+
+    Parameters
+    ----------
+    x, y : complex arrays, shape (d, n)
+        The tips' direct receptances.
+    alpha : array, shape (2, 2)
+        [alpha0].
+    """
+    weights = node_weights(omega)
+    limits = np.full((x.shape[0], speeds.size), np.nan)
+    trace, determinant = np.empty(omega.size, dtype=np.complex128), np.empty(omega.size, dtype=np.complex128)
+    turned = alpha[0, 0] * alpha[1, 1] - alpha[0, 1] * alpha[1, 0]
+    for i in range(x.shape[0]):
+        size = 0.0
+        for k in range(omega.size):
+            trace[k] = alpha[0, 0] * x[i, k] + alpha[1, 1] * y[i, k]
+            determinant[k] = turned * (x[i, k] * y[i, k])
+            size += abs(trace[k].real) + abs(trace[k].imag) + abs(determinant[k].real) + abs(determinant[k].imag)
+        if math.isfinite(size):
+            limits[i] = lowest_lobes(omega, trace, determinant, weights, stiffness, teeth, speeds)[0]
+    return limits
+
+
+@numba.njit(cache=True)
+def lowest_lobes(omega, trace, determinant, weights, stiffness, teeth, speeds):
+    """Return what `envelope` does; the nodes' weights are those of `node_weights`."""
     m = speeds.size
     limit = np.full(m, np.inf)
     chatter = np.full(m, np.nan)
@@ -164,8 +220,9 @@ def envelope(omega, trace, determinant, stiffness, teeth, speeds):
                 i = j
                 while i < m and speeds[i] <= high:
                     if floor < limit[i]:
-                        w = crossing(omega, trace, determinant, root, sign, k, start[k] + math.pi * lobe, math.pi / (teeth * speeds[i]))
-                        real = eigenvalue_at(omega, trace, determinant, root, sign, k, w).real
+                        half_delay = math.pi / (teeth * speeds[i])
+                        f_low, f_high = first - omega[k] * half_delay, second - omega[k + 1] * half_delay
+                        w, real = crossing(omega, trace, determinant, weights, root, sign, k, f_low, f_high, half_delay)
                         if real > 0.0 and 1.0 / (2.0 * stiffness * real) < limit[i]:
                             limit[i] = 1.0 / (2.0 * stiffness * real)
                             chatter[i] = w
@@ -175,37 +232,39 @@ def envelope(omega, trace, determinant, stiffness, teeth, speeds):
 
 
 @numba.njit(cache=True)
-def crossing(omega, trace, determinant, root, sign, k, phase, half_delay):
-    """Return the w in interval k where psi + pi l = w tau / 2; `phase` is psi + pi l at the interval's start."""
+def crossing(omega, trace, determinant, weights, root, sign, k, f_low, f_high, half_delay):
+    """Return the w in interval k where f = psi + pi l - w tau / 2 is zero, and Re mu there; f_low, f_high stand at the interval's ends.
+
+    Re mu is NaN where f has no zero but a jump: both eigenvalues come so close between two nodes that they change places.
+    """
     first = 0.5 * trace[k] + sign * root[k]
-    a, b = omega[k], omega[k + 1]
-    fa = phase - a * half_delay
-    w, fb = b, 0.0
-    side = 0
-    for step in range(30):
-        if step > 0:
-            w = (fa * b - fb * a) / (fa - fb)
-        turn = eigenvalue_at(omega, trace, determinant, root, sign, k, w) * first.conjugate()
-        f = phase + math.atan2(turn.imag, turn.real) - w * half_delay
-        if step == 0:
-            fb = f
-            if fa * fb > 0.0 or fa == fb:
-                return a if abs(fa) < abs(fb) else b
-            continue
-        if abs(f) < 1e-10:
-            break
-        # Illinois: halve the value at the end that stays
+    a, fa, b, fb = omega[k], f_low, omega[k + 1], f_high
+    if fa * fb > 0.0 or fa == fb:
+        # up to rounding it lies at one of the ends
+        return (a, first.real) if abs(fa) < abs(fb) else (b, (0.5 * trace[k + 1] + sign * root[k + 1]).real)
+    at, f, real = a, fa, first.real
+    w = (fa * b - fb * a) / (fa - fb)
+    for step in range(40):
+        at_before, f_before, real_before = at, f, real
+        at = w
+        mu = eigenvalue_at(omega, trace, determinant, weights, root, sign, k, at)
+        real = mu.real
+        turn = mu * first.conjugate()
+        f = f_low + math.atan2(turn.imag, turn.real) - (at - omega[k]) * half_delay
+        if abs(f) < 1e-8 and f != f_before:
+            # the rest along the chord, beside which the error is as small as the product of both values of f
+            share = f / (f - f_before)
+            return at - share * (at - at_before), real - share * (real - real_before)
+        # the inverse parabola through three points, or the middle where it leaves the two between which f changes sign
+        guess = np.nan
+        if fa != f and fb != f:
+            guess = a * fb * f / ((fa - fb) * (fa - f)) + b * fa * f / ((fb - fa) * (fb - f)) + at * fa * fb / ((f - fa) * (f - fb))
         if f * fb > 0.0:
-            b, fb = w, f
-            if side == 1:
-                fa *= 0.5
-            side = 1
+            b, fb = at, f
         else:
-            a, fa = w, f
-            if side == -1:
-                fb *= 0.5
-            side = -1
-    return w
+            a, fa = at, f
+        w = guess if a < guess < b and step < 8 else 0.5 * (a + b)
+    return at, np.nan
 
 
 @numba.njit(cache=True)
@@ -229,7 +288,7 @@ def pitch_envelope(omega, trace, determinant, stiffness, pitch, speeds):
     limit = np.full(m, np.inf)
     chatter = np.full(m, np.nan)
     lobes = np.full(m, -1, dtype=np.int64)
-    root = roots_along(trace, determinant)
+    root, weights = roots_along(trace, determinant), node_weights(omega)
     longest = pitch.max()
     for i in range(m):
         for sign in (1.0, -1.0):
@@ -242,14 +301,14 @@ def pitch_envelope(omega, trace, determinant, stiffness, pitch, speeds):
                     if parts == 1:
                         fb = delay_factor(pitch, speeds[i], b) * (0.5 * trace[k + 1] + sign * root[k + 1])
                     else:
-                        fb = delay_factor(pitch, speeds[i], b) * eigenvalue_at(omega, trace, determinant, root, sign, k, b)
+                        fb = delay_factor(pitch, speeds[i], b) * eigenvalue_at(omega, trace, determinant, weights, root, sign, k, b)
                     highest = max(fa.real, fb.real)
                     if fa.imag * fb.imag <= 0.0 and highest > 0.0 and 0.9 / (stiffness * highest) < limit[i]:
                         low, high, from_low = a, b, fa.imag
                         w, f = b, fb
                         for _ in range(50):
                             w = 0.5 * (low + high)
-                            f = delay_factor(pitch, speeds[i], w) * eigenvalue_at(omega, trace, determinant, root, sign, k, w)
+                            f = delay_factor(pitch, speeds[i], w) * eigenvalue_at(omega, trace, determinant, weights, root, sign, k, w)
                             if f.imag * from_low > 0.0:
                                 low = w
                             else:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.directional import mean_directional_matrix
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.stability._kernels import envelope, largest_real_part, pitch_envelope
+from rcsa_ident.stability._kernels import envelope, envelopes, largest_real_part, pitch_envelope
 from rcsa_ident.stability.modes import TipModes, receptance_of
 from rcsa_ident.stability.result import StabilityLobes
 
@@ -32,16 +33,12 @@ class ZeroOrder:
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the lower envelope of all lobes in the range of `speeds`."""
-        if process.speed_variation is not None:
-            raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
         cutter, coefficients = process.cutter, process.coefficients
         receptance = receptance_of(tip)
-        alpha = mean_directional_matrix(cutter.teeth, process.engagement, coefficients, process.feed_angle)
-        omega, trace, determinant = _characteristic(receptance, alpha)
+        omega, trace, determinant = _characteristic(receptance, _directions(process))
         order = np.argsort(speeds, kind="stable")
         ascending = np.ascontiguousarray(speeds[order])
-        equal = bool(np.ptp(cutter.pitch) < 1e-9)
-        if equal:
+        if _equal_pitch(process):
             curve = envelope(omega, trace, determinant, coefficients.tangential, cutter.teeth, ascending)
         else:
             curve = pitch_envelope(omega, trace, determinant, coefficients.tangential, cutter.pitch, ascending)
@@ -65,20 +62,80 @@ class ZeroOrder:
             warnings=tuple(_doubts(process, receptance, place if exists else None)),
         )
 
+    def depths(
+        self, omega: FloatArray, tips: tuple[ComplexArray, ComplexArray], process: MillingProcess, speeds: FloatArray, max_depth: float
+    ) -> FloatArray:
+        """Return the limits of many tips whose bending planes do not feel each other, as `lobes` does for each of them.
+
+        Parameters
+        ----------
+        omega : array, shape (n,) [rad/s]
+        tips : (array, array), shape (d, n) each [m/N]
+            The receptances in X and Y; a rigid direction is zero.
+        speeds : array, shape (m,) [rad/s]
+            In any order.
+
+        Returns
+        -------
+        array, shape (d, m) [m]
+            Infinite beyond `max_depth`.
+        """
+        alpha = _directions(process)
+        kept = _above_rest(omega)
+        omega = np.ascontiguousarray(omega[kept])
+        x, y = (tip if kept.size == tip.shape[1] else np.ascontiguousarray(tip[:, kept]) for tip in tips)
+        order = np.argsort(speeds, kind="stable")
+        ascending, stiffness = np.ascontiguousarray(speeds[order]), process.coefficients.tangential
+        if _equal_pitch(process):
+            found = envelopes(omega, x, y, alpha, stiffness, process.cutter.teeth, ascending)
+        else:
+            traces, determinants = alpha[0, 0] * x + alpha[1, 1] * y, _determinant(alpha) * (x * y)
+            _finite(traces, determinants)
+            each = zip(traces, determinants, strict=True)
+            found = np.array([pitch_envelope(omega, t, d, stiffness, process.cutter.pitch, ascending)[0] for t, d in each])
+        _finite(np.where(np.isinf(found), 0.0, found))
+        limits = np.empty(found.shape)
+        limits[:, order] = np.where(found <= max_depth, found, np.inf)
+        return limits
+
+
+def _directions(process: MillingProcess) -> FloatArray:
+    """[alpha0] of a cut at constant speed."""
+    if process.speed_variation is not None:
+        raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
+    return mean_directional_matrix(process.cutter.teeth, process.engagement, process.coefficients, process.feed_angle)
+
+
+def _equal_pitch(process: MillingProcess) -> bool:
+    return bool(np.ptp(process.cutter.pitch) < 1e-9)
+
 
 def _characteristic(receptance: Receptance, alpha: FloatArray) -> tuple[FloatArray, ComplexArray, ComplexArray]:
     """Frequencies above zero, ascending, with trace and determinant of [alpha0] G."""
     xx, xy = receptance.between("tip.x", "tip.x"), receptance.between("tip.x", "tip.y")
     yx, yy = receptance.between("tip.y", "tip.x"), receptance.between("tip.y", "tip.y")
-    trace = alpha[0, 0] * xx + alpha[0, 1] * yx + alpha[1, 0] * xy + alpha[1, 1] * yy
-    determinant = (alpha[0, 0] * alpha[1, 1] - alpha[0, 1] * alpha[1, 0]) * (xx * yy - xy * yx)
-    omega = receptance.omega
+    kept = _above_rest(receptance.omega)
+    trace = (alpha[0, 0] * xx + alpha[0, 1] * yx + alpha[1, 0] * xy + alpha[1, 1] * yy)[kept]
+    determinant = _determinant(alpha) * (xx * yy - xy * yx)[kept]
+    _finite(trace, determinant)
+    return np.ascontiguousarray(receptance.omega[kept]), np.ascontiguousarray(trace), np.ascontiguousarray(determinant)
+
+
+def _determinant(alpha: FloatArray) -> float:
+    return float(alpha[0, 0] * alpha[1, 1] - alpha[0, 1] * alpha[1, 0])
+
+
+def _above_rest(omega: FloatArray) -> NDArray[np.intp]:
+    """The places of frequencies above zero, which ascend."""
     kept = np.flatnonzero(omega > 0.0)
     if kept.size < 2 or np.any(np.diff(omega[kept]) <= 0.0):
         raise InputError("tip receptance frequencies", f"{omega.size} frequencies", "two or more above 0, ascending")
-    if not np.all(np.isfinite(trace[kept]) & np.isfinite(determinant[kept])):
+    return kept
+
+
+def _finite(*values: ComplexArray | FloatArray) -> None:
+    if not all(np.all(np.isfinite(each)) for each in values):
         raise InputError("tip receptance", "values that are not finite", "finite values at every frequency above 0")
-    return np.ascontiguousarray(omega[kept]), np.ascontiguousarray(trace[kept]), np.ascontiguousarray(determinant[kept])
 
 
 def _doubts(process: MillingProcess, receptance: Receptance, critical: float | None) -> list[str]:

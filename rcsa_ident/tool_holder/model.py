@@ -9,6 +9,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof, plane
+from rcsa_ident.dynamics.modal import PoleModel
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.structure import Structure, poles
 from rcsa_ident.tool_holder.geometry import BeamSegment, Contact, ToolAssembly
@@ -84,9 +85,12 @@ def tool_holder_receptance(
 ) -> Receptance:
     """Return the free-free receptances between tip and flange, shape (n, 4, 4), with mesh and modes chosen for `omega`."""
     omega = np.asarray(omega, dtype=float)
-    highest = float(omega.max())
-    structure = tool_holder_structure(assembly, highest / (2.0 * np.pi), axis, shear_coefficient)
-    return poles(structure, highest).receptance(omega)
+    return tool_holder_poles(assembly, float(omega.max()), axis, shear_coefficient).receptance(omega)
+
+
+def tool_holder_poles(assembly: ToolAssembly, highest: float, axis: Dof = Dof.X, shear_coefficient: ShearCoefficient = cowper) -> PoleModel:
+    """Return the poles behind those receptances: translation and slope of the tip, then of the flange, up to a frequency [rad/s]."""
+    return poles(tool_holder_structure(assembly, highest / (2.0 * np.pi), axis, shear_coefficient), highest)
 
 
 def mesh_error(assembly: ToolAssembly, omega: FloatArray, shear_coefficient: ShearCoefficient = cowper) -> float:

@@ -126,15 +126,28 @@ def drawn_limits(response: TooltipResponse, conditions: LobeConditions, draws: i
     if draws < 2 or any(axis not in response.spread for axis in response.coupled):
         return None
     rng = np.random.default_rng(seed)
+    steps: dict[Dof, list[FloatArray]] = {axis: [] for axis in response.coupled}
+    for _ in range(draws):
+        for axis, kept in steps.items():
+            kept.append(rng.standard_normal(response.spread[axis].shape[0]))
+    drawn = {axis: response.tip(axis) + _real_times(np.array(kept), response.spread[axis]) for axis, kept in steps.items()}
+    omega = next(iter(response.coupled.values())).omega
+    if isinstance(conditions.method, ZeroOrder):
+        rigid = np.zeros((draws, omega.size), dtype=complex)
+        tips = (drawn.get(Dof.X, rigid), drawn.get(Dof.Y, rigid))
+        return conditions.method.depths(omega, tips, conditions.process, conditions.speeds, conditions.max_depth)
     limits = np.empty((draws, conditions.speeds.size))
     for i in range(draws):
-        curves = {}
-        for axis, receptance in response.coupled.items():
-            change = response.spread[axis]
-            drawn = response.tip(axis) + rng.standard_normal(change.shape[0]) @ change
-            curves[axis] = (receptance.omega / (2.0 * np.pi), drawn)
+        curves = {axis: (omega / (2.0 * np.pi), tips[i]) for axis, tips in drawn.items()}
         limits[i] = conditions.lobes(measured_tip(curves)).limit_depth
     return limits
+
+
+def _real_times(weights: FloatArray, curves: ComplexArray) -> ComplexArray:
+    """Return weights @ curves without making the weights complex first, shapes (d, p), (p, n) -> (d, n)."""
+    parts = np.ascontiguousarray(curves).view(float)
+    found: ComplexArray = (weights @ parts).view(complex)
+    return found
 
 
 def best_speeds(lobes: StabilityLobes, count: int = 3) -> list[tuple[float, float]]:

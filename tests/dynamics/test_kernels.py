@@ -21,6 +21,23 @@ def test_pole_sum_of_nothing():
     assert np.all(kernels.pole_sum(np.array([1.0, 2.0]), np.empty(0, complex), np.empty((0, 3), complex)) == 0.0)
 
 
+@pytest.mark.parametrize("kind", [float, complex])
+@pytest.mark.parametrize("half", [0, 1, 4])
+def test_product_with_a_banded_matrix(half, kind):
+    rng = np.random.default_rng(5)
+    full = np.triu(np.tril(rng.normal(size=(9, 9)), half), -half).astype(kind)
+    full *= 1.0 if kind is float else 1.0 - 0.3j
+    band = np.zeros((2 * half + 1, 9), dtype=kind)
+    for i in range(9):
+        for j in range(9):
+            if abs(i - j) <= half:
+                band[half + i - j, j] = full[i, j]
+    x = rng.normal(size=(9, 3))
+    total = np.ones((9, 3), dtype=kind)
+    kernels.add_banded(total, band, x)
+    np.testing.assert_allclose(total, 1.0 + full @ x, rtol=0, atol=1e-13)
+
+
 def test_independent_columns():
     rng = np.random.default_rng(4)
     full = rng.normal(size=(30, 4))

@@ -104,9 +104,11 @@ def test_pole_model_is_a_sum_over_poles():
     rng = np.random.default_rng(5)
     pole = np.array([-40.0 + 900.0j, -10.0 - 500.0j, -3000.0 + 0j])
     outputs, inputs = rng.normal(size=(2, 3)) + 1j, rng.normal(size=(3, 2)) - 0.5j
-    values = PoleModel(pole, outputs, inputs, FLANGE).receptance(W).values
+    model = PoleModel(pole, outputs, inputs, FLANGE)
+    values = model.receptance(W).values
     expected = np.array([(outputs / (1j * w - pole)) @ inputs for w in W])
     np.testing.assert_allclose(values, expected, rtol=1e-12)
+    np.testing.assert_array_equal(model.entries(W, ((1, 0), (0, 1))), [values[:, 1, 0], values[:, 0, 1]])
 
 
 def test_refused():

@@ -36,7 +36,7 @@ def test_eigenvalues(characteristic):
         np.testing.assert_allclose(np.sort_complex([0.5 * trace[k] + root[k], 0.5 * trace[k] - root[k]]), expected, rtol=1e-10)
     for sign in (1.0, -1.0):
         middle = 0.5 * (OMEGA[40] + OMEGA[41])
-        found = kernels.eigenvalue_at(OMEGA, trace, determinant, root, sign, 40, middle)
+        found = kernels.eigenvalue_at(OMEGA, trace, determinant, kernels.node_weights(OMEGA), root, sign, 40, middle)
         assert np.min(np.abs(np.linalg.eigvals(ALPHA @ model(middle)) / found - 1.0)) < 1e-6
 
 
@@ -62,6 +62,49 @@ def test_envelopes(characteristic):
             depth, frequency = naive.zero_order_limit(model, ALPHA, STIFFNESS, pitch, speed, OMEGA)
             assert limit[i] == pytest.approx(depth, rel=1e-5)
             assert chatter[i] == pytest.approx(frequency, rel=1e-6)
+
+
+def test_envelopes_of_many_tips_are_those_of_each():
+    x = np.array([model(w)[0, 0] for w in OMEGA]) * np.array([[1.0], [1.1], [0.9 - 0.1j], [1.0]])
+    y = np.array([model(w)[1, 1] for w in OMEGA]) * np.array([[1.0], [0.8], [0.0], [np.nan]])
+    speeds = np.array([900.0, 1333.0, 2000.0])
+    found = kernels.envelopes(OMEGA, x, y, ALPHA, STIFFNESS, 3, speeds)
+    for i in range(3):
+        trace, determinant = ALPHA[0, 0] * x[i] + ALPHA[1, 1] * y[i], np.linalg.det(ALPHA) * x[i] * y[i]
+        np.testing.assert_allclose(found[i], kernels.envelope(OMEGA, trace, determinant, STIFFNESS, 3, speeds)[0], rtol=1e-9)
+    assert np.all(np.isnan(found[3]))
+
+
+def test_between_nodes_the_curve_is_a_quintic():
+    omega = np.cumsum(np.linspace(1.0, 2.0, 9))
+    weights = kernels.node_weights(omega)
+    for k in range(omega.size - 1):
+        # exact for as many coefficients as there are nodes: six inside, four or five at the ends
+        degree = min(k + 3, omega.size - 1) - max(k - 2, 0)
+        trace, determinant = (1.0 + 0.5j) * omega**degree, (0.3 - 1.0j) * (omega - 4.0) ** degree
+        for w in (omega[k], 0.3 * omega[k] + 0.7 * omega[k + 1], omega[k + 1]):
+            t, d = kernels.between_nodes(omega, trace, determinant, weights, k, w)
+            assert t == pytest.approx((1.0 + 0.5j) * w**degree, rel=1e-10)
+            assert d == pytest.approx((0.3 - 1.0j) * (w - 4.0) ** degree, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("place", [0.15, 0.42, 0.5, 0.81])
+@pytest.mark.parametrize("gap", [0.02, 0.3])
+def test_what_is_told_is_a_vibration_also_where_eigenvalues_change_places(place, gap):
+    """Between two nodes both come so close that nobody can tell which is which: a jump of the phase there is no limit."""
+    omega = 1000.0 + 4.0 * np.arange(40.0)
+    half = 0.02 * (omega - omega[20] - 4.0 * place) + 0.08j * gap
+    middle, speeds, teeth = 1.0 + 0.4j, np.linspace(60.0, 700.0, 300), 2
+    limit, chatter, lobe = kernels.envelope(omega, np.full(40, 2.0 * middle), middle**2 - half**2, STIFFNESS, teeth, speeds)
+    assert np.isfinite(limit).sum() > 30
+    for a, w, n, speed in zip(limit, chatter, lobe, speeds, strict=True):
+        if np.isfinite(a):
+            own = 0.02 * (w - omega[20] - 4.0 * place) + 0.08j * gap
+            beside = []
+            for mu in (middle + own, middle - own):
+                phase = 0.5 * np.pi + np.angle(mu) + np.pi * n - np.pi * w / (teeth * speed)
+                beside.append(abs(phase) + abs(2.0 * STIFFNESS * a * mu.real - 1.0))
+            assert min(beside) < 1e-7
 
 
 def test_no_limit_where_no_eigenvalue_has_a_positive_real_part():

@@ -17,6 +17,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.lobes import stability_lobes, uncoupled_planes
+from rcsa_ident.stability.zero_order import ZeroOrder
 from tests.oracles import literature, naive
 
 RPM = 2.0 * np.pi / 60.0
@@ -163,6 +164,25 @@ def test_speeds_in_any_order_and_beyond_the_depth():
     np.testing.assert_array_equal(mixed.lobe[mixed.stable], -1)
     assert np.all(np.isnan(mixed.chatter_frequency[mixed.stable]))
     assert mixed.absolute_limit == ordered.absolute_limit
+
+
+@pytest.mark.parametrize("pitch", [np.full(3, 2.0 * np.pi / 3.0), np.radians([110.0, 130.0, 120.0])])
+def test_many_tips_at_once_have_the_limits_of_each(pitch):
+    """Speeds in any order, frequencies from rest, limits up to a depth."""
+    band = 2.0 * np.pi * np.arange(0.0, 1600.0, 4.0)
+    speeds = np.array([15000.0, 5000.0, 12500.0, 25000.0]) * RPM
+    process = MillingProcess(Cutter(3, 0.012, pitch=pitch), COEFFICIENTS, Engagement.from_immersion(0.5, "down"), 0.7)
+    x = np.array([resonance(band, f, 0.03, 0.04) for f in (780.0, 800.0, 830.0)])
+    y = np.array([resonance(band, f, 0.02, 0.05) for f in (930.0, 700.0, 900.0)])
+    found = ZeroOrder().depths(band, (x, y), process, speeds, 0.4e-3)
+    for i in range(3):
+        planes = (Receptance(band, each[i][:, None, None], (c,), (c,)) for each, c in zip((x, y), TIP, strict=True))
+        each = stability_lobes(uncoupled_planes(*planes), process, speeds, 0.4e-3).limit_depth
+        np.testing.assert_allclose(found[i], each, rtol=1e-9)
+    assert 0 < np.isfinite(found).sum() < found.size
+    y[1, 7] = np.inf
+    with np.errstate(all="ignore"), pytest.raises(InputError, match="finite"):
+        ZeroOrder().depths(band, (x, y), process, speeds, 0.4e-3)
 
 
 def test_lobe_numbers_count_waves():
