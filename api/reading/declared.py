@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, NoReturn
 
-from api.work.toolings import toml_of, tooling_of, weigh
+from api.work.toolings import parsed, toml_of, weigh
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.keys import Table
 from rcsa_ident.io.setups import campaign_of
@@ -155,7 +155,7 @@ def _toolings(top: Table, cuts: list[dict[str, Any]], library: Library) -> dict[
 
 def _campaign(plain: Mapping[str, Any], locate: Callable[[str], Path]) -> Campaign:
     def tooling(table: Table, key: str) -> Tooling:
-        return tooling_of(table.data[key])
+        return tooling_of_keys(parsed(table.data[key]), "", key)
 
     def file(table: Table, key: str) -> Path:
         return locate(table.text(key, allowed="the name of a recording"))
