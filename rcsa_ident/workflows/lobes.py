@@ -129,7 +129,7 @@ def drawn_limits(response: TooltipResponse, conditions: LobeConditions, draws: i
     steps: dict[Dof, list[FloatArray]] = {axis: [] for axis in response.coupled}
     for _ in range(draws):
         for axis, kept in steps.items():
-            kept.append(rng.standard_normal(response.spread[axis].shape[0]))
+            kept.append(rng.standard_normal(response.spread[axis].shape[:1]))
     drawn = {axis: response.tip(axis) + _real_times(np.array(kept), response.spread[axis]) for axis, kept in steps.items()}
     omega = next(iter(response.coupled.values())).omega
     if isinstance(conditions.method, ZeroOrder):
