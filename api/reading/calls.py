@@ -26,6 +26,13 @@ class Upload:
     target: Path
 
 
+def warm() -> None:
+    """Import and compile what a verdict needs, see `look.warm`."""
+    from api.reading import look
+
+    look.warm()
+
+
 def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) -> dict[str, Any]:
     """Return what was found in an upload, see `look.look`."""
     from api.reading import look

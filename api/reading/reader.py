@@ -17,6 +17,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Protocol
 
+from api.reading import calls
 from api.work.pool import Busy
 from rcsa_ident.errors import InputError
 
@@ -79,16 +80,21 @@ class Reader:
     limits : Limits
     queue : int
         Calls that may wait beyond the one at work.
+    prepare : callable
+        What the process does first, outside of the limits.
     """
 
-    def __init__(self, limits: Limits, queue: int) -> None:
-        self.limits, self.queue, self.waiting = limits, queue, 0
+    def __init__(self, limits: Limits, queue: int, prepare: Callable[[], None] = calls.warm) -> None:
+        self.limits, self.queue, self.prepare, self.waiting = limits, queue, prepare, 0
         self.threads: ThreadPoolExecutor | None = None
         self.child: _Child | None = None
 
     def start(self) -> None:
         self.threads = ThreadPoolExecutor(1, "reader")
-        self.child = _Child(self.limits)
+        self.child = self._new()
+
+    def _new(self) -> _Child:
+        return _Child(self.limits, self.prepare)
 
     async def run(self, call: Callable[..., Any], *arguments: Any) -> Any:
         if self.threads is None or self.waiting > self.queue:
@@ -101,7 +107,9 @@ class Reader:
 
     def _ask(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         for _ in range(2):
-            child = self.child or _Child(self.limits)
+            if self.threads is None:
+                break
+            child = self.child or self._new()
             self.child = child
             try:
                 kind, answer = child.ask(call, arguments)
@@ -127,7 +135,7 @@ class Reader:
     def _replace(self) -> None:
         if self.child is not None:
             self.child.end()
-        self.child = None if self.threads is None else _Child(self.limits)
+        self.child = None if self.threads is None else self._new()
 
     def stop(self) -> None:
         threads, self.threads = self.threads, None
@@ -148,13 +156,13 @@ class _Killed(Exception):
 class _Child:
     """A process and the line to it."""
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: Limits, prepare: Callable[[], None]) -> None:
         for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
             os.environ.setdefault(name, "1")
         context = multiprocessing.get_context("spawn")
         self.limits, self.calls, self.ready = limits, 0, False
         self.line, theirs = context.Pipe()
-        self.process = context.Process(target=_serve, args=(theirs, limits), daemon=True, name="reader")
+        self.process = context.Process(target=_serve, args=(theirs, limits, prepare), daemon=True, name="reader")
         self.process.start()
         theirs.close()
 
@@ -194,7 +202,7 @@ class _Child:
         self.process.close()
 
 
-def _serve(line: Connection, limits: Limits) -> None:
+def _serve(line: Connection, limits: Limits, prepare: Callable[[], None]) -> None:
     """In the process: answer calls until the line ends, and end with the service, however that ends."""
     import resource
 
@@ -206,10 +214,9 @@ def _serve(line: Connection, limits: Limits) -> None:
         os._exit(1)
 
     threading.Thread(target=follow, daemon=True).start()
-    from api.reading.look import warm
     from rcsa_ident.io.hdf5 import LARGEST_DATA
 
-    warm()
+    prepare()
     taken = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (taken + limits.memory * MEBIBYTE,) * 2)
     # no core of somebody's data, and no file larger than what it may write
@@ -223,15 +230,18 @@ def _serve(line: Connection, limits: Limits) -> None:
             return
         # counted from the start of the process; the system ends it at the limit
         resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time() + limits.seconds) + 1, resource.RLIM_INFINITY))
-        line.send_bytes(json.dumps(_answer(call, arguments), allow_nan=False).encode())
+        line.send_bytes(_answer(call, arguments))
 
 
-def _answer(call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
+def _answer(call: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
+    kind, answer = "answer", ""
     try:
-        return "answer", call(*arguments)
+        return json.dumps([kind, call(*arguments)], allow_nan=False).encode()
     except InputError as error:
-        return "refused", (error.field, error.found if isinstance(error.found, str) else repr(error.found), error.allowed, error.where)
+        found = error.found if isinstance(error.found, str) else repr(error.found)
+        return json.dumps(["refused", [error.field, found[:1000], error.allowed[:1000], error.where]]).encode()
     except MemoryError:
-        return "costly", None
+        kind = "costly"
     except Exception as error:
-        return "failed", f"{type(error).__name__}: {error}"
+        kind, answer = "failed", f"{type(error).__name__}: {error}"[:1000]
+    return json.dumps([kind, answer]).encode()

@@ -1,0 +1,323 @@
+"""The process that reads uploads: what costs more than its limits is refused in words, and the next one is read."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from api.reading.normalised import blocks, length, read_normalised, write_normalised
+from api.reading.pictures import envelope, spectrum
+from api.reading.reader import Limits, Reader
+from api.work.pool import Busy
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.recordings import in_si
+from rcsa_ident.signals.recording import Quantity, Sensor
+
+LIMITS = Limits(memory=512, seconds=1.0, wall_seconds=60.0, calls=50)
+COSTLY = "costs more than 512 MiB or 1 s to read"
+SENSORS = (
+    Sensor("a/b", Quantity.DISPLACEMENT, Dof.X, 1.0e4, delay=1e-5, bandwidth=1e4),
+    Sensor(".", Quantity.ACCELERATION, Dof.Y, 1.1094e-3),
+    Sensor("trigger", Quantity.TRIGGER, pulses_per_revolution=2, tooth_angle=0.5),
+)
+
+
+def nothing():
+    """Of what reading needs, which these calls do not."""
+
+
+def much(megabytes):
+    return len(bytearray(megabytes << 20))
+
+
+def much_by_numpy(megabytes):
+    return float(np.ones(megabytes << 17).sum())
+
+
+def long():
+    end = time.process_time() + 60.0
+    while time.process_time() < end:
+        pass
+
+
+def refuse():
+    raise InputError("channel x", "nothing", "something", "cut.h5")
+
+
+def bug():
+    raise ZeroDivisionError("a secret detail")
+
+
+def nan():
+    return float("nan")
+
+
+def no_json():
+    return object()
+
+
+def end(by):
+    os.kill(os.getpid(), by)
+
+
+def end_once(marker):
+    if not Path(marker).exists():
+        Path(marker).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return "answered"
+
+
+def write(path, size):
+    with open(path, "wb") as file:
+        file.truncate(size)
+
+
+@pytest.fixture(scope="module")
+def reader():
+    found = Reader(LIMITS, 1, nothing)
+    found.start()
+    yield found
+    found.stop()
+
+
+def ask(reader, call, *arguments):
+    return asyncio.run(reader.run(call, *arguments))
+
+
+def test_answers_and_refusals_come_back(reader):
+    assert ask(reader, os.getpid) != os.getpid()
+    with pytest.raises(InputError) as refused:
+        ask(reader, refuse)
+    assert (refused.value.field, refused.value.found, refused.value.allowed, refused.value.where) == (
+        "channel x",
+        "nothing",
+        "something",
+        "cut.h5",
+    )
+    assert reader.waiting == 0
+
+
+@pytest.mark.parametrize(
+    ("call", "arguments"),
+    [(much, (600,)), (much_by_numpy, (600,)), (long, ()), (end, (signal.SIGSEGV,)), (end, (signal.SIGABRT,))],
+    ids=["memory", "memory by a library", "core", "fault", "abort"],
+)  # fmt: skip
+def test_what_costs_too_much_is_refused_and_the_next_is_read(reader, call, arguments):
+    with pytest.raises(InputError, match=COSTLY):
+        ask(reader, call, *arguments)
+    assert ask(reader, much, 100) == 100 << 20
+
+
+def test_what_sleeps_is_ended_by_the_clock():
+    found = Reader(Limits(wall_seconds=3.0), 1, nothing)
+    found.start()
+    with pytest.raises(InputError, match="costs more than 2048 MiB or 60 s"):
+        ask(found, time.sleep, 600)
+    assert ask(found, pow, 2, 5) == 32
+    found.stop()
+
+
+def test_what_is_allowed_is_counted_for_each_alone(reader):
+    """Not together: the process lives on."""
+    first = ask(reader, os.getpid)
+    for _ in range(4):
+        ask(reader, much, 300)
+        ask(reader, _burn, 0.4)
+    assert ask(reader, os.getpid) == first
+
+
+def _burn(seconds):
+    end = time.process_time() + seconds
+    while time.process_time() < end:
+        pass
+
+
+@pytest.mark.parametrize("call", [bug, nan, no_json])
+def test_a_bug_costs_one_answer_and_tells_no_details(reader, call):
+    with pytest.raises(InputError, match="cannot be read") as refused:
+        ask(reader, call)
+    assert "secret" not in str(refused.value)
+
+
+def test_no_file_grows_without_end(reader, tmp_path):
+    with pytest.raises(InputError):
+        ask(reader, write, str(tmp_path / "x"), 10**10)
+    assert not (tmp_path / "x").exists() or (tmp_path / "x").stat().st_size == 0
+
+
+def test_who_is_killed_is_asked_again(reader, tmp_path):
+    """Somebody else's doing says nothing about the upload."""
+    assert ask(reader, end_once, str(tmp_path / "marker")) == "answered"
+    with pytest.raises(Busy):
+        ask(reader, end, signal.SIGKILL)
+    assert ask(reader, pow, 2, 5) == 32
+
+
+def test_too_many_are_refused_at_once(reader):
+    async def four():
+        return await asyncio.gather(*(reader.run(time.sleep, 0.2) for _ in range(4)), return_exceptions=True)
+
+    # one at work, one waits
+    assert [type(each) for each in asyncio.run(four())] == [type(None), type(None), Busy, Busy]
+
+
+def test_one_at_a_time(reader):
+    async def two():
+        return await asyncio.gather(reader.run(_stamped), reader.run(_stamped))
+
+    (first, last), (begin, _) = sorted(asyncio.run(two()))
+    assert first < last <= begin
+
+
+def _stamped():
+    start = time.monotonic()
+    time.sleep(0.1)
+    return [start, time.monotonic()]
+
+
+def test_after_so_many_calls_comes_a_new_process():
+    found = Reader(Limits(calls=2), 0, nothing)
+    with pytest.raises(Busy):
+        ask(found, os.getpid)
+    found.start()
+    pids = [ask(found, os.getpid) for _ in range(5)]
+    found.stop()
+    assert pids[0] == pids[1] != pids[2] == pids[3] != pids[4]
+    with pytest.raises(Busy):
+        ask(found, os.getpid)
+
+
+def test_the_end_waits_for_nobody():
+    found = Reader(LIMITS, 3, nothing)
+    found.start()
+
+    async def ended():
+        asked = asyncio.create_task(found.run(time.sleep, 3.0))
+        await asyncio.sleep(0.5)
+        await asyncio.to_thread(found.stop)
+        return await asyncio.gather(asked, return_exceptions=True)
+
+    start = time.monotonic()
+    (answer,) = asyncio.run(ended())
+    assert isinstance(answer, Busy | InputError)
+    # compiling may take its time, the call does not
+    assert time.monotonic() - start < 60.0
+    assert found.child is None
+
+
+CODE = """
+import asyncio, os, time
+from api.reading.reader import Limits, Reader
+if __name__ == "__main__":
+    reader = Reader(Limits(), 1)
+    reader.start()
+    print(asyncio.run(reader.run(os.getpid)), flush=True)
+    time.sleep(60)
+"""
+
+
+def test_the_process_ends_with_the_service_however_it_ends(tmp_path):
+    script = tmp_path / "service.py"
+    script.write_text(CODE, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
+    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env=environment) as service:
+        child = int(service.stdout.readline())
+        service.kill()
+    for _ in range(200):
+        try:
+            if Path(f"/proc/{child}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()[0] == "Z":
+                return
+        except OSError:
+            return
+        time.sleep(0.05)
+    pytest.fail("the process lives on")
+
+
+@pytest.mark.parametrize("kind", ["f4", "f8", "i2", "u1", "i8", "exact f8"])
+def test_samples_stay_as_they_were_to_the_last_bit(tmp_path, kind):
+    rng = np.random.default_rng(2)
+    values = rng.standard_normal((3, 5000)) * 100.0
+    if kind == "exact f8":
+        values = values.astype("f4").astype("f8")
+    signals = [each.astype(kind.split()[-1]) for each in values]
+    if "f" in kind:
+        signals[0][7], signals[0][8], signals[1][0] = np.nan, np.inf, -0.0
+    path = tmp_path / "x.h5"
+    write_normalised(path, 51200.0, signals, SENSORS)
+    found = read_normalised(path)
+    direct = in_si(51200.0, signals, SENSORS)
+    assert found.sensors == SENSORS
+    assert found.rate == 51200.0
+    assert found.samples.tobytes() == direct.samples.tobytes()
+    assert np.isnan(found.samples[[7, 8], 0]).all() == ("f" in kind)
+    # half the size where nothing is lost by it
+    assert path.stat().st_size < 3 * 5000 * (4 if kind in ("f4", "i2", "u1", "exact f8") else 8) + 20_000
+
+
+def test_samples_can_be_read_in_parts(tmp_path):
+    path = tmp_path / "x.h5"
+    signals = list(np.arange(3 * 2500.0).reshape(3, 2500))
+    write_normalised(path, 1000.0, signals, SENSORS)
+    assert length(path) == (1000.0, 2500)
+    parts = list(blocks(path, 700))
+    assert [start for start, _ in parts] == [0, 700, 1400, 2100]
+    np.testing.assert_array_equal(np.concatenate([part.samples for _, part in parts]), read_normalised(path).samples)
+
+
+def test_damaged_samples_are_noticed(tmp_path):
+    path = tmp_path / "x.h5"
+    write_normalised(path, 1000.0, [np.random.default_rng(1).standard_normal(5000) for _ in SENSORS], SENSORS)
+    raw = bytearray(path.read_bytes())
+    raw[len(raw) // 2] ^= 1
+    path.write_bytes(raw)
+    with pytest.raises(InputError):
+        read_normalised(path)
+    for content in (b"", b"x" * 100):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match="gone or damaged"):
+            read_normalised(path)
+    path.unlink()
+    with pytest.raises(InputError, match="gone or damaged"):
+        read_normalised(path)
+
+
+@pytest.mark.parametrize(("count", "points"), [(1, 10), (9, 10), (10, 10), (11, 10), (2_500_000, 1000)])
+def test_an_outline_holds_every_extreme(tmp_path, count, points):
+    path = tmp_path / "x.h5"
+    rng = np.random.default_rng(4)
+    x = rng.standard_normal(count)
+    write_normalised(path, 1000.0, [x], SENSORS[2:])
+    found = envelope(path, points)
+    low, high = (np.array(found["channels"]["trigger"][key]) for key in ("low", "high"))
+    assert low.size == high.size == len(found["time_s"]) <= points
+    width = -(-count // points)
+    for k in {0, low.size // 2, low.size - 1}:
+        part = x[k * width : (k + 1) * width]
+        assert (low[k], high[k]) == (part.min(), part.max())
+        assert found["time_s"][k] == pytest.approx(k * width / 1000.0)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 1000, 51200])
+def test_a_tone_stands_at_its_place_with_its_amplitude(tmp_path, count):
+    path = tmp_path / "x.h5"
+    time = np.arange(count) / 51200.0
+    write_normalised(path, 51200.0, [0.25 * np.cos(2.0 * np.pi * 1600.0 * time) + 3.0], SENSORS[2:])
+    found = spectrum(path, 6000.0, 500)
+    amplitude = np.array(found["channels"]["trigger"]["amplitude"])
+    assert amplitude.size <= 500
+    if count >= 1000:
+        strongest = int(np.argmax(amplitude))
+        # between two of its frequencies the window loses 15 %
+        assert 0.84 * 0.25 <= amplitude[strongest] <= 1.001 * 0.25
+        assert found["frequency_hz"][strongest] == pytest.approx(1600.0, abs=60.0)
+    assert found["harmonics_hz"][:2] == [100.0, 200.0]
+    assert max(found["harmonics_hz"]) <= 25600.0
