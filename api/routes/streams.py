@@ -233,14 +233,22 @@ async def _until_over(websocket: WebSocket, session: Session, listener: Listener
     except TimeoutError:
         pass
     finally:
-        for task in (sending, over, *tasks):
-            task.cancel()
-        await asyncio.gather(sending, over, *tasks, return_exceptions=True)
+        await _ended({sending, over, *tasks})
     return session.end
 
 
+async def _ended(tasks: set[asyncio.Task[Any]]) -> None:
+    """Have tasks ended; what became of them has been told."""
+    for task in tasks:
+        task.cancel()
+    # not gathered: were this task cancelled meanwhile, it would be told that they were
+    for task in (await asyncio.wait(tasks))[0]:
+        if not task.cancelled():
+            task.exception()
+
+
 async def _sent(websocket: WebSocket, session: Session, listener: Listener) -> None:
-    while not session.over.is_set() or listener.frames or listener.texts:
+    while not session.over.is_set() or listener.pending:
         await listener.awake.wait()
         for each in listener.taken():
             await (websocket.send_text(each) if isinstance(each, str) else websocket.send_bytes(each))

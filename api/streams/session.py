@@ -95,7 +95,7 @@ class Listener:
         self.text, self.envelope = text, None if size is None else Envelope(size, axes)
         self.frames: deque[tuple[int, str | bytes]] = deque()
         self.texts: deque[str] = deque(maxlen=WAITING_TEXTS)
-        self.bytes, self.unread = 0, 0
+        self.bytes, self.unread, self.last = 0, 0, ""
         self.awake = asyncio.Event()
 
     def forces(self, first: int, values: FloatArray) -> None:
@@ -113,12 +113,21 @@ class Listener:
         self.awake.set()
 
     def tell(self, event: str, **further: Any) -> None:
-        """Take an event."""
-        self.texts.append(json.dumps({"event": event, **further}, allow_nan=False))
+        """Take an event; the end comes behind all forces, others before them."""
+        text = json.dumps({"event": event, **further}, allow_nan=False)
+        if event == "end":
+            self.last = text
+        else:
+            self.texts.append(text)
         self.awake.set()
 
+    @property
+    def pending(self) -> bool:
+        """Whether something waits."""
+        return bool(self.frames or self.texts or self.last)
+
     def taken(self) -> list[str | bytes]:
-        """Return what waits, events first, and forget it."""
+        """Return some of what waits, and forget it."""
         found: list[str | bytes] = [*self.texts]
         self.texts.clear()
         # one frame at a time, so that the rest can still make way
@@ -126,7 +135,10 @@ class Listener:
             frame = self.frames.popleft()[1]
             self.bytes -= len(frame)
             found.append(frame)
-        if not self.frames:
+        elif self.last:
+            found.append(self.last)
+            self.last = ""
+        if not self.pending:
             self.awake.clear()
         return found
 

@@ -1,0 +1,564 @@
+"""Live forces through the service: the batch's figures, counters that are true, hostile frames, viewers, ends of all kinds."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import struct
+import time
+
+import numpy as np
+import pytest
+from starlette.testclient import WebSocketDenialResponse
+from starlette.websockets import WebSocketDisconnect
+
+from api.security import make_key
+from api.streams.engine import FAILED, Message
+from api.streams.frames import packed, unpacked
+from api.streams.process import StreamProcess
+from api.work.forces import observed
+from api.work.known import read
+from api.work.toolings import tooling_of
+from benchmarks.observer import relative_error
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+from tests.api.conftest import Near
+from tests.api.streaming import CHANNELS, SENSITIVITY, STREAM, closed, hello, result, send, signals, streaming, tooling, until
+from tests.workflows.test_live import RATE, streamed
+
+SETTLE = round(0.2 * RATE)
+
+
+@pytest.fixture
+def shop(tmp_path):
+    with streaming(tmp_path) as found:
+        yield found
+
+
+def hub_of(http):
+    return http.app.state.parts.streams
+
+
+def batch(raw: np.ndarray) -> np.ndarray:
+    """What the commands' observer gives of the same samples, made from the first 0.2 s of them."""
+    kinds = [(q, a) for q in (Quantity.DISPLACEMENT, Quantity.ACCELERATION) for a in (Dof.X, Dof.Y)]
+    sensors = tuple(Sensor(n, q, a, s) for n, (q, a), s in zip(CHANNELS, kinds, SENSITIVITY, strict=True))
+    samples = raw / SENSITIVITY
+    first = Recording(RATE, samples[:SETTLE], sensors)
+    observer = observed(read(result()), tooling_of(tooling()), first, None, 12000.0 * np.pi / 30.0, "resonators").observer
+    return observer.run(observer.init(), samples[:, :2], samples[:, 2:])[1].force
+
+
+def joined(frames) -> np.ndarray:
+    return np.concatenate([unpacked(f)[1] if isinstance(f, bytes) else np.array(f["samples"]) for f in frames])
+
+
+@pytest.mark.parametrize("text", [True, False])
+def test_live_forces_are_those_of_the_batch(shop, text):
+    http, id = shop
+    raw = signals(2.0, 2.6)
+    cuts = np.cumsum([1, 700, 13, 2048, 1, 4000, 900, 3000])
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id, format="json" if text else "float32"))
+        opened = until(socket, "opened")[0]
+        assert (opened["axes"], opened["settle_samples"]) == (["X", "Y"], SETTLE)
+        for first, part in zip([0, *cuts], np.split(raw, cuts), strict=True):
+            send(socket, int(first) + 5, part, text)
+        ready = until(socket, "ready")[0]
+        assert ready["session"] == opened["session"]
+        assert ready["first"] == 5
+        assert ready["spindle_speed_rpm"] == pytest.approx(12000.0, rel=1e-5)
+        assert abs(ready["delay_samples"]) < 0.5
+        assert any("no air cut" in note for note in ready["notes"])
+        socket.send_json({"event": "end"})
+        end, frames = until(socket, "end")
+        assert (end["samples"], end["lost"], end["late"], end["dropped"], end["backlog"]) == (len(raw), 0, 0, 0, 0)
+        assert closed(socket) == (1000, {})
+    expected = batch(raw)
+    starts = [unpacked(f)[0] if isinstance(f, bytes) else f["first"] for f in frames]
+    assert starts[0] == 5
+    assert starts == sorted(starts)
+    np.testing.assert_allclose(joined(frames), expected, rtol=0, atol=(1e-9 if text else 1e-6) * np.abs(expected).max())
+
+
+def test_forces_are_true(shop):
+    """A stream that begins in air; the tool enters after a second and a half, and the spindle slows down under it. 300 to 4300 Hz."""
+    http, id = shop
+    raw, true = signals(0.0, 3.0, wander=3e-4, sag=1e-3), streamed(3e-4, 1e-3)[1]
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id, begins="air", settle_s=1.0, axes=["Y", "X"]))
+        for first in range(0, len(raw), 4096):
+            send(socket, first, raw[first : first + 4096])
+        until(socket, "ready")
+        socket.send_json({"event": "end"})
+        end, frames = until(socket, "end")
+    force = joined(frames)[:, ::-1]
+    later = slice(round(2.0 * RATE), None)
+    assert np.all(relative_error(force[later], true[later], RATE) < 0.06)
+    assert end["speed_drift_percent"] == pytest.approx(-0.1, abs=0.04)
+    assert end["angle_known"]
+
+
+def test_a_drift_beyond_what_the_observer_is_made_for_is_told(shop):
+    http, id = shop
+    raw = signals(0.0, 3.0, sag=4e-3)
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id, begins="air"))
+        for first in range(0, len(raw), 4096):
+            send(socket, first, raw[first : first + 4096])
+        until(socket, "ready")
+        socket.send_json({"event": "end"})
+        end = until(socket, "end")[0]
+    assert end["speed_drift_percent"] == pytest.approx(-0.4, abs=0.01)
+    assert any("-0.40 %" in note and "new stream" in note for note in end["notes"])
+
+
+def test_counters_are_true(shop):
+    """Known losses, repeats, overlaps and latecomers."""
+    http, id = shop
+    raw = signals(2.0, 2.9)
+    sent = [(0, 8000), (8100, 2000), (8100, 2000), (10000, 600), (9000, 500), (15600, 400), (16000, 1)]
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        for first, count in sent:
+            send(socket, first, raw[first : first + count])
+        until(socket, "ready")
+        socket.send_json({"event": "end"})
+        end, frames = until(socket, "end")
+    assert (end["lost"], end["late"], end["dropped"], end["backlog"]) == (100 + 5000, 2000 + 100 + 500, 0, 0)
+    assert end["samples"] == 8000 + 2000 + 500 + 400 + 1 == len(joined(frames))
+    covered = sorted({i for f in frames for i in range(unpacked(f)[0], unpacked(f)[0] + len(unpacked(f)[1]))})
+    assert covered == [*range(8000), *range(8100, 10600), *range(15600, 16001)]
+    # bridged: as good behind the small gap as without it
+    whole = batch(raw[:10000])
+    np.testing.assert_allclose(joined(frames)[8000:9900], whole[8100:10000], atol=0.05 * np.abs(whole).max())
+    text = http.get("/metrics").text
+    assert "rcsa_ident_stream_lost_samples_total 5100.0" in text
+    assert f"rcsa_ident_stream_samples_total {end['samples']}.0" in text
+    assert "rcsa_ident_stream_delay_seconds_count" in text
+
+
+def test_a_service_that_is_behind_drops_the_oldest_and_says_so(tmp_path):
+    near = Near()
+    with streaming(tmp_path, near, stream_buffer_seconds=6.0) as (http, id), http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        raw, most = signals(2.0, 3.0), round(6.0 * RATE)
+        for first in range(0, 20480, 4096):
+            send(socket, first, raw[first : first + 4096])
+        until(socket, "ready")
+        near.slow = True
+        sent = 20480
+        for _ in range(60):
+            send(socket, sent, raw[:4096])
+            sent += 4096
+        status = until(socket, "status")[0]
+        while status["backlog"] + status["samples"] + status["dropped"] < sent:
+            status = until(socket, "status")[0]
+        assert status["dropped"] > 0
+        # those on their way come on top
+        assert status["backlog"] <= most + 4 * 4096
+        near.slow = False
+        http.portal.call(near.work)
+        socket.send_json({"event": "end"})
+        end = until(socket, "end")[0]
+        assert (end["lost"], end["backlog"]) == (0, 0)
+        assert end["samples"] + end["dropped"] == sent
+        assert end["dropped"] >= sent - 20480 - most - 8 * 4096 > 0
+        assert f"rcsa_ident_stream_dropped_samples_total {end['dropped']}.0" in http.get("/metrics").text
+
+
+GOOD = np.zeros((4, 4))
+BAD_FRAMES = [
+    ("float32", b"", 1008, "frame"),
+    ("float32", b"\0" * 15, 1008, "frame"),
+    ("float32", packed(0, GOOD)[:-1], 1008, "frame"),
+    ("float32", packed(0, GOOD) + b"\0", 1008, "frame"),
+    ("float32", packed(0, GOOD[:0]), 1008, "samples"),
+    ("float32", packed(0, GOOD[:, :3]), 1008, "channels"),
+    ("float32", packed(0, GOOD * np.nan), 1008, "samples"),
+    ("float32", packed(0, GOOD + np.inf), 1008, "samples"),
+    ("float32", packed(0, GOOD + 1e35), 1008, "samples"),
+    ("float32", struct.pack("<QII", 0, 2**32 - 1, 4), 1009, "samples"),
+    ("float32", packed(0, np.zeros((65537, 4))), 1009, "samples"),
+    ("float32", packed(2**60, GOOD), 1008, "first"),
+    ("float32", packed(2**40, GOOD), 1008, "first"),
+    ("float32", '{"first": 0, "samples": [[0, 0, 0, 0]]}', 1003, "frame"),
+    ("float32", "x" * 50, 1008, "message"),
+    ("json", packed(0, GOOD), 1003, "frame"),
+    ("json", "nonsense", 1008, "message"),
+    ("json", "[" * 90, 1008, "message"),
+    ("json", "[" * 100_000, 1008, "message"),
+    ("json", "[1]", 1008, "message"),
+    ("json", '{"first": -1, "samples": [[0, 0, 0, 0]]}', 1008, "first"),
+    ("json", '{"first": true, "samples": [[0, 0, 0, 0]]}', 1008, "first"),
+    ("json", '{"first": 0, "samples": [[0, 0, 0]]}', 1008, "channels"),
+    ("json", '{"first": 0, "samples": [[0, 0, 0, 0], [0]]}', 1008, "samples"),
+    ("json", '{"first": 0, "samples": [[0, 0, 0, "1"]]}', 1008, "samples"),
+    ("json", '{"first": 0, "samples": [[0, 0, 0, NaN]]}', 1008, "message"),
+    ("json", '{"first": 0, "samples": [[0, 0, 0, 1e999]]}', 1008, "samples"),
+    ("json", '{"first": 0, "samples": [[0, 0, 0, 1' + "0" * 400 + "]]}", 1008, "samples"),
+    ("json", '{"first": 0}', 1008, "samples"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("form", "frame", "code", "field"), BAD_FRAMES)
+def test_a_bad_frame_ends_the_stream_with_words(shop, form, frame, code, field):
+    http, id = shop
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id, format=form))
+        if form == "float32":
+            send(socket, 7, GOOD + 1.0)
+        socket.send_text(frame) if isinstance(frame, str) else socket.send_bytes(frame)
+        found, problem = closed(socket)
+    assert found == code
+    assert problem["status"] == {1008: 422, 1003: 415, 1009: 413}[code]
+    assert problem["errors"][0]["field"] == field
+    assert problem["title"]
+    assert problem["request_id"]
+    assert not hub_of(http).sessions
+    assert http.get("/health").status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("change", "status", "field"),
+    [
+        ({"machine": "nobody"}, 404, None),
+        ({"tooling": "none"}, 404, None),
+        ({"channels": []}, 422, "channels"),
+        ({"channels": ["gap_x", "nothing"]}, 422, "channels"),
+        ({"channels": ["gap_x", "gap_x"]}, 422, "channels"),
+        ({"channels": ["fix_x"]}, 422, "channels"),
+        ({"axes": ["X", "X"]}, 422, "axes"),
+        ({"axes": ["Z"]}, 422, "axes.0"),
+        ({"spindle_speed_rpm": None}, 422, "spindle_speed_rpm"),
+        ({"spindle_speed_rpm": "fast"}, 422, "spindle_speed_rpm"),
+        ({"sampling_rate_hz": 1e12}, 422, "sampling_rate_hz"),
+        ({"settle_s": 100.0}, 422, "settle_s"),
+        ({"envelope": 0}, 422, "envelope"),
+        ({"more": 1}, 422, "more"),
+        ({"begins": "air", "air": {"campaign": "c", "recording": "r.h5"}}, 422, "air"),
+        ({"air": {"campaign": "c", "recording": "r.h5"}}, 404, None),
+        ({"sensors": {"gap_x": {"quantity": "displacement", "axis": "X", "sensitivity": 0.0}}}, 422, "sensors.gap_x.sensitivity"),
+    ],
+)
+def test_a_hello_that_says_nothing_usable_is_answered(shop, change, status, field):
+    http, id = shop
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id) | change)
+        code, problem = closed(socket)
+    assert (code, problem["status"]) == (1008, status)
+    if field is not None:
+        assert problem["errors"][0]["field"] == field
+
+
+@pytest.mark.parametrize(
+    ("first", "code", "status"),
+    [
+        ("nonsense", 1008, 422),
+        ("[1, 2]", 1008, 422),
+        ("[" * 100_000, 1008, 422),
+        ('{"machine": NaN}', 1008, 422),
+        ("{}", 1008, 422),
+        ("{}" + " " * 400_000, 1009, 413),
+        (b"\0\1", 1003, 415),
+        ('{"watch": "nobody"}', 1008, 404),
+        ('{"watch": "../x"}', 1008, 422),
+        ('{"replay": {"campaign": "c", "recording": "r.h5"}}', 1008, 404),
+        ('{"replay": {"campaign": "c", "recording": "r.h5", "rate": 1e9}}', 1008, 422),
+        ('{"replay": 1}', 1008, 422),
+    ],
+)
+def test_a_first_message_that_is_none(shop, first, code, status):
+    http, _ = shop
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_text(first) if isinstance(first, str) else socket.send_bytes(first)
+        found, problem = closed(socket)
+    assert (found, problem["status"]) == (code, status)
+
+
+def refused(http, headers) -> tuple[int, dict]:
+    with pytest.raises(WebSocketDenialResponse) as caught, http.websocket_connect(STREAM, headers=headers):
+        pass
+    return caught.value.status_code, caught.value.json()
+
+
+def test_a_page_from_elsewhere_opens_nothing(shop):
+    http, id = shop
+    for origin in ("http://evil.example", "https://localhost:1", "null", "file://", "http://localhost.evil.example"):
+        status, problem = refused(http, {"Origin": origin})
+        assert (status, problem["status"]) == (403, 403)
+    # a name that leads to this machine, but is another's
+    assert refused(http, {"Origin": "http://evil.example", "Host": "evil.example"})[0] == 403
+    with http.websocket_connect(STREAM, headers={"Origin": "http://localhost"}) as socket:
+        socket.send_json(hello(id))
+        until(socket, "opened")
+
+
+def test_openings_have_a_pace(tmp_path):
+    with streaming(tmp_path, burst=5, requests_per_minute=1) as (http, _):
+        # the machine, its identification and the tooling have taken three of another count
+        for _ in range(5):
+            with contextlib.suppress(WebSocketDisconnect), http.websocket_connect(STREAM) as socket:
+                socket.send_text("{}")
+                closed(socket)
+        with pytest.raises(WebSocketDenialResponse) as caught, http.websocket_connect(STREAM):
+            pass
+    assert caught.value.status_code == 429
+    assert int(caught.value.headers["retry-after"]) > 1
+
+
+@pytest.fixture
+def keyed(tmp_path):
+    """A service that asks for keys; the machine is group A's."""
+    with streaming(tmp_path) as (http, id):
+        parts, keys = http.app.state.parts, {}
+        for name, group, scopes in (
+            ("run", "local", ("run",)),
+            ("read", "local", ("read",)),
+            ("upload", "local", ("upload",)),
+            ("other", "B", ("admin",)),
+        ):
+            key, keys[name] = make_key(group, scopes, name)
+            parts.store.keys.add(key)
+        object.__setattr__(parts, "settings", _asking(parts.settings))
+        yield http, id, keys
+
+
+def _asking(settings):
+    from dataclasses import replace
+
+    return replace(settings, keys=True)
+
+
+def test_keys_scopes_and_groups(keyed):
+    http, id, keys = keyed
+    assert refused(http, {"X-API-Key": "ri_wrong_key"})[0] == 401
+    for first, status in (
+        (hello(id), 401),
+        (hello(id, key="ri_wrong_key"), 401),
+        (hello(id, key=keys["read"]), 403),
+        (hello(id, key=keys["other"]), 404),
+        ({"watch": "x", "key": keys["upload"]}, 403),
+    ):
+        with http.websocket_connect(STREAM) as socket:
+            socket.send_json(first)
+            code, problem = closed(socket)
+        assert (code, problem["status"]) == (1008, status), first
+    with http.websocket_connect(STREAM, headers={"X-API-Key": keys["run"]}) as socket:
+        socket.send_json(hello(id))
+        session = until(socket, "opened")[0]["session"]
+        # another group sees nothing of it
+        assert http.get("/v1/forces/streams", headers={"X-API-Key": keys["other"]}).json() == {"items": []}
+        assert len(http.get("/v1/forces/streams", headers={"X-API-Key": keys["read"]}).json()["items"]) == 1
+        with http.websocket_connect(STREAM) as viewer:
+            viewer.send_json({"watch": session, "key": keys["other"]})
+            assert closed(viewer)[1]["status"] == 404
+        with http.websocket_connect(STREAM) as viewer:
+            viewer.send_json({"watch": session, "key": keys["read"]})
+            until(viewer, "watching")
+    # a browser's way
+    with http.websocket_connect(STREAM, headers={"Origin": "http://localhost"}) as socket:
+        socket.send_json(hello(id, key=keys["run"]))
+        until(socket, "opened")
+
+
+def test_a_viewer_sees_the_same_in_buckets(shop):
+    http, id = shop
+    raw = signals(2.0, 2.8)
+    with http.websocket_connect(STREAM) as socket, http.websocket_connect(STREAM) as viewer:
+        socket.send_json(hello(id, name="lathe 3"))
+        session = until(socket, "opened")[0]["session"]
+        viewer.send_json({"watch": session, "envelope": 64, "format": "json"})
+        watching = until(viewer, "watching")[0]
+        assert (watching["name"], watching["axes"]) == ("lathe 3", ["X", "Y"])
+        for first in range(0, len(raw), 1000):
+            send(socket, first, raw[first : first + 1000])
+        until(socket, "ready")
+        ready = until(viewer, "ready")[0]
+        assert ready["session"] == session
+        (item,) = http.get("/v1/forces/streams").json()["items"]
+        assert (item["session"], item["name"], item["machine"], item["tooling"], item["stage"]) == (session, "lathe 3", id, "T1", "live")
+        # one that comes later is told, too
+        with http.websocket_connect(STREAM) as late:
+            late.send_json({"watch": session})
+            assert until(late, "ready")[0] == ready
+        socket.send_json({"event": "end"})
+        frames = until(socket, "end")[1]
+        seen = until(viewer, "end")[1]
+        assert closed(viewer) == (1000, {})
+    force = joined(frames)
+    assert force.shape == (*raw.shape[:1], 2)
+    rows = joined(seen)
+    assert [f["first"] for f in seen] == np.cumsum([0, *(64 * len(f["samples"]) for f in seen)])[:-1].tolist()
+    whole = force[: len(rows) * 64].reshape(-1, 64, 2)
+    np.testing.assert_allclose(rows[:, :, 0], whole.min(axis=1), rtol=1e-5)
+    np.testing.assert_allclose(rows[:, :, 1], whole.max(axis=1), rtol=1e-5)
+    assert len(rows) == len(force) // 64
+    assert http.get("/v1/forces/streams").json()["items"] == []
+
+
+def test_a_viewer_goes_and_the_stream_stays(shop):
+    http, id = shop
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        session = until(socket, "opened")[0]["session"]
+        with http.websocket_connect(STREAM) as viewer:
+            viewer.send_json({"watch": session})
+            until(viewer, "watching")
+            viewer.send_text("anything")
+        send(socket, 0, signals(2.0, 2.3))
+        until(socket, "ready")
+        assert len(hub_of(http).sessions[session].listeners) == 1
+
+
+def test_only_so_many(tmp_path):
+    with streaming(tmp_path, streams=2, streams_per_group=1, stream_listeners=1) as (http, id), http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        session = until(socket, "opened")[0]["session"]
+        with http.websocket_connect(STREAM) as second:
+            second.send_json(hello(id))
+            code, problem = closed(second)
+        assert (code, problem["status"]) == (1013, 503)
+        assert "1 streams of this group" in problem["detail"]
+        with http.websocket_connect(STREAM) as viewer:
+            viewer.send_json({"watch": session})
+            until(viewer, "watching")
+            with http.websocket_connect(STREAM) as more:
+                more.send_json({"watch": session})
+                assert closed(more)[0] == 1013
+
+
+def test_who_sends_nothing_is_ended(tmp_path):
+    with streaming(tmp_path, stream_idle_seconds=1.0) as (http, id), http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        code, problem = closed(socket)
+    assert (code, problem["status"]) == (1008, 408)
+    assert "1 s" in problem["detail"]
+
+
+def test_too_many_small_frames_end_a_stream(shop, monkeypatch):
+    http, id = shop
+    monkeypatch.setattr("api.streams.hub.MOST_FRAMES", 20)
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        for k in range(50):
+            send(socket, k, np.zeros((1, 4)))
+        code, problem = closed(socket)
+    assert (code, problem["status"]) == (1008, 429)
+
+
+def test_the_observer_waits_for_a_steady_part(shop):
+    """The spindle stands at first: noise, of which no observer can be made. It is told, and the next second is tried."""
+    http, id = shop
+    still = np.random.default_rng(1).standard_normal((2 * SETTLE, 4)) * SENSITIVITY * [1e-8, 1e-8, 0.05, 0.05]
+    raw = np.concatenate([still, signals(2.0, 2.5)])
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        for first in range(0, len(raw), 1024):
+            send(socket, first, raw[first : first + 1024])
+        for _ in range(2):
+            told = until(socket, "settling")[0]
+            assert "spindle_speed_rpm" in told["detail"] or "recording" in told["detail"]
+        ready = until(socket, "ready")[0]
+        assert ready["first"] == 2 * SETTLE
+        socket.send_json({"event": "end"})
+        end, frames = until(socket, "end")
+    assert end["dropped"] == 2 * SETTLE
+    assert end["samples"] == len(raw) - 2 * SETTLE == len(joined(frames))
+
+
+def test_an_end_before_there_is_an_observer(shop):
+    http, id = shop
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        send(socket, 0, signals(2.0, 2.1))
+        socket.send_json({"event": "end"})
+        end = until(socket, "end")[0]
+        assert (end["samples"], end["backlog"]) == (0, round(0.1 * RATE))
+        assert closed(socket)[0] == 1000
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        send(socket, 0, signals(2.0, 2.3))
+        # with enough for one it is made, and everything is answered
+        socket.send_json({"event": "end"})
+        end, frames = until(socket, "end")
+        assert end["samples"] == len(joined(frames)) == round(0.3 * RATE)
+
+
+def test_a_client_that_vanishes_leaves_nothing_behind(shop):
+    http, id = shop
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        send(socket, 0, signals(2.0, 2.3))
+        until(socket, "ready")
+    hub = hub_of(http)
+    assert not hub.sessions
+    assert not hub.by_number
+    assert not hub.host.engine.sessions
+
+
+def test_the_end_of_the_service_is_told(tmp_path):
+    with streaming(tmp_path) as (http, id), http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        until(socket, "opened")
+        http.portal.call(hub_of(http).stop)
+        code, problem = closed(socket)
+    assert (code, problem["status"], problem["detail"]) == (1001, 503, "the service ends")
+
+
+def test_what_fails_unforeseen_is_told_without_its_text(shop):
+    http, id = shop
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        send(socket, 0, signals(2.0, 2.3))
+        until(socket, "ready")
+        hub = hub_of(http)
+        (number,) = hub.by_number
+        http.portal.call(hub._deliver, Message(FAILED, number, content=b"secret detail"))
+        code, problem = closed(socket)
+    assert (code, problem["status"]) == (1011, 500)
+    assert "secret" not in json.dumps(problem)
+
+
+def test_forces_that_are_not_finite_end_the_stream(shop):
+    http, id = shop
+    raw = signals(2.0, 2.3)
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        send(socket, 0, raw)
+        until(socket, "ready")
+        _, state = hub_of(http).host.engine.sessions[1]
+        object.__setattr__(state.observer.axes[0], "offset", 1e308)
+        send(socket, len(raw), raw)
+        code, problem = closed(socket)
+    assert code == 1011
+    assert problem["status"] == 500
+
+
+def test_the_process_of_the_streams_is_replaced_when_it_dies(tmp_path):
+    """Spawned, killed without a word: sessions go on, what was on its way is counted as dropped."""
+    host = StreamProcess()
+    with streaming(tmp_path, host) as (http, id), http.websocket_connect(STREAM) as socket:
+        raw = signals(2.0, 3.0)
+        socket.send_json(hello(id))
+        send(socket, 0, raw[:10_000])
+        until(socket, "ready")
+        while until(socket, "status")[0]["samples"] < 10_000:
+            pass
+        os.kill(host.process.pid, 9)
+        until(socket, "restarted")
+        send(socket, 10_000, raw[10_000:])
+        socket.send_json({"event": "end"})
+        end, frames = until(socket, "end")
+        assert end["samples"] + end["dropped"] == len(raw)
+        assert end["dropped"] <= 5000
+        # settled again: the forces of the batch
+        expected = batch(raw)[-5000:]
+        np.testing.assert_allclose(joined(frames)[-5000:], expected, atol=0.1 * np.abs(expected).max())
+        second = host.process.pid
+    for _ in range(100):
+        if not os.path.exists(f"/proc/{second}"):
+            break
+        time.sleep(0.05)
+    assert not os.path.exists(f"/proc/{second}")
