@@ -23,7 +23,7 @@ from rcsa_ident.cli.common import (
     warn,
     writable,
 )
-from rcsa_ident.cli.processes import Processes, Workers, tell, workers
+from rcsa_ident.cli.processes import Dask, Processes, Workers, tell, workers_or_cluster
 from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
@@ -50,12 +50,12 @@ class Method(StrEnum):
 
 
 @answers
-def check(campaign_dir: CampaignFolder, processes: Processes = None, json_: Json = False) -> None:
+def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask = None, json_: Json = False) -> None:
     """Read everything and give a verdict on every recording; nothing is identified."""
     from rcsa_ident.report.rows import recording_rows
 
     stages = Stages(quiet=json_)
-    with workers(processes) as pool:
+    with workers_or_cluster(processes, dask) as pool:
         campaign, judged = read_and_judge(campaign_dir, pool, stages)
     rows = recording_rows((j.cut, j.reading) for j in judged)
     usable = sum(row.usable for row in rows)
@@ -77,6 +77,7 @@ def identify(
     method: Annotated[Method, typer.Option(help="paper: the published genetic algorithm, a baseline that takes longer.")] = Method.default,
     seed: Seed = 1,
     processes: Processes = None,
+    dask: Dask = None,
     start: Annotated[
         Path | None,
         typer.Option(help="RESULT.json of the same machine: its modes are refined with this campaign's cuts.", show_default=False),
@@ -101,7 +102,7 @@ def identify(
     if method is Method.paper and (start is not None or speed_bands > 1):
         raise InputError("--start" if start is not None else "--speed-bands", "--method paper", "the default method, which has a posterior")
     stages = Stages(quiet=json_)
-    with workers(processes) as pool:
+    with workers_or_cluster(processes, dask) as pool:
         known = None if start is None else read_start(start)
         campaign, judged = read_and_judge(campaign_dir, pool, stages)
         if speed_bands > 1:
@@ -145,7 +146,8 @@ def read_and_judge(folder: Path, pool: Workers, stages: Stages) -> tuple[Campaig
     from rcsa_ident.io.setups import read_campaign
     from rcsa_ident.workflows.identify import judge
 
-    campaign = read_campaign(folder)
+    # a worker elsewhere stands in another folder
+    campaign = read_campaign(folder if pool.cluster is None else folder.resolve())
     with stages.stage("recordings") as progress:
         judged = judge(campaign, partial(read_cut, campaign.sensors, campaign.sampling_rate), pool.map_many, progress)
     return campaign, judged

@@ -16,6 +16,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rcsa_ident.errors import InputError
+from rcsa_ident.scaleout import ClusterMap, cluster_map
+
 if TYPE_CHECKING:
     from multiprocessing.queues import SimpleQueue
 
@@ -27,6 +30,8 @@ EARLY = ("rcsa_ident.io.recordings", "rcsa_ident.workflows.identify", "rcsa_iden
 PAUSE = 0.1
 
 Processes = Annotated[int | None, typer.Option(min=1, max=64, help="Processes; by default one a core, at most 8.", show_default=False)]
+DASK_HELP = "Scheduler of a Dask cluster that works instead of processes here (tcp://host:8786); it sees the campaign under the same path."
+Dask = Annotated[str | None, typer.Option(metavar="ADDRESS", help=DASK_HELP, show_default=False)]
 #: Takes axis, stage and cost of a search.
 Show = Callable[[str, str, float], None]
 
@@ -56,22 +61,28 @@ class Workers:
         None without helpers.
     words : SimpleQueue or None
         What the helpers tell.
+    cluster : ClusterMap or None
+        In place of processes here; it tells nothing on its way.
     """
 
     helpers: int = 0
     pool: ProcessPoolExecutor | None = None
     words: SimpleQueue[tuple[str, str, float]] | None = None
+    cluster: ClusterMap | None = None
 
     def map(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterable[Any]:
         """Few long tasks."""
+        if self.cluster is not None:
+            return self.cluster(function, tasks)
         return map(function, tasks) if self.pool is None else _Shared(self.pool, function, list(tasks)).run(self.helpers)
 
     def map_many(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterable[Any]:
         """Many short tasks, sent some at a time."""
-        if self.pool is None:
+        if self.pool is None and self.cluster is None:
             return map(function, tasks)
         tasks = list(tasks)
-        size = max(1, min(8, len(tasks) // (4 * (self.helpers + 1))))
+        workers = self.helpers + 1 if self.cluster is None else self.cluster.slots
+        size = max(1, min(8, len(tasks) // (4 * workers)))
         chunks = [_Chunk(function, tasks[i : i + size]) for i in range(0, len(tasks), size)]
         return (result for results in self.map(_run_chunk, chunks) for result in results)
 
@@ -144,6 +155,19 @@ class _Shared:
             # a pool that is being ended takes no more
             with suppress(RuntimeError):
                 self._send()
+
+
+@contextmanager
+def workers_or_cluster(processes: int | None, dask: str | None) -> Iterator[Workers]:
+    """Yield what maps: processes here, or the workers of a cluster."""
+    if dask is None:
+        with workers(processes) as pool:
+            yield pool
+        return
+    if processes is not None:
+        raise InputError("--dask", f"--processes {processes} beside it", "one of both: the cluster has its own")
+    with cluster_map(dask) as cluster:
+        yield Workers(cluster=cluster)
 
 
 @contextmanager

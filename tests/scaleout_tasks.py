@@ -1,0 +1,35 @@
+"""What test_scaleout sends to workers, which import it."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+from rcsa_ident.errors import InputError
+
+
+def late(task: float) -> tuple[float, int]:
+    """Later tasks end earlier."""
+    time.sleep(0.3 / (1.0 + task))
+    return task, os.getpid()
+
+
+def picky(task: int) -> int:
+    if task == 2:
+        raise InputError("task", task, "another one", "here")
+    return task
+
+
+def marks(task: tuple[str, int]) -> None:
+    """Leaves a file behind; the first one fails."""
+    folder, number = task
+    if number == 0:
+        raise ValueError("the first")
+    time.sleep(0.3)
+    (Path(folder) / str(number)).touch()
+
+
+def ends(_task: int) -> None:
+    """The end of its worker."""
+    os._exit(1)
