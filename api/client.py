@@ -147,8 +147,19 @@ class Client:
         return self.send("POST", "/tooltip", json=body, headers={"Accept": "text/csv"}).text
 
     def lobes(self, machine: str, *toolings: str | Json, **further: Any) -> LobeAnswer:
-        """Return stability lobes of one tooling or several."""
-        return _read(LobeAnswer, self.send("POST", "/lobes", json={"machine": machine, "toolings": list(toolings), **further}))
+        """Return stability lobes of one tooling or several, also where the service makes a job of them."""
+        answer = self.send("POST", "/lobes", json={"machine": machine, "toolings": list(toolings), **further})
+        if answer.status_code == 200:
+            return _read(LobeAnswer, answer)
+        id = _read(JobAnswer, answer).id
+        while (found := self.lobe_job(id, wait=20)).job.finished is None:
+            pass
+        if found.answer is None:
+            problem = found.job.problem
+            told = {"detail": f"the job is {found.job.state}"} if problem is None else problem.model_dump()
+            told |= {"type": "about:blank", "title": found.job.state, "status": 422, "request_id": id}
+            raise ServiceError(422, ProblemDocument.model_validate(told))
+        return found.answer
 
     def advice(self, machine: str, *toolings: str | Json, **further: Any) -> AdviceAnswer:
         """Return what removes most, and how planned cuts stand."""

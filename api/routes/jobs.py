@@ -38,10 +38,21 @@ ACCEPTED: dict[str, Any] = {
     "description": "Accepted: it survives whatever happens to the service.",
     "headers": {"Location": {"description": "Of the job.", "schema": {"type": "string"}}, **RETRY},
 }
+_EVENT: dict[str, Any] = {
+    "type": "object",
+    "description": "One event of the stream; its data is JSON.",
+    "properties": {
+        "event": {"enum": ["progress", "trace", "fit", "end"]},
+        "data": {"type": "string"},
+        "id": {"type": "string"},
+        "retry": {"type": "integer"},
+    },
+    "required": ["event", "data"],
+}
 STREAM: dict[str, Any] = {
     "description": "Server-sent events: `progress` and `end` with the job, `trace` with axis, stage, cost and seconds, `fit` with axis, "
     "frequency_hz, measured_abs and model_abs [m/N]. It ends with `end`.",
-    "content": {EVENTS: {"schema": {"type": "string"}}},
+    "content": {EVENTS: {"schema": _EVENT}},
 }
 
 

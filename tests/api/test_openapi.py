@@ -14,9 +14,13 @@ from hypothesis.errors import Unsatisfiable
 
 from api.schemas.campaigns import EXAMPLE as CAMPAIGN
 from api.schemas.campaigns import NewCampaign
+from api.schemas.jobs import NewIdentification
 from api.schemas.queries import AdviceQuery, LobeQuery, TipQuery
 from api.schemas.toolings import ToolingKeys
+from api.security import new_id, now
+from api.stores.jobs import Event, Job, Outcome
 from tests.api.conftest import embedded, example, service
+from tests.api.identifying import carried
 from tests.api.recordings import recording
 
 with warnings.catch_warnings():
@@ -82,7 +86,7 @@ def test_references_lead_somewhere(http):
     walk(schema)
 
 
-@pytest.mark.parametrize("model", [ToolingKeys, NewCampaign, TipQuery, LobeQuery, AdviceQuery])
+@pytest.mark.parametrize("model", [ToolingKeys, NewCampaign, NewIdentification, TipQuery, LobeQuery, AdviceQuery])
 def test_examples_are_what_they_show(model):
     for shown in model.model_json_schema()["examples"]:
         model.model_validate_json(json.dumps(shown))
@@ -100,8 +104,8 @@ class Fuzzed:
     def send(self, case, known: bool) -> None:
         if known:
             case.path_parameters.update({key: value for key, value in self.known.items() if key in (case.path_parameters or {})})
-        if known and isinstance(case.body, dict) and "machine" in case.body:
-            case.body["machine"] = self.machine
+        if known and isinstance(case.body, dict):
+            case.body.update({key: value for key, value in {"machine": self.machine, **self.known}.items() if key in case.body})
         sent = case.as_transport_kwargs(base_url="http://localhost")
         headers = {k: v for k, v in sent.get("headers", {}).items() if k.lower() not in ("host", "user-agent", "x-api-key")}
         body = {"json": sent["json"]} if sent.get("json") is not None else {"content": sent.get("data") or b""}
@@ -116,16 +120,34 @@ class Fuzzed:
         case.validate_response(answer, checks=CHECKS)
 
 
+def jobs(http, store, folder, machine, campaign, result) -> dict[str, dict[str, str]]:
+    """Jobs that are done, one of each kind."""
+    id = store.jobs.add(Job(new_id(), "local", "identification", machine, campaign, "{}", "queued", now()), {}, 10).id
+    store.jobs.begin(id, "w", now())
+    trace = {"axis": "X", "stage": "search", "cost": 1.0, "seconds": 0.1}
+    store.jobs.tell(id, "w", [Event(0, "trace", json.dumps(trace))], '{"stage": "x", "done": 1, "total": 2}')
+    names = ("frequency_hz", "measured_re", "measured_im", "model_re", "model_im", "coherence")
+    lines = {name: [1.0] for name in names} | {"tooling": ["T1"]}
+    texts = {"result": result, "frf": json.dumps({"axes": {"X": lines}}), "report": "<!doctype html>"}
+    store.jobs.finish(id, "w", Outcome("done", now(), 1.0, "suspect", None, texts))
+    query = {"machine": machine, "toolings": [example()], "speeds": {"step_rpm": 2000}}
+    lobes = http.post("/v1/lobes", json=query, headers={"Prefer": "respond-async"}).json()["id"]
+    carried(store, folder)
+    return {"/v1/identifications": {"id": id, "campaign": campaign}, "/v1/lobes/": {"id": lobes}}
+
+
 def test_the_api_keeps_to_its_description(tmp_path, result):
     """Whatever is sent: no 5xx, no undocumented status, type or body. With a fixed seed, and so many cases for each operation."""
-    with service(embedded(tmp_path), tmp_path, requests_per_minute=10**8, burst=10**8, work_seconds=0.2) as http:
+    store = embedded(tmp_path)
+    limits = {"requests_per_minute": 10**8, "burst": 10**8, "job_queue": 10**6, "work_seconds": 0.2, "watch_seconds": 0.1}
+    with service(store, tmp_path, **limits) as http:
         id = http.post("/v1/machines", json={"name": "m"}).json()["id"]
         http.put(f"/v1/machines/{id}/identification", content=result, headers={"Content-Type": "application/json"})
         campaign = http.post(f"/v1/machines/{id}/campaigns", json=CAMPAIGN).json()["id"]
         name = CAMPAIGN["cuts"][0]["cut"]
         upload = {"content": recording(CAMPAIGN, tmp_path), "headers": {"Content-Type": "application/octet-stream"}}
         assert http.put(f"/v1/campaigns/{campaign}/recordings/{name}", **upload).status_code == 201
-        known = {"/v1/campaigns/": {"id": campaign, "name": name}}
+        known = {"/v1/campaigns/": {"id": campaign, "name": name}} | jobs(http, store, tmp_path, id, campaign, result)
         schema = schemathesis.openapi.from_dict(http.get("/openapi.json").json())
         found = [each.ok() for each in schema.get_all_operations()]
         # what deletes comes last

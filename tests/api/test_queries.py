@@ -98,15 +98,14 @@ def test_slower_methods_answer_for_few_speeds(shop, method):
     (found,) = client.lobes(id, "T1", method=method, bands=False, speeds={"from_rpm": 8000, "to_rpm": 8000}).toolings
     assert found.method == method
     assert found.limit_depth_mm[0] > 0.0
-    wide = {"from_rpm": 500, "to_rpm": 20000, "step_rpm": 10}
-    problem = refused(422, client.lobes, id, "T1", method=method, speeds=wide)
-    assert problem.errors[0].field == "speeds"
-    assert "no jobs" in problem.detail
 
 
-def test_zero_order_has_its_limit_of_work_too(shop):
+def test_advice_has_its_limit_of_work(shop):
     client, id = shop
-    assert "of work" in refused(422, client.lobes, id, *["T1"] * 12, speeds={"from_rpm": 100, "to_rpm": 5000, "step_rpm": 1}).detail
+    wide = {"from_rpm": 100, "to_rpm": 5000, "step_rpm": 1}
+    problem = refused(422, client.advice, id, *["T1"] * 12, speeds=wide, cut={"feed_per_tooth_mm": 0.1})
+    assert problem.errors[0].field == "speeds"
+    assert "of work" in problem.detail
 
 
 def test_tooltip_is_that_of_the_command(shop, result, tooling, tmp_path):

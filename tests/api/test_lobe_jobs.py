@@ -1,0 +1,129 @@
+"""Lobes that take long become a job, with the answer that they would have had at once."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from functools import partial
+
+import pytest
+
+from api.client import Client, ServiceError
+from api.jobs import lobes
+from api.jobs.codec import decode
+from api.jobs.worker import carry
+from tests.api.conftest import example, service
+from tests.api.identifying import Steps, carried
+from tests.api.test_machines import refused
+
+SPEEDS = {"from_rpm": 6000, "to_rpm": 12000, "step_rpm": 500}
+
+
+def later(client, id, *toolings, **further):
+    return client.lobes_later(id, *toolings, speeds=SPEEDS, **further).id
+
+
+def test_as_a_job_they_are_the_same(shop, store, tmp_path):
+    client, id = shop
+    at_once = client.lobes(id, "T1", example(), speeds=SPEEDS)
+    job = later(client, id, "T1", example())
+    waiting = client.lobe_job(job)
+    assert (waiting.job.kind, waiting.job.state, waiting.answer) == ("lobes", "queued", None)
+    # what it was asked of is what was there then
+    client.forget_tooling("T1")
+    engine = carried(store, tmp_path)
+    found = client.lobe_job(job)
+    assert found.job.state == "done"
+    assert found.answer == at_once
+    assert [name for _, name in engine.computed] == ["lobes.0", "lobes.1"]
+    assert [kind for kind, _ in client.events(job, "lobes")][-1] == "end"
+
+
+def test_where_it_went_on_after_a_kill_they_are_the_same(shop, store, tmp_path):
+    client, id = shop
+    first, second = (later(client, id, "T1", example()) for _ in range(2))
+    engine = carried(store, tmp_path)
+    third = later(client, id, "T1", example())
+    resumed = Steps()
+    resumed.texts = {(third, "lobes.0"): engine.texts[first, "lobes.0"]}
+    carried(store, tmp_path, resumed)
+    assert client.lobe_job(third).answer == client.lobe_job(second).answer == client.lobe_job(first).answer
+    assert [name for _, name in resumed.computed] == ["lobes.1"]
+
+
+def test_what_takes_long_becomes_a_job(shop, store):
+    client, id = shop
+    wide = {"from_rpm": 500, "to_rpm": 20000, "step_rpm": 10}
+    body = {"machine": id, "toolings": ["T1"], "method": "semi-discretisation", "speeds": wide}
+    answer = client.http.post("/v1/lobes", json=body, headers={"Idempotency-Key": "k"})
+    assert answer.status_code == 202
+    job = answer.json()["id"]
+    assert answer.headers["Location"] == f"/v1/lobes/{job}"
+    assert answer.headers["Retry-After"]
+    assert client.http.post("/v1/lobes", json=body, headers={"Idempotency-Key": "k"}).json()["id"] == job
+    _, (tooling,), question = decode(store.jobs.text(job, "question"))
+    assert tooling.name == "T1"
+    assert question.work_seconds == pytest.approx(4.0 * 3600.0)
+    other = client.http.post("/v1/lobes", json=body | {"method": "multi-frequency"}, headers={"Idempotency-Key": "k"})
+    assert other.status_code == 409
+
+
+def test_there_is_an_end_to_that_too(shop, store, tmp_path):
+    _, id = shop
+    wide = {"from_rpm": 500, "to_rpm": 20000, "step_rpm": 10}
+    with service(store, tmp_path, job_work_seconds=50.0) as http:
+        other = Client(http=http)
+        problem = refused(422, other.lobes, id, "T1", method="semi-discretisation", speeds=wide)
+        assert problem.errors[0].field == "speeds"
+        # asked for as a job in any case, the job says so
+        job = other.lobes_later(id, "T1", method="semi-discretisation", speeds=wide).id
+        carried(store, tmp_path)
+        found = other.lobe_job(job)
+        assert (found.job.state, found.answer) == ("failed", None)
+        assert found.job.problem.errors[0].field == "speeds"
+
+
+def test_the_client_waits_for_them(shop, store, tmp_path):
+    """With a limit of work at which nothing is quick any more."""
+    client, id = shop
+    at_once = client.lobes(id, "T1", speeds=SPEEDS)
+    with service(store, tmp_path, work_seconds=0.1) as http:
+        other = Client(http=http)
+        stop = threading.Event()
+
+        def work():
+            while not stop.wait(0.1):
+                carried(store, tmp_path)
+
+        thread = threading.Thread(target=work)
+        thread.start()
+        try:
+            speeds = {"from_rpm": 8000, "to_rpm": 8100, "step_rpm": 50}
+            assert other.lobes(id, "T1", method="multi-frequency", bands=False, speeds=speeds).toolings[0].method == "multi-frequency"
+            assert other.lobes(id, "T1", speeds=SPEEDS) == at_once
+            with pytest.raises(ServiceError, match="422"):
+                # the machine is identified along both axes, its lobes need a cutter that cuts
+                other.lobes(id, example(cutter={"teeth": 0, "diameter_mm": 12.0}), speeds=SPEEDS)
+        finally:
+            stop.set()
+            thread.join()
+
+
+def test_cancelled_lobes_have_no_answer(shop, store):
+    """The computation has no place to look up: its process ends, and nothing of it is kept."""
+    client, id = shop
+    job = later(client, id, "T1")
+    codes = []
+
+    def slow(_job, desk):
+        client.send("DELETE", f"/lobes/{job}")
+        desk.remember("lobes.0", partial(time.sleep, 4.0))
+        return lobes.Outcome("done", "", texts={"answer": json.dumps({})})
+
+    carry(store.jobs, {"lobes": slow}, "w", 3, job, partial(Steps().remember, job), codes.append)
+    assert codes == [0]
+    found = client.lobe_job(job)
+    assert (found.job.state, found.answer) == ("cancelled", None)
+    refused(409, client.send, "DELETE", f"/lobes/{job}")
+    refused(404, client.job, job)
