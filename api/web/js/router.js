@@ -1,4 +1,5 @@
 // Addresses after the #: #/path/with/parts?query. A view is a function (args, query, place) that fills the place and may return what ends it.
+import { Problem } from "./api.js";
 
 const routes = [];
 let ends = null;
@@ -61,7 +62,7 @@ export async function show(place, onshow, onerror) {
     return;
   }
   onshow("", {}, query);
-  onerror(place, new Error("There is no such page."));
+  onerror(place, new Problem(0, { detail: "There is no such page." }));
 }
 
 function decode(text) {

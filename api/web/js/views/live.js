@@ -58,7 +58,7 @@ export async function view(_args, query, place) {
       frames = requestAnimationFrame(draw);
       if (!dirty || held || !plot || document.hidden) return;
       dirty = false;
-      plot.show(data.columns(factor("force")), data.last - seconds, data.last);
+      plot.show(data.columns(factor("force")), Math.max(0, data.last - seconds), Math.max(seconds, data.last));
     };
     frames = requestAnimationFrame(draw);
     close = open(hello, {
@@ -181,7 +181,7 @@ function chartOf(uPlot, box, axes, data) {
 function reach(columns) {
   const values = Float64Array.from(columns.slice(1).flat().filter((v) => v !== null && !Number.isNaN(v))).sort();
   if (!values.length) return { min: -1, max: 1 };
-  const [low, high] = [0.01, 0.99].map((share) => values[Math.round(share * (values.length - 1))]);
-  const room = 0.25 * (high - low) + 1e-3;
+  const [low, high] = [0.03, 0.97].map((share) => values[Math.round(share * (values.length - 1))]);
+  const room = 0.45 * (high - low) + 1e-3;
   return { min: low - room, max: high + room };
 }

@@ -1,0 +1,303 @@
+"""What the page promises to everybody: keyboard, any width, light and dark, inches, faults beside their fields, nothing from elsewhere."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+
+from api.client import Client
+from tests.api.conftest import example
+from tests.api.test_serve import command
+from tests.cli import by_hand
+from tests.web.conftest import SAMPLES, Served, fault_beside, serving
+
+WIDTHS = (360, 768, 1280, 2560)
+#: Names as somebody might give them who means ill.
+HOSTILE = '<img src=x onerror="window.hit=1"><b>bold</b>'
+
+
+def plain(text: str) -> str:
+    return text.replace("\u202f", "").replace("\u00a0", " ")
+
+
+def views(shop: str) -> list[str]:
+    return [
+        "#/", f"#/machines/{shop}", "#/recordings", "#/campaigns/new", "#/identification", "#/toolings", "#/toolings/new",
+        "#/toolings/edit/T1", "#/change?tooling=T1&tooling=T1-long", "#/forces", "#/forces/live",
+    ]  # fmt: skip
+
+
+#: What stands beside the window though it is not inside something that scrolls.
+_OUTSIDE = """() => [...document.querySelectorAll('body *')].filter((e) => {
+  const r = e.getBoundingClientRect();
+  if (!r.width || !r.height || e.closest('.scrolls, .unseen, .skip, .picks, svg, .chart, .uplot, .live-chart')) return false;
+  return r.right > innerWidth + 1 || r.left < -1;
+}).map((e) => e.outerHTML.slice(0, 120))"""
+
+
+@pytest.mark.parametrize(("scheme", "widths"), [("light", WIDTHS), ("dark", (360,))])
+def test_every_view_fits_every_width(opened, served: Served, shop: str, scheme, widths):
+    page = opened(color_scheme=scheme)
+    for address in views(shop):
+        page.goto(f"{served.url}/{address}")
+        page.wait_for_selector("h1")
+        if "change" in address:
+            expect(page.locator(".chart .main-svg").first).to_be_visible(timeout=30_000)
+        for width in widths:
+            page.set_viewport_size({"width": width, "height": 800})
+            page.wait_for_timeout(120)
+            assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), (address, width)
+            assert page.evaluate(_OUTSIDE) == [], (address, width)
+        assert page.locator("h1").count() == 1, address
+
+
+#: Ratio of luminances of a text's colour and of what lies below it (WCAG 2).
+_CONTRASTS = """(pairs) => pairs.map(([ink, paper]) => {
+  const light = (name) => {
+    const probe = document.createElement('span');
+    probe.style.color = `var(--${name})`;
+    document.body.append(probe);
+    const [r, g, b] = getComputedStyle(probe).color.match(/[\\d.]+/g).map(Number).map((v) => v / 255)
+      .map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
+    probe.remove();
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const [a, b] = [light(ink), light(paper)];
+  return [ink, paper, (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05)];
+})"""
+_TEXTS = [(ink, paper) for ink in ("ink", "soft", "accent", "bad") for paper in ("paper", "ground", "raised")] + [
+    ("accent-ink", "accent"), ("good", "good-wash"), ("doubt", "doubt-wash"), ("bad", "bad-wash"), ("accent", "accent-wash"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_texts_and_lines_stand_out(opened, scheme):
+    page = opened(color_scheme=scheme)
+    for ink, paper, ratio in page.evaluate(_CONTRASTS, _TEXTS):
+        assert ratio >= 4.5, (ink, paper)
+    for ink, paper, ratio in page.evaluate(_CONTRASTS, [(f"s{k}", "paper") for k in range(1, 7)] + [("strong-line", "paper")]):
+        assert ratio >= 3.0, (ink, paper)
+
+
+def test_light_and_dark_are_chosen_and_kept(opened):
+    page = opened(color_scheme="light")
+    ground = "getComputedStyle(document.body).backgroundColor"
+    light = page.evaluate(ground)
+    page.get_by_role("button", name="Dark").click()
+    dark = page.evaluate(ground)
+    assert dark != light
+    page.reload()
+    page.wait_for_selector("h1")
+    assert page.evaluate(ground) == dark
+    page.get_by_role("button", name="Auto").click()
+    assert page.evaluate(ground) == light
+
+
+def test_the_whole_way_with_the_keyboard(opened, shop: str):
+    """From the first key to another tooling's best speed, without a pointer; where one is can be seen at every step."""
+    page = opened(f"#/machines/{shop}")
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.id") == "skip"
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.id") == "main"
+    page.evaluate("document.activeElement.blur()")
+
+    def tab_to(what: str, most: int = 80) -> None:
+        for _ in range(most):
+            page.keyboard.press("Tab")
+            if page.evaluate("document.activeElement === document.body"):
+                # behind the last element, before the first one
+                continue
+            shown = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
+            assert shown != "none", page.evaluate("document.activeElement.outerHTML.slice(0, 200)")
+            if page.evaluate("(s) => document.activeElement.matches(s)", what):
+                return
+        pytest.fail(f"Tab does not come to {what}")
+
+    tab_to('nav.steps a[href="#/change"]')
+    page.keyboard.press("Enter")
+    expect(page.locator(".best")).to_have_count(1, timeout=30_000)
+    assert page.evaluate("document.activeElement.id") == "main"
+    tab_to(".picks input:not(:checked)")
+    page.keyboard.press("Space")
+    expect(page.locator(".best")).to_have_count(2, timeout=30_000)
+    assert page.evaluate("document.activeElement.matches('.picks input')"), "the answer takes the focus away"
+    tab_to(".reader input")
+    page.keyboard.press("Control+A")
+    page.keyboard.type("8000")
+    expect(page.locator(".reads li").first).to_contain_text("stable")
+    # back is where one came from
+    page.keyboard.press("Alt+ArrowLeft")
+    expect(page.locator("h1")).to_have_text("Shop")
+
+
+def test_addresses_hold_what_is_shown(opened, served: Served, shop: str):
+    page = opened(f"#/change?machine={shop}&tooling=T1&im=20&st=up&to=12000")
+    expect(page.locator(".best")).to_be_visible(timeout=30_000)
+    expect(page.get_by_label("Radial immersion")).to_have_value("20")
+    expect(page.get_by_label("Strategy")).to_have_value("up")
+    page.get_by_label("Feed per tooth").fill("0.05")
+    expect(page).to_have_url(re.compile("fz=0.05"))
+    page.reload()
+    expect(page.get_by_label("Feed per tooth")).to_have_value("0.05")
+    expect(page.get_by_label("Radial immersion")).to_have_value("20")
+    page.goto(f"{served.url}/#/nowhere")
+    expect(page.get_by_text("There is no such page")).to_be_visible()
+
+
+def test_inches(opened, client: Client, shop: str):
+    page = opened(f"#/change?machine={shop}&tooling=T1")
+    best = page.locator(".best")
+    expect(best).to_be_visible(timeout=30_000)
+    depth = float(re.search(r"cut ([\d.]+) mm", plain(best.inner_text()).replace("\n", " "))[1])
+    page.get_by_role("button", name="inch").click()
+    inches = float(re.search(r"cut ([\d.]+) in", plain(best.inner_text()).replace("\n", " "))[1])
+    assert inches == pytest.approx(depth / 25.4, abs=0.006 / 25.4 + 6e-5)
+    assert "in³/min" in best.inner_text()
+    feed = page.get_by_label("Feed per tooth")
+    assert float(feed.input_value()) == pytest.approx(0.1 / 25.4, rel=1e-6)
+    expect(page.locator(".chart .ytitle", has_text="[in]")).to_be_visible()
+    # what is written in inches is what the service gets in millimetres
+    with page.expect_request(lambda r: r.url.endswith("/v1/lobes") and r.method == "POST") as asked:
+        feed.fill("0.004")
+    assert asked.value.post_data_json["cut"]["feed_per_tooth_mm"] == pytest.approx(0.1016)
+    page.reload()
+    expect(page.get_by_role("button", name="inch")).to_have_attribute("aria-pressed", "true")
+    page.get_by_role("button", name="mm", exact=True).click()
+    assert float(page.get_by_label("Feed per tooth").input_value()) == pytest.approx(0.1016)
+
+
+def test_what_is_wrong_stands_beside_its_field(opened, served: Served, shop: str):
+    page = opened(f"#/change?machine={shop}&tooling=T1")
+    expect(page.locator(".best")).to_be_visible(timeout=30_000)
+    before = len([r for r in page_requests(opened) if r.endswith("/v1/lobes")])
+    # seen on the page itself, in its own units
+    page.get_by_label("Radial immersion").fill("300")
+    assert "to 100" in plain(fault_beside(page, "cut.immersion"))
+    assert page.get_by_label("Radial immersion").get_attribute("aria-invalid") == "true"
+    assert len([r for r in page_requests(opened) if r.endswith("/v1/lobes")]) == before
+    page.get_by_label("Radial immersion").fill("30")
+    expect(page.locator('[data-field="cut.immersion"] .fault')).to_be_hidden()
+    # known to the service only: thirty thousand speeds
+    page.get_by_label("Step").fill("0.5")
+    assert "5000" in fault_beside(page, "speeds.to_rpm")
+
+    page.goto(f"{served.url}/#/toolings/edit/T1")
+    bore = page.locator('[data-field="holder.segments.0.inner_diameter_mm"] input')
+    bore.fill("60")
+    assert "below the outer diameter, 50" in fault_beside(page, "holder.segments.0.inner_diameter_mm")
+    expect(page.locator("img.drawing")).to_have_class(re.compile("old"))
+    bore.fill("12")
+    expect(page.locator('[data-field="holder.segments.0.inner_diameter_mm"] .fault')).to_be_hidden()
+    page.get_by_label("Stickout").fill("900")
+    assert "at most the tool's length" in fault_beside(page, "tool.stickout_mm")
+    page.goto(f"{served.url}/#/")
+    page.get_by_role("button", name="Make it").click()
+    assert fault_beside(page, "name")
+    page.get_by_label("Name", exact=True).fill("Shop")
+    page.get_by_role("button", name="Make it").click()
+    expect(page.locator('[data-field="name"] .fault')).to_contain_text("of its own")
+
+
+def page_requests(opened) -> list[str]:
+    return [request.url for request in opened.watch.requests]
+
+
+def test_a_tooling_is_drawn_as_it_is_written(opened, client: Client, shop: str):
+    page = opened("#/toolings/new?from=T1")
+    image = page.locator("img.drawing")
+    expect(image).to_be_visible()
+    assert page.evaluate("document.querySelector('img.drawing').naturalWidth") > 100
+    first = image.get_attribute("src")
+    page.get_by_label("Stickout").fill("55")
+    expect(image).not_to_have_attribute("src", first)
+    page.get_by_role("button", name="Add one below").last.click()
+    expect(page.locator("table.segments").last.locator("tbody tr")).to_have_count(2)
+    page.get_by_label("Name", exact=True).fill("T1-drawn")
+    page.get_by_role("button", name="Put into the library").click()
+    expect(page.get_by_role("heading", name="T1-drawn")).to_be_visible()
+    kept = client.tooling("T1-drawn").tooling
+    assert kept.tool.stickout_mm == 55.0
+    assert len(kept.holder.segments) == 2
+    assert kept.contact == client.tooling("T1").tooling.contact
+    # somebody else changes it meanwhile: nothing is overwritten
+    client.write_tooling("T1-drawn", example())
+    page.get_by_label("Stickout").fill("50")
+    page.get_by_role("button", name="Save").click()
+    assert "Somebody else" in fault_beside(page, "name")
+    assert client.tooling("T1-drawn").tooling.tool.stickout_mm == 70.5
+    page.get_by_role("button", name="Delete").click()
+    page.get_by_role("button", name="Delete it").click()
+    expect(page.get_by_role("heading", name="Toolings")).to_be_visible()
+    assert "T1-drawn" not in [t.name for t in client.toolings()]
+
+
+def test_names_of_others_are_text(opened, client: Client, served: Served, result: str):
+    id = client.make_machine("Named by others", HOSTILE).id
+    client.identify(id, result.replace("mode 1", HOSTILE))
+    client.write_tooling("hostile", by_hand.TOOLING.replace('name = "T1"', f"name = '{HOSTILE}'"))
+    head, cut, *_ = (SAMPLES / "campaign.toml").read_text().split("[[cuts]]")
+    text = f"{head}[[cuts]]{cut}".replace('"HPM sample machine"', f"'{HOSTILE}'").replace('id = "S1-ER32-00"', f"id = '{HOSTILE}'")
+    for path in (SAMPLES / "toolings").glob("*.toml"):
+        client.send("PUT", f"/toolings/{path.stem}", content=path.read_bytes(), headers={"Content-Type": "application/toml"})
+    made = client.send("POST", f"/machines/{id}/campaigns", content=text.encode(), headers={"Content-Type": "application/toml"}).json()
+    name = made["cuts"][0]["cut"]["name"]
+    raw = (SAMPLES / "recordings" / name).read_bytes()
+    client.send("PUT", f"/campaigns/{made['id']}/recordings/{name}", content=raw, headers={"Content-Type": "application/octet-stream"})
+    page = opened("#/")
+    for address in (
+        "#/",
+        f"#/machines/{id}",
+        f"#/machines/{id}/recordings",
+        f"#/campaigns/{made['id']}",
+        "#/toolings",
+        "#/toolings/edit/hostile",
+    ):
+        page.goto(f"{served.url}/{address}")
+        page.wait_for_selector("h1")
+        page.wait_for_timeout(200)
+        if address not in ("#/toolings", "#/toolings/edit/hostile"):
+            expect(page.locator("main")).to_contain_text("<b>bold</b>")
+        assert page.locator("img[src='x'], main b").count() == 0
+    page.goto(f"{served.url}/#/campaigns/{made['id']}")
+    page.locator("tbody tr button").first.click()
+    expect(page.locator(".chart .main-svg").first).to_be_visible()
+    assert page.locator("img[src='x'], main b").count() == 0
+    assert page.evaluate("window.hit") is None
+
+
+def test_the_description_of_the_interface_needs_no_network(opened):
+    page = opened()
+    page.goto(page.url.split("#")[0] + "docs")
+    expect(page.get_by_text("Stability lobes of one tooling or several")).to_be_visible()
+    assert page.locator(".opblock").count() > 20
+
+
+def test_a_key_is_asked_for_and_forgotten(opened, tmp_path: Path):
+    """Kept until the window is closed; a service of its own, with nothing in it: every view says what to do first."""
+    words, settings = command(tmp_path, "create-key", "--group", "hall 3")
+    key = subprocess.run(words, env=settings, capture_output=True, text=True, check=True).stdout.strip()
+    with serving(tmp_path, RCSA_IDENT_KEYS="on") as guarded:
+        page = opened(url=guarded.url)
+        field = page.get_by_label("Key", exact=True)
+        field.fill("ri_wrong_key")
+        page.get_by_role("button", name="Use this key").click()
+        expect(page.locator("dialog .fault")).to_contain_text("does not take the key")
+        page.get_by_label("Key", exact=True).fill(key)
+        page.keyboard.press("Enter")
+        expect(page.get_by_role("heading", name="Drop a campaign here")).to_be_visible()
+        assert key not in page.evaluate("JSON.stringify({...localStorage})")
+        assert key in page.evaluate("JSON.stringify({...sessionStorage})")
+        assert key not in page.url
+        for section in ("Recordings", "Identification", "Toolings", "Tool change", "Forces"):
+            page.get_by_role("link", name=section, exact=True).click()
+            empty = page.locator(".empty")
+            expect(empty).to_be_visible()
+            assert empty.get_by_role("link").count() == 1
+        page.get_by_role("button", name="Forget the key").click()
+        expect(page.get_by_label("Key", exact=True)).to_be_visible()
+        assert key not in page.evaluate("JSON.stringify({...sessionStorage})")
