@@ -103,6 +103,7 @@ def job_worker(settings: Any, ready: Callable[[], None], stop: Event) -> None:
     from api.files import Files
     from api.jobs import identification, lobes
     from api.jobs.durable import Durable
+    from api.jobs.spread import over_cluster
     from api.jobs.worker import Carrier, JobWorker
     from api.reading.campaigns import load_campaign
     from api.stores.sql import open_store
@@ -110,7 +111,8 @@ def job_worker(settings: Any, ready: Callable[[], None], stop: Event) -> None:
     _log()
     store = open_store(settings.database_url)
     load = partial(load_campaign, store, Files(settings.data / "files", settings.group_bytes, settings.free_bytes))
-    carriers: dict[str, Carrier] = {"identification": partial(identification.carry, load), "lobes": lobes.carry}
+    spread = over_cluster(settings.dask) if settings.dask else map
+    carriers: dict[str, Carrier] = {"identification": partial(identification.carry, load, spread=spread), "lobes": lobes.carry}
     JobWorker(store.jobs, Durable(settings.engine_url), carriers, settings.job_attempts).run(ready, stop)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rcsa_ident.errors import InputError
+from rcsa_ident.scaleout import ADDRESS
 
 PREFIX = "RCSA_IDENT_"
 MEGABYTE = 1_000_000
@@ -72,6 +73,8 @@ class Settings:
         Times that a job is taken up again without coming further before it is given up.
     job_work_seconds : float [s]
         Estimated work of lobes as a job; longer ones are refused.
+    dask : str
+        Scheduler of a Dask cluster that searches of jobs spread over (``tcp://host:8786``); empty where they stay here.
     watchers : int
         Event streams of jobs at once.
     watch_seconds : float [s]
@@ -110,6 +113,7 @@ class Settings:
     job_queue: int = 50
     job_attempts: int = 10
     job_work_seconds: float = 4.0 * 3600.0
+    dask: str = ""
     watchers: int = 200
     watch_seconds: float = 3600.0
 
@@ -127,6 +131,8 @@ class Settings:
         ):  # fmt: skip
             if not least <= getattr(self, name) <= most:
                 raise InputError(PREFIX + name.upper(), getattr(self, name), f"a number from {least:g} to {most:g}")
+        if self.dask and not ADDRESS.fullmatch(self.dask):
+            raise InputError(f"{PREFIX}DASK", self.dask, "the address of a Dask scheduler, as tcp://host:8786")
         if self.keys is False and not self.loopback:
             raise InputError(f"{PREFIX}KEYS", "off", f"on: the service listens on {self.host}, which others reach, too")
 
@@ -156,7 +162,14 @@ class Settings:
 
 def from_environment(environment: Mapping[str, str]) -> Settings:
     """Return the settings of ``RCSA_IDENT_DATA``, ``RCSA_IDENT_PORT`` and so on; what is not there keeps its default."""
-    readers: dict[str, Callable[[str], Any]] = {"data": Path, "database": str, "host": str, "keys": _switch, "work_seconds": float}
+    readers: dict[str, Callable[[str], Any]] = {
+        "data": Path,
+        "database": str,
+        "host": str,
+        "dask": str,
+        "keys": _switch,
+        "work_seconds": float,
+    }
     readers |= dict.fromkeys(("upload_seconds", "upload_idle_seconds", "reader_seconds", "reader_wall_seconds"), float)
     readers |= dict.fromkeys(("job_work_seconds", "watch_seconds"), float)
     readers |= {"stream_idle_seconds": float, "stream_buffer_seconds": float}

@@ -13,7 +13,7 @@ from typing import Any
 from rcsa_ident import __version__
 from rcsa_ident.errors import InputError, RcsaIdentError
 
-_ADDRESS = re.compile(r"(tcp|tls)://(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9.-]+):\d{1,5}")
+ADDRESS = re.compile(r"(tcp|tls)://(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9.-]+):\d{1,5}")
 _ALLOWED = "the address of a Dask scheduler, as tcp://host:8786"
 
 
@@ -86,7 +86,7 @@ def cluster_map(address: str, timeout: float = 10.0) -> Iterator[ClusterMap]:
     Whoever reaches a scheduler can run anything on its workers: ``tcp://`` belongs into a network of its own.
     Kernels are serial: workers of one thread each (``dask worker --nthreads 1 --nworkers N``) use all cores best.
     """
-    if not _ADDRESS.fullmatch(address):
+    if not ADDRESS.fullmatch(address):
         raise InputError("dask", address, _ALLOWED)
     try:
         import dask

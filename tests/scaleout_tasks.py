@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import time
 from pathlib import Path
@@ -33,3 +34,9 @@ def marks(task: tuple[str, int]) -> None:
 def ends(_task: int) -> None:
     """The end of its worker."""
     os._exit(1)
+
+
+def slow(task: int) -> tuple[int, int]:
+    """The last of three takes long where it is not done by the main process."""
+    time.sleep(30.0 if task == 2 and multiprocessing.parent_process() is not None else 0.01)
+    return task, os.getpid()
