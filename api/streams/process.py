@@ -114,6 +114,9 @@ def serve(connection: socket.socket) -> None:
 
     # whoever stops the service with a key stops this process through it
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with contextlib.suppress(OSError), open("/proc/self/comm", "w") as name:
+        # what a list of processes calls it
+        name.write("rcsa-streams")
     from rcsa_ident.workflows.warm import STEPS
 
     STEPS["force observer"]()
