@@ -1,0 +1,367 @@
+"""Uploads over a socket: bodies without an end, clients that go, lie or crawl, many at once; and a kill at every step."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx2
+import pytest
+import uvicorn
+
+from api.client import Client
+from api.files import STALE_FILE, STALE_PART, UPLOADS
+from api.main import create_app
+from api.settings import Settings
+from api.stores.sql import open_store
+from tests.api.conftest import Here, embedded, service
+from tests.api.recordings import content, declared
+from tests.api.test_machines import refused
+
+ROOT = Path(__file__).resolve().parents[2]
+BINARY = {"Content-Type": "application/octet-stream"}
+
+
+@contextmanager
+def listening(folder: Path, **settings) -> Iterator[int]:
+    """A service of this process on a port of loopback."""
+    app = create_app(Settings(data=folder, **settings), embedded(folder), Here(), Here())
+    with socket.socket() as bound:
+        bound.bind(("127.0.0.1", 0))
+        server = uvicorn.Server(uvicorn.Config(app, log_config=None, access_log=False, timeout_graceful_shutdown=5))
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [bound]})
+        thread.start()
+        while not server.started:
+            time.sleep(0.01)
+        try:
+            yield bound.getsockname()[1]
+        finally:
+            server.should_exit = True
+            thread.join()
+
+
+@pytest.fixture
+def place(tmp_path):
+    """Makes a service with a campaign: port, path of a recording, folder."""
+
+    @contextmanager
+    def made(**settings):
+        with listening(tmp_path, **settings) as port, Client(f"http://127.0.0.1:{port}") as client:
+            id = client.make_campaign(client.make_machine("m").id, declared(2)).id
+            yield client, port, id
+
+    return made
+
+
+def files_in(folder: Path) -> list[Path]:
+    return [p for p in (folder / "files").rglob("*") if p.is_file()]
+
+
+def until(true, seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def head(method: str, path: str, *further: str) -> bytes:
+    lines = [f"{method} {path} HTTP/1.1", "Host: localhost", "Content-Type: application/octet-stream", *further]
+    return "\r\n".join([*lines, "", ""]).encode()
+
+
+def answer_of(link: socket.socket) -> tuple[int, bytes]:
+    raw = b""
+    while part := link.recv(65536):
+        raw += part
+    return int(raw.split(b" ", 2)[1]), raw
+
+
+def test_a_body_without_an_end_is_cut_off(place, tmp_path):
+    with place(max_upload_bytes=3_000_000) as (client, port, id), socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+        link.sendall(head("PUT", f"/v1/campaigns/{id}/recordings/c0_cut.h5", "Transfer-Encoding: chunked"))
+        sent = 0
+        try:
+            while sent < 200_000_000:
+                link.sendall(b"f4240\r\n" + bytes(1_000_000) + b"\r\n")
+                sent += 1_000_000
+        except OSError:
+            pass
+        assert sent < 100_000_000
+        until(lambda: files_in(tmp_path) == [])
+        # a length that is told beforehand costs nothing at all
+        answer = client.http.put(f"/v1/campaigns/{id}/recordings/c0_cut.h5", content=bytes(3_000_001), headers=BINARY)
+        assert (answer.status_code, answer.headers["content-type"]) == (413, "application/problem+json")
+        many = [("f", (f"{k}.h5", bytes(400_000))) for k in range(10)]
+        assert client.http.post(f"/v1/campaigns/{id}/recordings", files=many).status_code == 413
+        assert files_in(tmp_path) == []
+
+
+@pytest.mark.parametrize("method", ["PUT", "PATCH"])
+def test_a_client_that_goes_half_way(place, tmp_path, method):
+    raw = content(tmp_path)
+    with place() as (client, port, id):
+        path = f"/v1/campaigns/{id}/recordings/c0_cut.h5"
+        with socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+            link.sendall(head(method, path, f"Content-Length: {len(raw)}", "Upload-Offset: 0", f"Upload-Length: {len(raw)}") + raw[:20_000])
+            until(lambda: files_in(tmp_path) != [])
+        if method == "PUT":
+            until(lambda: files_in(tmp_path) == [])
+            assert client.http.head(path).status_code == 404
+        else:
+            # what has come is kept, and the client goes on
+            until(lambda: client.http.head(path).headers.get("upload-offset") == "20000")
+            (tmp_path / "c0_cut.h5").write_bytes(raw)
+            assert client.upload_in_parts(id, tmp_path / "c0_cut.h5").sha256 == hashlib.sha256(raw).hexdigest()
+        assert client.upload(id, _written(tmp_path, raw)).verdict.usable
+
+
+def _written(folder: Path, raw: bytes) -> Path:
+    path = folder / "c0_cut.h5"
+    path.write_bytes(raw)
+    return path
+
+
+def test_a_length_that_is_a_lie(place, tmp_path):
+    """Less than was told of is waited for, so long; of more than was told of the rest is no part of the body."""
+    raw = content(tmp_path)
+    with place(upload_idle_seconds=0.3) as (client, port, id):
+        path = f"/v1/campaigns/{id}/recordings/c0_cut.h5"
+        with socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+            link.sendall(head("PUT", path, f"Content-Length: {len(raw) + 1}") + raw)
+            status, text = answer_of(link)
+        assert (status, b"nothing has come for 0.3 s" in text) == (408, True)
+        with socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+            link.sendall(head("PUT", path, f"Content-Length: {len(raw) - 1000}") + raw)
+            assert answer_of(link)[0] == 422
+        assert files_in(tmp_path) == []
+        for told in ("-1", "x", "9" * 400, "1e3"):
+            with socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+                link.sendall(head("PUT", path, f"Content-Length: {told}") + b"x")
+                assert answer_of(link)[0] in (400, 413)
+        assert client.upload(id, _written(tmp_path, raw)).verdict.usable
+
+
+def test_a_client_that_crawls_is_given_up(place, tmp_path):
+    limits = {"upload_idle_seconds": 0.5, "upload_bytes_per_second": 100_000}
+    with place(**limits) as (_, port, id), socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+        link.sendall(head("PUT", f"/v1/campaigns/{id}/recordings/c0_cut.h5", "Content-Length: 1000000"))
+        begin = time.monotonic()
+        try:
+            while time.monotonic() - begin < 30.0:
+                link.sendall(b"x")
+                time.sleep(0.05)
+                link.setblocking(False)
+                try:
+                    if link.recv(1, socket.MSG_PEEK):
+                        break
+                except BlockingIOError:
+                    pass
+                finally:
+                    link.settimeout(20)
+        except OSError:
+            pytest.fail("the connection ended without an answer")
+        status, text = answer_of(link)
+        assert (status, b"too slow" in text) == (408, True)
+    assert files_in(tmp_path) == []
+
+
+def test_too_many_at_once_are_told_to_wait(place, tmp_path):
+    raw = content(tmp_path)
+    with place(uploads=2) as (client, port, id):
+        path = f"/v1/campaigns/{id}/recordings/c0_cut.h5"
+        links = [socket.create_connection(("127.0.0.1", port), timeout=20) for _ in range(2)]
+        for link in links:
+            link.sendall(head("PUT", path, f"Content-Length: {len(raw)}") + raw[:1000])
+        until(lambda: len(files_in(tmp_path)) == 2)
+        for method in ("PUT", "PATCH"):
+            answer = client.http.request(method, path, content=raw, headers=BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))})
+            assert (answer.status_code, answer.headers["retry-after"]) == (503, "2")
+        # reads go on
+        assert client.campaign(id).usable == 0
+        for link in links:
+            link.close()
+        until(lambda: files_in(tmp_path) == [])
+        assert client.upload(id, _written(tmp_path, raw)).verdict.usable
+
+
+def test_uploads_of_one_name_at_once(place, tmp_path):
+    """The same content is one recording; of two contents one is kept, the other refused."""
+    raws = [content(tmp_path, seed) for seed in range(2)]
+    with place() as (client, port, id):
+        url = f"http://127.0.0.1:{port}/v1/campaigns/{id}/recordings/"
+        with ThreadPoolExecutor(6) as threads:
+            same = list(
+                threads.map(lambda _: httpx2.put(url + "c0_cut.h5", content=raws[0], headers=BINARY, timeout=60).status_code, range(6))
+            )
+            other = list(
+                threads.map(lambda k: httpx2.put(url + "c1_cut.h5", content=raws[k % 2], headers=BINARY, timeout=60).status_code, range(6))
+            )
+        assert sorted(same) == [200] * 5 + [201]
+        assert sorted(other) == [200, 200, 201, 409, 409, 409]
+        assert len(files_in(tmp_path)) == 2 * len({each.sha256 for each in client.recordings(id)})
+
+
+def test_two_who_write_the_same_parts(place, tmp_path):
+    raw = content(tmp_path)
+    with place() as (client, port, id):
+        path = f"/v1/campaigns/{id}/recordings/c0_cut.h5"
+        told = ["Upload-Offset: 0", f"Upload-Length: {len(raw)}"]
+        with socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+            link.sendall(head("PATCH", path, f"Content-Length: {len(raw)}", *told) + raw[:2000])
+            until(lambda: files_in(tmp_path) != [])
+            headers = BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}
+            assert client.http.patch(path, content=raw, headers=headers).status_code == 503
+            link.sendall(raw[2000:])
+            link.settimeout(20)
+            assert link.recv(65536).split(b" ", 2)[1] == b"201"
+
+
+def test_air_and_cut_at_once_end_with_the_right_verdict(place, tmp_path):
+    with place() as (client, port, id):
+        url = f"http://127.0.0.1:{port}/v1/campaigns/{id}/recordings/"
+        raws = {f"c{k}_{kind}.h5": content(tmp_path, k, kind == "air") for k in range(2) for kind in ("cut", "air")}
+        with ThreadPoolExecutor(4) as threads:
+            done = list(threads.map(lambda name: httpx2.put(url + name, content=raws[name], headers=BINARY, timeout=60).status_code, raws))
+        assert done == [201] * 4
+        found = client.campaign(id)
+        assert found.usable == 2
+        assert all(cut.verdict.notes == [] for cut in found.cuts)
+        assert client.http.get("/health").status_code == 200
+
+
+def test_no_room_is_told_in_words(store, tmp_path, monkeypatch):
+    raw = content(tmp_path)
+    with service(store, tmp_path, group_bytes=150_000) as http:
+        client = Client(http=http)
+        id = client.make_campaign(client.make_machine("m").id, declared(2)).id
+        client.upload(id, _written(tmp_path, raw), "c0_cut.h5")
+        problem = refused(413, client.upload, id, _written(tmp_path, raw), "c0_air.h5")
+        assert "may keep 150000" in problem.detail
+        refused(413, client.upload_in_parts, id, tmp_path / "c0_cut.h5", "c0_air.h5")
+    with service(embedded(tmp_path / "files"), tmp_path, free_bytes=10**9) as http:
+        client = Client(http=http)
+        id = client.make_campaign(client.make_machine("m").id, declared(2)).id
+        monkeypatch.setattr(shutil, "disk_usage", lambda _: shutil._ntuple_diskusage(10**10, 9 * 10**9, 10**9))
+        refused(503, client.upload, id, _written(tmp_path, raw))
+        monkeypatch.undo()
+
+        def full(*_):
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr("api.files.Part.write", full)
+        before = files_in(tmp_path)
+        assert "disk is full" in refused(503, client.upload, id, _written(tmp_path, raw)).detail
+        assert files_in(tmp_path) == before
+
+
+#: Where a process ends without a word: function, calls of it that are survived, and whether what has come is kept then.
+STEPS = [
+    ("api.files.Part.write", 0, False),
+    ("api.files.Part.sync", 0, False),
+    ("api.reading.look.read_upload", 0, False),
+    ("api.reading.look.judged", 0, False),
+    ("api.files.Files.keep", 0, False),
+    ("api.files.Files.keep", 1, False),
+    ("api.stores.sql_campaigns._changed", 0, False),
+    ("api.reading.uploads.Uploads._stale", 0, True),
+    ("api.stores.sql_campaigns.SqlCampaigns.settle", 0, True),
+    ("api.routes.recordings.answer", 0, True),
+]
+REPLACING = [*STEPS[4:7], ("api.reading.uploads.Uploads._release", 0, True), STEPS[7]]
+CODE = """
+import importlib, json, os, sys
+from pathlib import Path
+import api.reading.look
+from tests.api.conftest import embedded, service
+
+def upload(folder, id, target, survived, replacing):
+    path, _, function = target.rpartition(".")
+    try:
+        place = importlib.import_module(path)
+    except ModuleNotFoundError:
+        module, _, name = path.rpartition(".")
+        place = getattr(importlib.import_module(module), name)
+    left, before = [survived], getattr(place, function)
+    def dying(*arguments, **further):
+        if left[0] == 0:
+            os._exit(9)
+        left[0] -= 1
+        return before(*arguments, **further)
+    with service(embedded(folder), folder) as http:
+        setattr(place, function, dying)
+        url = f"/v1/campaigns/{id}/recordings/c0_cut.h5?replace={str(replacing).lower()}"
+        http.put(url, content=(folder / "upload").read_bytes(), headers={"Content-Type": "application/octet-stream"})
+
+for folder, *step in json.loads(sys.argv[1]):
+    child = os.fork()
+    if child == 0:
+        upload(Path(folder), *step)
+        os._exit(0)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+
+
+def whole(folder: Path, group: str = "local") -> dict[str, str]:
+    """Names and hashes of recordings, each of which is there to the last byte."""
+    with service(open_store(f"sqlite:///{folder / 'store.db'}"), folder) as http:
+        parts = http.app.state.parts
+        (machine,) = parts.store.machines.list(group, "", 9)
+        (campaign,) = parts.store.campaigns.list(group, machine.id, "", 9)
+        found = {}
+        for row in parts.store.recordings.list(group, campaign.id, "", 99):
+            raw = parts.files.path(group, UPLOADS, row.sha256).read_bytes()
+            assert (hashlib.sha256(raw).hexdigest(), len(raw)) == (row.sha256, row.size)
+            assert http.get(f"/v1/campaigns/{campaign.id}/recordings/{row.name}/signal").status_code == 200
+            found[row.name] = row.sha256
+        return found
+
+
+@pytest.mark.parametrize("replacing", [False, True], ids=["new", "replacing"])
+def test_a_kill_at_every_step_loses_nothing_and_leaves_nothing(tmp_path, replacing):
+    """What was there is there, or what has come in its place, whole; the rest is swept, and the same upload again is taken."""
+    folder, steps = tmp_path / "data", REPLACING if replacing else STEPS
+    folder.mkdir()
+    old, new = content(tmp_path, 1), content(tmp_path)
+    with service(embedded(folder), folder) as http:
+        client = Client(http=http)
+        id = client.make_campaign(client.make_machine("m").id, declared(1)).id
+        if replacing:
+            (folder / "upload").write_bytes(old)
+            client.upload(id, folder / "upload", "c0_cut.h5")
+    (folder / "upload").write_bytes(new)
+    before = {"c0_cut.h5": hashlib.sha256(old).hexdigest()} if replacing else {}
+    copies = [tmp_path / str(k) for k in range(len(steps))]
+    for copy in copies:
+        shutil.copytree(folder, copy)
+    asked = [[str(copy), id, target, survived, replacing] for copy, (target, survived, _) in zip(copies, steps, strict=True)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    words = [sys.executable, "-c", CODE, json.dumps(asked)]
+    process = subprocess.run(words, env=environment, capture_output=True, text=True, check=False, cwd=ROOT)
+    assert process.stdout.split() == ["9"] * len(steps), process.stderr[-2000:]
+    for copy, (*step, kept) in zip(copies, steps, strict=True):
+        there = whole(copy)
+        assert there == ({"c0_cut.h5": hashlib.sha256(new).hexdigest()} if kept else before), step
+        for path in files_in(copy):
+            long_ago = time.time() - 2.0 * max(STALE_FILE, STALE_PART)
+            os.utime(path, (long_ago, long_ago))
+        # the next start sweeps, and judges what is owed
+        with service(open_store(f"sqlite:///{copy / 'store.db'}"), copy) as http:
+            until(lambda copy=copy, there=there: len(files_in(copy)) == 2 * len(there))
+            store = http.app.state.parts.store
+            until(lambda store=store: store.campaigns.unsettled() == [])
+            again = http.put(f"/v1/campaigns/{id}/recordings/c0_cut.h5?replace=true", content=new, headers=BINARY)
+            assert again.status_code == (200 if kept else 201)
+            assert again.json()["verdict"]["usable"]
+        assert whole(copy) == {"c0_cut.h5": hashlib.sha256(new).hexdigest()}
+        assert len(files_in(copy)) == 2
