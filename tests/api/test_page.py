@@ -74,7 +74,17 @@ def test_what_is_packed_is_the_same_file(http):
 
 @pytest.mark.parametrize(
     "name",
-    ["", "index.html", "docs.html", "../routes/page.py", "..%2froutes%2fpage.py", "%2e%2e/settings.py", "/etc/passwd", "vendor/uplot/LICENSE", "js"],
+    [
+        "",
+        "index.html",
+        "docs.html",
+        "../routes/page.py",
+        "..%2froutes%2fpage.py",
+        "%2e%2e/settings.py",
+        "/etc/passwd",
+        "vendor/uplot/LICENSE",
+        "js",
+    ],
 )
 def test_nothing_else_is_a_file(http, name):
     answer = http.get(f"/static/x/{name}")

@@ -131,7 +131,7 @@ def test_the_whole_way_with_the_keyboard(opened, shop: str):
     page.keyboard.type("8000")
     expect(page.locator(".reads li").first).to_contain_text("stable")
     # back is where one came from
-    page.keyboard.press("Alt+ArrowLeft")
+    page.go_back()
     expect(page.locator("h1")).to_have_text("Shop")
 
 
