@@ -96,6 +96,45 @@ def worker(
     crew.stop()
 
 
+@app.command("backup")
+def backup_store(
+    context: typer.Context, file: Annotated[Path, typer.Argument(metavar="FILE.tar", help="To write; nothing may be there yet.")]
+) -> None:
+    """Write the embedded store into one file, while the service runs."""
+    from api.backups.save import backup
+
+    settings = context.obj
+    try:
+        if settings.database:
+            allowed = (
+                "the embedded store: a database by URL has tools of its own. In this order: a copy of files/ of the data folder, "
+                "pg_dump, and once more what is new in files/, nothing deleted"
+            )
+            raise InputError("RCSA_IDENT_DATABASE", "a database by URL", allowed)
+        account = backup(settings.data, file)
+    except InputError as error:
+        _fail(error)
+    typer.echo(f"{file}: {account.files} files, {account.bytes / 1e6:.1f} MB")
+    for words, names in (("missing, though referred to", account.missing), ("not what was uploaded any more", account.damaged)):
+        for name in names:
+            typer.echo(f"warning: {name} is {words}", err=True)
+
+
+@app.command("restore")
+def restore_store(
+    file: Annotated[Path, typer.Argument(metavar="FILE.tar", help="Written by backup.")],
+    data: Annotated[Path, typer.Option(help="Folder to make; nothing may be in it yet.", show_default=False)],
+) -> None:
+    """Make a data folder of a backup, for --data of a service that starts on it."""
+    from api.backups.load import restore
+
+    try:
+        account = restore(file, data)
+    except InputError as error:
+        _fail(error)
+    typer.echo(f"{data}: {account.files} files, {account.bytes / 1e6:.1f} MB")
+
+
 def job_worker(settings: Any, ready: Callable[[], None], stop: Event) -> None:
     """Carry out jobs until told to stop: what each process for jobs does."""
     from functools import partial

@@ -1,0 +1,146 @@
+"""A data folder from a backup, which may be anything."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import shutil
+import sqlite3
+import tarfile
+import tempfile
+from contextlib import closing
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from api.backups.members import BLOCK, ENGINE, FORMAT, MANIFEST, MEMBER, STORE, Account, copy, disk, sync
+from api.stores.tables import SCHEMA_VERSION
+from rcsa_ident.errors import InputError
+
+_LARGEST_MANIFEST = 1 << 28
+
+
+def restore(source: Path, data: Path) -> Account:
+    """Make a data folder of a backup.
+
+    Raises
+    ------
+    InputError
+        The folder is not empty, or the file is no whole backup that this release can read.
+    """
+    if data.is_symlink() or (data.exists() and not (data.is_dir() and not any(data.iterdir()))):
+        raise InputError("--data", f"{data.name} with something in it", "a folder that is empty, or not there yet")
+    with disk("--data"):
+        data.absolute().parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{data.name}.restoring-", dir=data.absolute().parent))
+        try:
+            account = _extract(source, temporary)
+            _check(temporary)
+            for folder in (path for path in (temporary, *temporary.rglob("*")) if path.is_dir()):
+                sync(folder)
+            _place(temporary, data.absolute())
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+    return account
+
+
+def _extract(source: Path, folder: Path) -> Account:
+    """Every member under a name of the service's own, as the manifest has it."""
+    if not source.is_file():
+        raise InputError("FILE.tar", "no such file", "a backup of this service")
+    found: dict[str, dict[str, Any]] = {}
+    with source.open("rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        while (info := _header(file, size)) is not None:
+            if info.name in found or MANIFEST in found:
+                raise _no_backup(f"{info.name} twice, or behind the manifest")
+            path = folder / info.name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            digest = hashlib.sha256()
+            with path.open("xb") as target:
+                copy(file, target, info.size, digest)
+                target.flush()
+                os.fsync(target.fileno())
+            file.seek(-info.size % BLOCK, os.SEEK_CUR)
+            found[info.name] = {"bytes": info.size, "sha256": digest.hexdigest()}
+    manifest = _manifest(folder / MANIFEST)
+    found.pop(MANIFEST)
+    if manifest["members"] != found or STORE not in found:
+        wrong = sorted(name for name in {*manifest["members"], *found} if manifest["members"].get(name) != found.get(name))
+        raise _no_backup(f"other content than its manifest has: {', '.join(wrong[:3]) or STORE}")
+    (folder / MANIFEST).unlink()
+    return Account(len(found), sum(each["bytes"] for each in found.values()), tuple(manifest["missing"]))
+
+
+def _header(file: BinaryIO, size: int) -> tarfile.TarInfo | None:
+    """The next member, None at the end; long names, links and holes are nothing that a backup has."""
+    block = file.read(BLOCK)
+    if block == bytes(BLOCK):
+        return None
+    try:
+        info = tarfile.TarInfo.frombuf(block, "ascii", "strict")
+    except (tarfile.HeaderError, ValueError):
+        raise _no_backup("something else, or an end too early") from None
+    if info.type not in (tarfile.REGTYPE, tarfile.AREGTYPE) or info.linkname or not MEMBER.fullmatch(info.name):
+        raise _no_backup(f"a member {info.name[:80]!r}")
+    if not 0 <= info.size <= size - file.tell() or (info.name == MANIFEST and info.size > _LARGEST_MANIFEST):
+        raise _no_backup(f"{info.name} of {info.size} bytes")
+    return info
+
+
+def _manifest(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        raise _no_backup("no manifest: it was not written to the end")
+    try:
+        manifest = json.loads(path.read_bytes())
+        format, missing = int(manifest["format"]), manifest["missing"]
+        if format > FORMAT:
+            raise InputError(
+                "FILE.tar", f"format {format}, of release {str(manifest['release'])[:20]}", f"at most {FORMAT}: take that release"
+            )
+        if not isinstance(manifest["members"], dict) or not all(isinstance(name, str) for name in missing):
+            raise TypeError
+    except InputError:
+        raise
+    except (ValueError, TypeError, KeyError, RecursionError):
+        raise _no_backup("a manifest that can not be read") from None
+    return dict(manifest)
+
+
+def _check(folder: Path) -> None:
+    """Databases that are whole, and of a version that this release knows."""
+    for name in (STORE, ENGINE):
+        if (folder / name).is_file():
+            try:
+                with closing(sqlite3.connect(folder / name)) as database:
+                    ((state,), *_) = database.execute("PRAGMA quick_check").fetchall()
+                    if state != "ok":
+                        raise sqlite3.DatabaseError(state)
+                    if name == STORE:
+                        ((version,),) = database.execute("SELECT schema_version FROM meta").fetchall()
+            except (sqlite3.Error, ValueError):
+                raise _no_backup(f"{name} that is no whole database") from None
+    if not isinstance(version, int) or version > SCHEMA_VERSION:
+        raise InputError("FILE.tar", f"schema version {version}", f"at most {SCHEMA_VERSION}: a later release has written it")
+
+
+def _place(folder: Path, data: Path) -> None:
+    """Give the folder its name."""
+    try:
+        os.rename(folder, data)
+    except OSError as error:
+        if error.errno not in (errno.EBUSY, errno.EXDEV):
+            raise
+        # a disk of its own is mounted there: what makes it a store comes last
+        inside = data / folder.name
+        shutil.copytree(folder, inside)
+        for name in sorted(os.listdir(inside), key=lambda each: each == STORE):
+            os.rename(inside / name, data / name)
+        inside.rmdir()
+        sync(data)
+    sync(data.parent)
+
+
+def _no_backup(found: str) -> InputError:
+    return InputError("FILE.tar", found, "a whole backup of this service")

@@ -1,0 +1,65 @@
+"""What a backup is made of."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from api.files import NORMALISED, UPLOADS
+from rcsa_ident.errors import InputError
+
+STORE, ENGINE, MANIFEST, FILES = "service.db", "jobs.db", "manifest.json", "files"
+FORMAT, BLOCK, CHUNK = 1, 512, 1 << 20
+MEMBER = re.compile(rf"service\.db|jobs\.db|manifest\.json|files/[0-9a-f]{{32}}/({UPLOADS}/[0-9a-f]{{64}}|{NORMALISED}/[0-9a-f]{{64}}\.h5)")
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """What went into a backup, or came out of it.
+
+    Parameters
+    ----------
+    files, bytes : int
+        Of all members.
+    missing : tuple of str
+        Files that rows refer to and that are nowhere.
+    damaged : tuple of str
+        Uploads that are not any more what they were when they came.
+    """
+
+    files: int
+    bytes: int
+    missing: tuple[str, ...] = ()
+    damaged: tuple[str, ...] = ()
+
+
+@contextmanager
+def disk(field: str) -> Iterator[None]:
+    """Tell what the disk refuses as bad input."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(field, error.strerror or "an error of the disk", "a disk with room that can be written to") from None
+
+
+def copy(source: Any, target: Any, size: int, digest: Any) -> None:
+    while size > 0:
+        data = source.read(min(size, CHUNK))
+        if not data:
+            raise InputError("FILE.tar", "a file that has become shorter", "files that stay, and a whole backup")
+        digest.update(data)
+        target.write(data)
+        size -= len(data)
+
+
+def sync(folder: Path) -> None:
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,0 +1,186 @@
+"""A backup of the data folder of a service that runs."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+import sqlite3
+import tarfile
+import tempfile
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from api.backups.members import BLOCK, ENGINE, FILES, FORMAT, MANIFEST, STORE, Account, copy, disk, sync
+from api.files import NORMALISED, UPLOADS, Files
+from api.stores.sql import open_store
+from rcsa_ident import __version__
+from rcsa_ident.errors import InputError
+
+_STAGING = ".backup-"
+
+
+def backup(data: Path, target: Path) -> Account:
+    """Write a backup of a data folder; a service may work on it meanwhile.
+
+    Raises
+    ------
+    InputError
+        There is no store, something is in the target's place, or the disk refuses.
+    """
+    if not (data / STORE).is_file():
+        raise InputError("RCSA_IDENT_DATA", f"no {STORE}", "the data folder of a service")
+    if target.exists() or target.is_symlink():
+        raise InputError("FILE.tar", f"{target.name} is there already", "a name that is free")
+    if not target.absolute().parent.is_dir():
+        raise InputError("FILE.tar", "no such folder", "a file in a folder that is there")
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    with disk("FILE.tar"), _alone(data) as staging:
+        missing = _gather(data, staging)
+        try:
+            # what keys open is in it
+            with open(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "wb") as file:
+                account = _write(file, staging, missing)
+                file.flush()
+                os.fsync(file.fileno())
+            _name(part, target)
+            sync(target.absolute().parent)
+        finally:
+            part.unlink(missing_ok=True)
+    return account
+
+
+def _name(part: Path, target: Path) -> None:
+    """Of two backups under one name one fails, and none is lost."""
+    try:
+        os.link(part, target)
+    except FileExistsError:
+        raise InputError("FILE.tar", f"{target.name} is there already", "a name that is free") from None
+    except OSError:
+        # a disk without links
+        os.rename(part, target)
+
+
+@contextmanager
+def _alone(data: Path) -> Iterator[Path]:
+    """A folder for what a backup holds, on the data's own disk; one at a time, and what a killed one has left is removed."""
+    with (data / "backup.lock").open("a") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError("RCSA_IDENT_DATA", "another backup under way", "one at a time") from None
+        for old in data.glob(f"{_STAGING}*"):
+            shutil.rmtree(old, ignore_errors=True)
+        staging = Path(tempfile.mkdtemp(prefix=_STAGING, dir=data))
+        try:
+            yield staging
+        finally:
+            shutil.rmtree(staging, ignore_errors=True)
+
+
+def _gather(data: Path, staging: Path) -> tuple[str, ...]:
+    """Snapshots of the databases and links to all files that rows of the snapshot refer to; returns those that are nowhere."""
+    missing: tuple[str, ...] = ()
+    for _ in range(5):
+        # a file that is deleted after the snapshot is linked before it; one that came just before the snapshot, after it
+        _link(data / FILES, staging / FILES)
+        if (data / ENGINE).is_file():
+            _snapshot(data / ENGINE, staging / ENGINE)
+        _snapshot(data / STORE, staging / STORE)
+        _link(data / FILES, staging / FILES)
+        wanted = _referred(staging)
+        missing = tuple(sorted(name for name in wanted if not (staging / name).is_file()))
+        if not missing:
+            break
+    for path in [path for path in (staging / FILES).rglob("*") if path.is_file()]:
+        if path.relative_to(staging).as_posix() not in wanted:
+            path.unlink()
+    return missing
+
+
+def _link(source: Path, target: Path) -> None:
+    for kind in (UPLOADS, NORMALISED):
+        for folder in source.glob(f"*/{kind}"):
+            there = target / folder.relative_to(source)
+            there.mkdir(parents=True, exist_ok=True)
+            for entry in os.scandir(folder):
+                # gone meanwhile, or linked before
+                with suppress(FileNotFoundError, FileExistsError):
+                    try:
+                        os.link(entry.path, there / entry.name)
+                    except PermissionError:
+                        # a disk without links
+                        shutil.copyfile(entry.path, there / entry.name)
+
+
+def _snapshot(source: Path, target: Path) -> None:
+    """A database as it is at one moment, in one file."""
+    target.unlink(missing_ok=True)
+    try:
+        with closing(sqlite3.connect(source, timeout=30.0)) as live, closing(sqlite3.connect(target)) as copy:
+            live.backup(copy)
+            copy.execute("PRAGMA journal_mode=DELETE")
+    except sqlite3.Error:
+        raise InputError("RCSA_IDENT_DATA", f"{source.name} does not answer", "a database of this service") from None
+
+
+def _referred(folder: Path) -> set[str]:
+    store = open_store(f"sqlite:///{folder / STORE}")
+    try:
+        files = Files(folder / FILES)
+        found = {(group, *key) for group in store.recordings.groups() for key in store.recordings.kept(group) if key[1]}
+        return {files.path(*each).relative_to(folder).as_posix() for each in found}
+    finally:
+        store.close()
+        # back into one file
+        with closing(sqlite3.connect(folder / STORE)) as database:
+            database.execute("PRAGMA journal_mode=DELETE")
+
+
+def _write(file: BinaryIO, staging: Path, missing: tuple[str, ...]) -> Account:
+    files = sorted(path.relative_to(staging).as_posix() for path in (staging / FILES).rglob("*") if path.is_file())
+    names = [name for name in (STORE, ENGINE) if (staging / name).is_file()] + files
+    members: dict[str, dict[str, Any]] = {}
+    for name in names:
+        with (staging / name).open("rb") as source:
+            members[name] = _add(file, name, source, os.fstat(source.fileno()).st_size)
+    damaged = tuple(name for name, each in members.items() if f"/{UPLOADS}/" in name and not name.endswith(each["sha256"]))
+    manifest = {
+        "format": FORMAT,
+        "release": __version__,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "members": members,
+        "missing": missing,
+    }
+    with tempfile.TemporaryFile() as source:
+        source.write(json.dumps(manifest, indent=1).encode())
+        size = source.tell()
+        source.seek(0)
+        _add(file, MANIFEST, source, size)
+    file.write(bytes(2 * BLOCK))
+    return Account(len(members), sum(each["bytes"] for each in members.values()), missing, damaged)
+
+
+def header(name: str, size: int) -> bytes:
+    """Return the block before a member: of the old form, which any program reads, with the size in binary where octal digits end."""
+    info = tarfile.TarInfo(name)
+    info.mode, info.size = 0o600, size if size < 8**11 else 0
+    block = bytearray(info.tobuf(tarfile.USTAR_FORMAT))
+    if size >= 8**11:
+        block[124:136] = b"\x80" + size.to_bytes(11, "big")
+        block[148:156] = b" " * 8
+        block[148:156] = b"%06o\0 " % sum(block)
+    return bytes(block)
+
+
+def _add(file: BinaryIO, name: str, source: Any, size: int) -> dict[str, Any]:
+    file.write(header(name, size))
+    digest = hashlib.sha256()
+    copy(source, file, size, digest)
+    file.write(bytes(-size % BLOCK))
+    return {"bytes": size, "sha256": digest.hexdigest()}
