@@ -21,6 +21,7 @@ import httpx2
 
 from api.schemas.campaigns import CampaignAnswer, CampaignSummary, RecordingAnswer, SignalAnswer, SpectrumAnswer, UploadAnswer
 from api.schemas.common import Answer, Page, ProblemDocument
+from api.schemas.forces import ForceAnswer, StreamsAnswer, StreamSummary
 from api.schemas.jobs import FittedLines, JobAnswer, LobeJob
 from api.schemas.keys import KeyAnswer, MadeKey
 from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes
@@ -405,6 +406,30 @@ class Client:
     def lobe_job(self, id: str, wait: int = 0) -> LobeJob:
         """Return lobes that are computed as a job; after so many seconds at the latest, where it has not ended before."""
         return _read(LobeJob, self.send("GET", f"/lobes/{id}", headers={"Prefer": f"wait={wait}"} if wait else {}))
+
+    def forces(self, machine: str, tooling: str | Json, recording: Path, air: Path | None = None, **further: Any) -> ForceAnswer:
+        """Return the forces of a recording that is a file here."""
+        return _read(ForceAnswer, self._forces({"machine": machine, "tooling": tooling, **further}, recording, air))
+
+    def forces_file(self, machine: str, tooling: str | Json, recording: Path, air: Path | None = None, **further: Any) -> str:
+        """Return the text of FORCES.csv."""
+        query = {"machine": machine, "tooling": tooling, **further}
+        return self._forces(query, recording, air, {"Accept": "text/csv"}).text
+
+    def forces_of_campaign(self, machine: str, campaign: str, recording: str, **further: Any) -> ForceAnswer:
+        """Return the forces of an uploaded recording, with its air cut."""
+        body = {"machine": machine, "campaign": campaign, "recording": recording, **further}
+        return _read(ForceAnswer, self.send("POST", "/forces", json=body))
+
+    def streams(self) -> list[StreamSummary]:
+        """Return all open force streams; `api.stream_client` opens one."""
+        return _read(StreamsAnswer, self.send("GET", "/forces/streams")).items
+
+    def _forces(self, query: Json, recording: Path, air: Path | None, headers: Mapping[str, str] | None = None) -> httpx2.Response:
+        with ExitStack() as opened:
+            named = {"recording": recording} | ({} if air is None else {"air": air})
+            files = {field: (path.name, opened.enter_context(path.open("rb"))) for field, path in named.items()}
+            return self.send("POST", "/forces", data={"query": json.dumps(query)}, files=files, headers=dict(headers or {}))
 
     def make_key(self, *scopes: str, label: str = "") -> MadeKey:
         """Make a key."""

@@ -43,7 +43,7 @@ def unpacked(raw: bytes, buckets: bool = False) -> tuple[int, FloatArray]:
 
 
 def samples_of(raw: bytes, channels: int) -> tuple[int, FloatArray]:
-    """Return first index and samples, shape (n, channels), of a frame that a client has sent.
+    """Return first index and samples, float32, shape (n, channels), of a frame that a client has sent.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def samples_of(raw: bytes, channels: int) -> tuple[int, FloatArray]:
     if len(raw) != HEADER.size + 4 * count * width:
         found = f"{len(raw)} bytes for {count} samples of {width} channels"
         raise InputError("frame", found, f"{HEADER.size + 4 * count * width} bytes")
-    return first, _finite(np.frombuffer(raw, "<f4", offset=HEADER.size).reshape(count, width).astype(float))
+    return first, _finite(np.frombuffer(raw, "<f4", offset=HEADER.size).reshape(count, width))
 
 
 def samples_of_text(text: str, channels: int) -> tuple[int, FloatArray]:

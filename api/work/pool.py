@@ -70,6 +70,9 @@ class Pool:
         self.warm = 0
         for _ in range(self.workers):
             self.executor.submit(warm).add_done_callback(self._warmed)
+        # behind what is asked for meanwhile, so that nobody waits for it
+        for _ in range(self.workers):
+            self.executor.submit(warm_observer)
 
     def _warmed(self, future: Any) -> None:
         if not future.cancelled() and future.exception() is None:
@@ -136,3 +139,11 @@ def warm() -> None:
 
     for step in ("tool-holder", "lobes"):
         STEPS[step]()
+
+
+def warm_observer() -> None:
+    """The same for what an observer of forces is made with: a stream waits for it."""
+    from rcsa_ident.workflows.warm import STEPS
+
+    STEPS["force observer"]()
+    import rcsa_ident.workflows.live  # noqa: F401

@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
+from api.client import Client, ServiceError
 from benchmarks.observer import relative_error
 from rcsa_ident.io.forces import read_forces_csv
 from rcsa_ident.signals.spectra import line_spectrum
@@ -289,3 +290,18 @@ def test_an_uploaded_air_cut_serves_a_live_stream(shop, campaign):
         socket.send_json({"event": "end"})
         frames = until(socket, "end")[1]
     assert np.all(relative_error(joined(frames), true, RATE) < 0.05)
+
+
+def test_the_client_asks_for_forces(shop, campaign, tmp_path):
+    http, machine = shop
+    client = Client(http=http)
+    for name, span in (("cut.h5", CUT), ("air.h5", AIR)):
+        (tmp_path / name).write_bytes(file(*span))
+    found = client.forces(machine, "T1", tmp_path / "cut.h5", tmp_path / "air.h5", spindle_speed_rpm=12000)
+    assert found == client.forces_of_campaign(machine, campaign, "c0_cut.h5")
+    assert found.axes["X"].rms_n > 10.0
+    text = client.forces_file(machine, "T1", tmp_path / "cut.h5", spindle_speed_rpm=12000)
+    assert text.startswith("time_s,Fx_n,Fy_n")
+    assert client.streams() == []
+    with pytest.raises(ServiceError, match="spindle_speed_rpm"):
+        client.forces(machine, "T1", tmp_path / "cut.h5")

@@ -14,8 +14,8 @@ from hypothesis.errors import Unsatisfiable
 
 from api.schemas.campaigns import EXAMPLE as CAMPAIGN
 from api.schemas.campaigns import NewCampaign
-from api.schemas.jobs import NewIdentification
 from api.schemas.forces import ForceQuery, ForceUpload
+from api.schemas.jobs import NewIdentification
 from api.schemas.queries import AdviceQuery, LobeQuery, TipQuery
 from api.schemas.toolings import ToolingKeys
 from api.security import new_id, now
@@ -87,7 +87,7 @@ def test_references_lead_somewhere(http):
     walk(schema)
 
 
-@pytest.mark.parametrize("model", [ToolingKeys, NewCampaign, NewIdentification, TipQuery, LobeQuery, AdviceQuery])
+@pytest.mark.parametrize("model", [ToolingKeys, NewCampaign, NewIdentification, TipQuery, LobeQuery, AdviceQuery, ForceUpload, ForceQuery])
 def test_examples_are_what_they_show(model):
     for shown in model.model_json_schema()["examples"]:
         model.model_validate_json(json.dumps(shown))

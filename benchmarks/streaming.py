@@ -1,0 +1,261 @@
+"""Force streams against the service as its command starts it: a minute at its pace beside an identification, an hour as fast as it goes.
+
+The signals are those of the virtual machine in the paper's cut (`turning`), 51.2 kHz, gap and fixture's acceleration of two axes: half a
+second more than the first second in air, then the cut, under a spindle whose speed wanders. The service knows the machine as it was
+identified from the sample runs. The client is this process, on the same cores.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from api.client import Client
+from api.stream_client import Event, Forces, ForceStream
+from benchmarks.observer import DATA, relative_error
+from benchmarks.service import serving
+from benchmarks.timing import row
+from benchmarks.turning import TurningCut, turning_cut
+
+#: Samples of a frame: 20 ms.
+FRAME = 1024
+ENTRY, WANDER, SAG = 1.5, 3e-4, 1e-3
+
+
+def run(seconds: float = 60.0, beside: bool = True) -> list[dict[str, Any]]:
+    """Stream for so long at the pace of the samples; `beside`: while an identification runs."""
+    turning = turning_cut()
+    samples, true = (np.concatenate(parts) for parts in zip(*turning.blocks(seconds, ENTRY, 4096, WANDER, SAG), strict=True))
+    frames = samples.astype(np.float32)
+    with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as port:
+        url = f"http://127.0.0.1:{port}"
+        with Client(url) as client:
+            machine = prepared(client)
+            job = begun(client, machine) if beside else None
+            found = paced(port, machine, turning, frames)
+            state = "" if job is None else f"; identification before: running, after: {client.job(job).state}"
+            if job is not None:
+                client.cancel(job)
+    return told(found, frames.shape[0], true, turning.rate, state)
+
+
+def prepared(client: Client) -> str:
+    """Write machine and tooling, and return the machine's id."""
+    machine = client.make_machine("HPM sample machine").id
+    client.identify(machine, result_text())
+    text = (DATA / "machines" / "toolings" / "S2-PG25.toml").read_text(encoding="utf-8")
+    client.write_tooling("T1", text.replace("teeth = 4", "teeth = 2"))
+    return machine
+
+
+def result_text() -> str:
+    """RESULT.json of the sample runs; RCSA_IDENT_OBSERVER_RESULT names one that is there."""
+    given = os.environ.get("RCSA_IDENT_OBSERVER_RESULT")
+    if given:
+        return Path(given).read_text(encoding="utf-8")
+    import subprocess
+    import sys
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "RESULT.json"
+        subprocess.run(
+            [sys.executable, "-m", "rcsa_ident.cli", "identify", str(DATA / "sample_runs"), "--out", str(path), "--json"],
+            check=True, stdout=subprocess.DEVNULL, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+        )  # fmt: skip
+        return path.read_text(encoding="utf-8")
+
+
+def begun(client: Client, machine: str) -> str:
+    """Upload the sample runs, start an identification, and return its id once it runs."""
+    campaign = client.upload_folder(machine, DATA / "sample_runs").id
+    job = client.identify_campaign(campaign, seed=1).id
+    while client.job(job).state == "queued":
+        time.sleep(0.2)
+    time.sleep(5.0)
+    return job
+
+
+def hello(machine: str, rate: float, **further: Any) -> dict[str, Any]:
+    """Return the first message; signals are in SI."""
+    sensors = {
+        f"{place}_{axis}": {"quantity": quantity, "axis": axis.upper()}
+        for place, quantity in (("gap", "displacement"), ("fix", "acceleration"))
+        for axis in "xy"
+    }
+    return {
+        "machine": machine, "tooling": "T1", "spindle_speed_rpm": 12000, "sampling_rate_hz": rate, "channels": list(sensors),
+        "sensors": sensors, "begins": "air",
+    } | further  # fmt: skip
+
+
+def paced(port: int, machine: str, turning: TurningCut, frames: np.ndarray) -> dict[str, Any]:
+    """Send each frame when its last sample would have been taken, and return forces, delays and counters."""
+    sent, came = np.zeros(frames.shape[0]), np.zeros(frames.shape[0])
+    force, statuses, end = np.full((frames.shape[0], 2), np.nan), list[dict[str, Any]](), dict[str, Any]()
+    ready = [np.inf]
+    with ForceStream(f"ws://127.0.0.1:{port}", hello(machine, turning.rate)) as stream:
+
+        def listen() -> None:
+            for message in stream.received():
+                now = time.perf_counter()
+                if isinstance(message, Forces):
+                    part = slice(message.first, message.first + message.values.shape[0])
+                    force[part], came[part] = message.values, now
+                elif isinstance(message, Event) and message.name == "ready":
+                    ready[0] = now
+                elif isinstance(message, Event) and message.name == "status":
+                    statuses.append(dict(message.content))
+                elif isinstance(message, Event) and message.name == "end":
+                    end.update(message.content)
+
+        thread = threading.Thread(target=listen)
+        thread.start()
+        before, begin = processes(), time.perf_counter()
+        for first in range(0, frames.shape[0], FRAME):
+            part = frames[first : first + FRAME]
+            due = begin + (first + part.shape[0]) / turning.rate
+            time.sleep(max(due - time.perf_counter(), 0.0))
+            stream.send(part, first)
+            sent[first : first + FRAME] = time.perf_counter()
+        stream.end()
+        thread.join()
+        wall, after = time.perf_counter() - begin, processes()
+    shares = {name: (after[name][0] - before[name][0]) / wall for name in after if name in before}
+    return {"force": force, "delay": came - sent, "caught_up": sent > ready[0] + 1.0, "end": end, "shares": shares, "statuses": statuses,
+            "ready": ready[0] - begin}  # fmt: skip
+
+
+def told(found: dict[str, Any], count: int, true: np.ndarray, rate: float, beside: str) -> list[dict[str, Any]]:
+    """Return what a stream at its pace has shown."""
+    end, force = found["end"], found["force"]
+    got = int(np.sum(np.isfinite(force[:, 0])))
+    lost = (
+        f"sent {count}, with a force {end['samples']}, received {got}, lost {end['lost']}, dropped {end['dropped']}, unread {end['unread']}"
+    )
+    delay = found["delay"][found["caught_up"]][FRAME - 1 :: FRAME] * 1e3
+    seconds = [status["delay_max_ms"] for status in found["statuses"] if status["stage"] == "live"][3:]
+    rows = [
+        row(f"stream of {count / rate:.0f} s at its pace: samples that are missing", float(count - got), None, "samples", lost + beside)
+    ]
+    for name, value in (
+        ("median", np.median(delay)),
+        ("95 %", np.quantile(delay, 0.95)),
+        ("99.9 %", np.quantile(delay, 0.999)),
+        ("longest", delay.max()),
+    ):
+        rows.append(
+            row(f"  from a frame's sending to its forces here, {name}", float(value), None, "ms", f"frames of {1e3 * FRAME / rate:.0f} ms")
+        )
+    rows.append(
+        row(
+            "  in the service alone, longest",
+            float(max(seconds)),
+            None,
+            "ms",
+            "from a frame's arrival to its forces, without the first 3 s",
+        )
+    )
+    rows.append(row("  from the first sample to an observer", found["ready"], None, "s", "1 s of it the samples that it is made from"))
+    for name, share in found["shares"].items():
+        rows.append(row(f"  share of a core, {name}", 100.0 * share, None, "%", ""))
+    for begin, finish in ((2.0, 10.0), (count / rate - 8.0, count / rate)):
+        part = slice(round(begin * rate), round(finish * rate))
+        error = relative_error(force[part], true[part], rate)
+        words = f"X {error[0]:.4f} Y {error[1]:.4f}; 300-4300 Hz, mean removed; live, of {np.std(true[part], axis=0).round(1)} N"
+        rows.append(row(f"  rms error over rms force, {begin:.0f} to {finish:.0f} s", float(error.max()), None, "-", words))
+    return rows
+
+
+def processes() -> dict[str, tuple[float, float]]:
+    """Return time on a core [s] and memory [MB] of the service's process and that of its streams, newest first."""
+    found: dict[str, tuple[float, float]] = {}
+    ours = {str(os.getpid())}
+    for folder in sorted(Path("/proc").glob("[0-9]*"), key=lambda f: int(f.name)):
+        try:
+            fields = (folder / "stat").read_text().rsplit(")", 1)[1].split()
+            name, parent = (folder / "comm").read_text().strip(), fields[1]
+            pages = int((folder / "statm").read_text().split()[1])
+        except (OSError, IndexError):
+            continue
+        if parent in ours:
+            # children of this process, and theirs
+            ours.add(folder.name)
+            kind = "streams" if name == "rcsa-streams" else "service" if parent == str(os.getpid()) else ""
+            if kind:
+                ticks = int(fields[11]) + int(fields[12])
+                found[kind] = ticks / os.sysconf("SC_CLK_TCK"), pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+    return found
+
+
+def hour(seconds: float) -> None:
+    """Stream so many seconds as fast as they are answered, and print memory every ten minutes of the stream."""
+    turning = turning_cut()
+    samples = np.concatenate([part for part, _ in turning.blocks(21.5, ENTRY, 4096)]).astype(np.float32)
+    # whole revolutions of the cut, again and again
+    lead, again = samples[: round(1.5 * turning.rate)], samples[round(1.5 * turning.rate) :]
+    total, mark = round(seconds * turning.rate), 0.0
+    answered, end = [0], dict[str, Any]()
+    with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as port:
+        with Client(f"http://127.0.0.1:{port}") as client:
+            machine = prepared(client)
+        print(f"before: {memory()}", flush=True)
+        with ForceStream(f"ws://127.0.0.1:{port}", hello(machine, turning.rate)) as stream:
+            moved = threading.Condition()
+
+            def listen() -> None:
+                for message in stream.received():
+                    with moved:
+                        if isinstance(message, Forces):
+                            answered[0] = message.first + message.values.shape[0]
+                        elif isinstance(message, Event) and message.name == "end":
+                            end.update(message.content)
+                        moved.notify()
+
+            thread = threading.Thread(target=listen)
+            thread.start()
+            first, begin = 0, time.perf_counter()
+            while first < total:
+                place = first if first < lead.shape[0] else (first - lead.shape[0]) % again.shape[0]
+                source = lead if first < lead.shape[0] else again
+                part = source[place : place + 4096][: total - first]
+                stream.send(part, first)
+                first += part.shape[0]
+                with moved:
+                    moved.wait_for(lambda first=first: first - answered[0] < 2.0 * turning.rate, 120.0)  # type: ignore[misc]
+                if first >= mark * turning.rate:
+                    print(f"{mark / 60.0:5.0f} min: {memory()}", flush=True)
+                    mark += 600.0
+            stream.end()
+            thread.join()
+        wall = time.perf_counter() - begin
+        print(f"end: {memory()}")
+        print(
+            f"{seconds:.0f} s of stream in {wall:.0f} s; samples {end['samples']} of {total}, lost {end['lost']}, dropped {end['dropped']}"
+        )
+
+
+def memory() -> str:
+    """Say how much memory the service takes."""
+    return ", ".join(f"{name} {size:.1f} MB" for name, (_, size) in sorted(processes().items()))
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Run the stream at its pace, or the long one."""
+    parser = argparse.ArgumentParser(prog="benchmarks streaming", description=__doc__)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--alone", action="store_true", help="without an identification beside it")
+    parser.add_argument("--long", type=float, metavar="SECONDS", help="so many seconds of stream as fast as it goes, with memory")
+    given = parser.parse_args(arguments)
+    if given.long is not None:
+        hour(given.long)
+        return
+    for each in run(given.seconds, not given.alone):
+        print(f"{each['claim']:<64} {each['ours']:<10.4g} {each['unit']:<8} {each['accuracy']}")
