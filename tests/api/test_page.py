@@ -107,3 +107,29 @@ def test_a_drawing_of_keys_that_are_in_no_library(client):
     assert "default-src 'none'" in drawn.headers["content-security-policy"]
     problem = refused(422, client.send, "POST", "/toolings/drawing", json=example(cutter={"teeth": 0, "diameter_mm": 12.0}))
     assert problem.errors[0].field == "cutter.teeth"
+
+
+SCRIPTS = sorted((FOLDER / "js").rglob("*.js"))
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda p: p.name)
+def test_modules_take_from_each_other_what_there_is(path):
+    """No compiler reads them before a browser does."""
+    text = path.read_text()
+    assert len(text.splitlines()) <= 300
+    for statement, names, target in re.findall(r'^(import \{([^}]*)\} from "([^"]+)";)', text, flags=re.MULTILINE):
+        source = (path.parent / target).resolve()
+        assert source in SCRIPTS, target
+        for name in (each.strip() for each in names.split(",") if each.strip()):
+            offered = re.search(rf"^export (async )?(function|const|class) {name}\b", source.read_text(), flags=re.MULTILINE)
+            assert offered, f"{name} of {target}"
+            assert re.search(rf"\b{name}\b", text.replace(statement, "")), f"{name} is not used"
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda p: p.name)
+def test_no_text_becomes_markup(path):
+    """Names come from other people: elements are made one by one, and nothing is evaluated."""
+    found = re.findall(
+        r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|\beval\b|new Function|setAttribute\(\"(?:style|on)", path.read_text()
+    )
+    assert not found

@@ -37,6 +37,12 @@ export const at = (path) => new URL(`v1/${path}`, document.baseURI).href;
 export const part = (text) => encodeURIComponent(text);
 export const keyHeaders = () => (key ? { "X-API-Key": key } : {});
 
+/** A key under which the same request may be sent twice; also where the connection is not an encrypted one. */
+export function once() {
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  return { "Idempotency-Key": [...bytes].map((b) => b.toString(16).padStart(2, "0")).join("") };
+}
+
 /** The problem of an answer that is none. */
 export function problemOf(status, text, headers = null) {
   let found = null;
@@ -47,7 +53,23 @@ export function problemOf(status, text, headers = null) {
   }
   if (status === 401) window.dispatchEvent(new Event("key-wanted"));
   if (found && typeof found === "object" && found.detail) return new Problem(status, found, headers);
-  return new Problem(status, { detail: status ? `the service answered ${status}` : "the service does not answer; is it running, and is the network there?" }, headers);
+  return new Problem(
+    status,
+    { detail: status ? `the service answered ${status}` : "the service does not answer; is it running, and is the network there?" },
+    headers,
+  );
+}
+
+/** fetch; what may be repeated is sent a second time where the line broke. */
+async function fetched(address, sent) {
+  try {
+    return await fetch(address, sent);
+  } catch (error) {
+    const twice = sent.method === "GET" || "Idempotency-Key" in sent.headers;
+    if (!twice || error.name === "AbortError") throw error;
+    await new Promise((resolve) => setTimeout(resolve, 400));
+    return fetch(address, sent);
+  }
 }
 
 /** Send, and return the answer; everything but 2xx and 304 is thrown as a `Problem`. */
@@ -59,7 +81,7 @@ export async function send(method, path, { json, body, headers = {}, signal } = 
   } else if (body !== undefined) sent.body = body;
   let answer;
   try {
-    answer = await fetch(at(path), sent);
+    answer = await fetched(at(path), sent);
   } catch (error) {
     if (error.name === "AbortError") throw error;
     throw problemOf(0, "");

@@ -43,8 +43,14 @@ export const safe = (name) => String(name).replaceAll("&", "&amp;").replaceAll("
 export function axis(title, more = {}) {
   const line = colour("line");
   return {
-    title: { text: title, standoff: 8 }, gridcolor: line, linecolor: colour("strong-line"), zerolinecolor: line, ticks: "outside", tickcolor: line,
-    automargin: true, ...more,
+    title: { text: title, standoff: 8 },
+    gridcolor: line,
+    linecolor: colour("strong-line"),
+    zerolinecolor: line,
+    ticks: "outside",
+    tickcolor: line,
+    automargin: true,
+    ...more,
   };
 }
 
@@ -52,9 +58,19 @@ function layoutOf(given) {
   const root = Number.parseFloat(getComputedStyle(document.documentElement).fontSize);
   return {
     font: { family: "system-ui, sans-serif", size: Math.round(root * 0.82), color: colour("ink") },
-    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 56, r: 14, t: 12, b: 44 }, showlegend: false, separators: ".\u202f",
-    hoverlabel: { bgcolor: colour("raised"), bordercolor: colour("strong-line"), font: { color: colour("ink"), size: Math.round(root * 0.82) } },
-    modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("strong-line"), activecolor: colour("accent") }, dragmode: "zoom", ...given,
+    paper_bgcolor: "rgba(0,0,0,0)",
+    plot_bgcolor: "rgba(0,0,0,0)",
+    margin: { l: 56, r: 14, t: 12, b: 44 },
+    showlegend: false,
+    separators: ".\u202f",
+    hoverlabel: {
+      bgcolor: colour("raised"),
+      bordercolor: colour("strong-line"),
+      font: { color: colour("ink"), size: Math.round(root * 0.82) },
+    },
+    modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("strong-line"), activecolor: colour("accent") },
+    dragmode: "zoom",
+    ...given,
   };
 }
 
@@ -77,7 +93,10 @@ export function chart(say, kind = "") {
     drawn = true;
     const buttons = ["select2d", "lasso2d", "autoScale2d", "toggleSpikelines", "hoverClosestCartesian", "hoverCompareCartesian"];
     await Plotly.react(box, data, layoutOf(layout), {
-      displaylogo: false, modeBarButtonsToRemove: buttons, displayModeBar: "hover", responsive: false,
+      displaylogo: false,
+      modeBarButtonsToRemove: buttons,
+      displayModeBar: "hover",
+      responsive: false,
       toImageButtonOptions: { format: "svg", filename: "rcsa-ident" },
     });
     if (!observer) {
@@ -105,6 +124,11 @@ export function chart(say, kind = "") {
 
 /** A legend of one's own: it wraps on a phone, and is read out. */
 export function legend(entries) {
-  return h("ul", { class: "legend" }, entries.map(({ name, series, dash = "solid", kind = "line" }) =>
-    h("li", null, h("span", { class: `key ${kind} ${series} ${dash}`, "aria-hidden": "true" }), name)));
+  return h(
+    "ul",
+    { class: "legend" },
+    entries.map(({ name, series, dash = "solid", kind = "line" }) =>
+      h("li", null, h("span", { class: `key ${kind} ${series} ${dash}`, "aria-hidden": "true" }), name),
+    ),
+  );
 }

@@ -46,6 +46,13 @@ export function tell(text, seconds = 6) {
   setTimeout(() => line.remove(), seconds * 1000);
 }
 
+/** Say something to those who hear the page; who sees it sees it anyway. */
+export function whisper(text) {
+  const line = h("div", { class: "unseen" }, text);
+  document.getElementById("told").append(line);
+  setTimeout(() => line.remove(), 4000);
+}
+
 const ICONS = {
   machine: "M4 21h16M6 21V5a2 2 0 0 1 2-2h8a2 2 0 0 1 2 2v3H9v4M12 8v5l-2 2v3h6v-3l-2-2V8",
   recordings: "M3 12h3l2-7 3 14 3-11 2 7 2-3h3",
@@ -68,7 +75,11 @@ export function mark(kind, word) {
 }
 
 export function note(kind, ...children) {
-  return h("div", { class: `note ${kind}` }, children.map((child) => (typeof child === "string" ? h("p", null, child) : child)));
+  return h(
+    "div",
+    { class: `note ${kind}` },
+    children.map((child) => (typeof child === "string" ? h("p", null, child) : child)),
+  );
 }
 
 export function card(title, actions, ...children) {
@@ -78,12 +89,23 @@ export function card(title, actions, ...children) {
 /** The head of a view. */
 export function head(title, words, ...actions) {
   document.title = `${title} · rcsa-ident`;
-  return h("div", { class: "page-head" }, h("div", null, h("h1", null, title), words && h("p", null, words)), h("div", { class: "row-of-buttons" }, actions));
+  return h(
+    "div",
+    { class: "page-head" },
+    h("div", null, h("h1", null, title), words && h("p", null, words)),
+    h("div", { class: "row-of-buttons" }, actions),
+  );
 }
 
 /** What is shown while there is nothing: says what to do next. */
 export function empty(title, words, ...actions) {
-  return h("div", { class: "empty" }, h("h2", null, title), h("p", { class: "soft" }, words), h("div", { class: "row-of-buttons" }, actions));
+  return h(
+    "div",
+    { class: "empty" },
+    h("h2", null, title),
+    h("p", { class: "soft" }, words),
+    h("div", { class: "row-of-buttons" }, actions),
+  );
 }
 
 export const waiting = (words) => h("p", { class: "waiting", role: "status" }, words);
@@ -95,7 +117,8 @@ export function link(to, words, kind = "") {
 /** Two or more choices, one of which holds. */
 export function choices(label, options, chosen, onpick) {
   const buttons = options.map(([value, words]) =>
-    h("button", { type: "button", "aria-pressed": String(value === chosen), onclick: () => pick(value) }, words));
+    h("button", { type: "button", "aria-pressed": String(value === chosen), onclick: () => pick(value) }, words),
+  );
   const box = h("div", { class: "switch", role: "group", "aria-label": label }, buttons);
   function pick(value) {
     options.forEach(([each], i) => buttons[i].setAttribute("aria-pressed", String(each === value)));
@@ -106,14 +129,20 @@ export function choices(label, options, chosen, onpick) {
 
 /** A table; a column is {name, unit, number, cell(row)}; it scrolls inside itself. */
 export function table(caption, columns, rows, { tall = false, row = null } = {}) {
-  const headings = columns.map((c) => h("th", { scope: "col", class: c.number ? "number" : null }, c.name, c.unit && h("span", { class: "unit" }, c.unit)));
+  const headings = columns.map((c) =>
+    h("th", { scope: "col", class: c.number ? "number" : null }, c.name, c.unit && h("span", { class: "unit" }, c.unit)),
+  );
   const body = rows.map((each, i) => {
     const cells = columns.map((c, k) =>
-      h(k === 0 ? "th" : "td", { class: c.number ? "number" : null, scope: k === 0 ? "row" : null }, c.cell(each, i)));
+      h(k === 0 ? "th" : "td", { class: c.number ? "number" : null, scope: k === 0 ? "row" : null }, c.cell(each, i)),
+    );
     return h("tr", row ? row(each, i) : null, cells);
   });
-  return h("div", { class: `scrolls${tall ? " tall" : ""}`, tabindex: "0", role: "region", "aria-label": caption },
-    h("table", null, h("caption", { class: "unseen" }, caption), h("thead", null, h("tr", null, headings)), h("tbody", null, body)));
+  return h(
+    "div",
+    { class: `scrolls${tall ? " tall" : ""}`, tabindex: "0", role: "region", "aria-label": caption },
+    h("table", null, h("caption", { class: "unseen" }, caption), h("thead", null, h("tr", null, headings)), h("tbody", null, body)),
+  );
 }
 
 /** Hand a text or a blob to the person as a file. */

@@ -30,14 +30,37 @@ export function dropZone(title, words, onfiles, { small = false } = {}) {
     if (input.files.length) onfiles([...input.files]);
     input.value = "";
   };
-  const files = h("input", { type: "file", multiple: true, class: "unseen", tabindex: "-1", "aria-hidden": "true", onchange: () => picked(files) });
-  const folder = h("input", { type: "file", webkitdirectory: true, class: "unseen", tabindex: "-1", "aria-hidden": "true", onchange: () => picked(folder) });
+  const files = h("input", {
+    type: "file",
+    multiple: true,
+    class: "unseen",
+    tabindex: "-1",
+    "aria-hidden": "true",
+    onchange: () => picked(files),
+  });
+  const folder = h("input", {
+    type: "file",
+    webkitdirectory: true,
+    class: "unseen",
+    tabindex: "-1",
+    "aria-hidden": "true",
+    onchange: () => picked(folder),
+  });
   const zone = h("section", { class: `drop${small ? " small" : ""}`, "aria-label": title });
-  add(zone, small ? null : icon("drop"), h("h2", null, title), h("p", { class: "soft" }, words),
-    h("div", { class: "row-of-buttons" },
+  add(
+    zone,
+    small ? null : icon("drop"),
+    h("h2", null, title),
+    h("p", { class: "soft" }, words),
+    h(
+      "div",
+      { class: "row-of-buttons" },
       h("button", { type: "button", class: small ? "" : "primary", onclick: () => folder.click() }, "Choose a folder"),
-      h("button", { type: "button", onclick: () => files.click() }, "Choose files")),
-    files, folder);
+      h("button", { type: "button", onclick: () => files.click() }, "Choose files"),
+    ),
+    files,
+    folder,
+  );
   let depth = 0;
   zone.addEventListener("dragenter", () => {
     depth += 1;

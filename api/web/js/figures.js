@@ -39,38 +39,78 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [] }) {
       return `${limit}${rate}${chatter === null ? "" : ` · ${plain(chatter)} Hz`}`;
     });
     data.push({
-      x, y, name: safe(each.tooling), text: told, type: "scatter", mode: "lines", line: { color: ink, width: 2.2, dash: DASHES[Math.floor(i / SERIES.length)] },
-      fill: lobes.length === 1 ? "tozeroy" : "none", fillcolor: colour(name, 0.07), hovertemplate: "%{text}",
+      x,
+      y,
+      name: safe(each.tooling),
+      text: told,
+      type: "scatter",
+      mode: "lines",
+      line: { color: ink, width: 2.2, dash: DASHES[Math.floor(i / SERIES.length)] },
+      fill: lobes.length === 1 ? "tozeroy" : "none",
+      fillcolor: colour(name, 0.07),
+      hovertemplate: "%{text}",
     });
     data.push({
-      x, y: each.chatter_frequency_hz, name: safe(each.tooling), yaxis: "y2", type: "scatter", mode: "markers", marker: { color: ink, size: 3.2 }, hoverinfo: "skip",
+      x,
+      y: each.chatter_frequency_hz,
+      name: safe(each.tooling),
+      yaxis: "y2",
+      type: "scatter",
+      mode: "markers",
+      marker: { color: ink, size: 3.2 },
+      hoverinfo: "skip",
     });
     const best = each.best_speeds.slice(0, lobes.length > 3 ? 1 : 3);
     data.push({
-      x: best.map((b) => b.spindle_speed_rpm), y: best.map((b) => (b.limit_depth_mm ?? maxDepth) * times), type: "scatter", mode: "markers",
-      marker: { color: colour("paper"), size: 10, symbol: "diamond", line: { color: ink, width: 2.4 } }, hoverinfo: "skip",
+      x: best.map((b) => b.spindle_speed_rpm),
+      y: best.map((b) => (b.limit_depth_mm ?? maxDepth) * times),
+      type: "scatter",
+      mode: "markers",
+      marker: { color: colour("paper"), size: 10, symbol: "diamond", line: { color: ink, width: 2.4 } },
+      hoverinfo: "skip",
     });
     const cut = recommended[i];
     if (cut) {
       data.push({
-        x: [cut.spindle_speed_rpm], y: [cut.axial_depth_mm * times], type: "scatter", mode: "markers", marker: { color: ink, size: 11, symbol: "circle", line: { color: colour("paper"), width: 1.5 } }, hoverinfo: "skip",
+        x: [cut.spindle_speed_rpm],
+        y: [cut.axial_depth_mm * times],
+        type: "scatter",
+        mode: "markers",
+        marker: { color: ink, size: 11, symbol: "circle", line: { color: colour("paper"), width: 1.5 } },
+        hoverinfo: "skip",
       });
     }
-    best.forEach((b, k) => annotations.push({
-      x: b.spindle_speed_rpm, y: (b.limit_depth_mm ?? maxDepth) * times, text: plain(b.spindle_speed_rpm), showarrow: false, yshift: 14,
-      font: { color: ink, size: k === 0 ? 15 : 12, weight: k === 0 ? 700 : 400 }, bgcolor: colour("paper", 0.75), borderpad: 1,
-    }));
+    best.forEach((b, k) =>
+      annotations.push({
+        x: b.spindle_speed_rpm,
+        y: (b.limit_depth_mm ?? maxDepth) * times,
+        text: plain(b.spindle_speed_rpm),
+        showarrow: false,
+        yshift: 14,
+        font: { color: ink, size: k === 0 ? 15 : 12, weight: k === 0 ? 700 : 400 },
+        bgcolor: colour("paper", 0.75),
+        borderpad: 1,
+      }),
+    );
   });
   const top = Math.min(highest * 1.16, maxDepth * times * 1.1) || 1;
   const layout = {
-    hovermode: "x unified", annotations,
-    xaxis: axis("Spindle speed [rev/min]", { anchor: "y2", tickformat: ",d", hoverformat: ",.0f", unifiedhovertitle: { text: "%{x} rev/min" } }),
+    hovermode: "x unified",
+    annotations,
+    xaxis: axis("Spindle speed [rev/min]", {
+      anchor: "y2",
+      tickformat: ",d",
+      hoverformat: ",.0f",
+      unifiedhovertitle: { text: "%{x} rev/min" },
+    }),
     yaxis: axis(`Depth limit [${unit("depth")}]`, { domain: [0.33, 1], range: [0, top], fixedrange: false }),
     yaxis2: axis("Chatter [Hz]", { domain: [0, 0.25], rangemode: "normal", nticks: 4 }),
   };
   const words = lobes.map((l) => {
     const best = l.best_speeds[0];
-    return best ? `${l.tooling}: deepest pocket at ${plain(best.spindle_speed_rpm)} rev/min, ${text("depth", best.limit_depth_mm ?? maxDepth)}` : l.tooling;
+    return best
+      ? `${l.tooling}: deepest pocket at ${plain(best.spindle_speed_rpm)} rev/min, ${text("depth", best.limit_depth_mm ?? maxDepth)}`
+      : l.tooling;
   });
   return { data, layout, say: `Stability lobes. ${words.join("; ")}.` };
 }
@@ -85,7 +125,8 @@ const PARTS = {
 function wrapped(curve, part) {
   const { of, spread } = PARTS[part];
   const y = curve.re.map((re, k) => of(re, curve.im[k]));
-  const band = part !== "phase" && curve.re_std ? curve.re.map((re, k) => 1.96 * spread(re, curve.im[k], curve.re_std[k], curve.im_std[k])) : null;
+  const band =
+    part !== "phase" && curve.re_std ? curve.re.map((re, k) => 1.96 * spread(re, curve.im[k], curve.re_std[k], curve.im_std[k])) : null;
   return { y, band };
 }
 
@@ -101,7 +142,10 @@ export function frfFigure(answers, { parts, shown }) {
       const series = answers.length === 1 ? seriesOf(k) : seriesOf(i);
       const dash = answers.length === 1 ? "solid" : DASHES[k];
       const label = safe(answers.length === 1 ? name : `${answer.tooling} ${name}`);
-      for (const [part, yaxis] of [[upper, "y"], [lower, "y2"]]) {
+      for (const [part, yaxis] of [
+        [upper, "y"],
+        [lower, "y2"],
+      ]) {
         const { y, band } = wrapped(curve, part);
         const scale = part === "phase" ? 1 : times;
         const x = answer.frequency_hz;
@@ -114,7 +158,13 @@ export function frfFigure(answers, { parts, shown }) {
         }
         const shownUnit = part === "phase" ? "°" : ` ${unit("receptance")}`;
         data.push({
-          x, y: y.map((v) => v * scale), yaxis, name: label, type: "scatter", mode: "lines", line: { color: colour(series), width: 1.8, dash },
+          x,
+          y: y.map((v) => v * scale),
+          yaxis,
+          name: label,
+          type: "scatter",
+          mode: "lines",
+          line: { color: colour(series), width: 1.8, dash },
           hovertemplate: `${label} %{y:.4~g}${shownUnit}<extra></extra>`,
         });
       }
@@ -124,8 +174,20 @@ export function frfFigure(answers, { parts, shown }) {
   const layout = {
     hovermode: "x unified",
     xaxis: axis("Frequency [Hz]", { anchor: "y2", tickformat: ",d", unifiedhovertitle: { text: "%{x:,.0f} Hz" } }),
-    yaxis: axis(log ? `Magnitude [${u}]` : `Real [${u}]`, { domain: [log ? 0.38 : 0.53, 1], type: log ? "log" : "linear", dtick: log ? 1 : undefined, exponentformat: "none" }),
-    yaxis2: axis(log ? "Phase [°]" : `Imag. [${u}]`, { domain: [0, log ? 0.3 : 0.46], ...(log ? { tickvals: [-180, -90, 0, 90, 180], range: [-190, 190] } : {}) }),
+    yaxis: axis(log ? `Magnitude [${u}]` : `Real [${u}]`, {
+      domain: [log ? 0.38 : 0.53, 1],
+      type: log ? "log" : "linear",
+      dtick: log ? 1 : undefined,
+      exponentformat: "none",
+    }),
+    yaxis2: axis(log ? "Phase [°]" : `Imag. [${u}]`, {
+      domain: [0, log ? 0.3 : 0.46],
+      ...(log ? { tickvals: [-180, -90, 0, 90, 180], range: [-190, 190] } : {}),
+    }),
   };
-  return { data, layout, say: `Frequency response of ${answers.map((a) => a.tooling).join(", ")}, ${log ? "magnitude and phase" : "real and imaginary part"}.` };
+  return {
+    data,
+    layout,
+    say: `Frequency response of ${answers.map((a) => a.tooling).join(", ")}, ${log ? "magnitude and phase" : "real and imaginary part"}.`,
+  };
 }

@@ -11,7 +11,9 @@ export function field(label, input, { name = "", hint = "", unit = "" } = {}) {
   const fault = h("div", { class: "fault", id: `${id}-fault`, hidden: true });
   const told = hint ? h("div", { class: "hint", id: `${id}-hint` }, hint) : null;
   if (hint) input.setAttribute("aria-describedby", `${id}-hint`);
-  const control = unit ? h("div", { class: "with-unit" }, input, h("span", { class: "unit" }, typeof unit === "string" ? u(unit) : unit)) : input;
+  const control = unit
+    ? h("div", { class: "with-unit" }, input, h("span", { class: "unit" }, typeof unit === "string" ? u(unit) : unit))
+    : input;
   return h("div", { class: "field", "data-field": name || null }, h("label", { for: id }, label), control, told, fault);
 }
 
@@ -25,7 +27,11 @@ export function quantity(label, kind, value, options = {}) {
 
 /** A choice from a list of [value, words]. */
 export function select(options, chosen, props = {}) {
-  return h("select", props, options.map(([value, words]) => h("option", { value, selected: value === chosen }, words)));
+  return h(
+    "select",
+    props,
+    options.map(([value, words]) => h("option", { value, selected: value === chosen }, words)),
+  );
 }
 
 const plainName = (name) => name.replace(/\[(\d+)\]/g, ".$1");
@@ -94,7 +100,13 @@ function placesOf(form, name) {
   let found = exact(wanted);
   if (!found.length && wanted.includes(" + ")) found = wanted.split(" + ").flatMap(exact);
   // pydantic names the members of a choice, too: toolings.0.ToolingKeys.cutter.teeth
-  if (!found.length) found = exact(wanted.split(".").filter((p) => !/^[A-Z]|\(/.test(p)).join("."));
+  if (!found.length)
+    found = exact(
+      wanted
+        .split(".")
+        .filter((p) => !/^[A-Z]|\(/.test(p))
+        .join("."),
+    );
   if (!found.length) found = known.filter((box) => wanted.endsWith(`.${box.dataset.field}`)).slice(0, 1);
   return found;
 }
@@ -103,7 +115,10 @@ function placesOf(form, name) {
 export function failed(place, error) {
   if (error?.name === "AbortError") return;
   if (place.matches?.("form")) showProblem(place, error);
-  else place.replaceChildren(note("bad", error.message, ...(error.errors ?? []).slice(1).map((e) => `${e.field}: found ${e.found}, allowed ${e.allowed}`)));
+  else
+    place.replaceChildren(
+      note("bad", error.message, ...(error.errors ?? []).slice(1).map((e) => `${e.field}: found ${e.found}, allowed ${e.allowed}`)),
+    );
   if (!("status" in error)) console.error(error);
 }
 
@@ -126,10 +141,22 @@ export function busy(button, work) {
 /** Ask before something is lost. */
 export function confirmed(question, words, yes) {
   return new Promise((resolve) => {
-    const box = h("dialog", { "aria-label": question },
-      h("form", { method: "dialog" }, h("h2", null, question), h("p", null, words),
-        h("div", { class: "row-of-buttons" },
-          h("button", { value: "yes", class: "danger" }, yes), h("button", { value: "no", autofocus: true }, "Keep it"))));
+    const box = h(
+      "dialog",
+      { "aria-label": question },
+      h(
+        "form",
+        { method: "dialog" },
+        h("h2", null, question),
+        h("p", null, words),
+        h(
+          "div",
+          { class: "row-of-buttons" },
+          h("button", { value: "yes", class: "danger" }, yes),
+          h("button", { value: "no", autofocus: true }, "Keep it"),
+        ),
+      ),
+    );
     box.addEventListener("close", () => {
       box.remove();
       resolve(box.returnValue === "yes");

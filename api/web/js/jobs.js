@@ -6,14 +6,19 @@ export const RUNNING = ["queued", "running"];
 /** A job's state in words. */
 export function wordsOf(job) {
   if (job.state === "queued") return "waiting for a free worker";
-  if (job.state === "running") return job.progress ? `${job.progress.stage}${job.progress.total ? `, ${job.progress.done} of ${job.progress.total}` : ""}` : "starting";
+  if (job.state === "running")
+    return job.progress
+      ? `${job.progress.stage}${job.progress.total ? `, ${job.progress.done} of ${job.progress.total}` : ""}`
+      : "starting";
   if (job.state === "failed") return "failed";
   if (job.state === "cancelled") return "cancelled";
   return job.status ?? "done";
 }
 
 export const kindOf = (job) =>
-  job.state === "done" ? ({ converged: "good", suspect: "doubt", failed: "bad" }[job.status] ?? "good") : ({ failed: "bad", cancelled: "idle" }[job.state] ?? "busy");
+  job.state === "done"
+    ? ({ converged: "good", suspect: "doubt", failed: "bad" }[job.status] ?? "good")
+    : ({ failed: "bad", cancelled: "idle" }[job.state] ?? "busy");
 
 export const shareOf = (job) => (job.progress?.total ? job.progress.done / job.progress.total : null);
 
@@ -25,11 +30,15 @@ export async function followLobes(question, signal, tell) {
   tell("waiting for a free worker", null);
   signal.addEventListener("abort", () => send("DELETE", `lobes/${first.id}`).catch(() => {}));
   let last = first;
-  await follow(`lobes/${first.id}/events`, (event, data) => {
-    if (event === "progress" || event === "end") last = data;
-    tell(wordsOf(last), shareOf(last));
-    return event === "end";
-  }, signal);
+  await follow(
+    `lobes/${first.id}/events`,
+    (event, data) => {
+      if (event === "progress" || event === "end") last = data;
+      tell(wordsOf(last), shareOf(last));
+      return event === "end";
+    },
+    signal,
+  );
   const done = await get(`lobes/${first.id}`, { signal });
   if (done.answer) return done.answer;
   throw new Error(done.job.problem?.detail ?? `the job is ${done.job.state}`);

@@ -6,7 +6,10 @@ import { allMachines, choose, forgetAll, knownMachines, machine } from "./state.
 import { isInch, setInch } from "./units.js";
 import { askForKey, keyButton } from "./views/keys.js";
 
-const view = (file, name = "view") => async (...given) => (await import(`./views/${file}.js`))[name](...given);
+const view =
+  (file, name = "view") =>
+  async (...given) =>
+    (await import(`./views/${file}.js`))[name](...given);
 
 route("", "machines", view("machines"));
 route("machines/:id", "machines", view("machine"));
@@ -45,10 +48,23 @@ function steps() {
     identification: known ? known.status : "",
   };
   const items = SECTIONS.map(([name, long, short, path]) =>
-    h("li", null,
-      h("a", { href: to(path), "aria-current": name === section ? "page" : null },
+    h(
+      "li",
+      null,
+      h(
+        "a",
+        { href: to(path), "aria-current": name === section ? "page" : null },
         icon(name === "machines" ? "machine" : name),
-        h("span", null, h("span", { class: "long" }, long), h("span", { class: "short" }, short), states[name] && h("span", { class: "state" }, states[name])))));
+        h(
+          "span",
+          null,
+          h("span", { class: "long" }, long),
+          h("span", { class: "short" }, short),
+          states[name] && h("span", { class: "state" }, states[name]),
+        ),
+      ),
+    ),
+  );
   fill(document.getElementById("steps"), h("ol", null, items));
 }
 
@@ -56,26 +72,58 @@ function picker() {
   const known = knownMachines();
   if (!known.length) return null;
   const here = machine();
-  const list = h("select", { id: "machine-here", onchange: () => {
-    choose(list.value);
-    // what is open belongs to the other machine
-    if (/^(campaigns|identifications|machines)\//.test(where().path)) location.hash = to(section === "machines" ? `machines/${list.value}` : section);
-    else refresh();
-  } }, known.map((m) => h("option", { value: m.id, selected: m.id === here?.id }, m.name)));
+  const list = h(
+    "select",
+    {
+      id: "machine-here",
+      onchange: () => {
+        choose(list.value);
+        // what is open belongs to the other machine
+        if (/^(campaigns|identifications|machines)\//.test(where().path))
+          location.hash = to(section === "machines" ? `machines/${list.value}` : section);
+        else refresh();
+      },
+    },
+    known.map((m) => h("option", { value: m.id, selected: m.id === here?.id }, m.name)),
+  );
   return h("label", { for: "machine-here" }, h("span", { class: "words" }, "Machine"), list);
 }
 
 function top() {
   const dark = document.documentElement.dataset.theme ?? "auto";
   const focused = document.activeElement?.id;
-  fill(document.getElementById("top"),
-    h("a", { class: "brand", href: to("") }, h("img", { src: document.querySelector('link[rel="icon"]').href, alt: "" }), h("span", null, "rcsa-ident")),
+  fill(
+    document.getElementById("top"),
+    h(
+      "a",
+      { class: "brand", href: to("") },
+      h("img", { src: document.querySelector('link[rel="icon"]').href, alt: "" }),
+      h("span", null, "rcsa-ident"),
+    ),
     picker(),
     h("span", { class: "space" }),
-    choices("Units", [["mm", "mm"], ["inch", "inch"]], isInch() ? "inch" : "mm", (value) => setInch(value === "inch")),
-    choices("Light or dark", [["light", "Light"], ["auto", "Auto"], ["dark", "Dark"]], dark, setTheme),
+    choices(
+      "Units",
+      [
+        ["mm", "mm"],
+        ["inch", "inch"],
+      ],
+      isInch() ? "inch" : "mm",
+      (value) => setInch(value === "inch"),
+    ),
+    choices(
+      "Light or dark",
+      [
+        ["light", "Light"],
+        ["auto", "Auto"],
+        ["dark", "Dark"],
+      ],
+      dark,
+      setTheme,
+    ),
     keyButton(),
-    h("a", { href: "docs", class: "small" }, "API"));
+    h("a", { href: "docs", class: "small" }, "API"),
+  );
   if (focused) document.getElementById(focused)?.focus();
 }
 

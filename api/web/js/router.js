@@ -21,7 +21,8 @@ export function where() {
 export function to(path, query = {}) {
   const search = new URLSearchParams();
   for (const [name, value] of Object.entries(query)) {
-    for (const each of Array.isArray(value) ? value : [value]) if (each !== null && each !== undefined && each !== "") search.append(name, each);
+    for (const each of Array.isArray(value) ? value : [value])
+      if (each !== null && each !== undefined && each !== "") search.append(name, each);
   }
   const text = search.toString();
   return `#/${path}${text ? `?${text}` : ""}`;

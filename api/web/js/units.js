@@ -5,22 +5,70 @@ const INCH = 25.4;
 const POUND = 4.4482216152605;
 // kind: [unit, factor, digits] metric and inch; the factor turns the service's number into the shown one
 const KINDS = {
-  length: [["mm", 1, 3], ["in", 1 / INCH, 4]],
-  depth: [["mm", 1, 2], ["in", 1 / INCH, 4]],
-  feed: [["mm", 1, 4], ["in", 1 / INCH, 5]],
-  displacement: [["µm", 1, 2], ["µin", 1000 / INCH, 1]],
-  receptance: [["µm/N", 1e6, 4], ["µin/lbf", (1e9 / INCH) * POUND, 2]],
-  removal: [["cm³/min", 1, 1], ["in³/min", 1000 / INCH ** 3, 2]],
-  force: [["N", 1, 1], ["lbf", 1 / POUND, 2]],
-  torque: [["N m", 1, 2], ["lbf ft", 1 / (POUND * INCH * 12e-3), 2]],
-  power: [["kW", 1, 2], ["hp", 1 / 0.7456998715822702, 2]],
-  pressure: [["N/mm²", 1, 0], ["ksi", (INCH * INCH) / POUND / 1000, 2]],
-  edge: [["N/mm", 1, 2], ["lbf/in", INCH / POUND, 1]],
-  speed: [["rev/min", 1, 0], ["rev/min", 1, 0]],
-  hertz: [["Hz", 1, 0], ["Hz", 1, 0]],
-  degree: [["°", 1, 2], ["°", 1, 2]],
-  percent: [["%", 1, 2], ["%", 1, 2]],
-  none: [["", 1, 3], ["", 1, 3]],
+  length: [
+    ["mm", 1, 3],
+    ["in", 1 / INCH, 4],
+  ],
+  depth: [
+    ["mm", 1, 2],
+    ["in", 1 / INCH, 4],
+  ],
+  feed: [
+    ["mm", 1, 4],
+    ["in", 1 / INCH, 5],
+  ],
+  displacement: [
+    ["µm", 1, 2],
+    ["µin", 1000 / INCH, 1],
+  ],
+  receptance: [
+    ["µm/N", 1e6, 4],
+    ["µin/lbf", (1e9 / INCH) * POUND, 2],
+  ],
+  removal: [
+    ["cm³/min", 1, 1],
+    ["in³/min", 1000 / INCH ** 3, 2],
+  ],
+  force: [
+    ["N", 1, 1],
+    ["lbf", 1 / POUND, 2],
+  ],
+  torque: [
+    ["N m", 1, 2],
+    ["lbf ft", 1 / (POUND * INCH * 12e-3), 2],
+  ],
+  power: [
+    ["kW", 1, 2],
+    ["hp", 1 / 0.7456998715822702, 2],
+  ],
+  pressure: [
+    ["N/mm²", 1, 0],
+    ["ksi", (INCH * INCH) / POUND / 1000, 2],
+  ],
+  edge: [
+    ["N/mm", 1, 2],
+    ["lbf/in", INCH / POUND, 1],
+  ],
+  speed: [
+    ["rev/min", 1, 0],
+    ["rev/min", 1, 0],
+  ],
+  hertz: [
+    ["Hz", 1, 0],
+    ["Hz", 1, 0],
+  ],
+  degree: [
+    ["°", 1, 2],
+    ["°", 1, 2],
+  ],
+  percent: [
+    ["%", 1, 2],
+    ["%", 1, 2],
+  ],
+  none: [
+    ["", 1, 3],
+    ["", 1, 3],
+  ],
 };
 
 let inch = false;
@@ -46,7 +94,11 @@ export function plain(value, digits = 0, least = 0) {
 export function significant(value, digits = 3) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const size = Math.abs(value);
-  if (size !== 0 && (size >= 1e6 || size < 1e-4)) return value.toExponential(digits - 1).replace(/e\+?(-?\d+)$/, (_, power) => `·10${[...power].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("")}`).replace("-", "−");
+  if (size !== 0 && (size >= 1e6 || size < 1e-4))
+    return value
+      .toExponential(digits - 1)
+      .replace(/e\+?(-?\d+)$/, (_, power) => `·10${[...power].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("")}`)
+      .replace("-", "−");
   const decimals = size === 0 ? 0 : Math.max(0, digits - 1 - Math.floor(Math.log10(size)));
   return plain(value, decimals, decimals);
 }

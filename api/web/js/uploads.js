@@ -79,7 +79,10 @@ class Queue extends EventTarget {
     };
     for (let turn = 1; ; turn += 1) {
       try {
-        item.recording = item.file.size > LARGE && !item.replace ? await inPieces(path, item.file, progress) : await whole("PUT", path, item.file, {}, progress);
+        item.recording =
+          item.file.size > LARGE && !item.replace
+            ? await inPieces(path, item.file, progress)
+            : await whole("PUT", path, item.file, {}, progress);
         item.state = "done";
         return;
       } catch (error) {
@@ -102,7 +105,8 @@ function whole(method, path, body, headers, progress) {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.open(method, at(path));
-    for (const [name, value] of Object.entries({ "Content-Type": "application/octet-stream", ...keyHeaders(), ...headers })) request.setRequestHeader(name, value);
+    for (const [name, value] of Object.entries({ "Content-Type": "application/octet-stream", ...keyHeaders(), ...headers }))
+      request.setRequestHeader(name, value);
     request.upload.onprogress = (event) => progress(event.loaded);
     const told = new Headers();
     request.onload = () => {

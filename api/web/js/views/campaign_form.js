@@ -1,6 +1,6 @@
 // A campaign described by hand, for recordings that come without a campaign.toml.
-import { all, post, Problem } from "../api.js";
-import { add, card, empty, fill, h, head, link, note } from "../dom.js";
+import { all, once, post, Problem } from "../api.js";
+import { add, card, empty, fill, h, head, link } from "../dom.js";
 import { dropZone } from "../drop.js";
 import { busy, field, quantity, select, showProblem } from "../forms.js";
 import { go, to } from "../router.js";
@@ -21,10 +21,13 @@ const base = (name) => name.replace(/\.[^.]+$/, "").replace(/(^|[_\-. ])(air|cut
 /** Cuts as the names of the files tell them: pairs of cut and air, and a speed where a number can be one. */
 export function cutsOf(names) {
   const airs = new Map(names.filter(isAir).map((name) => [base(name), name]));
-  return names.filter((name) => !isAir(name)).sort().map((name) => {
-    const found = [...base(name).matchAll(/\d{3,6}/g)].map(Number).find((n) => n >= 500 && n <= 100_000);
-    return { id: base(name) || name, cut: name, air: airs.get(base(name)) ?? "", speed: found ?? null };
-  });
+  return names
+    .filter((name) => !isAir(name))
+    .sort()
+    .map((name) => {
+      const found = [...base(name).matchAll(/\d{3,6}/g)].map(Number).find((n) => n >= 500 && n <= 100_000);
+      return { id: base(name) || name, cut: name, air: airs.get(base(name)) ?? "", speed: found ?? null };
+    });
 }
 
 /** Angles from the normal direction for a radial immersion (a share of the diameter). */
@@ -37,8 +40,20 @@ export async function view(_args, _query, place) {
   const [, toolings] = await Promise.all([allMachines(), all("toolings")]);
   const here = machine();
   add(place, head("Describe the cuts", "For recordings without a campaign.toml."));
-  if (!here) return void add(place, empty("No machine yet", "Make one first; the cuts belong to it.", link(to(""), "To the machines", "button primary")));
-  if (!toolings.length) return void add(place, empty("No tooling yet", "An identification has to know what was in the spindle.", link(to("toolings/new"), "Draw the tooling", "button primary")));
+  if (!here)
+    return void add(
+      place,
+      empty("No machine yet", "Make one first; the cuts belong to it.", link(to(""), "To the machines", "button primary")),
+    );
+  if (!toolings.length)
+    return void add(
+      place,
+      empty(
+        "No tooling yet",
+        "An identification has to know what was in the spindle.",
+        link(to("toolings/new"), "Draw the tooling", "button primary"),
+      ),
+    );
 
   const files = kept;
   const name = h("input", { autocomplete: "off", maxlength: 200 });
@@ -49,30 +64,115 @@ export async function view(_args, _query, place) {
   const ktc = quantity("Tangential coefficient", "pressure", 902, { name: "workpiece.tangential_coefficient_mpa" });
   const krc = quantity("Radial over tangential", "none", 0.26, { name: "workpiece.radial_ratio" });
   const common = {
-    tooling: select(toolings.map((t) => [t.name, t.name]), toolings[0].name),
+    tooling: select(
+      toolings.map((t) => [t.name, t.name]),
+      toolings[0].name,
+    ),
     depth: quantity("Axial depth", "depth", 0.4, { name: "axial_depth_mm" }),
     feed: quantity("Feed per tooth", "feed", 0.1, { name: "feed_per_tooth_mm" }),
     immersion: quantity("Radial immersion", "percent", 50),
-    strategy: select([["down", "Down milling"], ["up", "Up milling"]], "down"),
-    direction: select(["+X", "-X", "+Y", "-Y"].map((d) => [d, d.replace("-", "−")]), "+X"),
+    strategy: select(
+      [
+        ["down", "Down milling"],
+        ["up", "Up milling"],
+      ],
+      "down",
+    ),
+    direction: select(
+      ["+X", "-X", "+Y", "-Y"].map((d) => [d, d.replace("-", "−")]),
+      "+X",
+    ),
   };
   const first = quantity("First speed", "speed", null, { hint: "Fills the speeds below" });
   const step = quantity("Step", "speed", null);
   const sensors = h("tbody");
-  for (const [channel, kind, axis] of [["flange_x", "displacement", "X"], ["flange_y", "displacement", "Y"], ["fixture_x", "acceleration", "X"], ["fixture_y", "acceleration", "Y"]]) sensors.append(sensorRow(channel, kind, axis));
+  for (const [channel, kind, axis] of [
+    ["flange_x", "displacement", "X"],
+    ["flange_y", "displacement", "Y"],
+    ["fixture_x", "acceleration", "X"],
+    ["fixture_y", "acceleration", "Y"],
+  ])
+    sensors.append(sensorRow(channel, kind, axis));
   const body = h("tbody");
   const count = h("p", { class: "soft", role: "status" });
   const button = h("button", { class: "primary" }, "Make the campaign and upload");
-  const form = h("form", { class: "view", novalidate: true },
+  const form = h(
+    "form",
+    { class: "view", novalidate: true },
     card("Campaign", null, h("div", { class: "fields" }, field("Name", name, { name: "campaign.name" }), rate)),
-    card("Sensors", null, h("p", { class: "small soft" }, "Channels by their names in the recordings. Sensitivity in V/m or V/(m/s²); 1 where the file is in SI. Leave a name empty for a channel that is not there."),
-      h("div", { class: "scrolls", tabindex: "0", role: "region", "aria-label": "Sensors" }, h("table", null, h("thead", null, h("tr", null, ["Channel", "Measures", "Axis", "Sensitivity"].map((c) => h("th", { scope: "col" }, c)))), sensors))),
+    card(
+      "Sensors",
+      null,
+      h(
+        "p",
+        { class: "small soft" },
+        "Channels by their names in the recordings. Sensitivity in V/m or V/(m/s²); 1 where the file is in SI. Leave a name empty for a channel that is not there.",
+      ),
+      h(
+        "div",
+        { class: "scrolls", tabindex: "0", role: "region", "aria-label": "Sensors" },
+        h(
+          "table",
+          null,
+          h(
+            "thead",
+            null,
+            h(
+              "tr",
+              null,
+              ["Channel", "Measures", "Axis", "Sensitivity"].map((c) => h("th", { scope: "col" }, c)),
+            ),
+          ),
+          sensors,
+        ),
+      ),
+    ),
     card("Workpiece", null, h("div", { class: "fields" }, field("Material", material, { name: "workpiece.name" }), ktc, krc)),
-    card("All cuts", null, h("div", { class: "fields" }, field("Tooling", common.tooling), common.depth, common.feed, common.immersion, field("Strategy", common.strategy), field("Feed direction", common.direction), first, step)),
-    card("Each cut", null, dropZone("Drop recordings here", "Names that hold “air” are air cuts of the cut of the same name.", take, { small: true }), count,
-      h("div", { class: "scrolls tall", tabindex: "0", role: "region", "aria-label": "Cuts" }, h("table", null,
-        h("thead", null, h("tr", null, h("th", { scope: "col" }, "Cut"), h("th", { scope: "col" }, "Speed", h("span", { class: "unit" }, u("speed"))), h("th", { scope: "col" }, "Tooling"), h("th", { scope: "col" }, "Air cut"))), body))),
-    h("p", null, button));
+    card(
+      "All cuts",
+      null,
+      h(
+        "div",
+        { class: "fields" },
+        field("Tooling", common.tooling),
+        common.depth,
+        common.feed,
+        common.immersion,
+        field("Strategy", common.strategy),
+        field("Feed direction", common.direction),
+        first,
+        step,
+      ),
+    ),
+    card(
+      "Each cut",
+      null,
+      dropZone("Drop recordings here", "Names that hold “air” are air cuts of the cut of the same name.", take, { small: true }),
+      count,
+      h(
+        "div",
+        { class: "scrolls tall", tabindex: "0", role: "region", "aria-label": "Cuts" },
+        h(
+          "table",
+          null,
+          h(
+            "thead",
+            null,
+            h(
+              "tr",
+              null,
+              h("th", { scope: "col" }, "Cut"),
+              h("th", { scope: "col" }, "Speed", h("span", { class: "unit" }, u("speed"))),
+              h("th", { scope: "col" }, "Tooling"),
+              h("th", { scope: "col" }, "Air cut"),
+            ),
+          ),
+          body,
+        ),
+      ),
+    ),
+    h("p", null, button),
+  );
   add(place, form);
   const taken = new Map();
 
@@ -88,7 +188,14 @@ export async function view(_args, _query, place) {
     const speed = quantityInput("speed", cut.speed, { "aria-label": `Speed of ${cut.id}` });
     const tooling = select([["", "as above"], ...toolings.map((t) => [t.name, t.name])], "", { "aria-label": `Tooling of ${cut.id}` });
     const air = select([["", "none"], ...airs.map((a) => [a, a])], cut.air, { "aria-label": `Air cut of ${cut.id}` });
-    const tr = h("tr", null, h("th", { scope: "row" }, cut.id), h("td", null, speed, h("div", { class: "fault", id: `cut-${i}-fault`, hidden: true })), h("td", null, tooling), h("td", null, air));
+    const tr = h(
+      "tr",
+      null,
+      h("th", { scope: "row" }, cut.id),
+      h("td", null, speed, h("div", { class: "fault", id: `cut-${i}-fault`, hidden: true })),
+      h("td", null, tooling),
+      h("td", null, air),
+    );
     Object.assign(tr, { cut, speed, tooling, air });
     return tr;
   }
@@ -101,42 +208,84 @@ export async function view(_args, _query, place) {
   step.input.addEventListener("input", spread);
   take(files);
 
-  form.addEventListener("submit", busy(button, async () => {
-    const rows = [...body.children];
-    if (!rows.length) return void showProblem(form, new Problem(0, { detail: "There are no recordings yet: drop some in." }));
-    const [entry, exit] = angles(common.immersion.input.base / 100, common.strategy.value);
-    const made = {
-      campaign: { name: name.value.trim(), ...(rate.input.base === null ? {} : { sampling_rate_hz: rate.input.base }) },
-      sensors: Object.fromEntries([...sensors.children].filter((tr) => tr.inputs.channel.value.trim()).map((tr) => [tr.inputs.channel.value.trim(), { quantity: tr.inputs.kind.value, axis: tr.inputs.axis.value, sensitivity: tr.inputs.sensitivity.base }])),
-      workpiece: { name: material.value.trim(), tangential_coefficient_mpa: ktc.input.base, radial_ratio: krc.input.base },
-      cuts: rows.map((tr) => ({
-        id: tr.cut.id, tooling: tr.tooling.value || common.tooling.value, spindle_speed_rpm: tr.speed.base, axial_depth_mm: common.depth.input.base,
-        feed_per_tooth_mm: common.feed.input.base, entry_angle_deg: entry, exit_angle_deg: exit, feed_direction: common.direction.value, cut: tr.cut.cut,
-        ...(tr.air.value ? { air: tr.air.value } : {}),
-      })),
-    };
-    try {
-      const campaign = await post(`machines/${here.id}/campaigns`, made);
-      choose(here.id);
-      queueFor(campaign.id).add(campaign, [...taken.values()]);
-      kept = [];
-      go(`campaigns/${campaign.id}`);
-    } catch (error) {
-      if (!(error instanceof Problem)) throw error;
-      showProblem(form, error);
-    }
-  }));
+  form.addEventListener(
+    "submit",
+    busy(button, async () => {
+      const rows = [...body.children];
+      if (!rows.length) return void showProblem(form, new Problem(0, { detail: "There are no recordings yet: drop some in." }));
+      const [entry, exit] = angles(common.immersion.input.base / 100, common.strategy.value);
+      const made = {
+        campaign: { name: name.value.trim(), ...(rate.input.base === null ? {} : { sampling_rate_hz: rate.input.base }) },
+        sensors: Object.fromEntries(
+          [...sensors.children]
+            .filter((tr) => tr.inputs.channel.value.trim())
+            .map((tr) => [
+              tr.inputs.channel.value.trim(),
+              { quantity: tr.inputs.kind.value, axis: tr.inputs.axis.value, sensitivity: tr.inputs.sensitivity.base },
+            ]),
+        ),
+        workpiece: { name: material.value.trim(), tangential_coefficient_mpa: ktc.input.base, radial_ratio: krc.input.base },
+        cuts: rows.map((tr) => ({
+          id: tr.cut.id,
+          tooling: tr.tooling.value || common.tooling.value,
+          spindle_speed_rpm: tr.speed.base,
+          axial_depth_mm: common.depth.input.base,
+          feed_per_tooth_mm: common.feed.input.base,
+          entry_angle_deg: entry,
+          exit_angle_deg: exit,
+          feed_direction: common.direction.value,
+          cut: tr.cut.cut,
+          ...(tr.air.value ? { air: tr.air.value } : {}),
+        })),
+      };
+      try {
+        const campaign = await post(`machines/${here.id}/campaigns`, made, { headers: once() });
+        choose(here.id);
+        queueFor(campaign.id).add(campaign, [...taken.values()]);
+        kept = [];
+        go(`campaigns/${campaign.id}`);
+      } catch (error) {
+        if (!(error instanceof Problem)) throw error;
+        showProblem(form, error);
+      }
+    }),
+  );
 }
 
 function sensorRow(channel, kind, axis) {
   const inputs = {
     channel: h("input", { "aria-label": "Channel", autocomplete: "off" }),
-    kind: select([["displacement", "displacement"], ["acceleration", "acceleration"]], kind, { "aria-label": "Measures" }),
-    axis: select([["X", "X"], ["Y", "Y"]], axis, { "aria-label": "Axis" }),
+    kind: select(
+      [
+        ["displacement", "displacement"],
+        ["acceleration", "acceleration"],
+      ],
+      kind,
+      { "aria-label": "Measures" },
+    ),
+    axis: select(
+      [
+        ["X", "X"],
+        ["Y", "Y"],
+      ],
+      axis,
+      { "aria-label": "Axis" },
+    ),
     sensitivity: quantityInput("none", 1, { "aria-label": "Sensitivity" }),
   };
   inputs.channel.value = channel;
-  const tr = h("tr", null, Object.values(inputs).map((input) => h("td", { "data-field": input === inputs.sensitivity ? `sensors.${channel}.sensitivity` : "" }, input, input === inputs.sensitivity ? h("div", { class: "fault", hidden: true }) : null)));
+  const tr = h(
+    "tr",
+    null,
+    Object.values(inputs).map((input) =>
+      h(
+        "td",
+        { "data-field": input === inputs.sensitivity ? `sensors.${channel}.sensitivity` : "" },
+        input,
+        input === inputs.sensitivity ? h("div", { class: "fault", hidden: true }) : null,
+      ),
+    ),
+  );
   tr.inputs = inputs;
   return tr;
 }

@@ -1,34 +1,15 @@
 // After a tool change: what is asked on the left, what it means for the cut on the right.
 import { all, post, Problem } from "../api.js";
-import { add, card, empty, fill, h, head, link, note, waiting } from "../dom.js";
+import { add, empty, fill, h, head, link, note, waiting } from "../dom.js";
 import { busy, clearFaults, field, quantity, select, showProblem } from "../forms.js";
 import { remember, to } from "../router.js";
-import { allMachines, choose, knownMachines, machine } from "../state.js";
+import { allMachines, choose, machine } from "../state.js";
 import { followLobes } from "../jobs.js";
 import { text } from "../units.js";
+import { bodyOf, checked, METHODS, NUMBERS } from "./change_question.js";
 import { results } from "./change_results.js";
 
 const MOST = 12;
-const METHODS = [
-  ["zero-order", "Zero order: at once"],
-  ["multi-frequency", "Multi-frequency"],
-  ["semi-discretisation", "Semi-discretisation"],
-  ["full-discretisation", "Full discretisation"],
-  ["time-domain", "Time domain: slowest"],
-];
-// what an address may say: name in the query, kind, default, where it goes in the body
-const NUMBERS = [
-  ["im", "percent", 50, "cut.immersion", 0.1, 100, "Radial immersion"],
-  ["fz", "feed", 0.1, "cut.feed_per_tooth_mm", 1e-4, 10, "Feed per tooth"],
-  ["from", "speed", 4000, "speeds.from_rpm", 100, 200_000, "From"],
-  ["to", "speed", 20_000, "speeds.to_rpm", 100, 200_000, "To"],
-  ["step", "speed", 50, "speeds.step_rpm", 0.1, 100_000, "Step"],
-  ["deep", "depth", 10, "max_depth_mm", 1e-3, 500, "Deepest that is asked for"],
-  ["ktc", "pressure", null, "cut.ktc_mpa", 1, 50_000, "Tangential coefficient"],
-  ["krc", "none", null, "cut.krc", -1, 5, "Radial over tangential"],
-  ["power", "power", null, "max_power_kw", 1e-3, 10_000, "Spindle power, at most"],
-  ["torque", "torque", null, "max_torque_nm", 1e-3, 1e6, "Spindle torque, at most"],
-];
 
 export async function view(_args, query, place) {
   const [machines, toolings] = await Promise.all([allMachines(), all("toolings")]);
@@ -36,23 +17,56 @@ export async function view(_args, query, place) {
   if (asked && machines.some((m) => m.id === asked)) choose(asked);
   const here = machine();
   add(place, head("Tool change", "Tooltip FRF and stability lobes of any tooling, also one that never cut."));
-  if (!here) return void add(place, empty("No machine yet", "Lobes need a machine that has been identified.", link(to(""), "Begin with a machine", "button primary")));
+  if (!here)
+    return void add(
+      place,
+      empty("No machine yet", "Lobes need a machine that has been identified.", link(to(""), "Begin with a machine", "button primary")),
+    );
   if (!here.identification || !here.identification.axes.length) {
-    return void add(place, empty(`${here.name} has not been identified`, "Drop in recordings of ordinary cuts, and identify it from them. After that every tooling has its lobes.",
-      link(to("recordings"), "To the recordings", "button primary")));
+    return void add(
+      place,
+      empty(
+        `${here.name} has not been identified`,
+        "Drop in recordings of ordinary cuts, and identify it from them. After that every tooling has its lobes.",
+        link(to("recordings"), "To the recordings", "button primary"),
+      ),
+    );
   }
   if (!toolings.length) {
-    return void add(place, empty("No tooling yet", "Draw one, import a tool library, or drop tooling files in.", link(to("toolings"), "To the toolings", "button primary")));
+    return void add(
+      place,
+      empty(
+        "No tooling yet",
+        "Draw one, import a tool library, or drop tooling files in.",
+        link(to("toolings"), "To the toolings", "button primary"),
+      ),
+    );
   }
-  const chosen = new Set(query.getAll("tooling").filter((name) => toolings.some((t) => t.name === name)).slice(0, MOST));
+  const chosen = new Set(
+    query
+      .getAll("tooling")
+      .filter((name) => toolings.some((t) => t.name === name))
+      .slice(0, MOST),
+  );
   if (!chosen.size) chosen.add(toolings.at(-1).name);
 
-  const fields = Object.fromEntries(NUMBERS.map(([key, kind, usual, name, , , label]) => {
-    const given = query.get(key);
-    return [key, quantity(label, kind, given === null || given === "" ? usual : Number(given), { name })];
-  }));
-  const strategy = select([["down", "Down milling"], ["up", "Up milling"]], query.get("st") ?? "down");
-  const direction = select(["+X", "-X", "+Y", "-Y"].map((d) => [d, d.replace("-", "−")]), query.get("fd") ?? "+X");
+  const fields = Object.fromEntries(
+    NUMBERS.map(([key, kind, usual, name, , , label]) => {
+      const given = query.get(key);
+      return [key, quantity(label, kind, given === null || given === "" ? usual : Number(given), { name })];
+    }),
+  );
+  const strategy = select(
+    [
+      ["down", "Down milling"],
+      ["up", "Up milling"],
+    ],
+    query.get("st") ?? "down",
+  );
+  const direction = select(
+    ["+X", "-X", "+Y", "-Y"].map((d) => [d, d.replace("-", "−")]),
+    query.get("fd") ?? "+X",
+  );
   const method = select(METHODS, query.get("method") ?? "zero-order");
   const answer = h("div", { class: "change-results", "aria-live": "off" });
   const ask = h("button", { class: "primary" }, "Compute");
@@ -60,23 +74,64 @@ export async function view(_args, query, place) {
 
   // on a phone the answer stands higher than the conditions, which are told in a line
   const inShort = h("span", { class: "soft" });
-  const conditions = h("details", { class: "conditions", open: matchMedia("(min-width: 1100px)").matches }, h("summary", null, h("strong", null, "Cut and speeds"), inShort),
-    h("fieldset", null, h("legend", { class: "unseen" }, "Cut"),
-      h("div", { class: "fields" }, fields.im, field("Strategy", strategy, { name: "cut.strategy" }), fields.fz, field("Feed direction", direction, { name: "cut.feed_direction" }))),
-    h("fieldset", null, h("legend", { class: "unseen" }, "Speeds"), h("div", { class: "fields" }, fields.from, fields.to, fields.step)));
-  const form = h("form", { class: "card change-form", novalidate: true },
-    h("fieldset", { "data-field": "toolings" }, h("legend", null, "Toolings"), picks, h("div", { class: "fault", id: "toolings-fault", hidden: true })),
+  const conditions = h(
+    "details",
+    { class: "conditions", open: matchMedia("(min-width: 1100px)").matches },
+    h("summary", null, h("strong", null, "Cut and speeds"), inShort),
+    h(
+      "fieldset",
+      null,
+      h("legend", { class: "unseen" }, "Cut"),
+      h(
+        "div",
+        { class: "fields" },
+        fields.im,
+        field("Strategy", strategy, { name: "cut.strategy" }),
+        fields.fz,
+        field("Feed direction", direction, { name: "cut.feed_direction" }),
+      ),
+    ),
+    h("fieldset", null, h("legend", { class: "unseen" }, "Speeds"), h("div", { class: "fields" }, fields.from, fields.to, fields.step)),
+  );
+  const form = h(
+    "form",
+    { class: "card change-form", novalidate: true },
+    h(
+      "fieldset",
+      { "data-field": "toolings" },
+      h("legend", null, "Toolings"),
+      picks,
+      h("div", { class: "fault", id: "toolings-fault", hidden: true }),
+    ),
     conditions,
-    h("details", null, h("summary", null, "Material, spindle, method"),
-      h("div", { class: "fields" }, fields.ktc, fields.krc, fields.power, fields.torque, fields.deep, field("Method", method, { name: "method" })),
-      h("p", { class: "small soft" }, "Empty coefficients are those of the identification's workpiece.")),
-    ask);
+    h(
+      "details",
+      { open: ["method", "deep", "ktc", "krc", "power", "torque"].some((key) => query.has(key) && query.get(key) !== "zero-order") },
+      h("summary", null, "Material, spindle, method"),
+      h(
+        "div",
+        { class: "fields" },
+        fields.ktc,
+        fields.krc,
+        fields.power,
+        fields.torque,
+        fields.deep,
+        field("Method", method, { name: "method" }),
+      ),
+      h("p", { class: "small soft" }, "Empty coefficients are those of the identification's workpiece."),
+    ),
+    ask,
+  );
   add(place, h("div", { class: "change" }, form, answer));
 
   let running = null;
   let timer = null;
   const state = () => ({
-    machine: here.id, tooling: [...chosen], st: strategy.value, fd: direction.value, method: method.value,
+    machine: here.id,
+    tooling: [...chosen],
+    st: strategy.value,
+    fd: direction.value,
+    method: method.value,
     ...Object.fromEntries(NUMBERS.map(([key, , usual]) => [key, fields[key].input.base === usual ? null : fields[key].input.base])),
   });
   const slow = () => method.value !== "zero-order";
@@ -84,7 +139,10 @@ export async function view(_args, query, place) {
   async function compute() {
     remember("change", state());
     const shown = (key, kind) => text(kind, fields[key].input.base);
-    fill(inShort, `${strategy.selectedOptions[0].textContent}, ${shown("im", "percent")} immersion, ${shown("fz", "feed")} per tooth, ${text("speed", fields.from.input.base, { bare: true })} to ${shown("to", "speed")}`);
+    fill(
+      inShort,
+      `${strategy.selectedOptions[0].textContent}, ${shown("im", "percent")} immersion, ${shown("fz", "feed")} per tooth, ${text("speed", fields.from.input.base, { bare: true })} to ${shown("to", "speed")}`,
+    );
     running?.abort();
     running = new AbortController();
     const { signal } = running;
@@ -129,10 +187,12 @@ export async function view(_args, query, place) {
 async function answers(body, signal, place, late) {
   const { lobes: question, tips, advice } = body;
   const quick = question.method === "zero-order";
-  const lobes = quick ? post("lobes", question, { signal }) : followLobes(question, signal, (words, share) => {
-    clearTimeout(late);
-    fill(place, waiting(words), share === null ? null : h("progress", { max: 1, value: share, "aria-label": "progress" }));
-  });
+  const lobes = quick
+    ? post("lobes", question, { signal })
+    : followLobes(question, signal, (words, share) => {
+        clearTimeout(late);
+        fill(place, waiting(words), share === null ? null : h("progress", { max: 1, value: share, "aria-label": "progress" }));
+      });
   // an answer that fails is told once, by the first of them
   const [found, advised, ...responses] = await Promise.all([
     lobes,
@@ -142,55 +202,49 @@ async function answers(body, signal, place, late) {
   return { lobes: found.toolings, advice: advised?.toolings ?? null, tips: responses };
 }
 
-function bodyOf(id, names, fields, strategy, direction, method) {
-  const value = (key) => fields[key].input.base;
-  const cut = { immersion: value("im") / 100, strategy, feed_direction: direction };
-  for (const [key, name] of [["fz", "feed_per_tooth_mm"], ["ktc", "ktc_mpa"], ["krc", "krc"]]) if (value(key) !== null) cut[name] = value(key);
-  const speeds = { from_rpm: value("from"), to_rpm: value("to"), step_rpm: value("step") };
-  const lobes = { machine: id, toolings: names, cut, speeds, max_depth_mm: value("deep"), method };
-  const advice = value("fz") === null || method !== "zero-order" ? null : { ...lobes };
-  if (advice && value("power") !== null) advice.max_power_kw = value("power");
-  if (advice && value("torque") !== null) advice.max_torque_nm = value("torque");
-  return { lobes, advice, tips: names.map((tooling) => ({ machine: id, tooling })) };
-}
-
-/** What can be seen to be wrong before anything is sent, in the units that are shown. */
-function checked(fields, chosen) {
-  const errors = [];
-  for (const [key, kind, usual, name, least, most] of NUMBERS) {
-    const { base, value } = fields[key].input;
-    if (base === null && (usual === null || key === "fz")) continue;
-    if (base === null) errors.push({ field: name, found: "nothing", allowed: "A number is needed here" });
-    else if (!(base >= least && base <= most)) {
-      errors.push({ field: name, found: value, allowed: `From ${text(kind, least, { bare: true })} to ${text(kind, most)}` });
-    }
-  }
-  const [from, upTo] = [fields.from.input.base, fields.to.input.base];
-  if (!errors.length && upTo < from) errors.push({ field: "speeds.to_rpm", found: text("speed", upTo), allowed: "Not below the first speed" });
-  if (!chosen.size) errors.push({ field: "toolings", found: "nothing", allowed: "One tooling at least" });
-  return errors.length ? new Problem(0, { detail: "Something is not usable", errors }) : null;
-}
-
 function toolingPicks(toolings, chosen, onchange) {
   const boxes = toolings.map((tooling) => {
-    const box = h("input", { type: "checkbox", checked: chosen.has(tooling.name), onchange: () => {
-      if (box.checked) chosen.add(tooling.name);
-      else chosen.delete(tooling.name);
-      limit();
-      onchange();
-    } });
-    const words = h("span", null, h("strong", null, tooling.name), " ", h("span", { class: "soft small" }, `${tooling.teeth} × Ø${text("length", tooling.diameter_mm, { digits: 0 })}, ${text("length", tooling.stickout_mm, { digits: 1 })} out`));
+    const box = h("input", {
+      type: "checkbox",
+      checked: chosen.has(tooling.name),
+      onchange: () => {
+        if (box.checked) chosen.add(tooling.name);
+        else chosen.delete(tooling.name);
+        limit();
+        onchange();
+      },
+    });
+    const words = h(
+      "span",
+      null,
+      h("strong", null, tooling.name),
+      " ",
+      h(
+        "span",
+        { class: "soft small" },
+        `${tooling.teeth} × Ø${text("length", tooling.diameter_mm, { digits: 0 })}, ${text("length", tooling.stickout_mm, { digits: 1 })} out`,
+      ),
+    );
     return { box, item: h("li", { dataset: { name: tooling.name.toLowerCase() } }, h("label", { class: "check" }, box, words)) };
   });
   function limit() {
     for (const { box } of boxes) box.disabled = !box.checked && chosen.size >= MOST;
   }
   limit();
-  const list = h("ul", { class: "picks" }, boxes.map((b) => b.item));
+  const list = h(
+    "ul",
+    { class: "picks" },
+    boxes.map((b) => b.item),
+  );
   if (toolings.length <= 8) return list;
-  const search = h("input", { type: "search", placeholder: "Search …", "aria-label": "Search toolings", oninput: () => {
-    const wanted = search.value.trim().toLowerCase();
-    for (const { item, box } of boxes) item.hidden = !box.checked && !item.dataset.name.includes(wanted);
-  } });
+  const search = h("input", {
+    type: "search",
+    placeholder: "Search …",
+    "aria-label": "Search toolings",
+    oninput: () => {
+      const wanted = search.value.trim().toLowerCase();
+      for (const { item, box } of boxes) item.hidden = !box.checked && !item.dataset.name.includes(wanted);
+    },
+  });
   return h("div", { class: "picks-box" }, search, list);
 }

@@ -21,30 +21,65 @@ export async function view({ id }, _query, place) {
   const fit = chart("Measured points and model");
   const trace = new Map();
   const fits = new Map();
-  const axesKey = () => legend(["X", "Y"].flatMap((axis, k) => [{ name: `${axis} measured`, series: SERIES[k], kind: "dots" }, { name: `${axis} model`, series: SERIES[k] }]));
-  const costCard = card("Misfit over time", null, legend(["X", "Y", "both"].map((axis, k) => ({ name: axis === "both" ? "both axes" : axis, series: SERIES[k] }))), cost);
-  add(place, head("Identification", null, reports, cancel), fault, state,
-    h("div", { class: "split live" }, costCard, card("Measured points and model", null, axesKey(), fit)), result);
-  cancel.addEventListener("click", busy(cancel, async () => {
-    try {
-      job = await (await send("DELETE", `identifications/${id}`)).json();
-      draw();
-    } catch (error) {
-      failed(fault, error);
-    }
-  }));
+  const axesKey = () =>
+    legend(
+      ["X", "Y"].flatMap((axis, k) => [
+        { name: `${axis} measured`, series: SERIES[k], kind: "dots" },
+        { name: `${axis} model`, series: SERIES[k] },
+      ]),
+    );
+  const costCard = card(
+    "Misfit over time",
+    null,
+    legend(["X", "Y", "both"].map((axis, k) => ({ name: axis === "both" ? "both axes" : axis, series: SERIES[k] }))),
+    cost,
+  );
+  add(
+    place,
+    head("Identification", null, reports, cancel),
+    fault,
+    state,
+    h("div", { class: "split live" }, costCard, card("Measured points and model", null, axesKey(), fit)),
+    result,
+  );
+  cancel.addEventListener(
+    "click",
+    busy(cancel, async () => {
+      try {
+        job = await (await send("DELETE", `identifications/${id}`)).json();
+        draw();
+      } catch (error) {
+        failed(fault, error);
+      }
+    }),
+  );
 
   let clock = null;
   function draw() {
     const going = RUNNING.includes(job.state);
     cancel.hidden = !going;
-    const seconds = job.started ? Math.max(0, Math.round(((job.finished ? new Date(job.finished) : new Date()) - new Date(job.started)) / 1000)) : null;
+    const seconds = job.started
+      ? Math.max(0, Math.round(((job.finished ? new Date(job.finished) : new Date()) - new Date(job.started)) / 1000))
+      : null;
     const share = shareOf(job);
-    fill(state, h("div", { class: "row-of-buttons" }, mark(kindOf(job), job.state === "done" ? job.status : job.state), h("span", null, going ? wordsOf(job) : ""), seconds === null ? null : h("span", { class: "soft number" }, `${seconds} s`),
-      job.campaign ? link(to(`campaigns/${job.campaign}`), "its campaign") : null),
-    going ? h("progress", share === null ? { "aria-label": "Progress" } : { max: "1", value: String(share), "aria-label": "Progress" }) : null,
-    job.problem ? note("bad", job.problem.detail, ...(job.problem.errors ?? []).slice(1).map((e) => `${e.field}: ${e.found}; allowed ${e.allowed}`)) : null,
-    job.state === "cancelled" ? note("", "It was cancelled; nothing of the machine has changed.") : null);
+    fill(
+      state,
+      h(
+        "div",
+        { class: "row-of-buttons" },
+        mark(kindOf(job), job.state === "done" ? job.status : job.state),
+        h("span", null, going ? wordsOf(job) : ""),
+        seconds === null ? null : h("span", { class: "soft number" }, `${seconds} s`),
+        job.campaign ? link(to(`campaigns/${job.campaign}`), "its campaign") : null,
+      ),
+      going
+        ? h("progress", share === null ? { "aria-label": "Progress" } : { max: "1", value: String(share), "aria-label": "Progress" })
+        : null,
+      job.problem
+        ? note("bad", job.problem.detail, ...(job.problem.errors ?? []).slice(1).map((e) => `${e.field}: ${e.found}; allowed ${e.allowed}`))
+        : null,
+      job.state === "cancelled" ? note("", "It was cancelled; nothing of the machine has changed.") : null,
+    );
     if (!going) clearInterval(clock);
   }
 
@@ -65,23 +100,29 @@ export async function view({ id }, _query, place) {
 
   draw();
   if (RUNNING.includes(job.state)) clock = setInterval(draw, 1000);
-  const events = follow(`identifications/${id}/events`, (event, data) => {
-    if (event === "trace") {
-      if (!trace.has(data.axis)) trace.set(data.axis, []);
-      trace.get(data.axis).push(data);
-      redraw("cost");
-    } else if (event === "fit") {
-      fits.set(data.axis, data);
-      redraw("fit");
-    } else if (event === "progress" || event === "end") {
-      job = data;
-      draw();
-    }
-    return event === "end";
-  }, leaving.signal);
-  events.then(() => finished()).catch((error) => {
-    if (!leaving.signal.aborted) failed(fault, error);
-  });
+  const events = follow(
+    `identifications/${id}/events`,
+    (event, data) => {
+      if (event === "trace") {
+        if (!trace.has(data.axis)) trace.set(data.axis, []);
+        trace.get(data.axis).push(data);
+        redraw("cost");
+      } else if (event === "fit") {
+        fits.set(data.axis, data);
+        redraw("fit");
+      } else if (event === "progress" || event === "end") {
+        job = data;
+        draw();
+      }
+      return event === "end";
+    },
+    leaving.signal,
+  );
+  events
+    .then(() => finished())
+    .catch((error) => {
+      if (!leaving.signal.aborted) failed(fault, error);
+    });
 
   async function finished() {
     if (leaving.signal.aborted) return;
@@ -95,7 +136,11 @@ export async function view({ id }, _query, place) {
       fit.draw(() => fitFigure(measured(frf)));
       if (job.status !== "failed") await allMachines(true);
       fill(result, outcome(modes), modesCards(modes));
-      fill(reports, job.status === "failed" ? null : link(to("change", { machine: job.machine }), "Change the tool", "button primary"), files(id, fault));
+      fill(
+        reports,
+        job.status === "failed" ? null : link(to("change", { machine: job.machine }), "Change the tool", "button primary"),
+        files(id, fault),
+      );
     } catch (error) {
       failed(fault, error);
       if (!(error instanceof Problem)) console.error(error);
@@ -110,17 +155,24 @@ export async function view({ id }, _query, place) {
 
 function outcome(modes) {
   if (modes.status === "failed") return note("bad", h("strong", null, "Nothing was identified"), ...modes.reasons);
-  return [
-    modes.reasons.length ? note("doubt", h("strong", null, `The result is ${modes.status}`), ...modes.reasons) : null,
-  ];
+  return [modes.reasons.length ? note("doubt", h("strong", null, `The result is ${modes.status}`), ...modes.reasons) : null];
 }
 
 /** The final FRFs in the form of the events. */
 function measured(frf) {
   const size = (re, im) => re.map((value, k) => Math.hypot(value, im[k]));
-  return new Map(Object.entries(frf.axes).map(([axis, f]) => [axis, {
-    axis, frequency_hz: f.frequency_hz, measured_abs: size(f.measured_re, f.measured_im), model_abs: size(f.model_re, f.model_im), tooling: f.tooling,
-  }]));
+  return new Map(
+    Object.entries(frf.axes).map(([axis, f]) => [
+      axis,
+      {
+        axis,
+        frequency_hz: f.frequency_hz,
+        measured_abs: size(f.measured_re, f.measured_im),
+        model_abs: size(f.model_re, f.model_im),
+        tooling: f.tooling,
+      },
+    ]),
+  );
 }
 
 function files(id, fault) {
@@ -137,11 +189,21 @@ function files(id, fault) {
       failed(fault, error);
     }
   });
-  return [report, h("button", { type: "button", onclick: async () => {
-    try {
-      save("RESULT.json", await getText(`identifications/${id}/result`, "application/json"), "application/json");
-    } catch (error) {
-      failed(fault, error);
-    }
-  } }, "RESULT.json")];
+  return [
+    report,
+    h(
+      "button",
+      {
+        type: "button",
+        onclick: async () => {
+          try {
+            save("RESULT.json", await getText(`identifications/${id}/result`, "application/json"), "application/json");
+          } catch (error) {
+            failed(fault, error);
+          }
+        },
+      },
+      "RESULT.json",
+    ),
+  ];
 }

@@ -1,8 +1,8 @@
 // What was dropped: a campaign and its toolings and recordings are recognised by what is in them, and taken in after one look.
-import { all, getText, part, post, Problem, send } from "../api.js";
-import { add, card, fill, h, note, table, tell, waiting } from "../dom.js";
+import { all, getText, once, part, post, Problem, send } from "../api.js";
+import { card, fill, h, note, waiting } from "../dom.js";
 import { busy, field, select, showProblem } from "../forms.js";
-import { go, remember, to } from "../router.js";
+import { go, to } from "../router.js";
 import { allMachines, choose, knownMachines, machine } from "../state.js";
 import { queueFor } from "../uploads.js";
 import { keepFiles } from "./campaign_form.js";
@@ -37,7 +37,12 @@ export function keysOfToolings(text) {
 }
 
 const nameIn = (text) => /^\s*\[campaign\][^[]*?^\s*name\s*=\s*["']([^"']*)["']/ms.exec(text)?.[1] ?? "";
-const asName = (text) => text.replace(/[^A-Za-z0-9 ._+()-]/g, " ").replace(/^[^A-Za-z0-9]+/, "").trim().slice(0, 64) || "Machine 1";
+const asName = (text) =>
+  text
+    .replace(/[^A-Za-z0-9 ._+()-]/g, " ")
+    .replace(/^[^A-Za-z0-9]+/, "")
+    .trim()
+    .slice(0, 64) || "Machine 1";
 
 /** Show what was dropped, and take it in where the person says so. */
 export async function intake(place, files) {
@@ -46,20 +51,37 @@ export async function intake(place, files) {
   if (!found.campaign) {
     if (found.recordings.length) {
       keepFiles(found.recordings);
-      fill(place, card("Recordings without a campaign", null, note("doubt", `There is no campaign.toml among the ${files.length} files: nobody has said yet at which speed and with which tooling each one was cut.`),
-        h("p", null, h("a", { class: "button primary", href: to("campaigns/new") }, "Describe the cuts here"))));
+      fill(
+        place,
+        card(
+          "Recordings without a campaign",
+          null,
+          note(
+            "doubt",
+            `There is no campaign.toml among the ${files.length} files: nobody has said yet at which speed and with which tooling each one was cut.`,
+          ),
+          h("p", null, h("a", { class: "button primary", href: to("campaigns/new") }, "Describe the cuts here")),
+        ),
+      );
       return;
     }
-    const only = found.toolings.length ? ["These are toolings. Drop them on the toolings' page."] : ["Nothing among these files is a campaign.toml, a tooling or a recording.", "Recordings are HDF5, TDMS, UFF 58, WAV, MATLAB, Parquet or CSV files."];
+    const only = found.toolings.length
+      ? ["These are toolings. Drop them on the toolings' page."]
+      : [
+          "Nothing among these files is a campaign.toml, a tooling or a recording.",
+          "Recordings are HDF5, TDMS, UFF 58, WAV, MATLAB, Parquet or CSV files.",
+        ];
     fill(place, note("doubt", ...only));
     return;
   }
   const keys = keysOfToolings(found.campaign.text);
   const library = new Set((await all("toolings")).map((t) => t.name));
-  const toolings = await Promise.all(found.toolings.map(async ({ file, text }) => {
-    const key = keys.get(file.name) ?? file.name.replace(/\.toml$/i, "");
-    return { key, text, there: library.has(key) ? await getText(`toolings/${part(key)}`, "application/toml") : null };
-  }));
+  const toolings = await Promise.all(
+    found.toolings.map(async ({ file, text }) => {
+      const key = keys.get(file.name) ?? file.name.replace(/\.toml$/i, "");
+      return { key, text, there: library.has(key) ? await getText(`toolings/${part(key)}`, "application/toml") : null };
+    }),
+  );
   offer(place, found, toolings, [...keys.values()]);
 }
 
@@ -74,38 +96,70 @@ function offer(place, found, toolings, wanted) {
   which.addEventListener("change", () => (naming.hidden = which.value !== ""));
   const differing = toolings.filter((t) => t.there !== null && t.there !== t.text);
   const missing = wanted.filter((key) => !toolings.some((t) => t.key === key));
-  const choice = select([["file", "take the dropped files, in the library, too"], ["library", "use what is in the library"]], "file");
+  const choice = select(
+    [
+      ["file", "take the dropped files, in the library, too"],
+      ["library", "use what is in the library"],
+    ],
+    "file",
+  );
   const button = h("button", { class: "primary" }, "Take it in");
   const said = h("div", { role: "status" });
-  const form = h("form", { novalidate: true, class: "view" },
-    h("dl", { class: "facts" }, fact("Campaign", title || found.campaign.file.name), fact("Toolings", toolings.map((t) => t.key).join(", ") || "of the library"), fact("Recordings", String(found.recordings.length)), found.others.length ? fact("Left aside", `${found.others.length} other files`) : null),
-    h("div", { class: "fields" }, field("Machine", which), naming, differing.length ? field(`${differing.map((t) => t.key).join(", ")}: in the library, but different`, choice) : null),
+  const form = h(
+    "form",
+    { novalidate: true, class: "view" },
+    h(
+      "dl",
+      { class: "facts" },
+      fact("Campaign", title || found.campaign.file.name),
+      fact("Toolings", toolings.map((t) => t.key).join(", ") || "of the library"),
+      fact("Recordings", String(found.recordings.length)),
+      found.others.length ? fact("Left aside", `${found.others.length} other files`) : null,
+    ),
+    h(
+      "div",
+      { class: "fields" },
+      field("Machine", which),
+      naming,
+      differing.length ? field(`${differing.map((t) => t.key).join(", ")}: in the library, but different`, choice) : null,
+    ),
     missing.length ? note("", `Not among the files, so taken from the library: ${missing.join(", ")}.`) : null,
-    h("div", { class: "row-of-buttons" }, button, h("button", { type: "button", onclick: () => fill(place) }, "Leave it")), said);
-  form.addEventListener("submit", busy(button, async () => {
-    try {
-      fill(said, waiting("writing toolings and campaign …"));
-      const machineId = which.value || (await made(called.value.trim()));
-      for (const tooling of toolings) {
-        if (tooling.there === tooling.text || (tooling.there !== null && choice.value === "library")) continue;
-        await send("PUT", `toolings/${part(tooling.key)}`, { body: tooling.text, headers: { "Content-Type": "application/toml" } }).catch((error) => {
-          throw named(error, `tooling ${tooling.key}`);
+    h("div", { class: "row-of-buttons" }, button, h("button", { type: "button", onclick: () => fill(place) }, "Leave it")),
+    said,
+  );
+  form.addEventListener(
+    "submit",
+    busy(button, async () => {
+      const key = once();
+      try {
+        fill(said, waiting("writing toolings and campaign …"));
+        const machineId = which.value || (await made(called.value.trim()));
+        for (const tooling of toolings) {
+          if (tooling.there === tooling.text || (tooling.there !== null && choice.value === "library")) continue;
+          await send("PUT", `toolings/${part(tooling.key)}`, { body: tooling.text, headers: { "Content-Type": "application/toml" } }).catch(
+            (error) => {
+              throw named(error, `tooling ${tooling.key}`);
+            },
+          );
+        }
+        const answer = await send("POST", `machines/${machineId}/campaigns`, {
+          body: found.campaign.text,
+          headers: { "Content-Type": "application/toml", ...key },
+        }).catch((error) => {
+          throw named(error, "campaign.toml");
         });
+        const campaign = await answer.json();
+        choose(machineId);
+        await allMachines(true);
+        queueFor(campaign.id).add(campaign, found.recordings);
+        go(`campaigns/${campaign.id}`);
+      } catch (error) {
+        fill(said);
+        if (!(error instanceof Problem)) throw error;
+        showProblem(form, error);
       }
-      const answer = await send("POST", `machines/${machineId}/campaigns`, { body: found.campaign.text, headers: { "Content-Type": "application/toml" } }).catch((error) => {
-        throw named(error, "campaign.toml");
-      });
-      const campaign = await answer.json();
-      choose(machineId);
-      await allMachines(true);
-      queueFor(campaign.id).add(campaign, found.recordings);
-      go(`campaigns/${campaign.id}`);
-    } catch (error) {
-      fill(said);
-      if (!(error instanceof Problem)) throw error;
-      showProblem(form, error);
-    }
-  }));
+    }),
+  );
   fill(place, card("This is what was found", null, form));
   button.focus();
   place.scrollIntoView({ block: "nearest" });
@@ -121,5 +175,5 @@ function named(error, what) {
 }
 
 async function made(name) {
-  return (await post("machines", { name, description: "" })).id;
+  return (await post("machines", { name, description: "" }, { headers: once() })).id;
 }

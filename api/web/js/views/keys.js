@@ -17,12 +17,23 @@ export function askForKey() {
     fault.append("The service does not take the key that was given.");
     input.setAttribute("aria-invalid", "true");
   }
-  open = h("dialog", { "aria-labelledby": "key-title" },
-    h("form", { method: "dialog" },
+  open = h(
+    "dialog",
+    { "aria-labelledby": "key-title" },
+    h(
+      "form",
+      { method: "dialog" },
       h("h2", { id: "key-title" }, "This service asks for a key"),
       h("p", { class: "soft" }, "Whoever runs it makes one with ", h("code", null, "rcsa-ident-serve create-key"), "."),
       box,
-      h("div", { class: "row-of-buttons" }, h("button", { class: "primary", value: "use" }, "Use this key"), h("button", { value: "no", formnovalidate: true }, "Cancel"))));
+      h(
+        "div",
+        { class: "row-of-buttons" },
+        h("button", { class: "primary", value: "use" }, "Use this key"),
+        h("button", { value: "no", formnovalidate: true }, "Cancel"),
+      ),
+    ),
+  );
   open.addEventListener("close", () => {
     const used = open.returnValue === "use";
     open.remove();
@@ -38,8 +49,16 @@ export function askForKey() {
 /** Forget the key; nothing where there is none. */
 export function keyButton() {
   if (!hasKey()) return null;
-  return h("button", { type: "button", class: "quiet small", onclick: () => {
-    setKey("");
-    window.dispatchEvent(new Event("key-changed"));
-  } }, "Forget the key");
+  return h(
+    "button",
+    {
+      type: "button",
+      class: "quiet small",
+      onclick: () => {
+        setKey("");
+        window.dispatchEvent(new Event("key-changed"));
+      },
+    },
+    "Forget the key",
+  );
 }

@@ -16,7 +16,15 @@ export async function view(_args, query, place) {
   const here = await ground(place, "Live forces");
   if (!here) return undefined;
   const picker = await recordingPicker(here, query, { air: true });
-  const rate = select([["0.1", "ten times slower"], ["0.25", "four times slower"], ["1", "as recorded"], ["4", "four times faster"]], query.get("rate") ?? "1");
+  const rate = select(
+    [
+      ["0.1", "ten times slower"],
+      ["0.25", "four times slower"],
+      ["1", "as recorded"],
+      ["4", "four times faster"],
+    ],
+    query.get("rate") ?? "1",
+  );
   const streams = h("div");
   const stop = h("button", { type: "button", hidden: true }, "Stop");
   const freeze = h("button", { type: "button", hidden: true, "aria-pressed": "false" }, "Hold the picture");
@@ -24,10 +32,24 @@ export async function view(_args, query, place) {
   const board = h("dl", { class: "facts" });
   const chartBox = h("div", { class: "live-chart", role: "img", "aria-label": "Force over the last seconds" });
   const keys = h("div");
-  const screen = h("section", { class: "card", hidden: true }, h("header", null, h("h2", null, "Force now"), h("span", { class: "row-of-buttons" }, freeze, stop)), board, keys, chartBox);
+  const screen = h(
+    "section",
+    { class: "card", hidden: true },
+    h("header", null, h("h2", null, "Force now"), h("span", { class: "row-of-buttons" }, freeze, stop)),
+    board,
+    keys,
+    chartBox,
+  );
   const play = h("button", { class: "primary" }, "Play");
-  const form = h("form", { class: "card", novalidate: true }, h("h2", null, "Play a recording as if it were live"),
-    picker.any ? h("div", { class: "fields broad" }, picker.fields, field("Speed of playing", rate)) : empty("No recordings yet", "Upload a campaign, or connect a data logger.", link(to("recordings"), "To the recordings", "button")), picker.any ? h("p", null, play) : null);
+  const form = h(
+    "form",
+    { class: "card", novalidate: true },
+    h("h2", null, "Play a recording as if it were live"),
+    picker.any
+      ? h("div", { class: "fields broad" }, picker.fields, field("Speed of playing", rate))
+      : empty("No recordings yet", "Upload a campaign, or connect a data logger.", link(to("recordings"), "To the recordings", "button")),
+    picker.any ? h("p", null, play) : null,
+  );
   add(place, head("Live forces", here.name, tabs("forces/live")), fault, screen, h("div", { class: "columns" }, streams, form));
 
   let close = null;
@@ -94,22 +116,59 @@ export async function view(_args, query, place) {
   });
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
-    const recording = await get(`campaigns/${picker.which.value}/recordings/${encodeURIComponent(picker.recording.value)}`).catch(() => null);
+    const recording = await get(`campaigns/${picker.which.value}/recordings/${encodeURIComponent(picker.recording.value)}`).catch(
+      () => null,
+    );
     const times = Number(rate.value);
     const envelope = Math.max(1, Math.round(((recording?.sampling_rate_hz ?? 25_600) * Math.min(1, times)) / PER_SECOND));
-    start({ replay: { campaign: picker.which.value, recording: picker.recording.value, rate: times }, machine: here.id, envelope }, picker.recording.value);
+    start(
+      { replay: { campaign: picker.which.value, recording: picker.recording.value, rate: times }, machine: here.id, envelope },
+      picker.recording.value,
+    );
   });
 
   async function list() {
     try {
       const { items } = await get("forces/streams");
-      fill(streams, card("Streams that are open", null, items.length ? table("Open streams", [
-        { name: "Stream", cell: (s) => s.name || s.session },
-        { name: "Tooling", cell: (s) => s.tooling },
-        { name: "Samples", number: true, cell: (s) => plain(s.samples) },
-        { name: "Lost", number: true, cell: (s) => plain(s.lost) },
-        { name: "", cell: (s) => h("button", { type: "button", onclick: () => start({ watch: s.session, envelope: Math.max(1, Math.round(s.sampling_rate_hz / PER_SECOND)) }, s.name || s.tooling) }, "Watch") },
-      ], items) : h("p", { class: "soft" }, "No data logger sends at the moment. One that does appears here by itself; how it sends is described under API.")));
+      fill(
+        streams,
+        card(
+          "Streams that are open",
+          null,
+          items.length
+            ? table(
+                "Open streams",
+                [
+                  { name: "Stream", cell: (s) => s.name || s.session },
+                  { name: "Tooling", cell: (s) => s.tooling },
+                  { name: "Samples", number: true, cell: (s) => plain(s.samples) },
+                  { name: "Lost", number: true, cell: (s) => plain(s.lost) },
+                  {
+                    name: "",
+                    cell: (s) =>
+                      h(
+                        "button",
+                        {
+                          type: "button",
+                          onclick: () =>
+                            start(
+                              { watch: s.session, envelope: Math.max(1, Math.round(s.sampling_rate_hz / PER_SECOND)) },
+                              s.name || s.tooling,
+                            ),
+                        },
+                        "Watch",
+                      ),
+                  },
+                ],
+                items,
+              )
+            : h(
+                "p",
+                { class: "soft" },
+                "No data logger sends at the moment. One that does appears here by itself; how it sends is described under API.",
+              ),
+        ),
+      );
     } catch (error) {
       fill(streams, note("bad", error.message));
       if (!(error instanceof Problem)) console.error(error);
@@ -134,10 +193,14 @@ const fact = (name, ...value) => h("div", null, h("dt", null, name), h("dd", nul
 function status(event, about) {
   const live = event.stage === "live";
   return [
-    fact("State", mark(live ? "good" : event.stage === "ended" ? "idle" : "busy", event.stage)), fact("Of", about),
+    fact("State", mark(live ? "good" : event.stage === "ended" ? "idle" : "busy", event.stage)),
+    fact("Of", about),
     ...Object.entries(event.rms_n).map(([axis, n]) => fact(`F${axis.toLowerCase()}, RMS`, q("force", n))),
-    fact("Samples", plain(event.samples)), fact("Lost", h("span", { class: event.lost ? "fault" : null }, plain(event.lost))), fact("Dropped", h("span", { class: event.dropped ? "fault" : null }, plain(event.dropped))),
-    fact("Delay", `${plain(event.delay_ms, 1, 1)} ms`), fact("Waiting", plain(event.backlog)),
+    fact("Samples", plain(event.samples)),
+    fact("Lost", h("span", { class: event.lost ? "fault" : null }, plain(event.lost))),
+    fact("Dropped", h("span", { class: event.dropped ? "fault" : null }, plain(event.dropped))),
+    fact("Delay", `${plain(event.delay_ms, 1, 1)} ms`),
+    fact("Waiting", plain(event.backlog)),
     event.notes?.length ? fact("Notes", h("span", { class: "small" }, event.notes.join("; "))) : null,
   ];
 }
@@ -147,13 +210,29 @@ function chartOf(uPlot, box, axes, data) {
   let plot = null;
   function make() {
     const line = colour("line");
-    const words = { stroke: colour("ink"), grid: { stroke: line, width: 1 }, ticks: { stroke: line, width: 1 }, font: "13px system-ui, sans-serif", labelFont: "13px system-ui, sans-serif" };
-    const series = axes.flatMap((_, k) => ["low", "high"].map(() => ({ stroke: colour(SERIES[k]), width: 1, points: { show: false }, spanGaps: false })));
+    const words = {
+      stroke: colour("ink"),
+      grid: { stroke: line, width: 1 },
+      ticks: { stroke: line, width: 1 },
+      font: "13px system-ui, sans-serif",
+      labelFont: "13px system-ui, sans-serif",
+    };
+    const series = axes.flatMap((_, k) =>
+      ["low", "high"].map(() => ({ stroke: colour(SERIES[k]), width: 1, points: { show: false }, spanGaps: false })),
+    );
     const options = {
-      width: box.clientWidth || 600, height: box.clientHeight || 320, legend: { show: false }, cursor: { show: false }, pxAlign: false,
+      width: box.clientWidth || 600,
+      height: box.clientHeight || 320,
+      legend: { show: false },
+      cursor: { show: false },
+      pxAlign: false,
       scales: { x: { time: false } },
-      axes: [{ ...words, label: "Time [s]" }, { ...words, label: `Force [${unit("force")}]`, size: 64 }],
-      series: [{}, ...series], bands: axes.map((_, k) => ({ series: [2 + 2 * k, 1 + 2 * k], fill: colour(SERIES[k], 0.45) })),
+      axes: [
+        { ...words, label: "Time [s]" },
+        { ...words, label: `Force [${unit("force")}]`, size: 64 },
+      ],
+      series: [{}, ...series],
+      bands: axes.map((_, k) => ({ series: [2 + 2 * k, 1 + 2 * k], fill: colour(SERIES[k], 0.45) })),
     };
     plot?.destroy();
     box.replaceChildren();
@@ -164,11 +243,12 @@ function chartOf(uPlot, box, axes, data) {
   observer.observe(box);
   return {
     // all at once: one picture a frame
-    show: (columns, from, to) => plot.batch(() => {
-      plot.setData(columns, false);
-      plot.setScale("x", { min: from, max: to });
-      plot.setScale("y", reach(columns));
-    }),
+    show: (columns, from, to) =>
+      plot.batch(() => {
+        plot.setData(columns, false);
+        plot.setScale("x", { min: from, max: to });
+        plot.setScale("y", reach(columns));
+      }),
     repaint: make,
     destroy: () => {
       observer.disconnect();
@@ -179,7 +259,12 @@ function chartOf(uPlot, box, axes, data) {
 
 /** A range for all columns behind the first; the few moments in which an observer finds its feet do not set it. */
 function reach(columns) {
-  const values = Float64Array.from(columns.slice(1).flat().filter((v) => v !== null && !Number.isNaN(v))).sort();
+  const values = Float64Array.from(
+    columns
+      .slice(1)
+      .flat()
+      .filter((v) => v !== null && !Number.isNaN(v)),
+  ).sort();
   if (!values.length) return { min: -1, max: 1 };
   const [low, high] = [0.03, 0.97].map((share) => values[Math.round(share * (values.length - 1))]);
   const room = 0.45 * (high - low) + 1e-3;

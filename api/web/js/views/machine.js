@@ -1,5 +1,5 @@
 // One machine: what is known of it, where that comes from, and what one can do next.
-import { all, get, getText, Problem, send } from "../api.js";
+import { get, getText, Problem, send } from "../api.js";
 import { add, card, empty, fill, h, head, link, mark, note, save } from "../dom.js";
 import { chart, legend, SERIES } from "../charts.js";
 import { frfFigure } from "../figures.js";
@@ -18,35 +18,85 @@ export async function view({ id }, _query, place) {
   const machine = await get(`machines/${id}`);
   const fault = h("div");
   const known = machine.identification;
-  add(place, head(machine.name, machine.description,
-    statusMark(machine),
-    known?.axes.length ? link(to("change", { machine: id }), "Tool change", "button primary") : null,
-    link(to(`machines/${id}/recordings`), "Recordings", "button"),
-    h("button", { type: "button", class: "quiet danger", onclick: () => forget(machine, fault) }, "Forget")), fault);
+  add(
+    place,
+    head(
+      machine.name,
+      machine.description,
+      statusMark(machine),
+      known?.axes.length ? link(to("change", { machine: id }), "Tool change", "button primary") : null,
+      link(to(`machines/${id}/recordings`), "Recordings", "button"),
+      h("button", { type: "button", class: "quiet danger", onclick: () => forget(machine, fault) }, "Forget"),
+    ),
+    fault,
+  );
   if (!known) {
-    add(place, empty("Not identified yet", "Record ordinary stable cuts with the displacement sensor at the flange: two toolings, twenty to forty speeds each, and each speed in the air as well. Drop them in; the identification takes it from there.",
-      link(to(`machines/${id}/recordings`), "To the recordings", "button primary")), upload(machine, fault));
+    add(
+      place,
+      empty(
+        "Not identified yet",
+        "Record ordinary stable cuts with the displacement sensor at the flange: two toolings, twenty to forty speeds each, and each speed in the air as well. Drop them in; the identification takes it from there.",
+        link(to(`machines/${id}/recordings`), "To the recordings", "button primary"),
+      ),
+      upload(machine, fault),
+    );
     return;
   }
   const modes = await get(`machines/${id}/identification/modes`);
-  add(place, known.reasons.length ? note(known.status === "failed" ? "bad" : "doubt", h("strong", null, `The identification is ${known.status}`), ...known.reasons) : null);
+  add(
+    place,
+    known.reasons.length
+      ? note(known.status === "failed" ? "bad" : "doubt", h("strong", null, `The identification is ${known.status}`), ...known.reasons)
+      : null,
+  );
   if (known.axes.length) {
     const picture = chart("The spindle's receptance at its flange", "frf");
-    add(place, h("div", { class: "split" }, modesCards(modes),
-      card("Receptance at the flange", null, legend(known.axes.map((axis, k) => ({ name: `${axis} direction`, series: SERIES[k] }))), picture, h("p", { class: "small soft" }, "Machine and spindle alone, without a tool-holder. Shaded: 95 % band."))));
+    add(
+      place,
+      h(
+        "div",
+        { class: "split" },
+        modesCards(modes),
+        card(
+          "Receptance at the flange",
+          null,
+          legend(known.axes.map((axis, k) => ({ name: `${axis} direction`, series: SERIES[k] }))),
+          picture,
+          h("p", { class: "small soft" }, "Machine and spindle alone, without a tool-holder. Shaded: 95 % band."),
+        ),
+      ),
+    );
     get(`machines/${id}/identification/frf?from_hz=${Math.max(50, known.band_hz[0] * 0.5)}`)
       .then((frf) => picture.draw(() => frfFigure([{ ...frf, tooling: machine.name }], { parts: "polar", shown: "both" })))
       .catch((error) => fill(picture, note("bad", error.message)));
   }
-  add(place, card("Files", null, h("div", { class: "row-of-buttons" },
-    h("button", { type: "button", onclick: async () => {
-      try {
-        save("RESULT.json", await getText(`machines/${id}/identification`, "application/json"), "application/json");
-      } catch (error) {
-        failed(fault, error);
-      }
-    } }, "RESULT.json"),
-    link(to("identification"), "All identifications", "button"))), upload(machine, fault));
+  add(
+    place,
+    card(
+      "Files",
+      null,
+      h(
+        "div",
+        { class: "row-of-buttons" },
+        h(
+          "button",
+          {
+            type: "button",
+            onclick: async () => {
+              try {
+                save("RESULT.json", await getText(`machines/${id}/identification`, "application/json"), "application/json");
+              } catch (error) {
+                failed(fault, error);
+              }
+            },
+          },
+          "RESULT.json",
+        ),
+        link(to("identification"), "All identifications", "button"),
+      ),
+    ),
+    upload(machine, fault),
+  );
 }
 
 /** A result from the command line, for a machine. */
@@ -64,12 +114,23 @@ function upload(machine, fault) {
       if (!(error instanceof Problem)) console.error(error);
     }
   });
-  return h("details", null, h("summary", null, "Take over a result from the command line"),
-    h("div", { class: "field" }, h("label", { for: "result-file" }, "RESULT.json of ", h("code", null, "rcsa-ident identify")), input));
+  return h(
+    "details",
+    null,
+    h("summary", null, "Take over a result from the command line"),
+    h("div", { class: "field" }, h("label", { for: "result-file" }, "RESULT.json of ", h("code", null, "rcsa-ident identify")), input),
+  );
 }
 
 async function forget(machine, fault) {
-  if (!await confirmed(`Forget ${machine.name}?`, "Its identification and its campaigns go with it. This can not be taken back.", "Forget it")) return;
+  if (
+    !(await confirmed(
+      `Forget ${machine.name}?`,
+      "Its identification and its campaigns go with it. This can not be taken back.",
+      "Forget it",
+    ))
+  )
+    return;
   try {
     await send("DELETE", `machines/${machine.id}`);
     await allMachines(true);

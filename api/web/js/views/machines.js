@@ -1,5 +1,5 @@
 // The first page: which machines there are, how far each is known, and a place to drop recordings.
-import { all, get, getBlob, post } from "../api.js";
+import { get, getBlob, once, post } from "../api.js";
 import { add, card, fill, h, head, link, mark, note, save } from "../dom.js";
 import { dropZone } from "../drop.js";
 import { busy, field, showProblem } from "../forms.js";
@@ -11,64 +11,143 @@ import { statusMark } from "./machine.js";
 export async function view(_args, _query, place) {
   const machines = await allMachines(true);
   const box = h("div", { class: "view" });
-  const zone = dropZone("Drop a campaign here", "Its folder, or its files: campaign.toml, tooling files, recordings (HDF5, TDMS, UFF 58, WAV, MATLAB, Parquet, CSV).", (files) => intake(box, files));
+  const zone = dropZone(
+    "Drop a campaign here",
+    "Its folder, or its files: campaign.toml, tooling files, recordings (HDF5, TDMS, UFF 58, WAV, MATLAB, Parquet, CSV).",
+    (files) => intake(box, files),
+  );
   if (!machines.length) {
-    add(place, head("Spindle dynamics from ordinary cuts", "Recordings of cuts you make anyway go in. Tooltip FRFs, stability lobes and forces of any tooling come out."), box, zone,
-      h("ol", { class: "way" },
+    add(
+      place,
+      head(
+        "Spindle dynamics from ordinary cuts",
+        "Recordings of cuts you make anyway go in. Tooltip FRFs, stability lobes and forces of any tooling come out.",
+      ),
+      box,
+      zone,
+      h(
+        "ol",
+        { class: "way" },
         stage("Drop recordings in", "Each one gets its verdict at once: usable or not, and why."),
         stage("Identify the machine", "You watch the search; modes come with their uncertainties."),
-        stage("Change the tool", "Best speeds, lobes and tooltip FRFs of toolings that never cut.")),
-      h("div", { class: "columns" }, makeCard(), examples()));
+        stage("Change the tool", "Best speeds, lobes and tooltip FRFs of toolings that never cut."),
+      ),
+      h("div", { class: "columns" }, makeCard(), examples()),
+    );
     return;
   }
-  add(place, head("Machines", null), h("div", { class: "columns" }, machines.map(machineCard)), box, zone, h("div", { class: "columns" }, makeCard(), examples()));
+  add(
+    place,
+    head("Machines", null),
+    h("div", { class: "columns" }, machines.map(machineCard)),
+    box,
+    zone,
+    h("div", { class: "columns" }, makeCard(), examples()),
+  );
 }
 
 const stage = (title, words) => h("li", null, h("strong", null, title), h("span", { class: "soft" }, words));
 
 function machineCard(machine) {
   const known = machine.identification;
-  return h("section", { class: "card" },
+  return h(
+    "section",
+    { class: "card" },
     h("header", null, h("h2", null, link(to(`machines/${machine.id}`), machine.name)), statusMark(machine)),
     machine.description && h("p", { class: "soft" }, machine.description),
-    known ? h("p", null, `Axes ${known.axes.join(" and ") || "none"}, ${Math.round(known.band_hz[0])} to ${Math.round(known.band_hz[1])} Hz, from “${known.campaign}”.`) : h("p", { class: "soft" }, "Nothing is known of its dynamics yet."),
-    h("div", { class: "row-of-buttons" },
-      known && known.axes.length ? link(to("change", { machine: machine.id }), "Tool change", "button primary") : link(to(`machines/${machine.id}/recordings`), "Recordings", "button primary"),
-      link(to(`machines/${machine.id}`), "Look closer", "button")));
+    known
+      ? h(
+          "p",
+          null,
+          `Axes ${known.axes.join(" and ") || "none"}, ${Math.round(known.band_hz[0])} to ${Math.round(known.band_hz[1])} Hz, from “${known.campaign}”.`,
+        )
+      : h("p", { class: "soft" }, "Nothing is known of its dynamics yet."),
+    h(
+      "div",
+      { class: "row-of-buttons" },
+      known && known.axes.length
+        ? link(to("change", { machine: machine.id }), "Tool change", "button primary")
+        : link(to(`machines/${machine.id}/recordings`), "Recordings", "button primary"),
+      link(to(`machines/${machine.id}`), "Look closer", "button"),
+    ),
+  );
 }
 
 function makeCard() {
   const name = h("input", { autocomplete: "off", maxlength: 64 });
   const words = h("input", { autocomplete: "off", maxlength: 200 });
   const button = h("button", null, "Make it");
-  const form = h("form", { novalidate: true }, h("div", { class: "fields" }, field("Name", name, { name: "name", hint: "As people call it: HPM 800U" }), field("Where, or what", words, { name: "description" })), h("p", null, button));
-  form.addEventListener("submit", busy(button, async () => {
-    try {
-      const made = await post("machines", { name: name.value.trim(), description: words.value.trim() });
-      choose(made.id);
-      await allMachines(true);
-      go(`machines/${made.id}`);
-    } catch (error) {
-      showProblem(form, error);
-    }
-  }));
+  const form = h(
+    "form",
+    { novalidate: true },
+    h(
+      "div",
+      { class: "fields" },
+      field("Name", name, { name: "name", hint: "As people call it: HPM 800U" }),
+      field("Where, or what", words, { name: "description" }),
+    ),
+    h("p", null, button),
+  );
+  form.addEventListener(
+    "submit",
+    busy(button, async () => {
+      try {
+        const made = await post("machines", { name: name.value.trim(), description: words.value.trim() }, { headers: once() });
+        choose(made.id);
+        await allMachines(true);
+        go(`machines/${made.id}`);
+      } catch (error) {
+        showProblem(form, error);
+      }
+    }),
+  );
   return card("A new machine", null, form);
 }
 
 /** Files to try the service with. */
 function examples() {
   const list = h("div");
-  get("examples").then(({ items }) => {
-    if (!items.length) return;
-    fill(list, card("Example files", mark("idle", "to try"), h("ul", { class: "plain" }, items.map((item) => h("li", null,
-      h("button", { type: "button", class: "quiet", onclick: async () => {
-        try {
-          save(item.name.split("/").at(-1), await getBlob(`examples/${item.name.split("/").map(encodeURIComponent).join("/")}`));
-        } catch (error) {
-          fill(list, note("bad", error.message));
-        }
-      } }, item.name), h("span", { class: "soft small" }, ` ${sizeOf(item.size_bytes)} · ${item.about}`))))));
-  }).catch(() => list.remove());
+  get("examples")
+    .then(({ items }) => {
+      if (!items.length) return;
+      fill(
+        list,
+        card(
+          "Example files",
+          mark("idle", "to try"),
+          h(
+            "ul",
+            { class: "plain" },
+            items.map((item) =>
+              h(
+                "li",
+                null,
+                h(
+                  "button",
+                  {
+                    type: "button",
+                    class: "quiet",
+                    onclick: async () => {
+                      try {
+                        save(
+                          item.name.split("/").at(-1),
+                          await getBlob(`examples/${item.name.split("/").map(encodeURIComponent).join("/")}`),
+                        );
+                      } catch (error) {
+                        fill(list, note("bad", error.message));
+                      }
+                    },
+                  },
+                  item.name,
+                ),
+                h("span", { class: "soft small" }, ` ${sizeOf(item.size_bytes)} · ${item.about}`),
+              ),
+            ),
+          ),
+        ),
+      );
+    })
+    .catch(() => list.remove());
   return list;
 }
 

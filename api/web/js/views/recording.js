@@ -10,13 +10,22 @@ import { sizeOf } from "./machines.js";
 export async function view({ id, name }, _query, place) {
   const campaign = await get(`campaigns/${id}`);
   const cut = campaign.cuts.find((each) => each.cut.name === name || each.air?.name === name);
-  add(place, head(name, campaign.name, link(to(`campaigns/${id}`), "All cuts", "button")), cut ? recordingPanel(campaign, cut, name) : note("doubt", "The campaign names no such recording."));
+  add(
+    place,
+    head(name, campaign.name, link(to(`campaigns/${id}`), "All cuts", "button")),
+    cut ? recordingPanel(campaign, cut, name) : note("doubt", "The campaign names no such recording."),
+  );
 }
 
 /** What a row of the verdicts opens: the cut's recording, and its air cut's. */
 export function recordingPanel(campaign, cut, first = null) {
   const box = h("div", { class: "view" });
-  const names = [[cut.cut, "Cut"], [cut.air, "Air"]].filter(([file]) => file?.uploaded).map(([file, words]) => [file.name, words]);
+  const names = [
+    [cut.cut, "Cut"],
+    [cut.air, "Air"],
+  ]
+    .filter(([file]) => file?.uploaded)
+    .map(([file, words]) => [file.name, words]);
   const chosen = first ?? names[0][0];
   const show = (name) => shown(box, campaign.id, name);
   show(chosen);
@@ -30,19 +39,54 @@ async function shown(box, id, name) {
   const facts = h("dl", { class: "facts" });
   const keys = h("div");
   const place = h("div");
-  fill(box, facts, keys, h("h3", null, "Signal"), signal, h("h3", null, "Spectrum, multiples of the spindle's frequency dotted"), spectrum, place);
+  fill(
+    box,
+    facts,
+    keys,
+    h("h3", null, "Signal"),
+    signal,
+    h("h3", null, "Spectrum, multiples of the spindle's frequency dotted"),
+    spectrum,
+    place,
+  );
   try {
     const recording = await get(where);
-    fill(facts, fact("Length", `${plain(recording.duration_s, 2)} s`), fact("Sampling rate", `${plain(recording.sampling_rate_hz)} Hz`),
+    fill(
+      facts,
+      fact("Length", `${plain(recording.duration_s, 2)} s`),
+      fact("Sampling rate", `${plain(recording.sampling_rate_hz)} Hz`),
       fact("Speed found", recording.spindle_speed_rpm === null ? "–" : `${plain(recording.spindle_speed_rpm, 1)} rev/min`),
-      fact("Harmonics above noise", Object.entries(recording.harmonics_above_noise).map(([a, n]) => `${a} ${n}`).join(", ") || "–"),
-      h("div", null, h("dt", null, "File"), h("dd", null, h("button", { type: "button", class: "quiet", onclick: async () => {
-        try {
-          save(name, await getBlob(`${where}/file`));
-        } catch (error) {
-          failed(place, error);
-        }
-      } }, sizeOf(recording.size_bytes)))));
+      fact(
+        "Harmonics above noise",
+        Object.entries(recording.harmonics_above_noise)
+          .map(([a, n]) => `${a} ${n}`)
+          .join(", ") || "–",
+      ),
+      h(
+        "div",
+        null,
+        h("dt", null, "File"),
+        h(
+          "dd",
+          null,
+          h(
+            "button",
+            {
+              type: "button",
+              class: "quiet",
+              onclick: async () => {
+                try {
+                  save(name, await getBlob(`${where}/file`));
+                } catch (error) {
+                  failed(place, error);
+                }
+              },
+            },
+            sizeOf(recording.size_bytes),
+          ),
+        ),
+      ),
+    );
     const [time, lines] = await Promise.all([get(`${where}/signal?points=1000`), get(`${where}/spectrum`)]);
     const names = Object.keys(time.channels);
     fill(keys, legend(names.map((each, i) => ({ name: each, series: SERIES[i % SERIES.length] }))));
@@ -63,7 +107,14 @@ function panels(channels, names) {
   return units.map((given, k) => {
     const [kind, times] = given === "m" ? ["displacement", 1e6 * factor("displacement")] : [null, 1];
     const end = 1 - k * (height + gap);
-    return { names: names.filter((name) => channels[name].unit === given), yaxis: k ? `y${k + 1}` : "y", layoutKey: k ? `yaxis${k + 1}` : "yaxis", times, title: kind ? unit(kind) : given.replace("^2", "²"), domain: [Math.max(0, end - height), end] };
+    return {
+      names: names.filter((name) => channels[name].unit === given),
+      yaxis: k ? `y${k + 1}` : "y",
+      layoutKey: k ? `yaxis${k + 1}` : "yaxis",
+      times,
+      title: kind ? unit(kind) : given.replace("^2", "²"),
+      domain: [Math.max(0, end - height), end],
+    };
   });
 }
 
@@ -76,8 +127,18 @@ function signalFigure({ time_s: x, channels }, names) {
     if (k === all.length - 1) layout.xaxis.anchor = panel.yaxis;
     return panel.names.flatMap((name) => {
       const times = (values) => values.map((v) => (v === null ? null : v * panel.times));
-      const common = { x, mode: "lines", type: "scatter", line: { color: inkOf(names, name), width: 0.8 }, yaxis: panel.yaxis, hoverinfo: "skip" };
-      return [{ ...common, y: times(channels[name].low) }, { ...common, y: times(channels[name].high), fill: "tonexty", fillcolor: inkOf(names, name, 0.4) }];
+      const common = {
+        x,
+        mode: "lines",
+        type: "scatter",
+        line: { color: inkOf(names, name), width: 0.8 },
+        yaxis: panel.yaxis,
+        hoverinfo: "skip",
+      };
+      return [
+        { ...common, y: times(channels[name].low) },
+        { ...common, y: times(channels[name].high), fill: "tonexty", fillcolor: inkOf(names, name, 0.4) },
+      ];
     });
   });
   return { data, layout };
@@ -87,12 +148,34 @@ function spectrumFigure({ frequency_hz: x, channels, harmonics_hz: harmonics }, 
   const line = { color: colour("soft", 0.45), width: 1, dash: "dot" };
   const shapes = harmonics.slice(0, 400).map((f) => ({ type: "line", x0: f, x1: f, y0: 0, y1: 1, yref: "paper", line, layer: "below" }));
   const last = harmonics.at(-1);
-  const layout = { hovermode: "x unified", shapes, xaxis: axis("Frequency [Hz]", { tickformat: ",d", range: last ? [0, Math.min(x.at(-1), last * 1.1)] : undefined, showgrid: false, unifiedhovertitle: { text: "%{x:,.1f} Hz" } }) };
+  const layout = {
+    hovermode: "x unified",
+    shapes,
+    xaxis: axis("Frequency [Hz]", {
+      tickformat: ",d",
+      range: last ? [0, Math.min(x.at(-1), last * 1.1)] : undefined,
+      showgrid: false,
+      unifiedhovertitle: { text: "%{x:,.1f} Hz" },
+    }),
+  };
   const data = panels(channels, names).flatMap((panel, k, all) => {
-    layout[panel.layoutKey] = axis(`[${panel.title}]`, { domain: panel.domain, type: "log", exponentformat: "none", dtick: 1, tickformat: ".0e", nticks: 5 });
+    layout[panel.layoutKey] = axis(`[${panel.title}]`, {
+      domain: panel.domain,
+      type: "log",
+      exponentformat: "none",
+      dtick: 1,
+      tickformat: ".0e",
+      nticks: 5,
+    });
     if (k === all.length - 1) layout.xaxis.anchor = panel.yaxis;
     return panel.names.map((name) => ({
-      x, y: channels[name].amplitude.map((v) => v * panel.times), name: safe(name), mode: "lines", type: "scatter", line: { color: inkOf(names, name), width: 1.2 }, yaxis: panel.yaxis,
+      x,
+      y: channels[name].amplitude.map((v) => v * panel.times),
+      name: safe(name),
+      mode: "lines",
+      type: "scatter",
+      line: { color: inkOf(names, name), width: 1.2 },
+      yaxis: panel.yaxis,
       hovertemplate: `${safe(name)} %{y:.3~g} ${safe(panel.title)}<extra></extra>`,
     }));
   });

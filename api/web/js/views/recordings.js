@@ -11,18 +11,46 @@ export async function view({ id = null }, _query, place) {
   const here = id ? machines.find((m) => m.id === id) : machine();
   const campaigns = here ? (await all(`machines/${here.id}/campaigns`)).reverse() : [];
   const box = h("div", { class: "view" });
-  add(place, head("Recordings", here ? `Campaigns of ${here.name}` : null, link(to("campaigns/new"), "Describe cuts by hand", "button")), box,
-    dropZone("Drop a campaign here", "Its folder, or its files: campaign.toml, tooling files, recordings (HDF5, TDMS, UFF 58, WAV, MATLAB, Parquet, CSV).", (files) => intake(box, files)),
-    campaigns.length ? campaignTable(campaigns) : empty("No campaign yet", "A campaign is a folder of recordings of ordinary stable cuts, with a campaign.toml that says at which speeds. Example files are on the machines' page.", link(to(""), "To the example files", "button")));
+  add(
+    place,
+    head("Recordings", here ? `Campaigns of ${here.name}` : null, link(to("campaigns/new"), "Describe cuts by hand", "button")),
+    box,
+    dropZone(
+      "Drop a campaign here",
+      "Its folder, or its files: campaign.toml, tooling files, recordings (HDF5, TDMS, UFF 58, WAV, MATLAB, Parquet, CSV).",
+      (files) => intake(box, files),
+    ),
+    campaigns.length
+      ? campaignTable(campaigns)
+      : empty(
+          "No campaign yet",
+          "A campaign is a folder of recordings of ordinary stable cuts, with a campaign.toml that says at which speeds. Example files are on the machines' page.",
+          link(to(""), "To the example files", "button"),
+        ),
+  );
 }
 
 function campaignTable(campaigns) {
-  return card("Campaigns", null, table("Campaigns", [
-    { name: "Name", cell: (c) => link(to(`campaigns/${c.id}`), c.name) },
-    { name: "Made", cell: (c) => new Date(c.created).toLocaleString() },
-    { name: "Cuts", number: true, cell: (c) => String(c.cuts) },
-    { name: "Uploaded", number: true, cell: (c) => String(c.uploaded) },
-    { name: "Usable", number: true, cell: (c) => String(c.usable) },
-    { name: "", cell: (c) => (c.uploaded < c.cuts ? mark("idle", "files are missing") : mark(c.usable ? "good" : "bad", c.usable ? "complete" : "nothing usable")) },
-  ], campaigns));
+  return card(
+    "Campaigns",
+    null,
+    table(
+      "Campaigns",
+      [
+        { name: "Name", cell: (c) => link(to(`campaigns/${c.id}`), c.name) },
+        { name: "Made", cell: (c) => new Date(c.created).toLocaleString() },
+        { name: "Cuts", number: true, cell: (c) => String(c.cuts) },
+        { name: "Uploaded", number: true, cell: (c) => String(c.uploaded) },
+        { name: "Usable", number: true, cell: (c) => String(c.usable) },
+        {
+          name: "",
+          cell: (c) =>
+            c.uploaded < c.cuts
+              ? mark("idle", "files are missing")
+              : mark(c.usable ? "good" : "bad", c.usable ? "complete" : "nothing usable"),
+        },
+      ],
+      campaigns,
+    ),
+  );
 }

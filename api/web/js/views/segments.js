@@ -18,7 +18,10 @@ export function segmentsTable(caption, name, segments, onchange) {
   number();
 
   function cell(tr, key, label, placeholder, segment) {
-    const input = quantityInput("length", key === "inner_diameter_mm" && segment[key] === 0 ? null : (segment[key] ?? null), { "aria-label": label, placeholder: placeholder ?? "" });
+    const input = quantityInput("length", key === "inner_diameter_mm" && segment[key] === 0 ? null : (segment[key] ?? null), {
+      "aria-label": label,
+      placeholder: placeholder ?? "",
+    });
     tr.inputs[key] = input;
     return h("td", { "data-field": "" }, input, h("div", { class: "fault", hidden: true }));
   }
@@ -27,33 +30,62 @@ export function segmentsTable(caption, name, segments, onchange) {
     const tr = h("tr");
     tr.segment = segment;
     tr.inputs = {};
-    const material = h("select", { "aria-label": "Material" }, known.map((m) => h("option", { value: m, selected: m === segment.material }, m)));
+    const material = h(
+      "select",
+      { "aria-label": "Material" },
+      known.map((m) => h("option", { value: m, selected: m === segment.material }, m)),
+    );
     tr.inputs.material = material;
-    tr.append(h("th", { scope: "row" }),
+    tr.append(
+      h("th", { scope: "row" }),
       ...COLUMNS.map(([key, label, placeholder]) => cell(tr, key, label, placeholder, segment)),
       h("td", { "data-field": "" }, material, h("div", { class: "fault", hidden: true })),
-      h("td", { class: "nowrap" },
+      h(
+        "td",
+        { class: "nowrap" },
         act("↑", "Move up", () => tr.previousElementSibling?.before(tr), tr),
         act("↓", "Move down", () => tr.nextElementSibling?.after(tr), tr),
-        act("+", "Add one below", () => {
-          const next = row(values(tr));
-          tr.after(next);
-          next.querySelector("input").focus();
-        }, tr),
-        act("✕", "Take away", () => {
-          if (body.children.length > 1) tr.remove();
-        }, tr)));
+        act(
+          "+",
+          "Add one below",
+          () => {
+            const next = row(values(tr));
+            tr.after(next);
+            next.querySelector("input").focus();
+          },
+          tr,
+        ),
+        act(
+          "✕",
+          "Take away",
+          () => {
+            if (body.children.length > 1) tr.remove();
+          },
+          tr,
+        ),
+      ),
+    );
     return tr;
   }
 
   function act(sign, words, work, tr) {
-    return h("button", { type: "button", class: "quiet", "aria-label": words, title: words, onclick: (event) => {
-      work();
-      number();
-      onchange();
-      if (tr.isConnected && document.activeElement === document.body) event.currentTarget.focus();
-      if (!tr.isConnected) body.querySelector("button").focus();
-    } }, sign);
+    return h(
+      "button",
+      {
+        type: "button",
+        class: "quiet",
+        "aria-label": words,
+        title: words,
+        onclick: (event) => {
+          work();
+          number();
+          onchange();
+          if (tr.isConnected && document.activeElement === document.body) event.currentTarget.focus();
+          if (!tr.isConnected) body.querySelector("button").focus();
+        },
+      },
+      sign,
+    );
   }
 
   function number() {
@@ -76,8 +108,27 @@ export function segmentsTable(caption, name, segments, onchange) {
     return found;
   }
 
-  const box = h("div", { class: "scrolls", tabindex: "0", role: "region", "aria-label": caption },
-    h("table", { class: "segments" }, h("caption", null, caption),
-      h("thead", null, h("tr", null, h("th", { scope: "col" }, "#"), COLUMNS.map(([, label]) => h("th", { scope: "col" }, label, h("span", { class: "unit" }, u("length")))), h("th", { scope: "col" }, "Material"), h("th", { scope: "col" }, h("span", { class: "unseen" }, "Change")))), body));
+  const box = h(
+    "div",
+    { class: "scrolls", tabindex: "0", role: "region", "aria-label": caption },
+    h(
+      "table",
+      { class: "segments" },
+      h("caption", null, caption),
+      h(
+        "thead",
+        null,
+        h(
+          "tr",
+          null,
+          h("th", { scope: "col" }, "#"),
+          COLUMNS.map(([, label]) => h("th", { scope: "col" }, label, h("span", { class: "unit" }, u("length")))),
+          h("th", { scope: "col" }, "Material"),
+          h("th", { scope: "col" }, h("span", { class: "unseen" }, "Change")),
+        ),
+      ),
+      body,
+    ),
+  );
   return { box, rows: () => [...body.children].map(values) };
 }

@@ -9,11 +9,28 @@ import { segmentsTable } from "./segments.js";
 
 const START = {
   cutter: { teeth: 4, diameter_mm: 12, helix_deg: 30 },
-  tool: { stickout_mm: 60, segments: [{ length_mm: 26, outer_diameter_mm: 9.6, material: "carbide" }, { length_mm: 74, outer_diameter_mm: 12, material: "carbide" }] },
-  holder: { insertion_mm: 40, segments: [{ length_mm: 40, outer_diameter_mm: 32, inner_diameter_mm: 12, material: "steel" }, { length_mm: 26, outer_diameter_mm: 63, material: "steel" }] },
+  tool: {
+    stickout_mm: 60,
+    segments: [
+      { length_mm: 26, outer_diameter_mm: 9.6, material: "carbide" },
+      { length_mm: 74, outer_diameter_mm: 12, material: "carbide" },
+    ],
+  },
+  holder: {
+    insertion_mm: 40,
+    segments: [
+      { length_mm: 40, outer_diameter_mm: 32, inner_diameter_mm: 12, material: "steel" },
+      { length_mm: 26, outer_diameter_mm: 63, material: "steel" },
+    ],
+  },
   contact: { translational_stiffness: 2e10, rotational_stiffness: 6e5, translational_damping: 6e4, rotational_damping: 9 },
 };
-const CONTACT = [["translational_stiffness", "Translational stiffness", "N/m per m"], ["rotational_stiffness", "Rotational stiffness", "N m/rad per m"], ["translational_damping", "Translational damping", "N s/m per m"], ["rotational_damping", "Rotational damping", "N m s/rad per m"]];
+const CONTACT = [
+  ["translational_stiffness", "Translational stiffness", "N/m per m"],
+  ["rotational_stiffness", "Rotational stiffness", "N m/rad per m"],
+  ["translational_damping", "Translational damping", "N s/m per m"],
+  ["rotational_damping", "Rotational damping", "N m s/rad per m"],
+];
 
 export async function view({ name = "" }, query, place) {
   const from = name || query.get("from");
@@ -32,41 +49,94 @@ export async function view({ name = "" }, query, place) {
   const pitch = h("input", { autocomplete: "off", placeholder: "equal" });
   pitch.value = (keys.cutter.pitch_deg ?? []).join(", ");
   const stickout = quantity("Stickout", "length", keys.tool.stickout_mm, { name: "tool.stickout_mm", hint: "Tip to the holder's face" });
-  const insertion = quantity("Insertion", "length", keys.holder.insertion_mm, { name: "holder.insertion_mm", hint: "How deep the tool sits" });
+  const insertion = quantity("Insertion", "length", keys.holder.insertion_mm, {
+    name: "holder.insertion_mm",
+    hint: "How deep the tool sits",
+  });
   const tool = segmentsTable("Tool, from its tip", "tool.segments", keys.tool.segments, () => changed());
   const holder = segmentsTable("Holder, from the tool to the flange", "holder.segments", keys.holder.segments, () => changed());
-  const contact = CONTACT.map(([key, label, unit]) => [key, quantity(label, "none", keys.contact?.[key] ?? null, { name: `contact.${key}`, hint: unit })]);
+  const contact = CONTACT.map(([key, label, unit]) => [
+    key,
+    quantity(label, "none", keys.contact?.[key] ?? null, { name: `contact.${key}`, hint: unit }),
+  ]);
 
   const image = picture("The tooling, to scale");
   const doubt = h("div", { class: "fault", role: "status" });
   const store = h("button", { class: "primary" }, name ? "Save" : "Put into the library");
   const fault = h("div");
-  const form = h("form", { class: "editor", novalidate: true },
-    card("Name and cutter", null, h("div", { class: "fields" },
-      field("Name", called, { name: "name", hint: "Letters, digits and . _ + ( ) -" }), cutter.teeth, cutter.diameter_mm, cutter.helix_deg,
-      field("Pitch angles [°]", pitch, { name: "cutter.pitch_deg", hint: "For unequal pitch, with commas" }), stickout, insertion)),
-    card("Tool", null, tool.box), card("Holder", null, holder.box),
-    card("Contact between tool and holder", null, h("div", { class: "fields" }, contact.map(([, box]) => box)), h("p", { class: "small soft" }, "Per metre of insertion. All four empty: rigid.")));
-  add(place, head(title, null,
-    name && machine()?.identification ? link(to("change", { tooling: name }), "Lobes", "button") : null,
-    name ? link(to("toolings/new", { from: name }), "Copy", "button quiet") : null,
-    name ? h("button", { type: "button", class: "quiet", onclick: download }, "TOML file") : null,
-    name ? h("button", { type: "button", class: "quiet danger", onclick: remove }, "Delete") : null), fault,
-  h("div", { class: "bench" }, h("section", { class: "card sheet", "aria-label": "Drawing" }, image, doubt, h("div", { class: "row-of-buttons" }, store)), form));
+  const form = h(
+    "form",
+    { class: "editor", novalidate: true },
+    card(
+      "Name and cutter",
+      null,
+      h(
+        "div",
+        { class: "fields" },
+        field("Name", called, { name: "name", hint: "Letters, digits and . _ + ( ) -" }),
+        cutter.teeth,
+        cutter.diameter_mm,
+        cutter.helix_deg,
+        field("Pitch angles [°]", pitch, { name: "cutter.pitch_deg", hint: "For unequal pitch, with commas" }),
+        stickout,
+        insertion,
+      ),
+    ),
+    card("Tool", null, tool.box),
+    card("Holder", null, holder.box),
+    card(
+      "Contact between tool and holder",
+      null,
+      h(
+        "div",
+        { class: "fields" },
+        contact.map(([, box]) => box),
+      ),
+      h("p", { class: "small soft" }, "Per metre of insertion. All four empty: rigid."),
+    ),
+  );
+  add(
+    place,
+    head(
+      title,
+      null,
+      name && machine()?.identification ? link(to("change", { tooling: name }), "Lobes", "button") : null,
+      name ? link(to("toolings/new", { from: name }), "Copy", "button quiet") : null,
+      name ? h("button", { type: "button", class: "quiet", onclick: download }, "TOML file") : null,
+      name ? h("button", { type: "button", class: "quiet danger", onclick: remove }, "Delete") : null,
+    ),
+    fault,
+    h(
+      "div",
+      { class: "bench" },
+      h("section", { class: "card sheet", "aria-label": "Drawing" }, image, doubt, h("div", { class: "row-of-buttons" }, store)),
+      form,
+    ),
+  );
   store.setAttribute("form", (form.id = "tooling-form"));
 
   function written() {
     const found = {
       ...keys,
-      cutter: { ...keys.cutter, teeth: whole(cutter.teeth.input.base), diameter_mm: cutter.diameter_mm.input.base, helix_deg: cutter.helix_deg.input.base ?? 0 },
+      cutter: {
+        ...keys.cutter,
+        teeth: whole(cutter.teeth.input.base),
+        diameter_mm: cutter.diameter_mm.input.base,
+        helix_deg: cutter.helix_deg.input.base ?? 0,
+      },
       tool: { ...keys.tool, stickout_mm: stickout.input.base, segments: tool.rows() },
       holder: { ...keys.holder, insertion_mm: insertion.input.base, segments: holder.rows() },
     };
     const angles = pitch.value.trim();
-    if (angles) found.cutter.pitch_deg = angles.split(/[;,\s]+/).filter(Boolean).map(Number);
+    if (angles)
+      found.cutter.pitch_deg = angles
+        .split(/[;,\s]+/)
+        .filter(Boolean)
+        .map(Number);
     else delete found.cutter.pitch_deg;
     delete found.contact;
-    if (contact.some(([, box]) => box.input.base !== null)) found.contact = Object.fromEntries(contact.map(([key, box]) => [key, box.input.base]));
+    if (contact.some(([, box]) => box.input.base !== null))
+      found.contact = Object.fromEntries(contact.map(([key, box]) => [key, box.input.base]));
     if (called.value.trim()) found.name = found.name && name ? found.name : called.value.trim();
     else delete found.name;
     return found;
@@ -98,25 +168,35 @@ export async function view({ name = "" }, query, place) {
     timer = setTimeout(draw, 250);
   }
   form.addEventListener("input", changed);
-  form.addEventListener("submit", busy(store, async () => {
-    clearTimeout(timer);
-    asking?.abort();
-    clearFaults(form);
-    const wanted = called.value.trim();
-    if (!wanted) return void showProblem(form, new Problem(0, { detail: "", errors: [{ field: "name", found: "nothing", allowed: "A name, so that you find it again" }] }));
-    const before = wanted === name ? { "If-Match": `"${there.etag}"` } : { "If-None-Match": "*" };
-    try {
-      const kept = await (await send("PUT", `toolings/${part(wanted)}`, { json: written(), headers: before })).json();
-      tell(`${wanted} is in the library.`);
-      if (wanted === name) there.etag = kept.etag;
-      else go(`toolings/edit/${part(wanted)}`);
-    } catch (error) {
-      if (error.status === 412) {
-        const words = wanted === name ? "Somebody else has changed it meanwhile; take another name, or load the page again" : "A name that is not in the library yet";
-        showProblem(form, new Problem(412, { detail: "", errors: [{ field: "name", found: wanted, allowed: words }] }));
-      } else showProblem(form, error);
-    }
-  }));
+  form.addEventListener(
+    "submit",
+    busy(store, async () => {
+      clearTimeout(timer);
+      asking?.abort();
+      clearFaults(form);
+      const wanted = called.value.trim();
+      if (!wanted)
+        return void showProblem(
+          form,
+          new Problem(0, { detail: "", errors: [{ field: "name", found: "nothing", allowed: "A name, so that you find it again" }] }),
+        );
+      const before = wanted === name ? { "If-Match": `"${there.etag}"` } : { "If-None-Match": "*" };
+      try {
+        const kept = await (await send("PUT", `toolings/${part(wanted)}`, { json: written(), headers: before })).json();
+        tell(`${wanted} is in the library.`);
+        if (wanted === name) there.etag = kept.etag;
+        else go(`toolings/edit/${part(wanted)}`);
+      } catch (error) {
+        if (error.status === 412) {
+          const words =
+            wanted === name
+              ? "Somebody else has changed it meanwhile; take another name, or load the page again"
+              : "A name that is not in the library yet";
+          showProblem(form, new Problem(412, { detail: "", errors: [{ field: "name", found: wanted, allowed: words }] }));
+        } else showProblem(form, error);
+      }
+    }),
+  );
 
   async function download() {
     try {
@@ -126,7 +206,7 @@ export async function view({ name = "" }, query, place) {
     }
   }
   async function remove() {
-    if (!await confirmed(`Delete ${name}?`, "Campaigns that used it keep what they need.", "Delete it")) return;
+    if (!(await confirmed(`Delete ${name}?`, "Campaigns that used it keep what they need.", "Delete it"))) return;
     try {
       await send("DELETE", `toolings/${part(name)}`);
       go("toolings");

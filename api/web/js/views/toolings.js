@@ -10,23 +10,58 @@ import { q } from "../units.js";
 export async function view(_args, _query, place) {
   const toolings = await all("toolings");
   const said = h("div", { role: "status" });
-  add(place, head("Toolings", "Tool and holder, from the free end to the flange.", link(to("toolings/new"), "Draw a new one", "button primary")), said,
-    toolings.length ? h("div", { class: "shelf" }, toolings.map(cardOf)) : empty("No tooling yet", "Draw one from its sheet, drop tooling files in, or import a tool library of Fusion 360 or HSM.", link(to("toolings/new"), "Draw one", "button primary")),
-    dropZone("Drop tooling files or a tool library", "Tooling files (.toml), or a library of Fusion 360 or HSM as JSON: holders become segments.", (files) => take(files, said), { small: true }));
+  add(
+    place,
+    head("Toolings", "Tool and holder, from the free end to the flange.", link(to("toolings/new"), "Draw a new one", "button primary")),
+    said,
+    toolings.length
+      ? h("div", { class: "shelf" }, toolings.map(cardOf))
+      : empty(
+          "No tooling yet",
+          "Draw one from its sheet, drop tooling files in, or import a tool library of Fusion 360 or HSM.",
+          link(to("toolings/new"), "Draw one", "button primary"),
+        ),
+    dropZone(
+      "Drop tooling files or a tool library",
+      "Tooling files (.toml), or a library of Fusion 360 or HSM as JSON: holders become segments.",
+      (files) => take(files, said),
+      { small: true },
+    ),
+  );
 }
 
 function cardOf(tooling) {
   const edit = to(`toolings/edit/${part(tooling.name)}`);
-  return h("section", { class: "card tooling" },
+  return h(
+    "section",
+    { class: "card tooling" },
     h("a", { href: edit, class: "picture", tabindex: "-1", "aria-hidden": "true" }, libraryDrawing(tooling.name)),
     h("h2", null, link(edit, tooling.name)),
-    h("p", { class: "soft small" }, `${tooling.teeth} teeth, Ø `, q("length", tooling.diameter_mm, { digits: 1 }), ", ", q("length", tooling.stickout_mm, { digits: 1 }), " out"),
-    h("div", { class: "row-of-buttons" },
+    h(
+      "p",
+      { class: "soft small" },
+      `${tooling.teeth} teeth, Ø `,
+      q("length", tooling.diameter_mm, { digits: 1 }),
+      ", ",
+      q("length", tooling.stickout_mm, { digits: 1 }),
+      " out",
+    ),
+    h(
+      "div",
+      { class: "row-of-buttons" },
       machine()?.identification ? link(to("change", { tooling: tooling.name }), "Lobes", "button") : null,
-      link(edit, "Edit", "button quiet"), link(to("toolings/new", { from: tooling.name }), "Copy", "button quiet")));
+      link(edit, "Edit", "button quiet"),
+      link(to("toolings/new", { from: tooling.name }), "Copy", "button quiet"),
+    ),
+  );
 }
 
-const stem = (file) => file.name.replace(/\.[^.]+$/, "").replace(/[^A-Za-z0-9 ._+()-]/g, "-").slice(0, 64).replace(/^[^A-Za-z0-9]+/, "");
+const stem = (file) =>
+  file.name
+    .replace(/\.[^.]+$/, "")
+    .replace(/[^A-Za-z0-9 ._+()-]/g, "-")
+    .slice(0, 64)
+    .replace(/^[^A-Za-z0-9]+/, "");
 
 /** Write tooling files into the library, and import tool libraries; each is told for itself. */
 async function take(files, said) {
@@ -34,13 +69,19 @@ async function take(files, said) {
   for (const file of files) {
     try {
       if (/\.toml$/i.test(file.name)) {
-        await send("PUT", `toolings/${part(stem(file))}`, { body: await file.text(), headers: { "Content-Type": "application/toml", "If-None-Match": "*" } });
+        await send("PUT", `toolings/${part(stem(file))}`, {
+          body: await file.text(),
+          headers: { "Content-Type": "application/toml", "If-None-Match": "*" },
+        });
         lines.push(["good", `${file.name}: in the library as ${stem(file)}`]);
-      } else if (/\.(json|hsmlib|tools)$/i.test(file.name)) lines.push(...await imported(file));
+      } else if (/\.(json|hsmlib|tools)$/i.test(file.name)) lines.push(...(await imported(file)));
       else lines.push(["doubt", `${file.name}: neither a tooling file (.toml) nor a tool library (.json)`]);
     } catch (error) {
       if (!(error instanceof Problem)) throw error;
-      lines.push(["bad", `${file.name}: ${error.status === 412 ? "a tooling of this name is in the library already; it stays as it is" : error.message}`]);
+      lines.push([
+        "bad",
+        `${file.name}: ${error.status === 412 ? "a tooling of this name is in the library already; it stays as it is" : error.message}`,
+      ]);
     }
   }
   if (lines.some(([kind]) => kind === "good")) {
@@ -50,10 +91,22 @@ async function take(files, said) {
     await new Promise((resolve) => setTimeout(resolve, 50));
     said = document.querySelector("main .view > [role=status]") ?? said;
   }
-  fill(said, ["bad", "doubt", "good"].map((kind) => {
-    const some = lines.filter(([each]) => each === kind).map(([, words]) => words);
-    return some.length ? note(kind, h("ul", null, some.map((words) => h("li", null, words)))) : null;
-  }));
+  fill(
+    said,
+    ["bad", "doubt", "good"].map((kind) => {
+      const some = lines.filter(([each]) => each === kind).map(([, words]) => words);
+      return some.length
+        ? note(
+            kind,
+            h(
+              "ul",
+              null,
+              some.map((words) => h("li", null, words)),
+            ),
+          )
+        : null;
+    }),
+  );
 }
 
 async function imported(file) {

@@ -1,0 +1,59 @@
+// What is asked after a tool change: its fields, what they become, and what can be seen to be wrong before anything is sent.
+import { Problem } from "../api.js";
+import { text } from "../units.js";
+
+export const METHODS = [
+  ["zero-order", "Zero order: at once"],
+  ["multi-frequency", "Multi-frequency"],
+  ["semi-discretisation", "Semi-discretisation"],
+  ["full-discretisation", "Full discretisation"],
+  ["time-domain", "Time domain: slowest"],
+];
+// what an address may say: name in the query, kind, default, where it goes in the body
+export const NUMBERS = [
+  ["im", "percent", 50, "cut.immersion", 0.1, 100, "Radial immersion"],
+  ["fz", "feed", 0.1, "cut.feed_per_tooth_mm", 1e-4, 10, "Feed per tooth"],
+  ["from", "speed", 4000, "speeds.from_rpm", 100, 200_000, "From"],
+  ["to", "speed", 20_000, "speeds.to_rpm", 100, 200_000, "To"],
+  ["step", "speed", 50, "speeds.step_rpm", 0.1, 100_000, "Step"],
+  ["deep", "depth", 10, "max_depth_mm", 1e-3, 500, "Deepest that is asked for"],
+  ["ktc", "pressure", null, "cut.ktc_mpa", 1, 50_000, "Tangential coefficient"],
+  ["krc", "none", null, "cut.krc", -1, 5, "Radial over tangential"],
+  ["power", "power", null, "max_power_kw", 1e-3, 10_000, "Spindle power, at most"],
+  ["torque", "torque", null, "max_torque_nm", 1e-3, 1e6, "Spindle torque, at most"],
+];
+
+export function bodyOf(id, names, fields, strategy, direction, method) {
+  const value = (key) => fields[key].input.base;
+  const cut = { immersion: value("im") / 100, strategy, feed_direction: direction };
+  for (const [key, name] of [
+    ["fz", "feed_per_tooth_mm"],
+    ["ktc", "ktc_mpa"],
+    ["krc", "krc"],
+  ])
+    if (value(key) !== null) cut[name] = value(key);
+  const speeds = { from_rpm: value("from"), to_rpm: value("to"), step_rpm: value("step") };
+  const lobes = { machine: id, toolings: names, cut, speeds, max_depth_mm: value("deep"), method };
+  const advice = value("fz") === null || method !== "zero-order" ? null : { ...lobes };
+  if (advice && value("power") !== null) advice.max_power_kw = value("power");
+  if (advice && value("torque") !== null) advice.max_torque_nm = value("torque");
+  return { lobes, advice, tips: names.map((tooling) => ({ machine: id, tooling })) };
+}
+
+/** What can be seen to be wrong before anything is sent, in the units that are shown. */
+export function checked(fields, chosen) {
+  const errors = [];
+  for (const [key, kind, usual, name, least, most] of NUMBERS) {
+    const { base, value } = fields[key].input;
+    if (base === null && (usual === null || key === "fz")) continue;
+    if (base === null) errors.push({ field: name, found: "nothing", allowed: "A number is needed here" });
+    else if (!(base >= least && base <= most)) {
+      errors.push({ field: name, found: value, allowed: `From ${text(kind, least, { bare: true })} to ${text(kind, most)}` });
+    }
+  }
+  const [from, upTo] = [fields.from.input.base, fields.to.input.base];
+  if (!errors.length && upTo < from)
+    errors.push({ field: "speeds.to_rpm", found: text("speed", upTo), allowed: "Not below the first speed" });
+  if (!chosen.size) errors.push({ field: "toolings", found: "nothing", allowed: "One tooling at least" });
+  return errors.length ? new Problem(0, { detail: "Something is not usable", errors }) : null;
+}

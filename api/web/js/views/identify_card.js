@@ -1,0 +1,60 @@
+// From a campaign to its identification.
+import { once, post, Problem } from "../api.js";
+import { card, h } from "../dom.js";
+import { busy, failed, field, quantity, select } from "../forms.js";
+import { go } from "../router.js";
+
+/** The next step, and what may be set for it. */
+export function identifyCard(campaign) {
+  const seed = quantity("Seed", "none", 1, { name: "seed", hint: "The same seed gives the same result." });
+  const method = select(
+    [
+      ["default", "Default"],
+      ["paper", "As in the paper"],
+    ],
+    "default",
+  );
+  const apply = h("input", { type: "checkbox", checked: true, id: "apply" });
+  const start = h("input", { type: "checkbox", id: "start" });
+  const button = h("button", { class: "primary" }, "Identify the machine");
+  const form = h(
+    "form",
+    { novalidate: true, class: "view" },
+    h(
+      "div",
+      { class: "row-of-buttons" },
+      button,
+      h("span", { class: "soft" }, `from ${campaign.usable} usable cuts; it takes about a minute for 80`),
+    ),
+    h(
+      "details",
+      null,
+      h("summary", null, "Settings"),
+      h(
+        "div",
+        { class: "fields" },
+        seed,
+        field("Method", method, { name: "method" }),
+        h("label", { class: "check", for: "apply" }, apply, "the machine takes the result"),
+        h("label", { class: "check", for: "start" }, start, "go on from the machine's last result"),
+      ),
+    ),
+  );
+  form.addEventListener(
+    "submit",
+    busy(button, async () => {
+      try {
+        const job = await post(
+          "identifications",
+          { campaign: campaign.id, seed: seed.input.base, method: method.value, start: start.checked, apply: apply.checked },
+          { headers: once() },
+        );
+        go(`identifications/${job.id}`);
+      } catch (error) {
+        failed(form, error);
+        if (!(error instanceof Problem)) throw error;
+      }
+    }),
+  );
+  return card(null, null, form);
+}
