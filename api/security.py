@@ -24,7 +24,7 @@ from api.stores.records import Key
 SCOPES = ("read", "upload", "run", "admin")
 HEADER = "X-API-Key"
 #: Whose everything is where no key is asked for.
-LOCAL_GROUP = "local"
+LOCAL_GROUP = LOCAL_KEY = "local"
 #: A key is PREFIX_ID_SECRET.
 PREFIX = "ri"
 _LOCAL_NAME = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:\d{1,5})?", re.IGNORECASE)
@@ -86,7 +86,7 @@ def caller_of(request: HTTPConnection, parts: Parts, given: str | None = None) -
         # a page from elsewhere may reach loopback through a name of its own
         if not _LOCAL_NAME.fullmatch(request.headers.get("host", "")):
             raise Problem(403, "without a key the service answers on localhost only")
-        return Caller("local", LOCAL_GROUP, SCOPES)
+        return Caller(LOCAL_KEY, LOCAL_GROUP, SCOPES)
     _, _, rest = text.partition("_")
     id, _, secret = rest.partition("_")
     key = parts.store.keys.get(id) if text.startswith(f"{PREFIX}_") and id.isalnum() and id.isascii() and len(id) <= 64 else None

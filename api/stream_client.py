@@ -168,7 +168,7 @@ class ForceStream:
             raise StreamRefused(code, self._problem or {"detail": reason or "the connection has broken"}) from None
 
 
-def _object(raw: bytes | None) -> dict[str, Any]:
+def _object(raw: bytes | bytearray | None) -> dict[str, Any]:
     try:
         found = json.loads(raw or b"{}")
     except ValueError:

@@ -14,8 +14,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from api.streams.engine import BLOCK, CLOSE, FAILED, FORCES, OPEN, Message
+from api.streams.listener import Listener
 from api.streams.process import Host
-from api.streams.session import About, End, Listener, Session, Stage
+from api.streams.session import About, End, Session, Stage
 from rcsa_ident.arrays import FloatArray
 
 log = logging.getLogger("rcsa_ident.service")

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from api.streams.counts import Counts
 from api.streams.envelope import Envelope
 from api.streams.frames import MOST_INDEX, MOST_SAMPLES, TooLarge, packed, samples_of, samples_of_text, unpacked
-from api.streams.session import BLOCK, FLYING, WAITING_BYTES, WAITING_TEXTS, About, Listener, Session, Stage
+from api.streams.listener import WAITING_BYTES, WAITING_TEXTS, Listener
+from api.streams.session import BLOCK, FLYING, About, End, Session, Stage
 from rcsa_ident.errors import InputError
 
 ABOUT = About("s", "A", "", "m", "T1", "now", 1000.0, ("X", "Y"), 2, 10_000)
@@ -216,8 +217,6 @@ def test_who_does_not_read_loses_forces_and_never_memory():
 
 def test_a_session_ends_once():
     async def run():
-        from api.streams.session import End
-
         session = Session(ABOUT, 1)
         session.finish(End(1008, 422, "a"))
         session.finish(End())

@@ -1,0 +1,79 @@
+"""Who hears a stream: what waits for a reader, bounded."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections import deque
+from typing import Any
+
+from api.streams.envelope import Envelope
+from api.streams.frames import packed
+from rcsa_ident.arrays import FloatArray
+
+#: Bytes and texts that wait for a slow reader.
+WAITING_BYTES, WAITING_TEXTS = 4_000_000, 32
+
+
+class Listener:
+    """Who gets a session's forces, never more of them than fit.
+
+    Parameters
+    ----------
+    axes : int
+    text : bool
+        JSON in place of bytes.
+    size : int or None
+        Samples of a bucket, in place of every sample.
+    """
+
+    def __init__(self, axes: int, text: bool, size: int | None) -> None:
+        self.text, self.envelope = text, None if size is None else Envelope(size, axes)
+        self.frames: deque[tuple[int, str | bytes]] = deque()
+        self.texts: deque[str] = deque(maxlen=WAITING_TEXTS)
+        self.bytes, self.unread, self.last = 0, 0, ""
+        self.awake = asyncio.Event()
+
+    def forces(self, first: int, values: FloatArray) -> None:
+        """Take forces; the oldest that nobody has read make way and are counted."""
+        runs = [(first, values)] if self.envelope is None else self.envelope.add(first, values)
+        for begin, rows in runs:
+            frame = json.dumps({"first": begin, "samples": rows.tolist()}) if self.text else packed(begin, rows)
+            count = rows.shape[0] * (1 if self.envelope is None else self.envelope.size)
+            self.frames.append((count, frame))
+            self.bytes += len(frame)
+        while self.bytes > WAITING_BYTES:
+            count, frame = self.frames.popleft()
+            self.bytes -= len(frame)
+            self.unread += count
+        self.awake.set()
+
+    def tell(self, event: str, **further: Any) -> None:
+        """Take an event; the end comes behind all forces, others before them."""
+        text = json.dumps({"event": event, **further}, allow_nan=False)
+        if event == "end":
+            self.last = text
+        else:
+            self.texts.append(text)
+        self.awake.set()
+
+    @property
+    def pending(self) -> bool:
+        """Whether something waits."""
+        return bool(self.frames or self.texts or self.last)
+
+    def taken(self) -> list[str | bytes]:
+        """Return some of what waits, and forget it."""
+        found: list[str | bytes] = [*self.texts]
+        self.texts.clear()
+        # one frame at a time, so that the rest can still make way
+        if self.frames:
+            frame = self.frames.popleft()[1]
+            self.bytes -= len(frame)
+            found.append(frame)
+        elif self.last:
+            found.append(self.last)
+            self.last = ""
+        if not self.pending:
+            self.awake.clear()
+        return found
