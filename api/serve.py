@@ -87,7 +87,7 @@ def worker(
 
     settings = context.obj
     _log()
-    crew = Crew(count or max(settings.job_workers, 1), job_worker, settings)
+    crew = Crew(count or max(settings.job_workers, 1), job_worker, settings, settings.job_nice)
     ended = threading.Event()
     for each in (signal.SIGTERM, signal.SIGINT):
         signal.signal(each, lambda *_: ended.set())
@@ -173,7 +173,7 @@ def _run(settings: object) -> None:
     assert isinstance(settings, Settings)
     _log()
     try:
-        service = create_app(settings, crew=Crew(settings.job_workers, job_worker, settings))
+        service = create_app(settings, crew=Crew(settings.job_workers, job_worker, settings, settings.job_nice))
     except InputError as error:
         _fail(error)
     except OSError as error:

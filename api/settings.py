@@ -75,6 +75,8 @@ class Settings:
         Times that a job is taken up again without coming further before it is given up.
     job_work_seconds : float [s]
         Estimated work of lobes as a job; longer ones are refused.
+    examples : Path
+        Folder of a campaign that may be downloaded as an example, where it is there.
     dask : str
         Scheduler of a Dask cluster that searches of jobs spread over (``tcp://host:8786``); empty where they stay here.
     watchers : int
@@ -116,6 +118,7 @@ class Settings:
     job_queue: int = 50
     job_attempts: int = 10
     job_work_seconds: float = 4.0 * 3600.0
+    examples: Path = field(default_factory=lambda: Path("data/sample_runs"))
     dask: str = ""
     watchers: int = 200
     watch_seconds: float = 3600.0
@@ -129,7 +132,8 @@ class Settings:
             ("max_upload_bytes", 1000, 10**12), ("uploads", 1, 1000), ("group_bytes", 1000, 10**15), ("free_bytes", 0, 10**15),
             ("upload_seconds", 1.0, 10**6), ("upload_idle_seconds", 0.1, 3600.0), ("upload_bytes_per_second", 0, 10**9),
             ("reader_memory", 512, 10**6), ("reader_seconds", 0.1, 10**4), ("reader_wall_seconds", 0.1, 10**5), ("reader_calls", 1, 10**6),
-            ("job_workers", 0, 256), ("job_nice", 0, 19), ("job_queue", 1, 10**6), ("job_attempts", 1, 1000), ("job_work_seconds", 1.0, 10**7),
+            ("job_workers", 0, 256), ("job_nice", 0, 19),
+            ("job_queue", 1, 10**6), ("job_attempts", 1, 1000), ("job_work_seconds", 1.0, 10**7),
             ("watchers", 1, 10**5), ("watch_seconds", 0.1, 10**6),
         ):  # fmt: skip
             if not least <= getattr(self, name) <= most:
@@ -170,6 +174,7 @@ def from_environment(environment: Mapping[str, str]) -> Settings:
         "database": str,
         "host": str,
         "dask": str,
+        "examples": Path,
         "keys": _switch,
         "work_seconds": float,
     }

@@ -14,8 +14,6 @@ from multiprocessing.context import SpawnProcess
 from typing import Any
 
 log = logging.getLogger("rcsa_ident.jobs")
-#: How nice workers are: streams and queries come first.
-NICE = 10
 #: Seconds between two looks, the longest pause before one that dies at once is started again, and until which one ends by itself.
 LOOK, PAUSE, FAREWELL = 0.2, 30.0, 5.0
 #: Takes what sets ready, and works until the event is set.
@@ -41,10 +39,12 @@ class Crew:
         What each of them does; its module has to be importable.
     settings : object
         That crosses processes.
+    nice : int
+        How far they step back behind others.
     """
 
-    def __init__(self, count: int, work: Work, settings: Any) -> None:
-        self.count, self.work, self.settings = count, work, settings
+    def __init__(self, count: int, work: Work, settings: Any, nice: int = 0) -> None:
+        self.count, self.work, self.settings, self.nice = count, work, settings, nice
         self.members: list[_Member] = []
         self.ending = threading.Event()
         self.watch: threading.Thread | None = None
@@ -80,7 +80,7 @@ class Crew:
         context = multiprocessing.get_context("spawn")
         # without a lock, which a process that is killed may hold for ever
         ready = context.Value("b", 0, lock=False)
-        process = context.Process(target=_member, args=(self.work, self.settings, ready), daemon=True)
+        process = context.Process(target=_member, args=(self.work, self.settings, self.nice, ready), daemon=True)
         process.start()
         return _Member(process, ready, time.monotonic())
 
@@ -102,7 +102,7 @@ class Crew:
                     self.members[i] = fresh
 
 
-def _member(work: Work, settings: Any, ready: Any) -> None:
+def _member(work: Work, settings: Any, nice: int, ready: Any) -> None:
     """In a new process: end with the one that started it, however that ends."""
     parent = multiprocessing.parent_process()
     assert parent is not None
@@ -117,7 +117,7 @@ def _member(work: Work, settings: Any, ready: Any) -> None:
     # Ctrl-C is for the service, which ends its workers
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(os, "nice"):
-        os.nice(NICE)
+        os.nice(nice)
     work(settings, lambda: setattr(ready, "value", 1), stop)
     # what computes in a thread does not end by itself
     os._exit(0)
