@@ -24,6 +24,7 @@ from api.schemas.common import Answer, Page, ProblemDocument
 from api.schemas.forces import ForceAnswer, StreamsAnswer, StreamSummary
 from api.schemas.jobs import FittedLines, JobAnswer, LobeJob
 from api.schemas.keys import KeyAnswer, MadeKey
+from api.schemas.libraries import Example, Examples, ImportAnswer
 from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes
 from api.schemas.queries import AdviceAnswer, LobeAnswer, TipAnswer
 from api.schemas.toolings import ToolingAnswer, ToolingSummary
@@ -133,6 +134,20 @@ class Client:
     def toolings(self, limit: int = 50) -> Iterator[ToolingSummary]:
         """Yield all toolings."""
         return self._all("/toolings", Page[ToolingSummary], limit)
+
+    def import_toolings(self, library: bytes, **assumed: Any) -> ImportAnswer:
+        """Write the toolings of a Fusion 360 or HSM tool library; `replace` writes also over what is there."""
+        kind = "application/zip" if library.startswith(b"PK") else "application/json"
+        query = {key: str(value).lower() if isinstance(value, bool) else value for key, value in assumed.items() if value is not None}
+        return _read(ImportAnswer, self.send("POST", "/toolings/import", content=library, params=query, headers={"Content-Type": kind}))
+
+    def examples(self) -> list[Example]:
+        """Return what there is to start with."""
+        return _read(Examples, self.send("GET", "/examples")).items
+
+    def example(self, name: str, file: Path) -> None:
+        """Write an example's file."""
+        self._download(f"/examples/{quote(name)}", file)
 
     def forget_tooling(self, name: str, seen: str | None = None) -> None:
         """Forget a tooling."""

@@ -20,10 +20,12 @@ from api.reading.reader import Limits, Reader, Reading
 from api.reading.uploads import Uploads
 from api.routes import (
     campaigns,
+    examples,
     forces,
     health,
     identifications,
     keys,
+    libraries,
     machines,
     page,
     queries,
@@ -112,7 +114,7 @@ def create_app(
     problems.install(app)
     app.include_router(health.router)
     app.include_router(page.router)
-    for each in (keys, machines, toolings, campaigns, recordings, resumed, together, queries, identifications, forces, streams):
+    for each in (keys, machines, toolings, libraries, examples, campaigns, recordings, resumed, together, queries, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(Observed, parts=parts)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]

@@ -46,7 +46,7 @@ async def write(name: ToolingName, request: Request, response: Response, parts: 
 
     def keep() -> tuple[bool, Document]:
         text = utf8(raw) if is_toml else toml_text(body_of(ToolingKeys, raw))
-        document = Document(caller.group, name, text, json.dumps(_summary(text)), digest_of(text), now())
+        document = Document(caller.group, name, text, json.dumps(summary(text)), digest_of(text), now())
         kept = parts.store.toolings
         before = expected(request, lambda: getattr(kept.brief(caller.group, name), "digest", None))
         return kept.put(document, before), document
@@ -145,7 +145,7 @@ def toml_text(keys: ToolingKeys) -> str:
     return toml_of(keys.model_dump(exclude_unset=True, exclude_none=True))
 
 
-def _summary(text: str) -> dict[str, Any]:
+def summary(text: str) -> dict[str, Any]:
     """What a list tells; everything that the commands would refuse is refused."""
     tooling = tooling_of(text)
     cutter = tooling.cutter

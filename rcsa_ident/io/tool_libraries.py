@@ -114,8 +114,8 @@ def read_tool_library(path: str | Path, assumptions: Assumptions | None = None) 
     return import_tools(read_bytes(path, "tool library", LARGEST_LIBRARY), str(path), assumptions)
 
 
-def import_tools(raw: bytes, where: str, assumptions: Assumptions | None = None) -> list[Imported]:
-    """Return every entry of a library that is already in memory, see `read_tool_library`."""
+def import_tools(raw: bytes, where: str, assumptions: Assumptions | None = None, most: int = MOST_ENTRIES) -> list[Imported]:
+    """Return every entry of a library that is already in memory, at most so many, see `read_tool_library`."""
     given = assumptions or Assumptions()
     content = _content(raw, where)
     entries = content.get("data", [content]) if isinstance(content, Mapping) else content
@@ -125,8 +125,8 @@ def import_tools(raw: bytes, where: str, assumptions: Assumptions | None = None)
         or not any(isinstance(e, Mapping) and ("geometry" in e or "segments" in e) for e in entries)
     ):
         raise InputError("tool library", "no list of tools", "a list 'data' of tools with 'geometry' and 'holder'", where)
-    if len(entries) > MOST_ENTRIES:
-        raise InputError("tool library", f"{len(entries)} entries", f"at most {MOST_ENTRIES}", where)
+    if len(entries) > most:
+        raise InputError("tool library", f"{len(entries)} entries", f"at most {most}", where)
     spare = None
     if given.holder is not None:
         holders = [e for e in entries if isinstance(e, Mapping) and e.get("type") == _HOLDER]

@@ -1,0 +1,114 @@
+"""Files to start with: a tooling, a campaign, tested cuts, modes, a tool library, and recordings."""
+
+from __future__ import annotations
+
+import tomllib
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path as Folder
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Response
+from fastapi.responses import FileResponse, StreamingResponse
+
+from api.parts import Parts, ThisService
+from api.problems import Problem
+from api.routes.common import guard, problems
+from api.schemas.libraries import Example, Examples
+from api.security import Guarded
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.setups import read_campaign
+
+router = APIRouter(prefix="/examples", tags=["examples"], route_class=Guarded)
+_FOLDER = Folder(__file__).resolve().parents[1] / "examples"
+_TYPES = {".toml": "application/toml", ".csv": "text/csv; charset=utf-8", ".json": "application/json", ".zip": "application/zip"}
+_ABOUT = {
+    "S1-ER32.toml": "A tooling: end mill of 12 mm in a collet chuck.",
+    "S2-PG25.toml": "A tooling: the same end mill, shorter, in a press-fit chuck.",
+    "campaign.toml": "A campaign of one cut, with a word to every key.",
+    "CUTS.csv": "Tested cuts, which lobes are drawn with.",
+    "MODES.toml": "A tooltip's modes, which lobes are computed from without an identification.",
+    "tool-library.json": "A tool library as CAM programs export it.",
+    "small-campaign.zip": "A campaign of two cuts with their air cuts: to see uploads and verdicts.",
+}
+SAMPLE, _SAMPLE_ABOUT = "sample-campaign.zip", "A campaign with two toolings: enough for an identification."
+_BLOCK = 1 << 18
+
+
+@router.get("", summary="List examples", openapi_extra=guard("read"), responses=problems())
+def list_examples(parts: ThisService) -> Examples:
+    items = [Example(name=name, size_bytes=(_FOLDER / name).stat().st_size, about=about) for name, about in _ABOUT.items()]
+    members = _sample(parts)
+    if members:
+        items.append(Example(name=SAMPLE, size_bytes=_zip_bytes(members), about=_SAMPLE_ABOUT))
+    return Examples(items=items)
+
+
+@router.get(
+    "/{name}",
+    summary="An example's file",
+    openapi_extra=guard("read"),
+    response_class=Response,
+    responses={
+        200: {"description": "A file.", "content": {kind.split(";")[0]: {"schema": {"type": "string"}} for kind in _TYPES.values()}},
+        **problems(404, 422),
+    },
+)
+def get_example(name: Annotated[str, Path(pattern=r"^[A-Za-z0-9.-]{1,64}$")], parts: ThisService) -> Response:
+    if name in _ABOUT:
+        return FileResponse(_FOLDER / name, media_type=_TYPES[(_FOLDER / name).suffix], filename=name)
+    members = _sample(parts) if name == SAMPLE else []
+    if not members:
+        raise Problem(404, "there is no such example")
+    headers = {"Content-Disposition": f'attachment; filename="{SAMPLE}"'}
+    return StreamingResponse(_zipped(members), media_type=_TYPES[".zip"], headers=headers)
+
+
+def _sample(parts: Parts) -> list[tuple[str, Folder]]:
+    """What the folder of the settings holds of a campaign, by name in the archive; nothing where there is none."""
+    folder = parts.settings.examples
+    try:
+        campaign = read_campaign(folder)
+        with (folder / "campaign.toml").open("rb") as file:
+            toolings = [folder / str(each) for each in tomllib.load(file)["toolings"].values()]
+    except (InputError, OSError, KeyError, AttributeError):
+        return []
+    root = folder.resolve()
+    paths = [folder / "campaign.toml", *toolings]
+    paths += [path for cut in campaign.cuts for path in (cut.recording, cut.air) if path is not None]
+    members = {path.resolve(): path for path in paths}
+    return [(there.relative_to(root).as_posix(), path) for there, path in members.items() if there.is_file() and there.is_relative_to(root)]
+
+
+def _zip_bytes(members: list[tuple[str, Folder]]) -> int:
+    """Length of the archive: for each member a header, what says how long it was, and an entry in the list at the end."""
+    return sum(path.stat().st_size + 30 + 16 + 46 + 2 * len(name.encode()) for name, path in members) + 22
+
+
+class _Sink:
+    """Takes what an archive is made of until somebody fetches it."""
+
+    def __init__(self) -> None:
+        self.parts: list[bytes] = []
+
+    def write(self, data: bytes) -> int:
+        self.parts.append(bytes(data))
+        return len(data)
+
+    def flush(self) -> None:
+        pass
+
+    def taken(self) -> bytes:
+        found, self.parts = b"".join(self.parts), []
+        return found
+
+
+def _zipped(members: list[tuple[str, Folder]]) -> Iterator[bytes]:
+    sink = _Sink()
+    with zipfile.ZipFile(sink, "w", zipfile.ZIP_STORED) as archive:  # type: ignore[call-overload]
+        for name, path in members:
+            with path.open("rb") as source, archive.open(name, "w") as entry:
+                while block := source.read(_BLOCK):
+                    entry.write(block)
+                    yield sink.taken()
+    yield sink.taken()

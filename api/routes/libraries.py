@@ -1,0 +1,93 @@
+"""Tool libraries of CAM programs, into the library of toolings."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request
+from fastapi.concurrency import run_in_threadpool
+
+from api.parts import ThisService
+from api.problems import Problem
+from api.routes.common import BODY, found_or_404, guard, problems
+from api.routes.toolings import summary
+from api.schemas.common import NAME_PATTERN
+from api.schemas.libraries import ImportAnswer, ImportedTool
+from api.security import Guarded, WhoAsks, now
+from api.stores.records import ABSENT, Document, Stale, digest_of
+from api.work.libraries import LARGEST_LIBRARY, imported
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.tool_libraries import Assumptions
+
+router = APIRouter(prefix="/toolings", tags=["toolings"], route_class=Guarded)
+JSON, ZIP = "application/json", "application/zip"
+_EXAMPLE = {
+    "data": [
+        {
+            "description": "End mill 12", "type": "flat end mill", "unit": "millimeters", "BMC": "carbide",
+            "geometry": {"DC": 12.0, "LB": 60.0, "LCF": 26.0, "NOF": 4, "OAL": 104.0, "SFDM": 12.0},
+            "holder": {
+                "description": "Chuck 12", "gaugeLength": 95.0,
+                "segments": [{"height": 95.0, "lower-diameter": 32.0, "upper-diameter": 32.0}],
+            },
+        }
+    ]
+}  # fmt: skip
+_BODY = {
+    "required": True,
+    "content": {
+        JSON: {"schema": {"type": "object"}, "example": _EXAMPLE},
+        ZIP: {"schema": {"type": "string", "format": "binary"}},
+    },
+}
+
+
+@router.post(
+    "/import",
+    summary="Toolings of a Fusion 360 or HSM tool library",
+    description="JSON, or the .tools container. Each entry on its own: what is there already is skipped unless replace=true.",
+    openapi_extra=guard("upload", requestBody=_BODY, **{"x-content-types": (JSON, ZIP)}),
+    responses=problems(404, *BODY),
+)
+async def import_library(
+    request: Request,
+    parts: ThisService,
+    caller: WhoAsks,
+    flute_ratio: Annotated[float, Query(ge=0.3, le=1.0, description="Diameter that bends as the fluted part, over the cutting one.")] = 0.8,
+    helix_deg: Annotated[float, Query(ge=0.0, le=80.0, description="Where the library gives none.")] = 30.0,
+    stickout_mm: Annotated[float | None, Query(gt=0.0, le=5000.0, description="In place of the library's length below holder.")] = None,
+    insertion_mm: Annotated[float | None, Query(ge=0.0, le=5000.0, description="In place of what is left of the tool.")] = None,
+    material: Annotated[str | None, Query(max_length=50, description="In place of the library's.")] = None,
+    holder: Annotated[str | None, Query(max_length=200, description="Holder of the library, for tools without one.")] = None,
+    contact: Annotated[str | None, Query(pattern=NAME_PATTERN, description="Tooling here whose contact joins tool and holder.")] = None,
+    replace: Annotated[bool, Query(description="Write also over toolings that are there.")] = False,
+) -> ImportAnswer:
+    raw = await request.body()
+    if len(raw) > LARGEST_LIBRARY:
+        raise Problem(413, f"a tool library has at most {LARGEST_LIBRARY // 1_000_000} MB")
+    joint = None
+    if contact is not None:
+        joint = found_or_404(await run_in_threadpool(parts.store.toolings.get, caller.group, contact), f"tooling {contact}").text
+    given = Assumptions(flute_ratio, helix_deg, stickout_mm, insertion_mm, material, None, holder)
+    entries = await parts.work.run(imported, raw, given, joint)
+
+    def keep() -> list[ImportedTool]:
+        return [_kept(parts, caller.group, *entry, replace) for entry in entries]
+
+    return ImportAnswer(items=await run_in_threadpool(keep))
+
+
+def _kept(parts: Any, group: str, name: str, text: str, assumed: tuple[str, ...], reason: str, replace: bool) -> ImportedTool:
+    """What becomes of one entry; the others do not hang on it."""
+    if not reason:
+        try:
+            document = Document(group, name, text, json.dumps(summary(text)), digest_of(text), now())
+            parts.store.toolings.put(document, None if replace else ABSENT)
+        except InputError as error:
+            reason = str(error)
+        except Stale:
+            reason = "a tooling of that name is there already (replace=true writes over it)"
+    return ImportedTool(
+        name=name, status="skipped" if reason else "written", reason=reason or None, assumed=[] if reason else list(assumed)
+    )

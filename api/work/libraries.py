@@ -1,0 +1,55 @@
+"""Tool libraries of CAM programs as toolings of the library here."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+from api.work.toolings import tooling_of
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.tool_libraries import Assumptions, import_tools
+
+#: Largest library, and most entries in one.
+LARGEST_LIBRARY, MOST_TOOLS = 8_000_000, 2000
+
+
+def imported(raw: bytes, assumptions: Assumptions, contact: str | None) -> list[tuple[str, str, tuple[str, ...], str]]:
+    """Return name, text, assumptions, and the reason where there is no text, of every entry of a library.
+
+    Parameters
+    ----------
+    raw : bytes
+        JSON, or the container that it comes in.
+    assumptions : Assumptions
+    contact : str or None
+        Text of a tooling whose contact joins all tools and holders.
+    """
+    if contact is not None:
+        known = tooling_of(contact).assembly.contact
+        if known is None:
+            raise InputError("contact", "a tooling without one", "a tooling with a table [contact]")
+        assumptions = replace(assumptions, contact=known)
+    entries = import_tools(raw, "", assumptions, MOST_TOOLS)
+    names = library_names([entry.name for entry in entries])
+    return [(name, entry.text, entry.notes, entry.reason) for name, entry in zip(names, entries, strict=True)]
+
+
+def library_names(names: list[str]) -> list[str]:
+    """Return names as the library of toolings takes them, no two alike.
+
+    Examples
+    --------
+    >>> library_names(["Ø12 R0 / long", "", "T 5", "T 5"])
+    ['12 R0 - long', 'tool', 'T 5', 'T 5-2']
+    """
+    found: list[str] = []
+    taken: set[str] = set()
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9 ._+()-]+", "-", name).strip(" ._+()-")[:56].rstrip() or "tool"
+        count, free = 1, plain
+        while free in taken:
+            count += 1
+            free = f"{plain}-{count}"
+        taken.add(free)
+        found.append(free)
+    return found
