@@ -1,7 +1,8 @@
 """The web service under load on loopback: zero-order lobes of a new tooling each, and reads beside them.
 
 ``run()`` starts the service as its command does, writes the identification of a machine into it, and asks from several clients at once,
-each over a connection of its own. The clients run on the same cores.
+each over a connection of its own. The clients run on the same cores. Time by the clock depends on what else runs on these; beside it
+stands the time of a core that the service takes for an answer, and what its processes keep in memory.
 """
 
 from __future__ import annotations
@@ -40,27 +41,67 @@ def run(result: Path | None = None) -> list[dict[str, Any]]:
     """
     text = machine_text() if result is None else result.read_text(encoding="utf-8")
     rows = []
-    with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as port:
+    with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as (port, process):
+        rows.append(row("memory of the service's processes, idle", use(process)[1], None, "MB", "shared pages count once each"))
         machine = ask(port, "POST", "/v1/machines", {"name": "m"})["id"]
         ask(port, "PUT", f"/v1/machines/{machine}/identification", text)
         for words, further in (
             ("321 speeds with bands", {}),
             ("161 speeds with bands", {"speeds": {"step_rpm": 100}}),
             ("321 speeds without bands", {"bands": False}),
+            ("321 speeds with bands, five toolings in one query", {"several": 5}),
         ):
+            asked = {"several": 1} | further
+            count = asked.pop("several")
 
-            def lobes(seed: int, further: dict[str, Any] = further) -> tuple[str, str, Any]:
-                return "POST", "/v1/lobes", {"machine": machine, "toolings": [new_tooling(seed)], **further}
+            def lobes(seed: int, count: int = count, asked: dict[str, Any] = asked) -> tuple[str, str, Any]:
+                toolings = [new_tooling(1000 * k + seed) for k in range(count)]
+                return "POST", "/v1/lobes", {"machine": machine, "toolings": toolings, **asked}
 
             # each worker meets the machine once
             load(port, lobes, 2.0)
-            rate, p95 = load(port, lobes, SECONDS)
-            rows.append(row(f"zero-order lobes of a new tooling, {words}", rate, None, "1/s", "answers of the commands"))
-            rows.append(row(f"  the slowest of 20, {CLIENTS} clients", p95 * 1e3, None, "ms", ""))
-        rate, p95 = load(port, lambda _: ("GET", f"/v1/machines/{machine}", None), SECONDS)
-        rows.append(row("reads of a machine", rate, None, "1/s", ""))
-        rows.append(row(f"  the slowest of 20, {CLIENTS} clients", p95 * 1e3, None, "ms", ""))
+            rows += measured(process, f"zero-order lobes of a new tooling, {words}", lambda lobes=lobes: load(port, lobes, SECONDS))
+        rows += measured(process, "reads of a machine", lambda: load(port, lambda _: ("GET", f"/v1/machines/{machine}", None), SECONDS))
+        rows.append(row("memory of the service's processes after all that", use(process)[1], None, "MB", ""))
     return rows
+
+
+def measured(process: int, words: str, loaded: Callable[[], tuple[int, float, float, float]]) -> list[dict[str, Any]]:
+    """Return the rows of one load: answers per second, their times, and what the service worked for each."""
+    before = use(process)[0]
+    count, rate, middle, p95 = loaded()
+    work = (use(process)[0] - before) / count
+    return [
+        row(words, rate, None, "1/s", "answers of the commands"),
+        row(f"  half of them within, {CLIENTS} clients", middle * 1e3, None, "ms", ""),
+        row("  19 of 20 within", p95 * 1e3, None, "ms", ""),
+        row("  of a core for an answer, without the clients", work * 1e3, None, "ms", ""),
+    ]
+
+
+def use(process: int) -> tuple[float, float]:
+    """Return the seconds of a core that a process and its descendants have taken, and their memory [MB]; zeros where nobody tells."""
+    parents, seconds = {}, {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            fields = (folder / "stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        parents[int(folder.name)] = int(fields[1])
+        seconds[int(folder.name)] = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    mine = {process}
+    while more := {id for id, parent in parents.items() if parent in mine} - mine:
+        mine |= more
+    return sum(seconds.get(id, 0.0) for id in mine), sum(_memory(id) for id in mine)
+
+
+def _memory(process: int) -> float:
+    """What a process has in memory; of pages that several share, its part [MB]."""
+    try:
+        lines = Path(f"/proc/{process}/smaps_rollup").read_text().splitlines()
+    except OSError:
+        return 0.0
+    return sum(int(line.split()[1]) for line in lines if line.startswith("Pss:")) / 1e3
 
 
 def new_tooling(seed: int) -> dict[str, Any]:
@@ -116,8 +157,8 @@ def machine_text() -> str:
     return json.dumps(plain(data))
 
 
-def load(port: int, question: Callable[[int], tuple[str, str, Any]], seconds: float) -> tuple[float, float]:
-    """Ask from several clients for so long, and return answers per second and the time that 95 % stay below [s]."""
+def load(port: int, question: Callable[[int], tuple[str, str, Any]], seconds: float) -> tuple[int, float, float, float]:
+    """Ask from several clients for so long, and return answers, answers per second, and the times of half and of 95 % of them [s]."""
     times: list[float] = []
     numbers = iter(range(10**9))
     lock = threading.Lock()
@@ -139,7 +180,8 @@ def load(port: int, question: Callable[[int], tuple[str, str, Any]], seconds: fl
         thread.start()
     for thread in threads:
         thread.join()
-    return len(times) / (time.perf_counter() - start), float(np.quantile(times, 0.95))
+    rate = len(times) / (time.perf_counter() - start)
+    return len(times), rate, float(np.quantile(times, 0.5)), float(np.quantile(times, 0.95))
 
 
 def ask(port: int, method: str, path: str, body: Any, connection: HTTPConnection | None = None) -> Any:
@@ -157,8 +199,8 @@ def ask(port: int, method: str, path: str, body: Any, connection: HTTPConnection
 
 
 @contextmanager
-def serving(folder: Path) -> Iterator[int]:
-    """Run the service on a free port of loopback until it is ready, and end it."""
+def serving(folder: Path) -> Iterator[tuple[int, int]]:
+    """Run the service on a free port of loopback until it is ready, and end it; yields the port and its process."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = int(free.getsockname()[1])
@@ -173,6 +215,6 @@ def serving(folder: Path) -> Iterator[int]:
                     break
                 except (OSError, RuntimeError):
                     time.sleep(0.1)
-            yield port
+            yield port, process.pid
         finally:
             process.terminate()
