@@ -13,7 +13,7 @@ from api.client import Client
 from tests.api.conftest import example
 from tests.api.test_serve import command
 from tests.cli import by_hand
-from tests.web.conftest import SAMPLES, Served, fault_beside, serving
+from tests.web.conftest import SAMPLES, Served, drop, fault_beside, serving
 
 WIDTHS = (360, 768, 1280, 2560)
 #: Names as somebody might give them who means ill.
@@ -268,6 +268,46 @@ def test_names_of_others_are_text(opened, client: Client, served: Served, result
     expect(page.locator(".chart .main-svg").first).to_be_visible()
     assert page.locator("img[src='x'], main b").count() == 0
     assert page.evaluate("window.hit") is None
+
+
+def test_an_example_is_taken_in_and_a_tool_library_imported(opened, client: Client, tmp_path: Path):
+    """A ZIP is unpacked where it was dropped; what an import has assumed is told."""
+    page = opened()
+    page.get_by_role("button", name="Take it in: small-campaign.zip").click()
+    expect(page.get_by_text("This is what was found")).to_be_visible()
+    machine = page.locator("form").get_by_label("Machine", exact=True)
+    machine.select_option(label="A new machine")
+    page.get_by_label("Its name").fill("From an example")
+    page.get_by_role("button", name="Take it in", exact=True).click()
+    expect(page.get_by_text("4 of 4", exact=True)).to_be_visible(timeout=60_000)
+    expect(page.locator("tbody .mark.good")).to_have_count(2)
+    # another content under a known name is refused until the person says so
+    name = "S1-ER32-00_cut.h5"
+    other = tmp_path / name
+    other.write_bytes((SAMPLES / "recordings" / "S1-ER32-02_cut.h5").read_bytes())
+    drop(page, "section.drop", [other])
+    expect(page.locator("tbody .mark.bad")).to_have_text("another file is there")
+    page.get_by_role("button", name="Put it in place of that one").click()
+    expect(page.locator("tbody .mark.bad", has_text="another file")).to_have_count(0, timeout=30_000)
+    kept = client.send("GET", f"/campaigns/{page.url.rsplit('/', 1)[1]}/recordings/{name}").json()
+    assert kept["size_bytes"] == other.stat().st_size
+
+    broken = tmp_path / "cut off.zip"
+    broken.write_bytes(client.send("GET", "/examples/small-campaign.zip").content[:-40])
+    page.get_by_role("link", name="Machines").click()
+    page.get_by_role("heading", name="Drop a campaign here").wait_for()
+    drop(page, "section.drop", [broken])
+    expect(page.locator(".note.bad")).to_contain_text("cut off")
+
+    library = tmp_path / "tool-library.json"
+    library.write_bytes(client.send("GET", "/examples/tool-library.json").content)
+    page.get_by_role("link", name="Toolings").click()
+    page.get_by_role("heading", name="Toolings").wait_for()
+    drop(page, "section.drop", [library])
+    expect(page.locator(".note.good")).to_contain_text("in the library")
+    names = [t.name for t in client.toolings()]
+    for line in page.locator(".note.good li").all_inner_texts():
+        assert line.split(":")[0] in names
 
 
 def test_the_description_of_the_interface_needs_no_network(opened):

@@ -92,7 +92,8 @@ function lobesCard(found, removal, question) {
     h(
       "p",
       { class: "small soft" },
-      "Stable below the line. Shaded around it: where 95 % of the machines lie that the records allow. Diamonds: the deepest pockets. Dot: what is recommended. Hover for depth, removal rate and chatter frequency; drag to look closer, double click to come back.",
+      "Stable below the line. Shaded around it: where 95 % of the machines lie that the records allow. Diamonds: the deepest pockets. ",
+      "Dot: what is recommended. Hover for depth, removal rate and chatter frequency; drag to look closer, double click to come back.",
     ),
     h("div", { class: "reader" }, speed, read),
   );

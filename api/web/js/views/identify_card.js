@@ -16,6 +16,8 @@ export function identifyCard(campaign) {
   );
   const apply = h("input", { type: "checkbox", checked: true, id: "apply" });
   const start = h("input", { type: "checkbox", id: "start" });
+  const used = campaign.cuts.filter((cut) => cut.verdict?.usable);
+  const few = used.length < 16 || new Set(used.map((cut) => cut.tooling)).size < 2;
   const button = h("button", { class: "primary" }, "Identify the machine");
   const form = h(
     "form",
@@ -26,6 +28,7 @@ export function identifyCard(campaign) {
       button,
       h("span", { class: "soft" }, `from ${campaign.usable} usable cuts; it takes about a minute for 80`),
     ),
+    few ? h("p", { class: "soft" }, "Few for an identification: it wants two toolings, with twenty or more speeds each.") : null,
     h(
       "details",
       null,

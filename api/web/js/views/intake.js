@@ -5,6 +5,7 @@ import { busy, field, select, showProblem } from "../forms.js";
 import { go, to } from "../router.js";
 import { allMachines, choose, knownMachines, machine } from "../state.js";
 import { queueFor } from "../uploads.js";
+import { unzipped } from "../zip.js";
 import { keepFiles } from "./campaign_form.js";
 
 const RECORDING = /\.(h5|hdf5|tdms|uff|unv|wav|mat|parquet|csv)$/i;
@@ -47,7 +48,13 @@ const asName = (text) =>
 /** Show what was dropped, and take it in where the person says so. */
 export async function intake(place, files) {
   fill(place, waiting("looking at the files …"));
-  const found = await sorted(files);
+  let found = null;
+  try {
+    found = await sorted((await Promise.all(files.map((file) => (/\.zip$/i.test(file.name) ? unzipped(file) : [file])))).flat());
+  } catch (error) {
+    fill(place, note("bad", error.message));
+    return;
+  }
   if (!found.campaign) {
     if (found.recordings.length) {
       keepFiles(found.recordings);

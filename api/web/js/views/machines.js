@@ -1,8 +1,8 @@
 // The first page: which machines there are, how far each is known, and a place to drop recordings.
-import { get, getBlob, once, post } from "../api.js";
-import { add, card, fill, h, head, link, mark, note, save } from "../dom.js";
+import { get, getBlob, once, part, post } from "../api.js";
+import { add, card, fill, h, head, link, save } from "../dom.js";
 import { dropZone } from "../drop.js";
-import { busy, field, showProblem } from "../forms.js";
+import { busy, failed, field, showProblem } from "../forms.js";
 import { go, to } from "../router.js";
 import { allMachines, choose } from "../state.js";
 import { intake } from "./intake.js";
@@ -13,7 +13,7 @@ export async function view(_args, _query, place) {
   const box = h("div", { class: "view" });
   const zone = dropZone(
     "Drop a campaign here",
-    "Its folder, or its files: campaign.toml, tooling files, recordings (HDF5, TDMS, UFF 58, WAV, MATLAB, Parquet, CSV).",
+    "Its folder, a ZIP of it, or its files: campaign.toml, tooling files, recordings (HDF5, TDMS, UFF 58, WAV, MATLAB, Parquet, CSV).",
     (files) => intake(box, files),
   );
   if (!machines.length) {
@@ -32,7 +32,7 @@ export async function view(_args, _query, place) {
         stage("Identify the machine", "You watch the search; modes come with their uncertainties."),
         stage("Change the tool", "Best speeds, lobes and tooltip FRFs of toolings that never cut."),
       ),
-      h("div", { class: "columns" }, makeCard(), examples()),
+      h("div", { class: "columns" }, makeCard(), examples(box)),
     );
     return;
   }
@@ -42,7 +42,7 @@ export async function view(_args, _query, place) {
     h("div", { class: "columns" }, machines.map(machineCard)),
     box,
     zone,
-    h("div", { class: "columns" }, makeCard(), examples()),
+    h("div", { class: "columns" }, makeCard(), examples(box)),
   );
 }
 
@@ -104,50 +104,40 @@ function makeCard() {
   return card("A new machine", null, form);
 }
 
-/** Files to try the service with. */
-function examples() {
+/** Files to try the service with: downloaded, or a campaign taken in right here. */
+function examples(box) {
   const list = h("div");
+  const fetched = (item) => getBlob(`examples/${part(item.name)}`);
+  const acting = (item, label, work) => {
+    const button = h("button", { type: "button", class: "quiet", "aria-label": `${label}: ${item.name}` }, label);
+    button.addEventListener(
+      "click",
+      busy(button, async () => {
+        try {
+          await work(await fetched(item));
+        } catch (error) {
+          failed(box, error);
+        }
+      }),
+    );
+    return button;
+  };
   get("examples")
     .then(({ items }) => {
-      if (!items.length) return;
-      fill(
-        list,
-        card(
-          "Example files",
-          mark("idle", "to try"),
-          h(
-            "ul",
-            { class: "plain" },
-            items.map((item) =>
-              h(
-                "li",
-                null,
-                h(
-                  "button",
-                  {
-                    type: "button",
-                    class: "quiet",
-                    onclick: async () => {
-                      try {
-                        save(
-                          item.name.split("/").at(-1),
-                          await getBlob(`examples/${item.name.split("/").map(encodeURIComponent).join("/")}`),
-                        );
-                      } catch (error) {
-                        fill(list, note("bad", error.message));
-                      }
-                    },
-                  },
-                  item.name,
-                ),
-                h("span", { class: "soft small" }, ` ${sizeOf(item.size_bytes)} · ${item.about}`),
-              ),
-            ),
-          ),
+      // what can be taken in at once comes first
+      const zips = items.filter((item) => /\.zip$/.test(item.name)).reverse();
+      const lines = [...zips, ...items.filter((item) => !zips.includes(item))].map((item) =>
+        h(
+          "li",
+          null,
+          h("div", null, h("strong", null, item.name), h("span", { class: "soft small" }, ` ${sizeOf(item.size_bytes)} · ${item.about}`)),
+          acting(item, "Download", (blob) => save(item.name, blob)),
+          /campaign\.zip$/.test(item.name) ? acting(item, "Take it in", (blob) => intake(box, [new File([blob], item.name)])) : null,
         ),
       );
+      fill(list, card("Example files", null, h("ul", { class: "plain" }, lines)));
     })
-    .catch(() => list.remove());
+    .catch((error) => failed(list, error));
   return list;
 }
 

@@ -1,15 +1,20 @@
 // The library of toolings, drawn to scale.
 import { all, part, Problem, send } from "../api.js";
-import { add, card, empty, fill, h, head, link, note, tell } from "../dom.js";
+import { add, card, empty, fill, h, head, link, note } from "../dom.js";
 import { libraryDrawing } from "../drawing.js";
 import { dropZone } from "../drop.js";
+import { field, quantity, select } from "../forms.js";
 import { to } from "../router.js";
 import { machine } from "../state.js";
 import { q } from "../units.js";
 
+let told = [];
+
 export async function view(_args, _query, place) {
   const toolings = await all("toolings");
-  const said = h("div", { role: "status" });
+  const said = h("div", { class: "view", role: "status" }, spoken(told));
+  told = [];
+  const assumed = assumptions(toolings);
   add(
     place,
     head("Toolings", "Tool and holder, from the free end to the flange.", link(to("toolings/new"), "Draw a new one", "button primary")),
@@ -23,10 +28,11 @@ export async function view(_args, _query, place) {
         ),
     dropZone(
       "Drop tooling files or a tool library",
-      "Tooling files (.toml), or a library of Fusion 360 or HSM as JSON: holders become segments.",
-      (files) => take(files, said),
+      "Tooling files (.toml), or a library of Fusion 360 or HSM (.json, .tools): holders become segments.",
+      (files) => take(files, said, assumed.read),
       { small: true },
     ),
+    assumed.box,
   );
 }
 
@@ -64,7 +70,7 @@ const stem = (file) =>
     .replace(/^[^A-Za-z0-9]+/, "");
 
 /** Write tooling files into the library, and import tool libraries; each is told for itself. */
-async function take(files, said) {
+async function take(files, said, assumed) {
   const lines = [];
   for (const file of files) {
     try {
@@ -74,7 +80,7 @@ async function take(files, said) {
           headers: { "Content-Type": "application/toml", "If-None-Match": "*" },
         });
         lines.push(["good", `${file.name}: in the library as ${stem(file)}`]);
-      } else if (/\.(json|hsmlib|tools)$/i.test(file.name)) lines.push(...(await imported(file)));
+      } else if (/\.(json|hsmlib|tools)$/i.test(file.name)) lines.push(...(await imported(file, assumed)));
       else lines.push(["doubt", `${file.name}: neither a tooling file (.toml) nor a tool library (.json)`]);
     } catch (error) {
       if (!(error instanceof Problem)) throw error;
@@ -85,35 +91,61 @@ async function take(files, said) {
     }
   }
   if (lines.some(([kind]) => kind === "good")) {
-    tell("The library has changed.");
+    // the library is drawn anew, and what was said stands above it
+    told = lines;
     window.dispatchEvent(new Event("refresh"));
-    // the library is drawn anew, and what was said stays above it
-    await new Promise((resolve) => setTimeout(resolve, 50));
-    said = document.querySelector("main .view > [role=status]") ?? said;
-  }
-  fill(
-    said,
-    ["bad", "doubt", "good"].map((kind) => {
-      const some = lines.filter(([each]) => each === kind).map(([, words]) => words);
-      return some.length
-        ? note(
-            kind,
-            h(
-              "ul",
-              null,
-              some.map((words) => h("li", null, words)),
-            ),
-          )
-        : null;
-    }),
-  );
+  } else fill(said, spoken(lines));
 }
 
-async function imported(file) {
-  const answer = await send("POST", "toolings/import", { body: await file.text(), headers: { "Content-Type": "application/json" } });
+function spoken(lines) {
+  return ["bad", "doubt", "good"].map((kind) => {
+    const some = lines.filter(([each]) => each === kind).map(([, words]) => words);
+    return some.length
+      ? note(
+          kind,
+          h(
+            "ul",
+            null,
+            some.map((words) => h("li", null, words)),
+          ),
+        )
+      : null;
+  });
+}
+
+async function imported(file, assumed) {
+  const packed = /\.tools$/i.test(file.name);
+  const query = new URLSearchParams(Object.entries(assumed()).filter(([, value]) => value !== null && value !== "")).toString();
+  const answer = await send("POST", `toolings/import${query ? `?${query}` : ""}`, {
+    body: packed ? file : await file.text(),
+    headers: { "Content-Type": packed ? "application/zip" : "application/json" },
+  });
   const { items } = await answer.json();
   return items.map((item) => [
     item.status === "written" ? "good" : "doubt",
-    `${item.name}: ${item.status}${item.reason ? `, ${item.reason}` : ""}${item.assumed.length ? `; assumed: ${item.assumed.join(", ")}` : ""}`,
+    `${item.name}: ${item.status === "written" ? "in the library" : item.status}${item.reason ? `, ${item.reason}` : ""}${item.assumed.length ? `; assumed: ${item.assumed.join(", ")}` : ""}`,
   ]);
+}
+
+/** What an import takes where the library of tools says nothing; `read()` gives it as the query's keys. */
+function assumptions(toolings) {
+  const flute = quantity("Fluted part bends as, of the diameter", "percent", 80, {
+    hint: "The core of a cutter is thinner than its edges",
+  });
+  const helix = quantity("Helix", "degree", 30);
+  const contact = select([["", "rigid"], ...toolings.map((t) => [t.name, `as in ${t.name}`])], "");
+  const box = h(
+    "details",
+    null,
+    h("summary", null, "What an import assumes where a tool library says nothing"),
+    h("div", { class: "fields broad" }, flute, helix, field("Contact of tool and holder", contact)),
+  );
+  return {
+    box,
+    read: () => ({
+      flute_ratio: flute.input.base === null ? null : flute.input.base / 100,
+      helix_deg: helix.input.base,
+      contact: contact.value,
+    }),
+  };
 }
