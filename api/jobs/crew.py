@@ -51,8 +51,8 @@ class Crew:
 
     @property
     def ready(self) -> bool:
-        """Whether a worker is there that takes jobs, where this crew should have some."""
-        return self.count == 0 or any(m.process.is_alive() and m.ready.value for m in self.members)
+        """Whether a worker is there that takes jobs, or will in a moment, where this crew should have some."""
+        return self.count == 0 or any(m.process.is_alive() and (m.ready.value or not m.falls) for m in self.members)
 
     def start(self) -> None:
         """Start all workers."""

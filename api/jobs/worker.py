@@ -24,7 +24,7 @@ from rcsa_ident.errors import InputError
 log = logging.getLogger("rcsa_ident.jobs")
 #: Seconds between two looks for new jobs, between two signs of life, between two looks at everything, and after which a worker
 #: without a sign is dead.
-LOOK, BEAT, ROUND, LEASE = 0.5, 2.0, 3.0, 15.0
+LOOK, BEAT, ROUND, LEASE = 0.5, 4.0, 3.0, 20.0
 #: Jobs that somebody waits for at the screen come first.
 PRIORITY = {"lobes": 1}
 #: Carries out a job of one kind and returns how it ended, seconds left out.
