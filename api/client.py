@@ -32,6 +32,8 @@ from api.schemas.toolings import ToolingAnswer, ToolingSummary
 Model = TypeVar("Model", bound=Answer)
 Json = Mapping[str, Any]
 _BLOCK = 1 << 20
+#: A long recording is read before the answer comes.
+_READ = httpx2.Timeout(60.0, read=1200.0)
 
 
 class ServiceError(Exception):
@@ -243,7 +245,8 @@ class Client:
             params = {"replace": "true"} if replace else {}
             path = _recording(campaign, name or file.name)
             return _read(
-                RecordingAnswer, self.send("PUT", path, content=iter(partial(opened.read, _BLOCK), b""), headers=headers, params=params)
+                RecordingAnswer,
+                self.send("PUT", path, content=iter(partial(opened.read, _BLOCK), b""), headers=headers, params=params, timeout=_READ),
             )
 
     def upload_in_parts(
@@ -275,7 +278,9 @@ class Client:
                     **_digest(digest),
                 }
                 try:
-                    answer = self.send("PATCH", path, content=data, headers=headers, params={"replace": "true"} if replace else {})
+                    answer = self.send(
+                        "PATCH", path, content=data, headers=headers, params={"replace": "true"} if replace else {}, timeout=_READ
+                    )
                 except (httpx2.TransportError, ServiceError) as error:
                     failed += 1
                     lost = isinstance(error, httpx2.TransportError) or error.status in (408, 503)
@@ -312,7 +317,7 @@ class Client:
         with ExitStack() as stack:
             parts = [("files", (file.name, stack.enter_context(file.open("rb")), "application/octet-stream")) for file in files]
             path, params = f"/campaigns/{campaign}/recordings", {"replace": "true"} if replace else {}
-            return _read(UploadAnswer, self.send("POST", path, files=parts, params=params))
+            return _read(UploadAnswer, self.send("POST", path, files=parts, params=params, timeout=_READ))
 
     def upload_folder(self, machine: str, folder: Path, told: Callable[[RecordingAnswer], object] | None = None) -> CampaignAnswer:
         """Upload the folder of a campaign: campaign.toml, its toolings and every recording that is there.

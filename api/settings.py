@@ -110,8 +110,8 @@ class Settings:
     upload_idle_seconds: float = 30.0
     upload_bytes_per_second: int = 10_000
     reader_memory: int = 2048
-    reader_seconds: float = 60.0
-    reader_wall_seconds: float = 120.0
+    reader_seconds: float = 120.0
+    reader_wall_seconds: float = 900.0
     reader_calls: int = 200
     job_workers: int = 1
     job_nice: int = 10

@@ -14,10 +14,10 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import in_si, read_signals
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.report.rows import recording_rows
-from rcsa_ident.signals.measurement import MAX_FREQUENCY, Reading, judge_air, measure_cut
+from rcsa_ident.signals.measurement import Reading, judge_air, measure_cut
 from rcsa_ident.signals.recording import Recording, Sensor
-from rcsa_ident.signals.steady import measured_axes, steady_record
-from rcsa_ident.signals.verdict import Verdict, raw_faults
+from rcsa_ident.signals.steady import measured_axes
+from rcsa_ident.signals.verdict import Verdict
 
 _RPM = 30.0 / np.pi
 
@@ -65,9 +65,12 @@ def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) ->
     except InputError:
         # it went in this moment: the verdict is looked at once more anyway
         beside = None
+    verdict, reading = judged(campaign, cut, recording, beside, role)
+    speed = reading.spindle_speed
     return told(recording) | {
-        "verdict": judged(campaign, cut, recording, beside, role),
-        **lines_found(campaign, cut, recording, role),
+        "verdict": verdict,
+        "spindle_speed_rpm": speed * _RPM if speed is not None and np.isfinite(speed) else None,
+        "harmonics_above_noise": {axis.upper(): reading.harmonics.get(axis, 0) for axis in measured_axes(recording)},
     }
 
 
@@ -75,7 +78,7 @@ def judge(text: str, cut_id: str, cut: Path, air: Path | None) -> dict[str, Any]
     """Return the verdict on samples of a cut that are there already."""
     campaign = campaign_of_text(text)
     declared = next(each for each in campaign.cuts if each.id == cut_id)
-    return judged(campaign, declared, read_normalised(cut), None if air is None else read_normalised(air), "cut")
+    return judged(campaign, declared, read_normalised(cut), None if air is None else read_normalised(air), "cut")[0]
 
 
 def told(recording: Recording) -> dict[str, Any]:
@@ -87,8 +90,8 @@ def told(recording: Recording) -> dict[str, Any]:
     }
 
 
-def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | None, role: str) -> dict[str, Any]:
-    """Return the verdict on a cut, beside its air cut where there is one, or on an air cut alone."""
+def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | None, role: str) -> tuple[dict[str, Any], Reading]:
+    """Return the verdict on a cut, beside its air cut where there is one, or on an air cut alone; and what it rests on."""
     cutter = campaign.toolings[cut.tooling].cutter
     try:
         with np.errstate(all="ignore"):
@@ -102,7 +105,7 @@ def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | 
     except (ArithmeticError, np.linalg.LinAlgError):
         reading = Reading(Verdict(("numbers of these samples have no finite answer",)))
     (row,) = recording_rows([(cut, reading)])
-    return {
+    verdict = {
         "usable": row.usable,
         "reasons": list(row.reasons),
         "notes": list(row.notes),
@@ -110,32 +113,7 @@ def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | 
         "lines": row.lines,
         "signal_to_noise_db": {axis: value for axis, value in row.signal_to_noise_db.items() if np.isfinite(value)},
     }
-
-
-def lines_found(campaign: Campaign, cut: Cut, recording: Recording, role: str) -> dict[str, Any]:
-    """Return the speed that the record itself tells, and how many multiples of the tooth-passing frequency stand above the noise.
-
-    Of an air cut, multiples of the spindle's frequency.
-    """
-    axes, teeth = measured_axes(recording), 1 if role == "air" else campaign.toolings[cut.tooling].cutter.teeth
-    nothing = {"spindle_speed_rpm": None, "harmonics_above_noise": {axis.upper(): 0 for axis in axes}}
-    if not axes or raw_faults(recording):
-        return nothing
-    try:
-        with np.errstate(all="ignore"):
-            steady = steady_record(recording, axes, cut.conditions.spindle_speed, MAX_FREQUENCY, teeth)
-    except (InputError, ArithmeticError, np.linalg.LinAlgError):
-        return nothing
-    if isinstance(steady, str) or not np.isfinite(steady.spindle_speed):
-        return nothing
-    order = np.arange(teeth, steady.highest_order + 1, teeth)
-    ratio = np.abs(steady.flange[order]) ** 2 / np.maximum(2.0 * steady.variance[order], 1e-300)
-    # pure noise has a mean of 1, and its largest of n is rarely above log(n) + 7
-    count = np.sum(ratio > np.log(max(order.size, 1)) + 7.0, axis=0)
-    return {
-        "spindle_speed_rpm": steady.spindle_speed * _RPM,
-        "harmonics_above_noise": {axis.upper(): int(n) for axis, n in zip(axes, count, strict=True)},
-    }
+    return verdict, reading
 
 
 def warm() -> None:

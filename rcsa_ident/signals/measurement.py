@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -107,10 +107,20 @@ class CutMeasurement:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A record's verdict and, where it is usable, its measurement."""
+    """A record's verdict and, where it is usable, its measurement.
+
+    Parameters
+    ----------
+    spindle_speed : float or None [rad/s]
+        From the record, also of one that is not usable, unless nothing can be told of it.
+    harmonics : mapping of Dof to int
+        Multiples of the tooth-passing frequency, of an air cut of the spindle's, that stand above the noise beside them.
+    """
 
     verdict: Verdict
     measurement: CutMeasurement | None = None
+    spindle_speed: float | None = None
+    harmonics: Mapping[Dof, int] = field(default_factory=dict)
 
 
 def measure_cut(
@@ -148,21 +158,28 @@ def measure_cut(
     faults = raw_faults(cut) + tuple(f"air cut: {fault}" for fault in (raw_faults(air) if air is not None else ()))
     if faults:
         return Reading(Verdict(faults, notes))
-    steady = _judged(cut, axes, programmed, max_frequency, cutter.teeth)
+    steady = steady_record(cut, axes, programmed, max_frequency, cutter.teeth)
     if isinstance(steady, str):
         return Reading(Verdict((steady,), notes))
-    still = None if air is None else _judged(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
-    if isinstance(still, str):
-        return Reading(Verdict((f"air cut: {still}",), notes))
+    found = steady.spindle_speed, _harmonics(steady)
+    faults = _speed_faults(steady, programmed)
+    if faults:
+        return Reading(Verdict(faults, notes), None, *found)
+    still = None if air is None else steady_record(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
+    if still is not None:
+        faults = (still,) if isinstance(still, str) else _speed_faults(still, programmed)
+        if faults:
+            return Reading(Verdict((f"air cut: {faults[0]}",), notes), None, *found)
+    assert not isinstance(still, str)
     harmonic = np.arange(cutter.teeth, steady.highest_order + 1, cutter.teeth)
     if harmonic.size == 0:
-        return Reading(Verdict((f"no tooth-passing line below {max_frequency:.0f} Hz",), notes))
+        return Reading(Verdict((f"no tooth-passing line below {max_frequency:.0f} Hz",), notes), None, *found)
     angle, alignment_std = 0.0, 0.0
     if still is not None:
         angle, alignment_std = angle_to_air(steady, still, cutter.teeth)
     reasons = _cut_faults(steady, still, angle, harmonic, cutter, max_frequency)
     if reasons:
-        return Reading(Verdict(reasons, notes))
+        return Reading(Verdict(reasons, notes), None, *found)
     speed = steady.spindle_speed
     force, slope = force_and_slope(cutter, replace(conditions, spindle_speed=speed), coefficients, harmonic)
     strong = WEAKEST_FORCE * np.abs(force).max()
@@ -180,7 +197,7 @@ def measure_cut(
                 harmonic[k], harmonic[k] * speed, cut_points, air_points, variance, points.coherence[k, i], force_k, slope_k
             )
     measurement = CutMeasurement(cut_id, tooling, speed, result, alignment_std, *trigger_delay(cut, speed, cutter.teeth))
-    return Reading(Verdict((), notes if air is not None else (*notes, NO_AIR)), measurement)
+    return Reading(Verdict((), notes if air is not None else (*notes, NO_AIR)), measurement, *found)
 
 
 def judge_air(air: Recording, conditions: CuttingConditions, max_frequency: float = MAX_FREQUENCY) -> Reading:
@@ -195,19 +212,26 @@ def judge_air(air: Recording, conditions: CuttingConditions, max_frequency: floa
     if not axes:
         raise InputError("sensors", "no displacement", "a displacement sensor for X or Y")
     faults = raw_faults(air)
-    if not faults:
-        still = _judged(air, axes, conditions.spindle_speed, _AIR_BEYOND * max_frequency, 1)
-        faults = (still,) if isinstance(still, str) else ()
-    return Reading(Verdict(faults, notes))
+    if faults:
+        return Reading(Verdict(faults, notes))
+    still = steady_record(air, axes, conditions.spindle_speed, _AIR_BEYOND * max_frequency, 1)
+    if isinstance(still, str):
+        return Reading(Verdict((still,), notes))
+    return Reading(Verdict(_speed_faults(still, conditions.spindle_speed), notes), None, still.spindle_speed, _harmonics(still))
 
 
-def _judged(recording: Recording, axes: tuple[Dof, ...], programmed: float, max_frequency: float, teeth: int) -> SteadyRecord | str:
-    """The steady part, or the first reason against it or its speed."""
-    steady = steady_record(recording, axes, programmed, max_frequency, teeth)
-    if isinstance(steady, str):
-        return steady
-    faults = speed_faults(steady.displacement, steady.lines, programmed)
-    return faults[0] if faults else steady
+def _speed_faults(steady: SteadyRecord, programmed: float) -> tuple[str, ...]:
+    """The first reason against the speed of a steady part."""
+    return speed_faults(steady.displacement, steady.lines, programmed)[:1]
+
+
+def _harmonics(steady: SteadyRecord) -> dict[Dof, int]:
+    """Multiples of the tooth-passing frequency that are no noise, for each axis."""
+    order = np.arange(steady.teeth, steady.highest_order + 1, steady.teeth)
+    ratio = np.abs(steady.flange[order]) ** 2 / np.maximum(2.0 * steady.variance[order], 1e-300)
+    # pure noise has a mean of 1, and its largest of n is rarely above log(n) + 7
+    count = np.sum(ratio > np.log(max(order.size, 1)) + 7.0, axis=0)
+    return {axis: int(n) for axis, n in zip(steady.axes, count, strict=True)}
 
 
 def _cut_faults(

@@ -5,8 +5,10 @@ import pytest
 
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError
+from rcsa_ident.signals.measurement import judge_air
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
-from rcsa_ident.signals.verdict import raw_faults, tooth_count_fault
+from rcsa_ident.signals.verdict import implausible, raw_faults, tooth_count_fault
 from tests.signals.synthetic import RATE, RPM, changed, conditions, drift, pair, profile, wave
 
 
@@ -202,3 +204,59 @@ def test_an_air_cut_that_holds_another_speed(good):
     x = wave(profile(rng), 9500.0 * RPM, 7168) + drift(rng, 7168)[:, None] + 2e-9 * rng.normal(size=(7168, 2))
     samples = np.column_stack([x, 0.05 * rng.normal(size=(7168, 2))])
     assert reasons(good, air=Recording(RATE, samples, good.cut.sensors)).startswith("air cut: speed")
+
+
+@pytest.mark.parametrize(("factor", "words"), [(1e4, "flange_x swings by"), (1e-5, "flange_x swings by"), (1.0, None)])
+def test_motion_that_no_spindle_makes_is_a_note(good, factor, words):
+    def scale(x):
+        x[:, 0] *= factor
+
+    notes = good.measure(cut=changed(good.cut, scale)).verdict.notes
+    assert len(notes) == (words is not None)
+    assert words is None or (words in notes[0] and "are its unit and sensitivity right?" in notes[0])
+
+
+def test_an_acceleration_in_the_wrong_unit_is_a_note(good):
+    def scale(x):
+        x[:, 2] *= 1e6
+
+    assert implausible(good.cut) == ()
+    assert ["fixture_x" in note for note in implausible(changed(good.cut, scale))] == [True]
+    # lost samples and silence are told otherwise
+    silent = Recording(RATE, np.full((100, 1), np.nan), (Sensor("x", Quantity.DISPLACEMENT, Dof.X),))
+    assert implausible(silent) == ()
+
+
+def test_speed_and_harmonics_are_told_of_what_is_not_usable_too(good):
+    expected = good.measure()
+    assert expected.spindle_speed == expected.measurement.spindle_speed
+    # 600 Hz of tooth passing up to 4300 Hz
+    assert expected.harmonics == {Dof.X: 7, Dof.Y: 7}
+    off = good.measure(conditions=conditions(9100.0))
+    assert not off.verdict.usable
+    assert off.spindle_speed == pytest.approx(good.speed, rel=1e-3)
+    lost = good.measure(cut=changed(good.cut, lambda x: x.__setitem__((0, 0), np.nan)))
+    assert (lost.spindle_speed, lost.harmonics) == (None, {})
+
+
+def test_noise_has_no_harmonics(good):
+    rng = np.random.default_rng(7)
+    noise = Recording(RATE, 1e-7 * rng.standard_normal(good.cut.samples.shape), good.cut.sensors)
+    found = good.measure(cut=noise, air=None)
+    assert not found.verdict.usable
+    assert sum(found.harmonics.values()) <= 1
+
+
+def test_an_air_cut_alone(good):
+    found = judge_air(good.air, conditions(9000.0))
+    assert found.verdict.usable
+    assert found.measurement is None
+    assert found.spindle_speed == pytest.approx(9000.0 * RPM, rel=2e-3)
+    assert min(found.harmonics.values()) >= 8
+    assert not judge_air(good.air, conditions(6500.0)).verdict.usable
+    short = Recording(RATE, good.air.samples[:300], good.air.sensors)
+    assert judge_air(short, conditions(9000.0)).verdict.reasons[0].startswith("too short")
+    frozen = changed(good.air, lambda x: x.__setitem__((slice(None), 1), 0.5))
+    assert judge_air(frozen, conditions(9000.0)).verdict.reasons[0].startswith("no signal")
+    with pytest.raises(InputError, match="no displacement"):
+        judge_air(Recording(RATE, good.air.samples[:, 2:], good.air.sensors[2:]), conditions(9000.0))
