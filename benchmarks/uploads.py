@@ -33,7 +33,7 @@ def run() -> list[dict[str, Any]]:
         large = _recording(folder / "large.h5")
         size = large.stat().st_size
         disk = min(_disk(large, folder / "copy") for _ in range(REPEATS))
-        with serving(folder / "data") as port:
+        with serving(folder / "data") as (port, _):
             machine = ask(port, "POST", "/v1/machines", {"name": "m"})["id"]
             path = f"/v1/campaigns/{_campaign(port, machine)}/recordings/"
             # what reads is imported and compiled by the first
