@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -93,11 +94,12 @@ class ForceStream:
 
     def __init__(self, url: str, hello: Mapping[str, Any], key: str | None = None) -> None:
         self.buckets, self.text = hello.get("envelope") is not None, hello.get("format") == "json"
-        self.following, self._problem = 0, dict[str, Any]()
+        self.following, self._problem, self._opened = 0, dict[str, Any](), ExitStack()
         headers = {} if key is None else {"X-API-Key": key}
         try:
             # noise does not shrink
-            self.socket = connect(f"{url}/v1/forces/stream", additional_headers=headers, compression=None, max_size=None)
+            opening = connect(f"{url}/v1/forces/stream", additional_headers=headers, compression=None, max_size=None)
+            self.socket = self._opened.enter_context(opening)
         except InvalidStatus as error:
             raise StreamRefused(error.response.status_code, _object(error.response.body)) from None
         self.socket.send(json.dumps(dict(hello)))
@@ -106,7 +108,7 @@ class ForceStream:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.socket.close()
+        self._opened.close()
 
     def send(self, samples: FloatArray, first: int | None = None) -> None:
         """Send samples, shape (n, c); by default they follow those before.

@@ -1,0 +1,130 @@
+"""A data logger against the service as its command starts it: a stream, a reader who does not read, two ends."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+
+import httpx2
+import numpy as np
+import pytest
+
+from api.stream_client import Event, Forces, ForceStream, StreamRefused
+from benchmarks.observer import relative_error
+from benchmarks.streaming import processes
+from tests.api.streaming import hello, result, signals, tooling
+from tests.api.test_serve import command, free_port
+from tests.workflows.test_live import RATE, streamed
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory):
+    """A service with the machine and its tooling: its process, port and the machine's id."""
+    port = free_port()
+    words, environment = command(tmp_path_factory.mktemp("served"), "--port", str(port), RCSA_IDENT_JOB_WORKERS="0")
+    with subprocess.Popen(words, env=environment, stderr=subprocess.DEVNULL) as process:
+        try:
+            url = f"http://127.0.0.1:{port}"
+            for _ in range(1200):
+                try:
+                    if httpx2.get(f"{url}/ready").status_code == 200:
+                        break
+                except httpx2.TransportError:
+                    pass
+                time.sleep(0.1)
+            id = httpx2.post(f"{url}/v1/machines", json={"name": "m"}).json()["id"]
+            kinds = ({"Content-Type": "application/json"}, {"Content-Type": "application/toml"})
+            assert httpx2.put(f"{url}/v1/machines/{id}/identification", content=result(), headers=kinds[0]).status_code == 201
+            assert httpx2.put(f"{url}/v1/toolings/T1", content=tooling(), headers=kinds[1]).status_code == 201
+            yield process, port, id
+        finally:
+            process.kill()
+
+
+@pytest.mark.parametrize("form", ["float32", "json"])
+def test_a_logger_gets_the_forces_of_all_its_samples(served, form):
+    _, port, id = served
+    raw, true = signals(0.0, 3.0), streamed()[1]
+    with ForceStream(f"ws://127.0.0.1:{port}", hello(id, begins="air", format=form, name="logger")) as stream:
+        for first in range(0, len(raw), 1024):
+            stream.send(raw[first : first + 1024])
+        stream.end()
+        messages = list(stream.received())
+    events = {m.name: m.content for m in messages if isinstance(m, Event)}
+    forces = [m for m in messages if isinstance(m, Forces)]
+    assert {"opened", "ready", "end"} <= set(events)
+    assert (events["end"]["samples"], events["end"]["lost"], events["end"]["dropped"], events["end"]["unread"]) == (len(raw), 0, 0, 0)
+    assert [m.first for m in forces] == np.cumsum([0, *(len(m.values) for m in forces)])[:-1].tolist()
+    force, later = np.concatenate([m.values for m in forces]), slice(round(1.7 * RATE), None)
+    assert np.all(relative_error(force[later], true[later], RATE) < 0.04)
+
+
+def test_buckets(served):
+    _, port, id = served
+    raw = signals(2.0, 2.5)
+    with ForceStream(f"ws://127.0.0.1:{port}", hello(id, envelope=100)) as stream:
+        stream.send(raw, 250)
+        stream.end()
+        forces = [m for m in stream.received() if isinstance(m, Forces)]
+    assert forces[0].first == 200
+    rows = np.concatenate([m.values for m in forces])
+    assert rows.shape == ((250 + len(raw)) // 100 - 2, 2, 2)
+    assert np.all(rows[:, :, 0] <= rows[:, :, 1])
+
+
+def test_what_is_refused_is_told(served):
+    _, port, id = served
+    with ForceStream(f"ws://127.0.0.1:{port}", hello("nobody")) as stream, pytest.raises(StreamRefused) as caught:
+        list(stream.received())
+    assert (caught.value.code, caught.value.problem["status"]) == (1008, 404)
+    with ForceStream(f"ws://127.0.0.1:{port}", hello(id)) as stream:
+        stream.send(np.full((1000, 4), np.nan))
+        with pytest.raises(StreamRefused, match="finite") as caught:
+            list(stream.received())
+        with pytest.raises(StreamRefused):
+            stream.send(np.zeros((1000, 4)))
+    assert caught.value.problem["errors"][0]["field"] == "samples"
+    with pytest.raises(StreamRefused) as caught:
+        ForceStream(f"ws://127.0.0.1:{port}", hello(id), key="ri_wrong_key")
+    assert (caught.value.code, caught.value.problem["title"]) == (401, "Unauthorized")
+
+
+def test_who_does_not_read_costs_no_memory(served):
+    """A hundred seconds of samples, as fast as they are taken: what nobody reads makes way, and is counted."""
+    _, port, id = served
+    raw = signals(2.0, 2.4)
+    with ForceStream(f"ws://127.0.0.1:{port}", hello(id)) as stream:
+        stream.send(raw)
+        next(m for m in stream.received() if isinstance(m, Event) and m.name == "ready")
+        before = processes()["service"][1]
+        for _ in range(100):
+            stream.send(np.tile(raw[:2560], (10, 1)))
+        for _ in range(300):
+            (item,) = httpx2.get(f"http://127.0.0.1:{port}/v1/forces/streams").json()["items"]
+            if item["samples"] + item["dropped"] == stream.following:
+                break
+            time.sleep(0.1)
+        # 4 MB of forces wait, and what the system holds
+        assert processes()["service"][1] < before + 60.0
+        stream.end()
+        messages = list(stream.received())
+    end = next(m.content for m in messages if isinstance(m, Event) and m.name == "end")
+    got = sum(len(m.values) for m in messages if isinstance(m, Forces))
+    assert end["unread"] > 0
+    assert end["samples"] + end["dropped"] == stream.following
+    assert 0 < got < stream.following
+
+
+def test_the_service_ends_with_its_streams(served):
+    process, port, id = served
+    with ForceStream(f"ws://127.0.0.1:{port}", hello(id)) as stream:
+        assert next(iter(stream.received())).name == "opened"
+        start = time.monotonic()
+        process.send_signal(signal.SIGTERM)
+        with pytest.raises(StreamRefused) as caught:
+            list(stream.received())
+        assert caught.value.code in (1001, 1012)
+    assert process.wait(20.0) is not None
+    assert time.monotonic() - start < 15.0
+    assert "streams" not in processes()
