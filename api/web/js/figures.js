@@ -48,7 +48,7 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [] }) {
       line: { color: ink, width: 2.2, dash: DASHES[Math.floor(i / SERIES.length)] },
       fill: lobes.length === 1 ? "tozeroy" : "none",
       fillcolor: colour(name, 0.07),
-      hovertemplate: "%{text}",
+      hovertemplate: lobes.length === 1 ? "%{text}<extra></extra>" : "%{text}",
     });
     data.push({
       x,
@@ -101,7 +101,7 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [] }) {
       anchor: "y2",
       tickformat: ",d",
       hoverformat: ",.0f",
-      unifiedhovertitle: { text: "%{x} rev/min" },
+      unifiedhovertitle: { text: "%{x:,.0f} rev/min" },
     }),
     yaxis: axis(`Depth limit [${unit("depth")}]`, { domain: [0.33, 1], range: [0, top], fixedrange: false }),
     yaxis2: axis("Chatter [Hz]", { domain: [0, 0.25], rangemode: "normal", nticks: 4 }),

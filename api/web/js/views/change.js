@@ -5,7 +5,7 @@ import { busy, clearFaults, field, quantity, select, showProblem } from "../form
 import { remember, to } from "../router.js";
 import { allMachines, choose, machine } from "../state.js";
 import { followLobes } from "../jobs.js";
-import { text } from "../units.js";
+import { text, unit } from "../units.js";
 import { bodyOf, checked, METHODS, NUMBERS } from "./change_question.js";
 import { results } from "./change_results.js";
 
@@ -138,10 +138,10 @@ export async function view(_args, query, place) {
 
   async function compute() {
     remember("change", state());
-    const shown = (key, kind) => text(kind, fields[key].input.base);
+    const shown = (key, kind) => `${fields[key].input.value}\u00a0${unit(kind)}`;
     fill(
       inShort,
-      `${strategy.selectedOptions[0].textContent}, ${shown("im", "percent")} immersion, ${shown("fz", "feed")} per tooth, ${text("speed", fields.from.input.base, { bare: true })} to ${shown("to", "speed")}`,
+      `${strategy.selectedOptions[0].textContent}, ${shown("im", "percent")} immersion, ${shown("fz", "feed")} per tooth, ${fields.from.input.value} to ${shown("to", "speed")}`,
     );
     running?.abort();
     running = new AbortController();

@@ -4,7 +4,7 @@ import { add, card, choices, fill, h, note, save, table, whisper } from "../dom.
 import { chart, legend, SERIES } from "../charts.js";
 import { frfFigure, lobeFigure, removalPer } from "../figures.js";
 import { failed, quantity } from "../forms.js";
-import { plain, q } from "../units.js";
+import { plain, q, u } from "../units.js";
 import { headline, reserve } from "./headline.js";
 
 let parts = "polar";
@@ -17,8 +17,7 @@ export function results(place, found, { toolings, body }) {
   const removal = summaries.map((t) => (feed === null || !t ? null : removalPer(t, question.cut.immersion, feed)));
   const several = found.lobes.length > 1;
   fill(place, headline(found, removal, question), warnings(found));
-  if (several) add(place, comparison(found, summaries, removal, question));
-  add(place, lobesCard(found, removal, question), frfCard(found, body));
+  add(place, lobesCard(found, removal, question), several ? comparison(found, summaries, question) : null, frfCard(found, body));
   whisper(
     [...place.querySelectorAll(".best")]
       .map((each) => each.querySelector("h2").textContent + ": " + (each.querySelector(".set")?.textContent ?? ""))
@@ -164,55 +163,40 @@ function frfCard(found, body) {
   );
 }
 
-function comparison(found, summaries, removal, question) {
-  const deepest = found.lobes.map((l) => l.best_speeds[0] ?? null);
+function comparison(found, summaries, question) {
   const rows = found.lobes.map((lobes, i) => ({
     lobes,
     i,
-    tooling: summaries[i],
+    stickout: summaries[i]?.stickout_mm ?? null,
     best: found.advice?.[i]?.highest_removal[0] ?? null,
-    pocket: deepest[i],
+    pocket: lobes.best_speeds[0] ?? null,
   }));
   const top = Math.max(...rows.map((r) => r.best?.removal_rate_cm3_per_min ?? 0));
-  const box = card(
-    "Side by side",
-    null,
-    table(
-      "Toolings side by side",
-      [
-        {
-          name: "Tooling",
-          cell: (r) => [
-            h("span", { class: `key line ${SERIES[r.i % SERIES.length]}`, "aria-hidden": "true" }),
-            r.lobes.tooling,
-            r.best && r.best.removal_rate_cm3_per_min === top ? h("span", { class: "soft small" }, " removes most") : null,
-          ],
-        },
-        { name: "Stickout", number: true, cell: (r) => (r.tooling ? q("length", r.tooling.stickout_mm, { digits: 1 }) : "–") },
-        { name: "Stable at every speed", number: true, cell: (r) => q("depth", r.lobes.absolute_limit_mm) },
-        {
-          name: "Deepest pocket",
-          number: true,
-          cell: (r) =>
-            r.pocket
-              ? [
-                  q("depth", r.pocket.limit_depth_mm ?? question.max_depth_mm),
-                  " at ",
-                  q("speed", r.pocket.spindle_speed_rpm, { bare: true }),
-                ]
-              : "–",
-        },
-        {
-          name: "Recommended",
-          number: true,
-          cell: (r) => (r.best ? [q("speed", r.best.spindle_speed_rpm), ", ", q("depth", r.best.axial_depth_mm)] : "–"),
-        },
-        { name: "Removal", number: true, cell: (r) => (r.best ? q("removal", r.best.removal_rate_cm3_per_min) : "–") },
+  const column = (name, kind, value, digits = null) => ({
+    name,
+    unit: u(kind),
+    number: true,
+    cell: (r) => q(kind, value(r) ?? null, { bare: true, digits }),
+  });
+  const depthOf = (pocket) => (pocket ? (pocket.limit_depth_mm ?? question.max_depth_mm) : null);
+  const columns = [
+    {
+      name: "Tooling",
+      cell: (r) => [
+        h("span", { class: `key line ${SERIES[r.i % SERIES.length]}`, "aria-hidden": "true" }),
+        r.lobes.tooling,
+        r.best && r.best.removal_rate_cm3_per_min === top ? h("div", { class: "soft small" }, "removes most") : null,
       ],
-      rows,
-    ),
-    found.advice ? reserve(null, question) : null,
-  );
+    },
+    column("Stickout", "length", (r) => r.stickout, 1),
+    column("Always stable", "depth", (r) => r.lobes.absolute_limit_mm),
+    column("Pocket at", "speed", (r) => r.pocket?.spindle_speed_rpm),
+    column("its depth", "depth", (r) => depthOf(r.pocket)),
+    column("Set", "speed", (r) => r.best?.spindle_speed_rpm),
+    column("and cut", "depth", (r) => r.best?.axial_depth_mm),
+    column("Removes", "removal", (r) => r.best?.removal_rate_cm3_per_min),
+  ];
+  const box = card("Side by side", null, table("Toolings side by side", columns, rows), found.advice ? reserve(null, question) : null);
   box.classList.add("wide");
   return box;
 }

@@ -67,7 +67,7 @@ export function headline(found, removal, question) {
             "p",
             { class: "soft" },
             "Or ",
-            further.map(([speed, deep], k) => [k ? " and " : "", `${plain(speed)} rev/min at `, q("depth", deep)]),
+            further.map(([speed, deep], k) => [k ? " and " : "", `${plain(speed)}\u00a0rev/min at `, q("depth", deep)]),
           )
         : null,
       best && cards === 1 ? reserve(pocket, question) : null,
@@ -81,7 +81,7 @@ export function headline(found, removal, question) {
 export function reserve(pocket, question) {
   return h(
     "p",
-    { class: "soft small" },
+    { class: "soft small reserve" },
     "10 % below the limit that 95 % of the machines allowed by the records reach, with the speed right within 1 %.",
     pocket
       ? [

@@ -6,7 +6,7 @@ import { frfFigure } from "../figures.js";
 import { confirmed, failed } from "../forms.js";
 import { go, to } from "../router.js";
 import { allMachines } from "../state.js";
-import { modesCards } from "./modes.js";
+import { modesCards, notes } from "./modes.js";
 
 export function statusMark(machine) {
   const known = machine.identification;
@@ -56,13 +56,18 @@ export async function view({ id }, _query, place) {
       h(
         "div",
         { class: "split" },
-        modesCards(modes),
-        card(
-          "Receptance at the flange",
-          null,
-          legend(known.axes.map((axis, k) => ({ name: `${axis} direction`, series: SERIES[k] }))),
-          picture,
-          h("p", { class: "small soft" }, "Machine and spindle alone, without a tool-holder. Shaded: 95 % band."),
+        h("div", { class: "view" }, modesCards(modes)),
+        h(
+          "div",
+          { class: "view" },
+          card(
+            "Receptance at the flange",
+            null,
+            legend(known.axes.map((axis, k) => ({ name: `${axis} direction`, series: SERIES[k] }))),
+            picture,
+            h("p", { class: "small soft" }, "Machine and spindle alone, without a tool-holder. Shaded: 95 % band."),
+          ),
+          notes(modes),
         ),
       ),
     );

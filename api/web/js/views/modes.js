@@ -18,6 +18,7 @@ export function withSpread(value, spread, times = 1) {
   );
 }
 
+/** A card for each axis. */
 export function modesCards(modes) {
   const cards = Object.entries(modes.axes).map(([axis, found]) => {
     const rows = found.modes.map((mode, i) => ({ mode, i }));
@@ -55,7 +56,7 @@ export function modesCards(modes) {
       joint(found.joint),
     );
   });
-  return h("div", { class: "modes" }, cards, notes(modes));
+  return cards;
 }
 
 function joint(values) {
