@@ -238,6 +238,18 @@ def test_a_step_is_computed_once(quiet):
     assert json.loads(quiet.store.jobs.find(quiet.id).progress) == {"stage": "stage", "done": 2, "total": 2}
 
 
+def test_only_a_new_step_counts_as_coming_further(quiet):
+    def worked():
+        quiet.store.jobs.begin(quiet.id, "w", now())
+        with quiet.desk() as desk:
+            desk.remember("a", lambda: 1)
+        return quiet.store.jobs.find(quiet.id).attempts
+
+    assert worked() == 0
+    # one that dies at its second step again and again comes to its first one each time
+    assert [worked(), worked()] == [1, 2]
+
+
 @settings(deadline=None, max_examples=50)
 @given(st.lists(st.lists(st.integers(), max_size=4), max_size=4), st.integers(0, 20))
 def test_wherever_it_is_interrupted_each_task_is_done_once(calls, killed_after):
