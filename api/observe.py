@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import logging
 import re
@@ -13,6 +14,7 @@ from typing import Any
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
 from api.parts import Parts
 from api.problems import Problem, document
@@ -22,6 +24,8 @@ from api.work.pool import Busy
 log = logging.getLogger("rcsa_ident.service")
 _ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 RETRY = {"Retry-After": "2"}
+#: Time for a body that is no upload [s], what more it gets for each byte that has come, and for a request's head [s]; bytes of a head.
+BODY_SECONDS, BYTE_SECONDS, HEAD_SECONDS, HEAD_BYTES = 60.0, 1e-4, 20.0, 262_144
 
 
 class Observed:
@@ -79,6 +83,7 @@ class _Body:
 
     def __init__(self, request: Request, receive: Receive, most: int) -> None:
         self.source, self.most, self.seen = receive, most, 0
+        self.usual, self.start = most, time.monotonic()
         told = request.headers.get("content-length", "")
         self.told = int(told[:20]) if told.isdecimal() and told.isascii() else 0
         self.read = self.told == 0 and "transfer-encoding" not in request.headers
@@ -86,12 +91,54 @@ class _Body:
     async def receive(self) -> Message:
         """Return the next part."""
         if self.told <= self.most:
-            message = await self.source()
+            message = await self._in_time()
             self.seen += len(message.get("body", b""))
             if self.seen <= self.most:
                 self.read = self.read or not message.get("more_body", False)
                 return message
         raise HTTPException(413, f"at most {self.most} bytes")
+
+    async def _in_time(self) -> Message:
+        """The next part, if it does not keep everybody waiting; those who let more in look at the clock themselves."""
+        if self.read or self.most != self.usual:
+            return await self.source()
+        try:
+            async with asyncio.timeout(self.start + BODY_SECONDS + BYTE_SECONDS * self.seen - time.monotonic()):
+                return await self.source()
+        except TimeoutError:
+            raise HTTPException(408, "too slow") from None
+
+
+class Patient(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
+    """A connection that is closed if the head of a request does not come in time, or does not end."""
+
+    seconds, most = HEAD_SECONDS, HEAD_BYTES
+
+    def connection_made(self, transport: Any) -> None:
+        super().connection_made(transport)
+        self.waiting, self.came = self.loop.call_later(self.seconds, self._over), 0
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        if self.cycle is not None and not self.cycle.response_complete:
+            # a head has come to its end
+            self.waiting.cancel()
+            self.came = 0
+            return
+        self.came += len(data)
+        if self.came > self.most:
+            self.transport.close()
+        elif self.waiting.cancelled():
+            self.waiting = self.loop.call_later(self.seconds, self._over)
+
+    def _over(self) -> None:
+        # unless it has become a WebSocket
+        if self.transport.get_protocol() is self:
+            self.transport.close()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self.waiting.cancel()
+        super().connection_lost(exc)
 
 
 def _problem(error: Exception) -> Problem:

@@ -111,6 +111,7 @@ def install(app: FastAPI) -> None:
         words = {
             413: f"the body is too large: {error.detail}",
             400: "the body can not be read",
+            408: "the body comes too slowly",
             404: "nothing is there",
             405: "the path does not take this method",
         }

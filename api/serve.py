@@ -168,6 +168,7 @@ def _run(settings: object) -> None:
 
     from api.jobs.crew import Crew
     from api.main import create_app
+    from api.observe import Patient
     from api.settings import Settings
 
     assert isinstance(settings, Settings)
@@ -185,7 +186,7 @@ def _run(settings: object) -> None:
         log.warning("no keys are asked for: everybody on this machine may do everything (RCSA_IDENT_KEYS=on asks for them)")
     # streams of events and forces would keep it from ending
     # samples are noise to the last bits: packing them costs a core and gains nothing
-    limits: dict[str, Any] = {"timeout_graceful_shutdown": 3, "ws_per_message_deflate": False}
+    limits: dict[str, Any] = {"timeout_graceful_shutdown": 3, "ws_per_message_deflate": False, "http": Patient}
     uvicorn.run(service, host=settings.host, port=settings.port, log_config=None, access_log=False, server_header=False, **limits)
 
 

@@ -34,7 +34,7 @@ _WHY = {
 }
 _ALWAYS = (401, 403, 429, 503)
 #: What a body may meet.
-BODY = (400, 413, 415, 422)
+BODY = (400, 408, 413, 415, 422)
 
 
 def problems(*statuses: int, always: Sequence[int] = _ALWAYS) -> dict[int | str, dict[str, Any]]:

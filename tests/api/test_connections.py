@@ -1,0 +1,143 @@
+"""Clients that do not come to an end with what they send."""
+
+from __future__ import annotations
+
+import select
+import socket
+import threading
+import time
+from contextlib import contextmanager
+
+import pytest
+import uvicorn
+
+from api import observe
+from api.main import create_app
+from api.observe import Patient
+from api.settings import Settings
+from tests.api.conftest import Here, Near
+
+
+class Hasty(Patient):
+    seconds, most = 0.6, 20_000
+
+
+@contextmanager
+def listening(app):
+    """A server on a free port."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    server = uvicorn.Server(uvicorn.Config(app, port=port, http=Hasty, log_config=None, lifespan="on"))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    try:
+        while not server.started:
+            time.sleep(0.01)
+        yield port
+    finally:
+        server.should_exit = True
+        thread.join()
+
+
+@pytest.fixture
+def port(store, tmp_path, monkeypatch):
+    monkeypatch.setattr(observe, "BODY_SECONDS", 0.5)
+    with listening(create_app(Settings(data=tmp_path), store, Here(), Here(), Near())) as found:
+        yield found
+
+
+def told(port, *parts, pause=0.0, seconds=10.0):
+    """What comes back until the connection is closed."""
+    with socket.create_connection(("127.0.0.1", port), timeout=seconds) as link:
+        answer = b""
+        try:
+            for part in parts:
+                # an answer before the end is the end
+                if pause and select.select([link], [], [], pause)[0]:
+                    break
+                link.sendall(part)
+            while data := link.recv(65536):
+                answer += data
+        except (ConnectionResetError, BrokenPipeError):
+            pass
+    return answer
+
+
+HEAD = b"POST /v1/machines HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+GET = b"GET /v1/machines HTTP/1.1\r\nHost: localhost\r\n"
+
+
+@pytest.mark.parametrize("body", [b"Content-Length: 12\r\n\r\n{", b"Transfer-Encoding: chunked\r\n\r\nFFFF\r\n{"])
+def test_a_body_that_stops(port, body):
+    answer = told(port, HEAD + body)
+    assert answer.startswith(b"HTTP/1.1 408")
+    assert b"application/problem+json" in answer
+    assert b"the body comes too slowly" in answer
+
+
+def test_a_body_that_trickles(port):
+    answer = told(port, HEAD + b"Content-Length: 1000\r\n\r\n", *[b" "] * 40, pause=0.05)
+    assert answer.startswith(b"HTTP/1.1 408")
+
+
+@pytest.mark.parametrize("head", [b"", b"GET /v1/mach", GET, GET + b"X-A: "])
+def test_a_head_that_stops(port, head):
+    start = time.monotonic()
+    assert told(port, head) == b""
+    assert time.monotonic() - start < 5.0
+
+
+def test_a_second_head_that_stops(port):
+    answer = told(port, GET + b"\r\n" + GET)
+    assert answer.count(b"HTTP/1.1 200") == 1
+
+
+def test_a_head_without_an_end(port):
+    assert b"200" not in told(port, GET, *[b"X-A: " + b"a" * 5000 + b"\r\n"] * 200)
+
+
+def test_requests_behind_each_other_are_all_answered(port):
+    """Also where the first part of the next comes with the last of the one before."""
+    text = GET + b"\r\n"
+    stream = text * 60 + GET + b"Connection: close\r\n\r\n"
+    parts = [stream[i : i + 700] for i in range(0, len(stream), 700)]
+    assert told(port, *parts).count(b"HTTP/1.1 200") == 61
+
+
+def test_an_answer_may_take_longer_than_a_head(store, tmp_path):
+    async def slow(scope, receive, send):
+        import asyncio
+
+        if scope["type"] == "lifespan":
+            for kind in ("startup", "shutdown"):
+                await receive()
+                await send({"type": f"lifespan.{kind}.complete"})
+            return
+        await asyncio.sleep(1.2)
+        await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"2")]})
+        await send({"type": "http.response.body", "body": b"ok"})
+
+    with listening(slow) as port:
+        assert told(port, GET + b"Connection: close\r\n\r\n").endswith(b"ok")
+
+
+def test_a_websocket_stays_open(store, tmp_path):
+    from websockets.sync.client import connect
+
+    async def echo(scope, receive, send):
+        if scope["type"] == "lifespan":
+            for kind in ("startup", "shutdown"):
+                await receive()
+                await send({"type": f"lifespan.{kind}.complete"})
+            return
+        await receive()
+        await send({"type": "websocket.accept"})
+        while (message := await receive())["type"] == "websocket.receive":
+            await send({"type": "websocket.send", "text": message["text"]})
+
+    with listening(echo) as port, connect(f"ws://127.0.0.1:{port}/") as link:
+        for word in ("a", "b"):
+            time.sleep(1.0)
+            link.send(word)
+            assert link.recv() == word
