@@ -1,0 +1,93 @@
+"""How a service is asked: what it answers below 400, or a `ServiceError`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Self, TypeVar
+
+import httpx2
+
+from api.schemas.common import Answer, ProblemDocument
+
+Model = TypeVar("Model", bound=Answer)
+Json = Mapping[str, Any]
+
+
+class ServiceError(Exception):
+    """The service has answered otherwise.
+
+    Parameters
+    ----------
+    status : int
+    problem : ProblemDocument or None
+        None where something else than the service has answered.
+    """
+
+    def __init__(self, status: int, problem: ProblemDocument | None) -> None:
+        super().__init__(f"{status}: {problem.detail if problem else 'no problem document'}")
+        self.status, self.problem = status, problem
+
+
+class Asking:
+    """A service.
+
+    Parameters
+    ----------
+    url : str
+    key : str or None
+    http : httpx2.Client or None
+        In place of one of its own.
+    """
+
+    def __init__(self, url: str = "http://127.0.0.1:8000", key: str | None = None, http: httpx2.Client | None = None) -> None:
+        self.http = httpx2.Client(base_url=url, timeout=60.0) if http is None else http
+        self.headers = {} if key is None else {"X-API-Key": key}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.http.close()
+
+    def send(self, method: str, path: str, **further: Any) -> httpx2.Response:
+        """Return an answer below 400."""
+        headers = {**self.headers, **further.pop("headers", {})}
+        answer = self.http.request(method, f"/v1{path}", headers=headers, **further)
+        if answer.status_code >= 400:
+            raise refused(answer)
+        return answer
+
+    def download(self, path: str, file: Path) -> None:
+        """Write an answer to a file."""
+        with self.http.stream("GET", f"/v1{path}", headers=self.headers) as answer, file.open("wb") as opened:
+            if answer.status_code >= 400:
+                answer.read()
+                raise refused(answer)
+            for block in answer.iter_bytes():
+                opened.write(block)
+
+    def all(self, path: str, kind: Any, limit: int, query: Mapping[str, str] | None = None) -> Iterator[Any]:
+        """Yield the items of all parts of a list."""
+        after: str | None = ""
+        while after is not None:
+            part = kind.model_validate_json(self.send("GET", path, params={"after": after, "limit": limit, **(query or {})}).content)
+            yield from part.items
+            after = part.next
+
+
+def refused(answer: httpx2.Response) -> ServiceError:
+    """Return what an answer from 400 on says."""
+    # the answer to HEAD has no body
+    told = answer.headers.get("content-type", "").startswith("application/problem+json") and answer.content
+    return ServiceError(answer.status_code, ProblemDocument.model_validate_json(answer.content) if told else None)
+
+
+def match(seen: str | None) -> dict[str, str]:
+    """Return the header of a writer that has seen an entity tag."""
+    return {} if seen is None else {"If-Match": f'"{seen}"'}
+
+
+def read(model: type[Model], answer: httpx2.Response) -> Model:
+    """Return an answer as a noun."""
+    return model.model_validate_json(answer.content)

@@ -1,0 +1,190 @@
+"""The client's campaigns and recordings."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import time
+import tomllib
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from urllib.parse import quote
+
+import httpx2
+
+from api.client.asking import Asking, Json, ServiceError, read
+from api.schemas.campaigns import CampaignAnswer, CampaignSummary, RecordingAnswer, SignalAnswer, SpectrumAnswer, UploadAnswer
+from api.schemas.common import Page
+
+_BLOCK = 1 << 20
+#: A long recording is read before the answer comes.
+_READ = httpx2.Timeout(60.0, read=1200.0)
+
+
+class Uploads(Asking):
+    """Campaigns and recordings."""
+
+    def make_campaign(self, machine: str, campaign: str | Json, repeat: str | None = None) -> CampaignAnswer:
+        """Make a campaign, from the text of campaign.toml or from its keys; `repeat` is an idempotency key."""
+        headers = {} if repeat is None else {"Idempotency-Key": repeat}
+        path = f"/machines/{machine}/campaigns"
+        if isinstance(campaign, str):
+            headers["Content-Type"] = "application/toml"
+            return read(CampaignAnswer, self.send("POST", path, content=campaign.encode(), headers=headers))
+        return read(CampaignAnswer, self.send("POST", path, json=campaign, headers=headers))
+
+    def campaign(self, id: str) -> CampaignAnswer:
+        """Return a campaign with the verdicts on its cuts."""
+        return read(CampaignAnswer, self.send("GET", f"/campaigns/{id}"))
+
+    def campaign_file(self, id: str) -> str:
+        """Return the text of campaign.toml."""
+        return self.send("GET", f"/campaigns/{id}", headers={"Accept": "application/toml"}).text
+
+    def campaigns(self, machine: str, limit: int = 50) -> Iterator[CampaignSummary]:
+        """Yield all campaigns of a machine."""
+        return self.all(f"/machines/{machine}/campaigns", Page[CampaignSummary], limit)
+
+    def archive(self, id: str, file: Path) -> None:
+        """Write the folder of a campaign, as `rcsa-ident identify` takes it, to a ZIP file."""
+        self.download(f"/campaigns/{id}/archive", file)
+
+    def forget_campaign(self, id: str) -> None:
+        """Forget a campaign and its recordings."""
+        self.send("DELETE", f"/campaigns/{id}")
+
+    def recordings(self, campaign: str, limit: int = 50) -> Iterator[RecordingAnswer]:
+        """Yield all recordings of a campaign."""
+        return self.all(f"/campaigns/{campaign}/recordings", Page[RecordingAnswer], limit)
+
+    def recording(self, campaign: str, name: str) -> RecordingAnswer:
+        """Return what was found in a recording."""
+        return read(RecordingAnswer, self.send("GET", _recording(campaign, name)))
+
+    def recording_file(self, campaign: str, name: str, file: Path) -> None:
+        """Write a recording, as it came, to a file."""
+        self.download(f"{_recording(campaign, name)}/file", file)
+
+    def spectrum(self, campaign: str, name: str, **query: int) -> SpectrumAnswer:
+        """Return amplitudes over frequency; points."""
+        return read(SpectrumAnswer, self.send("GET", f"{_recording(campaign, name)}/spectrum", params=query))
+
+    def signal(self, campaign: str, name: str, **query: int) -> SignalAnswer:
+        """Return the outline over time; points."""
+        return read(SignalAnswer, self.send("GET", f"{_recording(campaign, name)}/signal", params=query))
+
+    def forget_recording(self, campaign: str, name: str) -> None:
+        """Forget a recording, or what has come of one."""
+        self.send("DELETE", _recording(campaign, name))
+
+    def upload(self, campaign: str, file: Path, name: str | None = None, replace: bool = False) -> RecordingAnswer:
+        """Upload a recording at once, and have its checksum compared; `name` where the campaign calls it otherwise."""
+        with file.open("rb") as opened:
+            digest = hashlib.file_digest(opened, "sha256").digest()
+            opened.seek(0)
+            headers = {"Content-Type": "application/octet-stream", "Content-Length": str(file.stat().st_size), **_digest(digest)}
+            params = {"replace": "true"} if replace else {}
+            path = _recording(campaign, name or file.name)
+            return read(
+                RecordingAnswer,
+                self.send("PUT", path, content=iter(partial(opened.read, _BLOCK), b""), headers=headers, params=params, timeout=_READ),
+            )
+
+    def upload_in_parts(
+        self, campaign: str, file: Path, name: str | None = None, part: int = 8 << 20, replace: bool = False, attempts: int = 5
+    ) -> RecordingAnswer:
+        """Upload a recording in parts, each from where the service says that the one before ended, also after a lost connection.
+
+        Parameters
+        ----------
+        part : int [bytes]
+        attempts : int
+            For a part that the connection loses.
+        """
+        path, size = _recording(campaign, name or file.name), file.stat().st_size
+        with file.open("rb") as opened:
+            digest = hashlib.file_digest(opened, "sha256").digest()
+            failed, offset = 0, self._offset(path, size)
+            while True:
+                if offset == size and (kept := self._kept(path)) is not None:
+                    if kept.sha256 == digest.hex():
+                        return kept
+                    offset = 0
+                opened.seek(offset)
+                data = opened.read(part)
+                headers = {
+                    "Content-Type": "application/octet-stream",
+                    "Upload-Offset": str(offset),
+                    "Upload-Length": str(size),
+                    **_digest(digest),
+                }
+                try:
+                    answer = self.send(
+                        "PATCH", path, content=data, headers=headers, params={"replace": "true"} if replace else {}, timeout=_READ
+                    )
+                except (httpx2.TransportError, ServiceError) as error:
+                    failed += 1
+                    lost = isinstance(error, httpx2.TransportError) or error.status in (408, 503)
+                    if failed >= attempts or not lost:
+                        raise
+                    time.sleep(min(0.2 * 2**failed, 5.0))
+                    offset = self._offset(path, size)
+                    continue
+                if answer.status_code != 204:
+                    return read(RecordingAnswer, answer)
+                failed, offset = 0, int(answer.headers["Upload-Offset"])
+
+    def _offset(self, path: str, size: int) -> int:
+        """Where an upload goes on: 0 where another file is there, the size where one of that size is whole."""
+        try:
+            state = self.send("HEAD", path).headers
+        except ServiceError as error:
+            if error.status != 404:
+                raise
+            return 0
+        offset, length = int(state["Upload-Offset"]), int(state["Upload-Length"])
+        return offset if length == size else 0
+
+    def _kept(self, path: str) -> RecordingAnswer | None:
+        try:
+            return read(RecordingAnswer, self.send("GET", path))
+        except ServiceError as error:
+            if error.status != 404:
+                raise
+            return None
+
+    def upload_together(self, campaign: str, files: Iterable[Path], replace: bool = False) -> UploadAnswer:
+        """Upload several recordings in one body; of each file stands in the answer what has become of it."""
+        with ExitStack() as stack:
+            parts = [("files", (file.name, stack.enter_context(file.open("rb")), "application/octet-stream")) for file in files]
+            path, params = f"/campaigns/{campaign}/recordings", {"replace": "true"} if replace else {}
+            return read(UploadAnswer, self.send("POST", path, files=parts, params=params, timeout=_READ))
+
+    def upload_folder(self, machine: str, folder: Path, told: Callable[[RecordingAnswer], object] | None = None) -> CampaignAnswer:
+        """Upload the folder of a campaign: campaign.toml, its toolings and every recording that is there.
+
+        Parameters
+        ----------
+        told : callable, optional
+            Given each recording when it is kept.
+        """
+        data = tomllib.loads((folder / "campaign.toml").read_text(encoding="utf-8-sig"))
+        toolings = {name: tomllib.loads((folder / path).read_text(encoding="utf-8-sig")) for name, path in data["toolings"].items()}
+        campaign = self.make_campaign(machine, {**data, "toolings": toolings})
+        # air cuts first: a cut is then judged once, beside its own
+        paths = dict.fromkeys(cut[key] for key in ("air", "cut") for cut in data["cuts"] if key in cut)
+        for path in paths:
+            answer = self.upload(campaign.id, folder / path)
+            if told is not None:
+                told(answer)
+        return self.campaign(campaign.id)
+
+
+def _recording(campaign: str, name: str) -> str:
+    return f"/campaigns/{campaign}/recordings/{quote(name, safe='')}"
+
+
+def _digest(sha256: bytes) -> dict[str, str]:
+    return {"Repr-Digest": f"sha-256=:{base64.b64encode(sha256).decode()}:"}

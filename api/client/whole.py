@@ -1,0 +1,159 @@
+"""The client as a whole."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import httpx2
+
+from api.client.asking import Json, match, read
+from api.client.jobs import Jobs
+from api.client.uploads import Uploads
+from api.schemas.common import Page
+from api.schemas.forces import ForceAnswer, StreamsAnswer, StreamSummary
+from api.schemas.keys import KeyAnswer, MadeKey
+from api.schemas.libraries import Example, Examples, ImportAnswer
+from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes
+from api.schemas.queries import AdviceAnswer, TipAnswer
+from api.schemas.toolings import ToolingAnswer, ToolingSummary
+
+
+class Client(Uploads, Jobs):
+    """A service.
+
+    Parameters
+    ----------
+    url : str
+    key : str or None
+    http : httpx2.Client or None
+        In place of one of its own.
+    """
+
+    def make_machine(self, name: str, description: str = "", repeat: str | None = None) -> MachineAnswer:
+        """Make a machine; `repeat` is an idempotency key."""
+        headers = {} if repeat is None else {"Idempotency-Key": repeat}
+        return read(MachineAnswer, self.send("POST", "/machines", json={"name": name, "description": description}, headers=headers))
+
+    def machine(self, id: str) -> MachineAnswer:
+        """Return a machine."""
+        return read(MachineAnswer, self.send("GET", f"/machines/{id}"))
+
+    def machines(self, limit: int = 50) -> Iterator[MachineAnswer]:
+        """Yield all machines."""
+        return self.all("/machines", Page[MachineAnswer], limit)
+
+    def forget_machine(self, id: str) -> None:
+        """Forget a machine and its identification."""
+        self.send("DELETE", f"/machines/{id}")
+
+    def identify(self, id: str, result: str | bytes, seen: str | None = None) -> IdentificationSummary:
+        """Give a machine the content of RESULT.json; `seen` is the etag of the one that it replaces."""
+        headers = {"Content-Type": "application/json", **match(seen)}
+        return read(IdentificationSummary, self.send("PUT", f"/machines/{id}/identification", content=result, headers=headers))
+
+    def identification(self, id: str) -> Identification:
+        """Return the content of RESULT.json."""
+        return read(Identification, self.send("GET", f"/machines/{id}/identification"))
+
+    def modes(self, id: str) -> Modes:
+        """Return modes with their uncertainties."""
+        return read(Modes, self.send("GET", f"/machines/{id}/identification/modes"))
+
+    def frf(self, id: str, **query: float) -> Frf:
+        """Return the spindle's receptance; from_hz, to_hz, step_hz."""
+        return read(Frf, self.send("GET", f"/machines/{id}/identification/frf", params=query))
+
+    def write_tooling(self, name: str, tooling: str | Json, seen: str | None = None) -> ToolingAnswer:
+        """Write a tooling, from the text of a tooling file or from its keys."""
+        if isinstance(tooling, str):
+            headers = {"Content-Type": "application/toml", **match(seen)}
+            return read(ToolingAnswer, self.send("PUT", f"/toolings/{name}", content=tooling.encode(), headers=headers))
+        return read(ToolingAnswer, self.send("PUT", f"/toolings/{name}", json=tooling, headers=match(seen)))
+
+    def tooling(self, name: str) -> ToolingAnswer:
+        """Return a tooling."""
+        return read(ToolingAnswer, self.send("GET", f"/toolings/{name}"))
+
+    def tooling_file(self, name: str) -> str:
+        """Return the text of the tooling file."""
+        return self.send("GET", f"/toolings/{name}", headers={"Accept": "application/toml"}).text
+
+    def drawing(self, name: str) -> str:
+        """Return a tooling to scale, SVG."""
+        return self.send("GET", f"/toolings/{name}/drawing").text
+
+    def toolings(self, limit: int = 50) -> Iterator[ToolingSummary]:
+        """Yield all toolings."""
+        return self.all("/toolings", Page[ToolingSummary], limit)
+
+    def import_toolings(self, library: bytes, **assumed: Any) -> ImportAnswer:
+        """Write the toolings of a Fusion 360 or HSM tool library; `replace` writes also over what is there."""
+        kind = "application/zip" if library.startswith(b"PK") else "application/json"
+        query = {key: str(value).lower() if isinstance(value, bool) else value for key, value in assumed.items() if value is not None}
+        return read(ImportAnswer, self.send("POST", "/toolings/import", content=library, params=query, headers={"Content-Type": kind}))
+
+    def examples(self) -> list[Example]:
+        """Return what there is to start with."""
+        return read(Examples, self.send("GET", "/examples")).items
+
+    def example(self, name: str, file: Path) -> None:
+        """Write an example's file."""
+        self.download(f"/examples/{quote(name)}", file)
+
+    def forget_tooling(self, name: str, seen: str | None = None) -> None:
+        """Forget a tooling."""
+        self.send("DELETE", f"/toolings/{name}", headers=match(seen))
+
+    def tooltip(self, machine: str, tooling: str | Json, **further: Any) -> TipAnswer:
+        """Return a tooltip FRF."""
+        return read(TipAnswer, self.send("POST", "/tooltip", json={"machine": machine, "tooling": tooling, **further}))
+
+    def tooltip_file(self, machine: str, tooling: str | Json, **further: Any) -> str:
+        """Return the text of FRF.csv."""
+        body = {"machine": machine, "tooling": tooling, **further}
+        return self.send("POST", "/tooltip", json=body, headers={"Accept": "text/csv"}).text
+
+    def advice(self, machine: str, *toolings: str | Json, **further: Any) -> AdviceAnswer:
+        """Return what removes most, and how planned cuts stand."""
+        return read(AdviceAnswer, self.send("POST", "/advice", json={"machine": machine, "toolings": list(toolings), **further}))
+
+    def forces(self, machine: str, tooling: str | Json, recording: Path, air: Path | None = None, **further: Any) -> ForceAnswer:
+        """Return the forces of a recording that is a file here."""
+        return read(ForceAnswer, self._forces({"machine": machine, "tooling": tooling, **further}, recording, air))
+
+    def forces_file(self, machine: str, tooling: str | Json, recording: Path, air: Path | None = None, **further: Any) -> str:
+        """Return the text of FORCES.csv."""
+        query = {"machine": machine, "tooling": tooling, **further}
+        return self._forces(query, recording, air, {"Accept": "text/csv"}).text
+
+    def forces_of_campaign(self, machine: str, campaign: str, recording: str, **further: Any) -> ForceAnswer:
+        """Return the forces of an uploaded recording, with its air cut."""
+        body = {"machine": machine, "campaign": campaign, "recording": recording, **further}
+        return read(ForceAnswer, self.send("POST", "/forces", json=body))
+
+    def streams(self) -> list[StreamSummary]:
+        """Return all open force streams; `api.stream_client` opens one."""
+        return read(StreamsAnswer, self.send("GET", "/forces/streams")).items
+
+    def _forces(self, query: Json, recording: Path, air: Path | None, headers: Mapping[str, str] | None = None) -> httpx2.Response:
+        with ExitStack() as opened:
+            named = {"recording": recording} | ({} if air is None else {"air": air})
+            files = {field: (path.name, opened.enter_context(path.open("rb"))) for field, path in named.items()}
+            return self.send("POST", "/forces", data={"query": json.dumps(query)}, files=files, headers=dict(headers or {}))
+
+    def make_key(self, *scopes: str, label: str = "") -> MadeKey:
+        """Make a key."""
+        return read(MadeKey, self.send("POST", "/keys", json={"scopes": list(scopes), "label": label}))
+
+    def keys(self, limit: int = 50) -> Iterator[KeyAnswer]:
+        """Yield all keys."""
+        return self.all("/keys", Page[KeyAnswer], limit)
+
+    def withdraw_key(self, id: str) -> None:
+        """Withdraw a key."""
+        self.send("DELETE", f"/keys/{id}")
