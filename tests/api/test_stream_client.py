@@ -90,30 +90,32 @@ def test_what_is_refused_is_told(served):
     assert (caught.value.code, caught.value.problem["title"]) == (401, "Unauthorized")
 
 
-def test_who_does_not_read_costs_no_memory(served):
-    """A hundred seconds of samples, as fast as they are taken: what nobody reads makes way, and is counted."""
+def test_a_viewer_who_does_not_read_costs_no_memory(served):
+    """More than the system holds for it: what it does not read makes way, and is counted; the logger notices nothing."""
     _, port, id = served
-    raw = signals(2.0, 2.4)
+    raw = np.tile(signals(2.0, 2.1), (10, 1))
     with ForceStream(f"ws://127.0.0.1:{port}", hello(id)) as stream:
         stream.send(raw)
-        next(m for m in stream.received() if isinstance(m, Event) and m.name == "ready")
-        before = processes()["service"][1]
-        for _ in range(100):
-            stream.send(np.tile(raw[:2560], (10, 1)))
-        for _ in range(300):
-            (item,) = httpx2.get(f"http://127.0.0.1:{port}/v1/forces/streams").json()["items"]
-            if item["samples"] + item["dropped"] == stream.following:
-                break
-            time.sleep(0.1)
-        # 4 MB of forces wait, and what the system holds
-        assert processes()["service"][1] < before + 60.0
-        stream.end()
-        messages = list(stream.received())
-    end = next(m.content for m in messages if isinstance(m, Event) and m.name == "end")
-    got = sum(len(m.values) for m in messages if isinstance(m, Forces))
+        ready = next(m for m in stream.received() if isinstance(m, Event) and m.name == "ready").content
+        before, got = processes()["service"][1], 0
+        with ForceStream(f"ws://127.0.0.1:{port}", {"watch": ready["session"], "format": "json"}) as viewer:
+            assert next(iter(viewer.received())).name == "watching"
+            for _ in range(23):
+                stream.send(raw)
+                for message in stream.received(10.0):
+                    got += len(message.values) if isinstance(message, Forces) else 0
+                    if got >= stream.following - len(raw):
+                        break
+            stream.end()
+            ends = [m.content for m in stream.received() if isinstance(m, Event) and m.name == "end"]
+            # 4 MB of forces wait
+            assert processes()["service"][1] < before + 40.0
+            seen = list(viewer.received())
+    assert (ends[0]["samples"], ends[0]["unread"], ends[0]["dropped"]) == (24 * len(raw), 0, 0)
+    end = next(m.content for m in seen if isinstance(m, Event) and m.name == "end")
+    read = sum(len(m.values) for m in seen if isinstance(m, Forces))
     assert end["unread"] > 0
-    assert end["samples"] + end["dropped"] == stream.following
-    assert 0 < got < stream.following
+    assert read + end["unread"] <= 24 * len(raw)
 
 
 def test_the_service_ends_with_its_streams(served):
