@@ -153,11 +153,15 @@ def test_inches(opened, client: Client, shop: str):
     page = opened(f"#/change?machine={shop}&tooling=T1")
     best = page.locator(".best")
     expect(best).to_be_visible(timeout=30_000)
-    depth = float(re.search(r"cut ([\d.]+) mm", plain(best.inner_text()).replace("\n", " "))[1])
+    cut = {"immersion": 0.5, "strategy": "down", "feed_direction": "+X", "feed_per_tooth_mm": 0.1}
+    advice = client.advice(shop, "T1", cut=cut).toolings[0].highest_removal[0]
+    assert f"cut {advice.axial_depth_mm:.2f} mm" in plain(best.inner_text()).replace("\n", " ")
     page.get_by_role("button", name="inch").click()
-    inches = float(re.search(r"cut ([\d.]+) in", plain(best.inner_text()).replace("\n", " "))[1])
-    assert inches == pytest.approx(depth / 25.4, abs=0.006 / 25.4 + 6e-5)
-    assert "in³/min" in best.inner_text()
+    read = plain(best.inner_text()).replace("\n", " ")
+    assert f"cut {advice.axial_depth_mm / 25.4:.4f} in" in read
+    assert f"{advice.removal_rate_cm3_per_min / 2.54**3:.2f} in³/min" in read
+    assert f"{advice.torque_nm / 1.3558179483:.2f} lbf ft" in read
+    assert f"{advice.power_kw / 0.74569987:.2f} hp" in read
     feed = page.get_by_label("Feed per tooth")
     assert float(feed.input_value()) == pytest.approx(0.1 / 25.4, rel=1e-6)
     expect(page.locator(".chart .ytitle", has_text="[in]")).to_be_visible()
