@@ -44,6 +44,14 @@ CALLS = [
     ("DELETE", "/campaigns/c/recordings/n", None, "upload"),
     ("POST", "/tooltip", {"machine": "m", "tooling": "t"}, "run"),
     ("POST", "/lobes", {"machine": "m", "toolings": ["t"]}, "run"),
+    ("GET", "/lobes/j", None, "read"),
+    ("GET", "/lobes/j/events", None, "read"),
+    ("DELETE", "/lobes/j", None, "run"),
+    ("POST", "/identifications", {"campaign": "c"}, "run"),
+    ("GET", "/identifications", None, "read"),
+    ("GET", "/identifications/j", None, "read"),
+    ("DELETE", "/identifications/j", None, "run"),
+    *(("GET", f"/identifications/j/{name}", None, "read") for name in ("events", "modes", "frf", "result", "report")),
     ("POST", "/advice", {"machine": "m", "toolings": ["t"], "cut": {"feed_per_tooth_mm": 0.1}}, "run"),
     ("POST", "/keys", {"scopes": ["read"]}, "admin"),
     ("GET", "/keys", None, "admin"),
@@ -58,7 +66,7 @@ def test_every_call_is_in_the_list(http):
         for method in item
         if path.startswith("/v1")
     ]
-    patterns = {"m": "{id}", "k": "{id}", "c": "{id}", "t": "{name}", "n": "{name}"}
+    patterns = {"m": "{id}", "k": "{id}", "c": "{id}", "j": "{id}", "t": "{name}", "n": "{name}"}
     listed = [(m, "/".join(patterns.get(part, part) for part in p.split("/"))) for m, p, _, _ in CALLS]
     assert sorted(operations) == sorted(listed)
 

@@ -1,0 +1,371 @@
+"""What a job works with and who carries it out: steps done once, words in time, and an end whatever dies."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from api.jobs import desk as desks
+from api.jobs.backend import Carried
+from api.jobs.desk import Desk
+from api.jobs.worker import LEASE, JobWorker, carry, gone, place, process
+from api.security import new_id, now
+from api.stores.jobs import Job, Worker
+from api.stores.records import Machine
+from rcsa_ident.errors import InputError
+from tests.api.identifying import Steps, left
+
+
+@pytest.fixture
+def machine(store):
+    return store.machines.add(Machine(new_id(), "A", "M", "", now())).id
+
+
+def job(machine, **changed):
+    return replace(Job(new_id(), "A", "identification", machine, "c1", "{}", "queued", now()), **changed)
+
+
+def running(store, machine, **changed):
+    """The id of a job that worker w has taken up."""
+    id = store.jobs.add(job(machine, **changed), {}, 100).id
+    assert store.jobs.begin(id, "w", now()) is not None
+    return id
+
+
+class Quiet:
+    """A desk's surroundings: a job that runs, an engine, and the code with which the process would have ended."""
+
+    def __init__(self, store, machine):
+        self.store, self.id = store, running(store, machine)
+        self.steps, self.codes = Steps(), []
+
+    def desk(self, token="w"):
+        return Desk(self.store.jobs, self.id, token, partial(self.steps.remember, self.id), self.codes.append)
+
+
+@pytest.fixture
+def quiet(store, machine, monkeypatch):
+    monkeypatch.setattr(desks, "DELIVERY", 0.02)
+    monkeypatch.setattr(desks, "GRACE", 0.3)
+    return Quiet(store, machine)
+
+
+def test_a_step_is_computed_once(quiet):
+    calls = []
+
+    def compute(value):
+        calls.append(value)
+        return (value, 1.5)
+
+    for _ in range(2):
+        with quiet.desk() as desk:
+            assert desk.remember("a", partial(compute, 1)) == (1, 1.5)
+            assert desk.map(lambda x: compute(x)[0] * 10, [2, 3], "m", "stage") == [20, 30]
+    assert calls == [1, 2, 3]
+    assert json.loads(quiet.store.jobs.find(quiet.id).progress) == {"stage": "stage", "done": 2, "total": 2}
+
+
+def test_only_a_new_step_counts_as_coming_further(quiet):
+    def worked():
+        quiet.store.jobs.begin(quiet.id, "w", now())
+        with quiet.desk() as desk:
+            desk.remember("a", lambda: 1)
+        return quiet.store.jobs.find(quiet.id).attempts
+
+    assert worked() == 0
+    # one that dies at its second step again and again comes to its first one each time
+    assert [worked(), worked()] == [1, 2]
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.lists(st.lists(st.integers(), max_size=4), max_size=4), st.integers(0, 20))
+def test_wherever_it_is_interrupted_each_task_is_done_once(calls, killed_after):
+    """The process ends between two steps; the next one has the same results, and computes only what was missing."""
+    texts, done = {}, []
+
+    class Killed(BaseException):
+        pass
+
+    def engine(name, compute, budget):
+        if name not in texts:
+            if len(texts) == budget:
+                raise Killed
+            texts[name] = compute()
+        return texts[name]
+
+    def work(budget):
+        desk = Desk(None, "j", "w", partial(engine, budget=budget), left)
+
+        def task(x):
+            done.append(x)
+            return 2 * x
+
+        return [desk.map(task, tasks, f"{k}", "s") for k, tasks in enumerate(calls)]
+
+    with suppress(Killed):
+        work(killed_after)
+    wanted = [[2 * x for x in tasks] for tasks in calls]
+    assert work(10**6) == wanted
+    assert done == [x for tasks in calls for x in tasks]
+
+
+def test_refusals_are_remembered_as_such(quiet):
+    def refuse():
+        raise InputError("cuts", 3, "more", "here")
+
+    for _ in range(2):
+        with quiet.desk() as desk, pytest.raises(InputError, match="here: cuts: found 3, allowed is more"):
+            desk.remember("a", refuse)
+    assert quiet.steps.computed == [(quiet.id, "a")]
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        (InputError("cuts", "none", "some"), "cuts: found none, allowed is some"),
+        (RuntimeError("secret detail"), "something unexpected happened; the log has it under this job's id"),
+        (MemoryError(), "something unexpected happened; the log has it under this job's id"),
+    ],
+)
+@pytest.mark.parametrize("inside", [True, False])
+def test_a_job_that_fails_says_why(store, machine, fault, words, inside, caplog):
+    id = store.jobs.add(job(machine), {}, 10).id
+
+    def carrier(_job, desk):
+        def work():
+            raise fault
+
+        return desk.remember("a", work) if inside else work()
+
+    carry(store.jobs, {"identification": carrier}, "w", 3, id, partial(Steps().remember, id), left)
+    found = store.jobs.find(id)
+    assert found.state == "failed"
+    assert json.loads(found.problem)["detail"] == words
+    assert "secret" not in found.problem
+    entries = json.loads(found.problem)["errors"]
+    assert entries == ([{"field": "cuts", "found": "none", "allowed": "some"}] if isinstance(fault, InputError) else [])
+    assert isinstance(fault, InputError) or "Error" in caplog.text
+
+
+def test_a_job_that_is_cancelled_stops_where_it_looks_up(quiet):
+    with quiet.desk() as desk:
+        quiet.store.jobs.cancel("A", quiet.id, now())
+
+        def work():
+            start = time.monotonic()
+            while time.monotonic() - start < 10.0:
+                desk.word("trace", {"cost": 1.0})
+                time.sleep(0.01)
+
+        with pytest.raises(desks.Stopped):
+            work()
+    assert quiet.codes == []
+    assert quiet.store.jobs.find(quiet.id).state == "cancelled"
+
+
+def test_long_work_without_a_word_ends_with_its_process(quiet):
+    with quiet.desk():
+        quiet.store.jobs.cancel("A", quiet.id, now())
+        time.sleep(0.6)
+    assert quiet.codes == [0]
+
+
+def test_who_has_lost_a_job_says_nothing_more(quiet):
+    with quiet.desk():
+        quiet.store.jobs.begin(quiet.id, "another", now())
+        time.sleep(0.2)
+    assert quiet.codes[0] == 3
+
+
+def test_an_engine_that_refuses_ends_the_process_and_not_the_job(store, machine):
+    id = store.jobs.add(job(machine), {}, 10).id
+    codes = []
+
+    def engine(name, compute):
+        raise RuntimeError("another owner")
+
+    carry(store.jobs, {"identification": lambda _job, desk: desk.remember("a", dict)}, "w", 3, id, engine, codes.append)
+    assert codes == [3]
+    assert store.jobs.find(id).state == "running"
+
+
+def test_words_in_quick_succession_are_few_and_curves_fewer(quiet):
+    drawn = []
+    with quiet.desk() as desk:
+        end = time.monotonic() + 0.5
+        while time.monotonic() < end:
+            desk.word("trace", {"cost": 1.0})
+            desk.curve("fit x", lambda: drawn.append(1) or {"axis": "X"})
+    told = [e.kind for e in quiet.store.jobs.events(quiet.id, 0, 1000)]
+    assert 1 <= told.count("trace") <= 6
+    assert told.count("fit") == len(drawn) == 1
+
+
+def test_a_job_whose_process_dies_again_and_again_is_given_up(store, machine):
+    id = store.jobs.add(job(machine), {}, 10).id
+    for _ in range(3):
+        # taken up, and never heard of again
+        store.jobs.begin(id, "w", now())
+    carry(store.jobs, {"identification": lambda *_: pytest.fail("once more")}, "w", 3, id, None, left)
+    found = store.jobs.find(id)
+    assert found.state == "failed"
+    assert "died 3 times" in json.loads(found.problem)["detail"]
+
+
+class Fake:
+    """An engine that is told what it knows."""
+
+    def __init__(self, *carried):
+        self.known = list(carried)
+        self.calls = []
+
+    def submit(self, job, priority):
+        self.calls.append(("submit", job, priority))
+
+    def carried(self):
+        return self.known
+
+    def resume(self, job):
+        self.calls.append(("resume", job))
+
+    def forget(self, jobs):
+        self.calls.append(("forget", *jobs))
+
+
+def worker_of(store, *carried):
+    found = JobWorker(store.jobs, Fake(*carried), {}, 3)
+    found.id = "me"
+    store.jobs.claim(Worker("me", found.place, process(os.getpid()), found.token), None)
+    return found
+
+
+def test_what_was_accepted_is_handed_over_once(store, machine):
+    ids = [store.jobs.add(job(machine), {}, 10).id, store.jobs.add(job(machine, kind="lobes"), {}, 10).id]
+    worker = worker_of(store)
+    worker.look()
+    worker.look()
+    assert worker.backend.calls == [("submit", ids[0], 10), ("submit", ids[1], 1)]
+
+
+def test_what_the_engine_has_lost_is_handed_over_again(store, machine):
+    id = store.jobs.add(job(machine), {}, 10).id
+    worker = worker_of(store)
+    worker.look()
+    worker.round()
+    worker.look()
+    assert worker.backend.calls == [("submit", id, 10)] * 2
+
+
+@pytest.mark.parametrize(
+    ("state", "executor", "current", "expected"),
+    [
+        ("running", "dead", True, "resume"),
+        ("running", "me", True, None),
+        ("waiting", None, True, None),
+        ("waiting", None, False, "forget"),
+        ("running", "me", False, None),
+        ("over", "me", True, "forget"),
+    ],
+)
+def test_a_round_of_an_open_job(store, machine, state, executor, current, expected):
+    id = running(store, machine)
+    worker = worker_of(store, Carried(id, state, executor, current))
+    worker.round()
+    assert worker.backend.calls == ([] if expected is None else [(expected, id)])
+
+
+def test_a_round_of_what_has_ended(store, machine):
+    id = running(store, machine)
+    store.jobs.cancel("A", id, now())
+    worker = worker_of(store, Carried(id, "waiting"), Carried("gone", "over"))
+    worker.round()
+    assert worker.backend.calls == [("forget", "gone", id)] or worker.backend.calls == [("forget", *sorted([id, "gone"]))]
+
+
+def test_a_job_of_one_that_lives_elsewhere_is_left_to_it(store, machine, monkeypatch):
+    id = running(store, machine)
+    store.jobs.claim(Worker("other", "elsewhere", "1:1", "w"), None)
+    worker = worker_of(store, Carried(id, "running", "other"))
+    moment = [time.monotonic()]
+    monkeypatch.setattr("api.jobs.worker.time.monotonic", lambda: moment[0])
+    worker.round()
+    moment[0] += 0.9 * LEASE
+    store.jobs.beat("other", "w")
+    worker.round()
+    moment[0] += 0.9 * LEASE
+    worker.round()
+    assert worker.backend.calls == []
+    # not a sign of it for too long
+    moment[0] += 0.2 * LEASE
+    worker.round()
+    assert worker.backend.calls == [("resume", id)]
+
+
+def test_a_job_that_another_has_just_taken_over_is_left_to_it(store, machine):
+    id = running(store, machine)
+    store.jobs.claim(Worker("third", "elsewhere", "1:1", "t3"), None)
+    store.jobs.take(id, "w", "t3")
+    worker = worker_of(store, Carried(id, "running", "dead"))
+    worker.round()
+    assert worker.backend.calls == []
+
+
+def test_a_dead_process_of_this_place_is_known_at_once():
+    me = process(os.getpid())
+    assert me == process(os.getpid())
+    assert not gone(me)
+    assert place() == place()
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as child:
+        other = process(child.pid)
+        assert other != me
+        assert not gone(other)
+        child.kill()
+        child.wait()
+    if not other.endswith(":"):
+        assert gone(other)
+        # the same number, started at another time
+        assert gone(me.split(":")[0] + ":1")
+
+
+def test_workers_take_the_first_free_name(store):
+    first, second = (JobWorker(store.jobs, Fake(), {}, 3) for _ in range(2))
+    assert first._claim()
+    assert second._claim()
+    assert (first.id, second.id) == (f"{first.place}-1", f"{first.place}-2")
+    store.jobs.leave(first.id, first.token)
+    third = JobWorker(store.jobs, Fake(), {}, 3)
+    assert third._claim()
+    assert third.id == first.id
+    # one that was killed: its process is gone
+    store.jobs.leave(second.id, second.token)
+    store.jobs.claim(Worker(second.id, second.place, "999999999:1", "killed"), None)
+    fourth = JobWorker(store.jobs, Fake(), {}, 3)
+    assert fourth._claim()
+    assert fourth.id == second.id
+
+
+def test_a_worker_that_is_told_to_stop_leaves_nothing_behind(store, machine):
+    id = running(store, machine)
+    stop = threading.Event()
+
+    class Once(Fake):
+        def start(self, executor, carry):
+            stop.set()
+
+    worker = JobWorker(store.jobs, Once(), {}, 3)
+    store.jobs.begin(id, worker.token, now())
+    worker.run(lambda: None, stop)
+    assert store.jobs.workers() == []
+    # an end that was asked for is no attempt
+    assert store.jobs.find(id).attempts == 0
