@@ -42,6 +42,8 @@ class Asking:
 
     def __init__(self, url: str = "http://127.0.0.1:8000", key: str | None = None, http: httpx2.Client | None = None) -> None:
         self.http = httpx2.Client(base_url=url, timeout=60.0) if http is None else http
+        #: For answers that come when a long recording is read; a client that is given keeps its own patience.
+        self.patient: dict[str, Any] = {"timeout": httpx2.Timeout(60.0, read=1200.0)} if http is None else {}
         self.headers = {} if key is None else {"X-API-Key": key}
 
     def __enter__(self) -> Self:

@@ -19,8 +19,6 @@ from api.schemas.campaigns import CampaignAnswer, CampaignSummary, RecordingAnsw
 from api.schemas.common import Page
 
 _BLOCK = 1 << 20
-#: A long recording is read before the answer comes.
-_READ = httpx2.Timeout(60.0, read=1200.0)
 
 
 class Uploads(Asking):
@@ -89,7 +87,7 @@ class Uploads(Asking):
             path = _recording(campaign, name or file.name)
             return read(
                 RecordingAnswer,
-                self.send("PUT", path, content=iter(partial(opened.read, _BLOCK), b""), headers=headers, params=params, timeout=_READ),
+                self.send("PUT", path, content=iter(partial(opened.read, _BLOCK), b""), headers=headers, params=params, **self.patient),
             )
 
     def upload_in_parts(
@@ -122,7 +120,7 @@ class Uploads(Asking):
                 }
                 try:
                     answer = self.send(
-                        "PATCH", path, content=data, headers=headers, params={"replace": "true"} if replace else {}, timeout=_READ
+                        "PATCH", path, content=data, headers=headers, params={"replace": "true"} if replace else {}, **self.patient
                     )
                 except (httpx2.TransportError, ServiceError) as error:
                     failed += 1
@@ -160,7 +158,7 @@ class Uploads(Asking):
         with ExitStack() as stack:
             parts = [("files", (file.name, stack.enter_context(file.open("rb")), "application/octet-stream")) for file in files]
             path, params = f"/campaigns/{campaign}/recordings", {"replace": "true"} if replace else {}
-            return read(UploadAnswer, self.send("POST", path, files=parts, params=params, timeout=_READ))
+            return read(UploadAnswer, self.send("POST", path, files=parts, params=params, **self.patient))
 
     def upload_folder(self, machine: str, folder: Path, told: Callable[[RecordingAnswer], object] | None = None) -> CampaignAnswer:
         """Upload the folder of a campaign: campaign.toml, its toolings and every recording that is there.

@@ -2,28 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-
-@dataclass(frozen=True, slots=True)
-class Upload:
-    """A file that came, and what it should be.
-
-    Parameters
-    ----------
-    path : Path
-        Where it is; its name says nothing.
-    name : str
-        As the client calls it: its suffix says the format.
-    target : Path
-        Where its samples are written; nothing is there.
-    """
-
-    path: Path
-    name: str
-    target: Path
+from api.reading.declared import Upload
 
 
 def warm() -> None:

@@ -48,6 +48,25 @@ class File:
     cuts: tuple[str, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Upload:
+    """A file that came, and what it should be.
+
+    Parameters
+    ----------
+    path : Path
+        Where it is; its name says nothing.
+    name : str
+        As the client calls it: its suffix says the format.
+    target : Path
+        Where its samples are written; nothing is there.
+    """
+
+    path: Path
+    name: str
+    target: Path
+
+
 def recording_name(text: str) -> str:
     """Return the last part of a path as the service writes it: one form for letters that have two."""
     return unicodedata.normalize("NFC", re.split(r"[/\\]", text)[-1])

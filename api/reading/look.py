@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from api.reading.calls import Upload
-from api.reading.declared import campaign_of_text
+from api.reading.declared import Upload, campaign_of_text
 from api.reading.normalised import read_normalised, write_normalised
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import in_si, read_signals

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from api.reading.calls import Upload
+from api.reading.declared import Upload
 from rcsa_ident.signals.recording import Sensor
 
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from api.files import NORMALISED, UPLOADS, Files
 from api.reading import calls
-from api.reading.declared import files_of
+from api.reading.declared import Upload, files_of
 from api.reading.reader import Reading
 from api.stores.campaigns import Campaign, FileKey, Recording
 from api.stores.records import Store, Taken, Unavailable
@@ -96,7 +96,7 @@ class Uploads:
         air = await asyncio.to_thread(self._air, campaign, cut) if role == "cut" else None
         target = self.files.spare(campaign.group)
         try:
-            upload = calls.Upload(received.path, name, target)
+            upload = Upload(received.path, name, target)
             found = await self.reader.run(calls.look, upload, campaign.text, cut, role, self._path(air))
             recording = Recording(
                 campaign.group,

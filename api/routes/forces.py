@@ -14,8 +14,7 @@ from starlette.background import BackgroundTask
 
 from api.parts import Parts, ThisService
 from api.problems import Problem
-from api.reading.calls import Upload
-from api.reading.declared import FORMATS
+from api.reading.declared import FORMATS, Upload
 from api.reading.plain import read_plain
 from api.reading.uploads import Received
 from api.routes.common import BODY, guard, problems
