@@ -131,3 +131,11 @@ def test_the_readme_draws_the_tree_that_stands():
     assert not missing, f"drawn, but not there: {missing}"
     modules = {str(p.relative_to(ROOT)) for p in PACKAGE.rglob("*.py") if p.name != "__init__.py"}
     assert modules <= drawn, f"there, but not drawn: {sorted(modules - drawn)}"
+
+
+def test_every_setting_of_the_service_is_described():
+    from api.settings import Settings
+
+    table = [line.split("|")[1] for line in (ROOT / "docs" / "service.md").read_text().splitlines() if line.startswith("| `")]
+    described = {name for cell in table for name in re.findall(r"`([A-Z_]+)`", cell)}
+    assert {name.upper() for name in Settings.__dataclass_fields__} == described
