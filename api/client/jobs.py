@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -38,7 +39,7 @@ class Jobs(Asking):
         end = time.monotonic() + seconds
         while True:
             left = max(end - time.monotonic(), 0.0)
-            job = self.job(id, wait=int(min(left, 20.0)))
+            job = self.job(id, wait=min(math.ceil(left), 20))
             if job.finished is not None or left == 0.0:
                 return job
 
