@@ -31,6 +31,8 @@ def ready(parts: ThisService) -> State:
     parts.store.check()
     if not parts.work.ready:
         raise Problem(503, "workers are starting", headers={"Retry-After": "2"})
+    if not parts.streams.host.ready:
+        raise Problem(503, "the process of the streams is starting", headers={"Retry-After": "2"})
     if parts.crew is not None and not parts.crew.ready:
         raise Problem(503, "no worker for jobs is alive: those that are accepted wait", headers={"Retry-After": "5"})
     return State(status="ok")

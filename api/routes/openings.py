@@ -36,6 +36,8 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Quantity, Sensor
 
 _RPM = math.pi / 30.0
+#: That an observer is made from, at least.
+REVOLUTIONS = 12
 #: Of a replay [s]: what is read at once, and what comes at once.
 PART, TICK = 1.0, 0.02
 
@@ -121,7 +123,10 @@ async def logger(parts: Parts, group: str, hello: StreamHello) -> Opening:
         axes = tuple(hello.axes) if hello.axes is not None else displacement_axes(channels)
         if len(set(axes)) < len(axes):
             raise InputError("axes", list(axes), "each axis once")
-        settle = math.ceil(hello.settle_s * hello.sampling_rate_hz)
+        seconds = max(hello.settle_s, 0.0 if speed is None else REVOLUTIONS * 2.0 * math.pi / speed)
+        if seconds > 0.5 * parts.settings.stream_buffer_seconds:
+            raise InputError("spindle_speed_rpm", hello.spindle_speed_rpm, f"a speed of which {REVOLUTIONS} revolutions can wait")
+        settle = math.ceil(seconds * hello.sampling_rate_hz)
         air = None
         if hello.air is not None:
             if hello.begins == "air":

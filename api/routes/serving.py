@@ -29,6 +29,8 @@ from rcsa_ident.errors import InputError
 log = logging.getLogger("rcsa_ident.service")
 #: Time for what waits for a reader at the end, and for a steady part that an observer can be made from [s].
 LINGER, SETTLING = 5.0, 120.0
+#: Fields of errors that the next part of a stream may not have, and what lies between two attempts [s].
+UNSTEADY, PAUSE = ("recording", "recording length", "spindle_speed_rpm", "trigger"), 0.5
 #: Between two looks at the key [s].
 LOOK = 20.0
 #: An index further ahead is a fault of its sender, not a gap [s].
@@ -165,6 +167,8 @@ async def finished(hub: Hub, session: Session) -> None:
     session.arrived.set()
     if session.stage is not Stage.LIVE or session.counts.backlog:
         await session.drained.wait()
+    if session.stage is Stage.ENDED:
+        return
     hub.tell_status(session, "end")
     hub.close(session, End())
 
@@ -189,7 +193,7 @@ async def _prepared(parts: Parts, session: Session, opening: Opening) -> None:
         try:
             plan, ready = await _patiently(lambda window=window: opening.design(parts.work, *window))  # type: ignore[misc]
         except InputError as error:
-            if opening.source is not None or loop.time() > limit:
+            if opening.source is not None or error.field not in UNSTEADY or loop.time() > limit:
                 raise refused or error from None
             # perhaps the spindle has still come up to speed, or the tool has entered: the next second may do
             refused, detail = error, problems.of_input(error)
@@ -197,6 +201,7 @@ async def _prepared(parts: Parts, session: Session, opening: Opening) -> None:
                 listener.tell("settling", detail=detail.detail, errors=detail.errors)
             session.stage = Stage.SETTLING if session.stage is Stage.DESIGNING else session.stage
             parts.metrics.missed(0, session.skip(window[0] + opening.settle))
+            await asyncio.sleep(PAUSE)
             continue
         hub.begin(session, plan, window[0], {"session": session.about.id, **ready})
     if opening.source is not None:

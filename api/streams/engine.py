@@ -16,7 +16,11 @@ HEADER = struct.Struct("<BQQdddI")
 #: To the process.
 OPEN, BLOCK, CLOSE = 1, 2, 3
 #: From the process.
-READY, FORCES, FAILED = 11, 12, 13
+READY, FORCES, REFUSED, FAILED = 11, 12, 13, 14
+
+
+class Endless(Exception):
+    """Signals whose forces are not finite."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +32,7 @@ class Message:
     kind : int
         OPEN: content is a `Plan`, pickled by one of the service's own workers. BLOCK: content is float64[samples, channels], `first`
         its index. FORCES: content is float64[samples, axes], `drift` of the spindle's speed as a share, `known` 1 where the
-        spindle's angle was.
+        spindle's angle was. REFUSED: forces are not finite. FAILED: content is what is logged.
     session : int
     first : int
     arrived : float [s]
@@ -108,6 +112,9 @@ class Engine:
                 self.sessions.pop(message.session, None)
             elif message.session in self.sessions:
                 return self._forces(message)
+        except Endless:
+            self.sessions.pop(message.session, None)
+            return Message(REFUSED, message.session)
         except Exception as error:
             self.sessions.pop(message.session, None)
             return Message(FAILED, message.session, content=repr(error).encode()[:2000])
@@ -123,7 +130,7 @@ class Engine:
             state, block = plan.observer.run(state, *plan.signals(samples))
         force = block.force[:, list(plan.order)]
         if not np.all(np.isfinite(force)):
-            raise ArithmeticError("forces that are not finite")
+            raise Endless
         self.sessions[message.session] = plan, state
         drift, known = plan.observer.drift(state), float(state.angle.known)
         return Message(FORCES, message.session, message.first, message.arrived, drift, known, force.astype("<f8").tobytes())

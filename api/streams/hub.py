@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from api.streams.engine import BLOCK, CLOSE, FAILED, FORCES, OPEN, Message
+from api.streams.engine import BLOCK, CLOSE, FAILED, FORCES, OPEN, REFUSED, Message
 from api.streams.listener import Listener
 from api.streams.process import Host
 from api.streams.session import About, End, Session, Stage
@@ -158,6 +158,9 @@ class Hub:
             fields = {"session": session.about.id, "found": message.content.decode("utf-8", "replace")}
             log.error("a stream has failed", extra={"fields": fields})
             self.close(session, End(1011, 500, _UNEXPECTED))
+        elif message.kind == REFUSED:
+            fault = {"field": "samples", "found": "signals whose forces are not finite", "allowed": "signals of the sensors"}
+            self.close(session, End(1008, 422, "samples: found signals whose forces are not finite", (fault,)))
         elif message.kind == FORCES:
             values = np.frombuffer(message.content, "<f8").reshape(-1, len(session.about.axes))
             delay = time.monotonic() - message.arrived

@@ -332,8 +332,8 @@ def test_forces_that_are_not_finite_end_the_stream(shop):
         object.__setattr__(state.observer.axes[0], "offset", 1e308)
         send(socket, len(raw), raw)
         code, problem = closed(socket)
-    assert code == 1011
-    assert problem["status"] == 500
+    assert code == 1008
+    assert problem["errors"][0]["found"] == "signals whose forces are not finite"
 
 
 def test_the_process_of_the_streams_is_replaced_when_it_dies(tmp_path):
@@ -362,3 +362,31 @@ def test_the_process_of_the_streams_is_replaced_when_it_dies(tmp_path):
             break
         time.sleep(0.05)
     assert not os.path.exists(f"/proc/{second}")
+
+
+def test_a_slow_spindle_has_enough_revolutions(shop):
+    http, id = shop
+    for speed, settle in ((600, 12 * 0.1), (6000, 0.2)):
+        with http.websocket_connect(STREAM) as socket:
+            socket.send_json(hello(id, spindle_speed_rpm=speed))
+            assert until(socket, "opened")[0]["settle_samples"] == pytest.approx(settle * RATE, abs=1)
+
+
+def test_what_the_next_second_can_not_mend_ends_at_once(shop):
+    """One axis is asked for where the channels and the machine have two."""
+    http, id = shop
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id, axes=["X"]))
+        send(socket, 0, signals(2.0, 2.3))
+        code, problem = closed(socket)
+    assert (code, problem["errors"][0]["field"]) == (1008, "axes")
+
+
+def test_the_service_is_ready_when_the_streams_are(tmp_path):
+    near = Near()
+    with streaming(tmp_path, near) as (http, _):
+        assert http.get("/ready").status_code == 200
+        near.ready = False
+        answer = http.get("/ready")
+        assert answer.status_code == 503
+        assert "streams" in answer.json()["detail"]

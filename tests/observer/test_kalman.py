@@ -48,6 +48,21 @@ def plain_filter(kalman, measured):
     return plain, force, means, covariances
 
 
+def test_what_nobody_has_measured_is_predicted(kalman, measured):
+    """Powers of the transition matrix on the state, and nothing else."""
+    state = kalman.run(kalman.init(), measured)[0]
+    a, _, force, _ = kalman.model.matrices()
+    x, expected = state.modes.T.ravel()[kalman.model.live], []
+    for _ in range(50):
+        x = a @ x
+        expected.append(force @ x)
+    after, found = kalman.predict(state, 50)
+    np.testing.assert_allclose(found[:, 0], expected, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_array_equal(found[:, 2], 0.0)
+    np.testing.assert_allclose(after.modes.T.ravel()[kalman.model.live], x, atol=1e-9 * np.abs(x).max())
+    assert after.count == state.count + 50
+
+
 def test_agrees_with_filterpy(kalman, measured):
     """Through the settling phase and, with the gain that it leads to, for ever after."""
     _, force, means, covariances = plain_filter(kalman, measured)

@@ -132,6 +132,22 @@ def test_a_short_gap_is_bridged(gap):
     assert np.all(np.std(worse[:1000] - whole[:1000], axis=0) > 3.0 * np.std(bridged[:1000] - whole[:1000], axis=0))
 
 
+def test_in_a_gap_the_oscillators_go_on_whatever_stands_for_the_lost_samples():
+    """Noise in the memory of the last revolution: forces expected in the gap do not know of it."""
+    samples, _ = streamed()
+    state = run(observer(), samples[: 2 * SECOND])[0]
+    inner, count = observer().observer, 500
+    noise = 1e-6 * np.random.default_rng(2).standard_normal((2, count, 2))
+    expected = [inner.bridge(state.observer, gap, 1e4 * gap)[1] for gap in noise]
+    np.testing.assert_array_equal(expected[0].force, expected[1].force)
+    whole = run(observer(), samples[: 2 * SECOND + count])[1][-count:]
+    assert np.all(np.std(expected[0].force - whole, axis=0) < 0.1 * np.std(whole, axis=0))
+    # and what comes behind the gap shows that the stream's own bridge is of that kind
+    confused = replace(state, gap=state.gap + 3e-8 * np.random.default_rng(3).standard_normal(state.gap.shape))
+    after = [observer().bridge(each, count).observer.axes[0].filter.modes for each in (state, confused)]
+    np.testing.assert_array_equal(after[0], after[1])
+
+
 def test_behind_a_long_gap_the_observer_begins_anew():
     samples, true = streamed()
     begin, count = round(1.8 * RATE), round(2.0 * LONGEST_BRIDGE * RATE)
