@@ -64,7 +64,7 @@ def test_from_dropping_recordings_to_the_best_speed(opened, client: Client, tmp_
     if page.get_by_label("Machine", exact=True).last.is_visible():
         page.get_by_label("Machine", exact=True).last.select_option(label="A new machine")
     page.get_by_label("Its name").fill("HPM 800U")
-    page.get_by_role("button", name="Take it in").click()
+    page.get_by_role("button", name="Take it in", exact=True).click()
 
     # every recording's verdict
     expect(page.locator("h1")).to_have_text("HPM sample machine")
