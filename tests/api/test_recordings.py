@@ -375,7 +375,7 @@ def test_the_client_goes_on_after_lost_connections(client, campaign, tmp_path, m
         return send(method, path, **further)
 
     monkeypatch.setattr(client, "send", poor)
-    monkeypatch.setattr("api.client.time.sleep", lambda _: None)
+    monkeypatch.setattr("api.client.uploads.time.sleep", lambda _: None)
     path = made(tmp_path, "c0_cut.h5")
     part = path.stat().st_size // 4 + 1
     found = client.upload_in_parts(campaign, path, part=part)
