@@ -114,7 +114,8 @@ def create_app(
     problems.install(app)
     app.include_router(health.router)
     app.include_router(page.router)
-    for each in (keys, machines, toolings, libraries, examples, campaigns, recordings, resumed, together, queries, identifications, forces, streams):
+    about = (keys, machines, toolings, libraries, examples)
+    for each in (*about, campaigns, recordings, resumed, together, queries, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(Observed, parts=parts)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]

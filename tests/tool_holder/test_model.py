@@ -216,7 +216,10 @@ def test_laws_for_any_assembly(assembly):
     """Reciprocal, passive, with two rigid-body motions, and the fast way is the full one."""
     omega = 2.0 * np.pi * np.linspace(300.0, 5000.0, 12)
     structure = tool_holder_structure(assembly, 5000.0)
-    np.testing.assert_allclose(natural_frequencies(structure)[:2], 0.0, atol=2.0)
+    natural = natural_frequencies(structure)
+    # an eigenvalue is good to a few roundings of the largest one, and frequencies are their roots
+    assert np.all(natural[:2] < 1e-7 * natural[-1])
+    assert np.all(natural[:2] < 1e-2 * natural[2])
     fast, full = tool_holder_receptance(assembly, omega).values, structure.receptance(omega).values
     scale = np.sqrt(np.abs(np.einsum("nii->ni", full)))
     size = scale[:, :, None] * scale[:, None, :]
