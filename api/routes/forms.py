@@ -47,7 +47,7 @@ async def events(request: Request, parts: Parts) -> AsyncIterator[Head | bytes |
     told = parse_options_header(request.headers.get("content-type", ""))[1]
     found: list[Head | bytes | None] = []
     heads: dict[bytes, bytes] = {}
-    name, value, count = bytearray(), bytearray(), 0
+    name, value, count, whole = bytearray(), bytearray(), 0, False
 
     def begin() -> None:
         nonlocal count
@@ -61,6 +61,10 @@ async def events(request: Request, parts: Parts) -> AsyncIterator[Head | bytes |
         name.clear()
         value.clear()
 
+    def end() -> None:
+        nonlocal whole
+        whole = True
+
     try:
         parser = MultipartParser(
             told.get(b"boundary", b""),
@@ -72,6 +76,7 @@ async def events(request: Request, parts: Parts) -> AsyncIterator[Head | bytes |
                 "on_headers_finished": lambda: found.append(_head(heads)),
                 "on_part_data": lambda data, start, end: found.append(bytes(data[start:end])),
                 "on_part_end": lambda: found.append(None),
+                "on_end": end,
             },
         )
         if not told.get(b"boundary"):
@@ -82,6 +87,9 @@ async def events(request: Request, parts: Parts) -> AsyncIterator[Head | bytes |
                 yield each
             found.clear()
         parser.finalize()
+        if not whole:
+            # the last part may be cut off, which the parser does not mind
+            raise FormParserError
     except FormParserError:
         raise Problem(400, "the body can not be read: it is no complete multipart/form-data") from None
 

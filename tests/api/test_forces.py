@@ -211,9 +211,9 @@ def test_bad_forms(shop):
     kind = {"Content-Type": "multipart/form-data; boundary=b"}
     part = b'--b\r\nContent-Disposition: form-data; name="query"\r\n\r\n' + query(machine)
     for body, headers, status in (
-        (b"", kind, 422),
+        (b"", kind, 400),
         (b"nonsense", kind, 400),
-        (part, kind, 422),
+        (part, kind, 400),
         (part + b"\r\n--b--\r\n", kind, 422),
         (part + b"\r\n" + part + b"\r\n--b--\r\n", kind, 422),
         (part.replace(b'"query"', b'"more"') + b"\r\n--b--\r\n", kind, 422),

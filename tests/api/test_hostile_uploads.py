@@ -251,6 +251,15 @@ def test_forms_that_are_none(campaign, raw, kind):
     assert [p for p in (campaign.folder / "files").rglob("*") if p.is_file()] == []
 
 
+def test_a_form_that_breaks_off_is_told(campaign):
+    """Without the boundary at its end the last file may be a part of one: it is not kept, and not left out in silence."""
+    path, kind = campaign.paths["x", ".h5"].rsplit("/", 1)[0], {"Content-Type": "multipart/form-data; boundary=x"}
+    head = b"--x\r\nContent-Disposition: form-data; name=f; filename=c0_cut.h5\r\n\r\nabc"
+    for end in (b"", b"\r\n", b"\r\n--x", b"\r\n--x-", b"\r\n--x\r\n"):
+        assert campaign.http.post(path, content=head + end, headers=kind).status_code == 400, end
+    assert campaign.http.post(path, content=head + b"\r\n--x--", headers=kind).status_code == 200
+
+
 def test_a_form_of_very_many_parts(campaign):
     path = campaign.paths["x", ".h5"].rsplit("/", 1)[0]
     part = b"--x\r\nContent-Disposition: form-data; name=f; filename=a\r\n\r\n\r\n"
