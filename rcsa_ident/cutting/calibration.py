@@ -93,7 +93,8 @@ class ForceCalibration:
         slope[[t, r]] = -1.0 / self.value[t], 1.0 / self.value[r]
         deviation = np.sqrt(np.maximum(np.diag(self.covariance)[[t, r]], 1e-300))
         factor = float(np.max(self.half_width[[t, r]] / deviation)) / _NORMAL_95
-        return min(factor * float(np.sqrt(slope @ self.covariance @ slope)), 1.0)
+        # of errors that cancel, rounding may leave less than nothing
+        return min(factor * float(np.sqrt(max(slope @ self.covariance @ slope, 0.0))), 1.0)
 
 
 def unit_lines(lines: Lines, cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray) -> ComplexArray:
