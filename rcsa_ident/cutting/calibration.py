@@ -94,7 +94,7 @@ class ForceCalibration:
         deviation = np.sqrt(np.maximum(np.diag(self.covariance)[[t, r]], 1e-300))
         factor = float(np.max(self.half_width[[t, r]] / deviation)) / _NORMAL_95
         # of errors that cancel, rounding may leave less than nothing
-        return min(factor * float(np.sqrt(max(slope @ self.covariance @ slope, 0.0))), 1.0)
+        return min(factor * float(np.sqrt(max(float(slope @ self.covariance @ slope), 0.0))), 1.0)
 
 
 def unit_lines(lines: Lines, cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray) -> ComplexArray:
