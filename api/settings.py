@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.scaleout import ADDRESS
@@ -169,24 +169,12 @@ class Settings:
 
 def from_environment(environment: Mapping[str, str]) -> Settings:
     """Return the settings of ``RCSA_IDENT_DATA``, ``RCSA_IDENT_PORT`` and so on; what is not there keeps its default."""
-    readers: dict[str, Callable[[str], Any]] = {
-        "data": Path,
-        "database": str,
-        "host": str,
-        "dask": str,
-        "examples": Path,
-        "keys": _switch,
-        "work_seconds": float,
-    }
-    readers |= dict.fromkeys(("upload_seconds", "upload_idle_seconds", "reader_seconds", "reader_wall_seconds"), float)
-    readers |= dict.fromkeys(("job_work_seconds", "watch_seconds"), float)
-    readers |= {"stream_idle_seconds": float, "stream_buffer_seconds": float}
     given: dict[str, Any] = {}
-    for name in Settings.__dataclass_fields__:
+    for name, kind in get_type_hints(Settings).items():
         text = environment.get(PREFIX + name.upper(), "").strip()
         if text:
             try:
-                given[name] = readers.get(name, int)(text)
+                given[name] = _READERS[kind](text)
             except ValueError:
                 allowed = "on or off" if name == "keys" else "a number"
                 raise InputError(PREFIX + name.upper(), text, allowed) from None
@@ -197,3 +185,6 @@ def _switch(text: str) -> bool:
     if text.lower() not in ("on", "off", "true", "false", "1", "0"):
         raise ValueError(text)
     return text.lower() in ("on", "true", "1")
+
+
+_READERS: dict[Any, Callable[[str], Any]] = {Path: Path, str: str, int: int, float: float, bool | None: _switch}

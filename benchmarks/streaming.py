@@ -8,6 +8,7 @@ identified from the sample runs. The client is this process, on the same cores.
 from __future__ import annotations
 
 import argparse
+import functools
 import os
 import tempfile
 import threading
@@ -222,6 +223,9 @@ def hour(seconds: float) -> None:
                             end.update(message.content)
                         moved.notify()
 
+            def near(sent: int) -> bool:
+                return sent - answered[0] < 2.0 * turning.rate
+
             thread = threading.Thread(target=listen)
             thread.start()
             first, begin = 0, time.perf_counter()
@@ -232,7 +236,7 @@ def hour(seconds: float) -> None:
                 stream.send(part, first)
                 first += part.shape[0]
                 with moved:
-                    moved.wait_for(lambda first=first: first - answered[0] < 2.0 * turning.rate, 120.0)  # type: ignore[misc]
+                    moved.wait_for(functools.partial(near, first), 120.0)
                 if first >= mark * turning.rate:
                     print(f"{mark / 60.0:5.0f} min: {memory()}", flush=True)
                     mark += 600.0

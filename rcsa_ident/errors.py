@@ -30,7 +30,7 @@ class InputError(RcsaIdentError, ValueError):
         place = f"{where}: " if where else ""
         super().__init__(f"{place}{field}: found {_short(found)}, allowed is {allowed}")
 
-    def __reduce__(self) -> tuple[type[InputError], tuple[str, object, str, str]]:
+    def __reduce__(self) -> tuple[type[InputError], tuple[object, ...]]:
         """Pickle with all arguments, so that the error crosses processes."""
         return type(self), (self.field, self.found, self.allowed, self.where)
 

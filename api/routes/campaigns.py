@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import zipfile
 from collections.abc import Iterator
+from pathlib import Path as FilePath
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Request, Response
@@ -16,6 +16,7 @@ from api.files import UPLOADS
 from api.parts import Parts, ThisService
 from api.problems import Problem
 from api.reading.declared import LARGEST, declare, toml_text
+from api.routes.archives import zipped
 from api.routes.common import BODY, After, Limit, MachineId, found_or_404, guard, page, problems, utf8
 from api.routes.machines import Repeat
 from api.schemas.campaigns import EXAMPLE, CampaignAnswer, CampaignSummary, CutAnswer, FileState, NewCampaign, VerdictAnswer
@@ -38,7 +39,6 @@ _BODY = {
         TOML: {"schema": {"type": "string"}, "example": _EXAMPLE_TOML},
     },
 }
-_BLOCK = 1 << 20
 
 
 @router.post(
@@ -130,7 +130,7 @@ def archive(id: CampaignId, parts: ThisService, caller: WhoAsks) -> StreamingRes
     if not any(row.role == "cut" for row in rows.values()):
         raise Problem(409, "no recording of a cut is uploaded yet")
     headers = {"Content-Disposition": f'attachment; filename="campaign-{campaign.id}.zip"'}
-    return StreamingResponse(_zipped(parts, campaign, rows), media_type=ZIP, headers=headers)
+    return StreamingResponse(zipped(_members(parts, campaign, rows)), media_type=ZIP, headers=headers)
 
 
 @router.delete(
@@ -179,38 +179,9 @@ def _cut(cut: dict[str, Any], rows: dict[str, Recording]) -> CutAnswer:
     return CutAnswer(**cut | files, verdict=verdict)
 
 
-class _Stream:
-    """A file that only takes in, and hands on."""
-
-    def __init__(self) -> None:
-        self.parts: list[bytes] = []
-
-    def write(self, data: bytes) -> int:
-        self.parts.append(bytes(data))
-        return len(data)
-
-    def flush(self) -> None:
-        """Nothing waits."""
-
-    def taken(self) -> bytes:
-        """Return what has come since."""
-        found, self.parts = b"".join(self.parts), []
-        return found
-
-
-def _zipped(parts: Parts, campaign: Campaign, rows: dict[str, Recording]) -> Iterator[bytes]:
-    """Yield a ZIP archive while it is made: measured signals hardly shrink, so nothing is packed."""
-    stream = _Stream()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED, allowZip64=True) as out:  # type: ignore[call-overload]
-        out.writestr("campaign.toml", toml_text(campaign.text, rows.__contains__))
-        for name, text in json.loads(campaign.text)["toolings"].items():
-            out.writestr(f"toolings/{name}.toml", text)
-        for name, row in rows.items():
-            with (
-                parts.files.path(campaign.group, UPLOADS, row.sha256).open("rb") as file,
-                out.open(f"recordings/{name}", "w", force_zip64=True) as entry,
-            ):
-                while block := file.read(_BLOCK):
-                    entry.write(block)
-                    yield stream.taken()
-    yield stream.taken()
+def _members(parts: Parts, campaign: Campaign, rows: dict[str, Recording]) -> Iterator[tuple[str, bytes | FilePath]]:
+    yield "campaign.toml", toml_text(campaign.text, rows.__contains__).encode()
+    for name, text in json.loads(campaign.text)["toolings"].items():
+        yield f"toolings/{name}.toml", text.encode()
+    for name, row in rows.items():
+        yield f"recordings/{name}", parts.files.path(campaign.group, UPLOADS, row.sha256)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-import zipfile
-from collections.abc import Iterator
 from pathlib import Path as Folder
 from typing import Annotated
 
@@ -13,6 +11,7 @@ from fastapi.responses import FileResponse, StreamingResponse
 
 from api.parts import Parts, ThisService
 from api.problems import Problem
+from api.routes.archives import zipped, zipped_bytes
 from api.routes.common import guard, problems
 from api.schemas.libraries import Example, Examples
 from api.security import Guarded
@@ -32,7 +31,6 @@ _ABOUT = {
     "small-campaign.zip": "A campaign of two cuts with their air cuts: to see uploads and verdicts.",
 }
 SAMPLE, _SAMPLE_ABOUT = "sample-campaign.zip", "A campaign with two toolings: enough for an identification."
-_BLOCK = 1 << 18
 
 
 @router.get("", summary="List examples", openapi_extra=guard("read"), responses=problems())
@@ -40,7 +38,7 @@ def list_examples(parts: ThisService) -> Examples:
     items = [Example(name=name, size_bytes=(_FOLDER / name).stat().st_size, about=about) for name, about in _ABOUT.items()]
     members = _sample(parts)
     if members:
-        items.append(Example(name=SAMPLE, size_bytes=_zip_bytes(members), about=_SAMPLE_ABOUT))
+        items.append(Example(name=SAMPLE, size_bytes=zipped_bytes(members), about=_SAMPLE_ABOUT))
     return Examples(items=items)
 
 
@@ -61,7 +59,7 @@ def get_example(name: Annotated[str, Path(pattern=r"^[A-Za-z0-9.-]{1,64}$")], pa
     if not members:
         raise Problem(404, "there is no such example")
     headers = {"Content-Disposition": f'attachment; filename="{SAMPLE}"'}
-    return StreamingResponse(_zipped(members), media_type=_TYPES[".zip"], headers=headers)
+    return StreamingResponse(zipped(members), media_type=_TYPES[".zip"], headers=headers)
 
 
 def _sample(parts: Parts) -> list[tuple[str, Folder]]:
@@ -78,37 +76,3 @@ def _sample(parts: Parts) -> list[tuple[str, Folder]]:
     paths += [path for cut in campaign.cuts for path in (cut.recording, cut.air) if path is not None]
     members = {path.resolve(): path for path in paths}
     return [(there.relative_to(root).as_posix(), path) for there, path in members.items() if there.is_file() and there.is_relative_to(root)]
-
-
-def _zip_bytes(members: list[tuple[str, Folder]]) -> int:
-    """Length of the archive: for each member a header, what says how long it was, and an entry in the list at the end."""
-    return sum(path.stat().st_size + 30 + 16 + 46 + 2 * len(name.encode()) for name, path in members) + 22
-
-
-class _Sink:
-    """Takes what an archive is made of until somebody fetches it."""
-
-    def __init__(self) -> None:
-        self.parts: list[bytes] = []
-
-    def write(self, data: bytes) -> int:
-        self.parts.append(bytes(data))
-        return len(data)
-
-    def flush(self) -> None:
-        pass
-
-    def taken(self) -> bytes:
-        found, self.parts = b"".join(self.parts), []
-        return found
-
-
-def _zipped(members: list[tuple[str, Folder]]) -> Iterator[bytes]:
-    sink = _Sink()
-    with zipfile.ZipFile(sink, "w", zipfile.ZIP_STORED) as archive:  # type: ignore[call-overload]
-        for name, path in members:
-            with path.open("rb") as source, archive.open(name, "w") as entry:
-                while block := source.read(_BLOCK):
-                    entry.write(block)
-                    yield sink.taken()
-    yield sink.taken()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 import logging
 from collections.abc import Awaitable, Callable
 from typing import Any
@@ -191,7 +192,7 @@ async def _prepared(parts: Parts, session: Session, opening: Opening) -> None:
             continue
         session.stage = Stage.DESIGNING
         try:
-            plan, ready = await _patiently(lambda window=window: opening.design(parts.work, *window))  # type: ignore[misc]
+            plan, ready = await _patiently(functools.partial(opening.design, parts.work, *window))
         except InputError as error:
             if opening.source is not None or error.field not in UNSTEADY or loop.time() > limit:
                 raise refused or error from None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from datetime import timedelta
 from typing import Any
 
 from sqlalchemy import Connection, Engine, create_engine, event, text
@@ -15,8 +14,6 @@ from api.stores import tables
 from api.stores.records import Unavailable
 from rcsa_ident.errors import InputError
 
-#: How long an idempotency key is remembered.
-REMEMBERED = timedelta(days=1)
 _BUSY_MS = 5000
 
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from datetime import UTC, datetime
 from typing import Any
 
-from sqlalchemy import Connection, Engine, Select, Table, delete, insert, select, update
+from sqlalchemy import Engine, Select, Table, delete, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from api.stores import tables
 from api.stores.campaigns import Campaigns, Recordings
-from api.stores.database import REMEMBERED, Database, open_engine
+from api.stores.database import Database, open_engine
 from api.stores.jobs import Jobs
 from api.stores.records import ABSENT, Document, Documents, Key, Keys, Machine, Machines, Stale, Taken
+from api.stores.repeats import earlier, forget_old
 from api.stores.sql_campaigns import SqlCampaigns, SqlRecordings, delete_campaigns
 from api.stores.sql_jobs import SqlJobs, forget_jobs
 
@@ -69,6 +69,10 @@ def _key(row: Any) -> Key:
     return Key(**data | {"scopes": tuple(data["scopes"].split())})
 
 
+def _first(row: Any) -> Machine:
+    return Machine(row.id, row.group, row.name, row.description, row.created)
+
+
 class SqlMachines:
     """Machines in a table."""
 
@@ -80,30 +84,20 @@ class SqlMachines:
         try:
             with self.store.writing() as connection:
                 if repeat is not None:
-                    before = (datetime.now(UTC) - REMEMBERED).isoformat()
-                    connection.execute(delete(r).where(r.c.created < before))
-                    earlier = self._earlier(connection, machine.group, repeat)
-                    if earlier is not None:
-                        return earlier
+                    forget_old(connection, r)
+                    first = earlier(connection, r, machine.group, repeat)
+                    if first is not None:
+                        return _first(first)
                     connection.execute(insert(r).values(asdict(machine) | {"key": repeat[0], "digest": repeat[1]}))
                 connection.execute(insert(tables.machines).values(asdict(machine)))
                 return machine
         except IntegrityError:
             # somebody else was first between look and write, or has the name
             with self.store.reading() as connection:
-                earlier = None if repeat is None else self._earlier(connection, machine.group, repeat)
-            if earlier is None:
+                first = None if repeat is None else earlier(connection, r, machine.group, repeat)
+            if first is None:
                 raise Taken("name") from None
-            return earlier
-
-    def _earlier(self, connection: Connection, group: str, repeat: tuple[str, str]) -> Machine | None:
-        r = tables.repeats
-        row = connection.execute(select(r).where(r.c.group == group, r.c.key == repeat[0])).first()
-        if row is None:
-            return None
-        if row.digest != repeat[1]:
-            raise Taken("idempotency key")
-        return Machine(row.id, group, row.name, row.description, row.created)
+            return _first(first)
 
     def get(self, group: str, id: str) -> Machine | None:
         t = tables.machines

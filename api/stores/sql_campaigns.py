@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
-from datetime import UTC, datetime
 from typing import Any
 
 from sqlalchemy import Connection, Select, delete, func, insert, select, update
@@ -13,8 +12,9 @@ from sqlalchemy.exc import IntegrityError
 
 from api.stores import tables
 from api.stores.campaigns import Campaign, Counts, FileKey, Recording
-from api.stores.database import REMEMBERED, Database
+from api.stores.database import Database
 from api.stores.records import Taken
+from api.stores.repeats import earlier, forget_old
 
 _C, _R, _K = tables.campaigns, tables.recordings, tables.campaign_repeats
 _CAMPAIGN = [_C.c[name] for name in Campaign.__dataclass_fields__]
@@ -31,11 +31,10 @@ class SqlCampaigns:
         try:
             with self.store.writing() as connection:
                 if repeat is not None:
-                    before = (datetime.now(UTC) - REMEMBERED).isoformat()
-                    connection.execute(delete(_K).where(_K.c.created < before))
-                    earlier = _earlier(connection, campaign.group, repeat)
-                    if earlier is not None:
-                        return earlier
+                    forget_old(connection, _K)
+                    first = earlier(connection, _K, campaign.group, repeat)
+                    if first is not None:
+                        return Campaign(**connection.execute(select(*_CAMPAIGN).where(_C.c.id == first.id)).one()._asdict())
                     row = {"group": campaign.group, "key": repeat[0], "digest": repeat[1], "id": campaign.id, "created": campaign.created}
                     connection.execute(insert(_K).values(row))
                 # held until the campaign is there: a machine that is deleted meanwhile takes it along
@@ -93,15 +92,6 @@ def delete_campaigns(connection: Connection, wanted: Select[Any]) -> int:
         for table, column in ((_R, _R.c.campaign), (_K, _K.c.id), (_C, _C.c.id)):
             connection.execute(delete(table).where(column.in_(part)))
     return len(ids)
-
-
-def _earlier(connection: Connection, group: str, repeat: tuple[str, str]) -> Campaign | None:
-    row = connection.execute(select(_K).where(_K.c.group == group, _K.c.key == repeat[0])).first()
-    if row is None:
-        return None
-    if row.digest != repeat[1]:
-        raise Taken("idempotency key")
-    return Campaign(**connection.execute(select(*_CAMPAIGN).where(_C.c.id == row.id)).one()._asdict())
 
 
 class SqlRecordings:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from datetime import UTC, datetime
 from typing import Any
 
 from sqlalchemy import Connection, delete, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from api.stores import tables
-from api.stores.database import REMEMBERED, Database
+from api.stores.database import Database
 from api.stores.jobs import OPEN, Event, Full, Job, Outcome, Worker
-from api.stores.records import Taken
+from api.stores.repeats import earlier, forget_old
 
 
 class SqlJobs:
@@ -27,10 +26,10 @@ class SqlJobs:
         try:
             with self.store.writing() as connection:
                 if repeat is not None:
-                    connection.execute(delete(r).where(r.c.created < (datetime.now(UTC) - REMEMBERED).isoformat()))
-                    earlier = self._earlier(connection, job.group, repeat)
-                    if earlier is not None:
-                        return earlier
+                    forget_old(connection, r)
+                    first = self._first(connection, job.group, repeat)
+                    if first is not None:
+                        return first
                 # nobody forgets the machine between this look and the end
                 there = select(m.c.id).where(m.c.group == job.group, m.c.id == job.machine).with_for_update()
                 if connection.execute(there).first() is None:
@@ -48,19 +47,14 @@ class SqlJobs:
         except IntegrityError:
             # the same key came twice in one moment
             with self.store.reading() as connection:
-                earlier = None if repeat is None else self._earlier(connection, job.group, repeat)
-            if earlier is None:
+                first = None if repeat is None else self._first(connection, job.group, repeat)
+            if first is None:
                 raise
-            return earlier
+            return first
 
-    def _earlier(self, connection: Connection, group: str, repeat: tuple[str, str]) -> Job | None:
-        r, t = tables.job_repeats, tables.jobs
-        row = connection.execute(select(r).where(r.c.group == group, r.c.key == repeat[0])).first()
-        if row is None:
-            return None
-        if row.digest != repeat[1]:
-            raise Taken("idempotency key")
-        found = connection.execute(select(t).where(t.c.id == row.id)).first()
+    def _first(self, connection: Connection, group: str, repeat: tuple[str, str]) -> Job | None:
+        row, t = earlier(connection, tables.job_repeats, group, repeat), tables.jobs
+        found = None if row is None else connection.execute(select(t).where(t.c.id == row.id)).first()
         return None if found is None else Job(**found._asdict())
 
     def get(self, group: str, id: str) -> Job | None:

@@ -49,17 +49,23 @@ machines = Table(
     Column("created", String(40), nullable=False),
     UniqueConstraint("group", "name"),
 )
-repeats = Table(
-    "idempotency_keys",
-    metadata,
-    Column("group", _Name, primary_key=True),
-    Column("key", String(200), primary_key=True),
-    Column("digest", String(64), nullable=False),
-    Column("id", _Name, nullable=False),
-    Column("name", _Name, nullable=False),
-    Column("description", Text, nullable=False),
-    Column("created", String(40), nullable=False, index=True),
-)
+
+
+def _repeats(name: str, *further: Column) -> Table:
+    """Idempotency keys of one kind of call: what the first of them has made."""
+    return Table(
+        name,
+        metadata,
+        Column("group", _Name, primary_key=True),
+        Column("key", String(200), primary_key=True),
+        Column("digest", String(64), nullable=False),
+        Column("id", _Name, nullable=False),
+        *further,
+        Column("created", String(40), nullable=False, index=True),
+    )
+
+
+repeats = _repeats("idempotency_keys", Column("name", _Name, nullable=False), Column("description", Text, nullable=False))
 
 
 def _documents(name: str) -> Table:
@@ -92,15 +98,7 @@ campaigns = Table(
     Column("settled", Integer, nullable=False),
     Index("ix_campaigns_machine", "group", "machine"),
 )
-campaign_repeats = Table(
-    "campaign_idempotency_keys",
-    metadata,
-    Column("group", _Name, primary_key=True),
-    Column("key", String(200), primary_key=True),
-    Column("digest", String(64), nullable=False),
-    Column("id", _Name, nullable=False),
-    Column("created", String(40), nullable=False, index=True),
-)
+campaign_repeats = _repeats("campaign_idempotency_keys")
 recordings = Table(
     "recordings",
     metadata,
@@ -139,15 +137,7 @@ jobs = Table(
     Column("events", Integer, nullable=False),
     Index("ix_jobs_group", "group", "kind", "id"),
 )
-job_repeats = Table(
-    "job_idempotency_keys",
-    metadata,
-    Column("group", _Name, primary_key=True),
-    Column("key", String(200), primary_key=True),
-    Column("digest", String(64), nullable=False),
-    Column("id", _Name, nullable=False),
-    Column("created", String(40), nullable=False, index=True),
-)
+job_repeats = _repeats("job_idempotency_keys")
 job_events = Table(
     "job_events",
     metadata,

@@ -22,7 +22,7 @@ class TooLong(InputError):
         super().__init__(field, found, allowed, where)
         self.seconds = seconds
 
-    def __reduce__(self) -> tuple[type[TooLong], tuple[str, object, str, str, float]]:  # type: ignore[override]
+    def __reduce__(self) -> tuple[type[TooLong], tuple[object, ...]]:
         return type(self), (self.field, self.found, self.allowed, self.where, self.seconds)
 
 

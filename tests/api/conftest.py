@@ -14,9 +14,9 @@ from fastapi.testclient import TestClient
 from api.client import Client
 from api.main import create_app
 from api.schemas.toolings import EXAMPLE
-from api.security import make_key
+from api.security import make_key, new_id, now
 from api.settings import Settings
-from api.stores.records import Store
+from api.stores.records import Machine, Store
 from api.stores.sql import open_store
 from api.streams.engine import HEADER, Engine, Message
 from api.work.pool import guarded
@@ -104,6 +104,12 @@ def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Store]:
     found = open_store(database(request, getattr(request, "param", SQLITE), tmp_path))
     yield found
     found.close()
+
+
+@pytest.fixture
+def machine(store: Store) -> str:
+    """The id of a machine of group A."""
+    return store.machines.add(Machine(new_id(), "A", "M", "", now())).id
 
 
 def service(store: Store, tmp_path: Path, **settings: Any) -> TestClient:

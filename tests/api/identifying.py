@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,8 @@ from api.files import Files
 from api.jobs import identification, lobes
 from api.jobs.worker import Carrier, carry
 from api.reading.campaigns import load_campaign
+from api.security import new_id, now
+from api.stores.jobs import Job
 from api.stores.records import Store
 
 SAMPLES = Path(__file__).resolve().parents[2] / "data" / "sample_runs"
@@ -59,6 +62,17 @@ class Steps:
 def left(code: int) -> None:
     """In the place of the process' end."""
     raise AssertionError(f"the process would have ended with {code}")
+
+
+def job(machine: str, **changed: Any) -> Job:
+    return replace(Job(new_id(), "A", "identification", machine, "c1", "{}", "queued", now()), **changed)
+
+
+def running(store: Store, machine: str, **changed: Any) -> str:
+    """The id of a job that worker w has taken up."""
+    id = store.jobs.add(job(machine, **changed), {}, 100).id
+    assert store.jobs.begin(id, "w", now()) is not None
+    return id
 
 
 def carriers(store: Store, folder: Path) -> dict[str, Carrier]:

@@ -14,6 +14,7 @@ import pytest
 
 from api.reading.campaigns import load_campaign
 from api.reading.declared import FORMATS, campaign_of_text, declare, files_of, recording_name, toml_text
+from api.routes.archives import zipped
 from api.work.toolings import toml_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import READERS, read_cut
@@ -268,9 +269,18 @@ def test_an_archive_of_nothing(client, machine):
     assert client.http.get(f"/v1/campaigns/{made.id}/archive").status_code == 409
 
 
-def test_an_archive_comes_in_pieces(uploaded, monkeypatch):
+def test_an_archive_is_never_whole_in_memory(tmp_path, monkeypatch):
+    (tmp_path / "long").write_bytes(bytes(range(256)) * 40)
+    monkeypatch.setattr("api.routes.archives._BLOCK", 1000)
+    pieces = list(zipped([("a/short", b"x"), ("b/long", tmp_path / "long")]))
+    assert max(map(len, pieces)) < 1300
+    archive = zipfile.ZipFile(io.BytesIO(b"".join(pieces)))
+    assert archive.testzip() is None
+    assert {name: archive.read(name) for name in archive.namelist()} == {"a/short": b"x", "b/long": bytes(range(256)) * 40}
+
+
+def test_an_archive_is_sent_while_it_is_made(uploaded):
     client, id = uploaded
-    monkeypatch.setattr("api.routes.campaigns._BLOCK", 1000)
     with client.http.stream("GET", f"/v1/campaigns/{id}/archive") as answer:
         raw = b"".join(answer.iter_raw())
     assert zipfile.ZipFile(io.BytesIO(raw)).testzip() is None

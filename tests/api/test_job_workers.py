@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 
 import pytest
@@ -20,27 +19,10 @@ from api.jobs import desk as desks
 from api.jobs.backend import Carried
 from api.jobs.desk import Desk
 from api.jobs.worker import LEASE, JobWorker, carry, gone, place, process
-from api.security import new_id, now
-from api.stores.jobs import Job, Worker
-from api.stores.records import Machine
+from api.security import now
+from api.stores.jobs import Worker
 from rcsa_ident.errors import InputError
-from tests.api.identifying import Steps, left
-
-
-@pytest.fixture
-def machine(store):
-    return store.machines.add(Machine(new_id(), "A", "M", "", now())).id
-
-
-def job(machine, **changed):
-    return replace(Job(new_id(), "A", "identification", machine, "c1", "{}", "queued", now()), **changed)
-
-
-def running(store, machine, **changed):
-    """The id of a job that worker w has taken up."""
-    id = store.jobs.add(job(machine, **changed), {}, 100).id
-    assert store.jobs.begin(id, "w", now()) is not None
-    return id
+from tests.api.identifying import Steps, job, left, running
 
 
 class Quiet:

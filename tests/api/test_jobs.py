@@ -4,31 +4,15 @@ from __future__ import annotations
 
 import json
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from functools import partial
 
 import pytest
 
 from api.security import new_id, now
-from api.stores.jobs import Applied, Event, Full, Job, Outcome, Worker
+from api.stores.jobs import Applied, Event, Full, Outcome, Worker
 from api.stores.records import Document, Machine, Taken, digest_of
 from tests.api.conftest import BOTH
-
-
-@pytest.fixture
-def machine(store):
-    return store.machines.add(Machine(new_id(), "A", "M", "", now())).id
-
-
-def job(machine, **changed):
-    return replace(Job(new_id(), "A", "identification", machine, "c1", "{}", "queued", now()), **changed)
-
-
-def running(store, machine, **changed):
-    """The id of a job that worker w has taken up."""
-    id = store.jobs.add(job(machine, **changed), {}, 100).id
-    assert store.jobs.begin(id, "w", now()) is not None
-    return id
+from tests.api.identifying import job, running
 
 
 @BOTH
