@@ -27,6 +27,7 @@ from api.routes import (
     keys,
     libraries,
     machines,
+    materials,
     page,
     queries,
     recordings,
@@ -114,7 +115,7 @@ def create_app(
     problems.install(app)
     app.include_router(health.router)
     app.include_router(page.router)
-    about = (keys, machines, toolings, libraries, examples)
+    about = (keys, machines, toolings, libraries, materials, examples)
     for each in (*about, campaigns, recordings, resumed, together, queries, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(Observed, parts=parts)

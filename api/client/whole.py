@@ -19,6 +19,7 @@ from api.schemas.forces import ForceAnswer, StreamsAnswer, StreamSummary
 from api.schemas.keys import KeyAnswer, MadeKey
 from api.schemas.libraries import Example, Examples, ImportAnswer
 from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes
+from api.schemas.materials import MaterialAnswer, Materials
 from api.schemas.queries import AdviceAnswer, TipAnswer
 from api.schemas.toolings import ToolingAnswer, ToolingSummary
 
@@ -96,6 +97,10 @@ class Client(Uploads, Jobs):
         kind = "application/zip" if library.startswith(b"PK") else "application/json"
         query = {key: str(value).lower() if isinstance(value, bool) else value for key, value in assumed.items() if value is not None}
         return read(ImportAnswer, self.send("POST", "/toolings/import", content=library, params=query, headers={"Content-Type": kind}))
+
+    def materials(self) -> list[MaterialAnswer]:
+        """Return the library of materials."""
+        return read(Materials, self.send("GET", "/materials")).items
 
     def examples(self) -> list[Example]:
         """Return what there is to start with."""

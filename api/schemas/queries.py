@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field
@@ -17,7 +18,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import FEED_DIRECTIONS
 
 _RPM = math.pi / 30.0
-MOST_TOOLINGS, MOST_SPEEDS = 12, 5000
+MOST_TOOLINGS, MOST_SPEEDS, MOST_TESTED = 12, 5000, 1000
 Method = Literal["zero-order", "multi-frequency", "semi-discretisation", "full-discretisation", "time-domain"]
 Angle = Annotated[float, Field(ge=0.0, le=180.0)]
 Turn = Annotated[float, Field(ge=-360.0, le=360.0)]
@@ -131,22 +132,16 @@ class Speeds(Body):
         return tuple((self.from_rpm + self.step_rpm * k) * _RPM for k in range(count))
 
 
-class LobeQuery(Body):
-    """Which toolings on which machine, and which cut."""
+class TestedCut(Body):
+    """A cut that was tried, and what was seen."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "machine": "m1",
-                    "toolings": [EXAMPLE],
-                    "cut": {"immersion": 0.5, "strategy": "down"},
-                    "speeds": {"from_rpm": 4000, "to_rpm": 20000, "step_rpm": 50},
-                    "max_depth_mm": 10.0,
-                }
-            ]
-        }
-    )
+    spindle_speed_rpm: Rpm
+    axial_depth_mm: Depth
+    verdict: Literal["stable", "chatter", "marginal"]
+
+
+class Milled(Body):
+    """Which toolings on which machine, and which cut."""
 
     machine: Id
     toolings: list[Tooling] = Field(min_length=1, max_length=MOST_TOOLINGS, description="Several are compared.")
@@ -170,11 +165,48 @@ class LobeQuery(Body):
         )
 
 
+class LobeQuery(Milled):
+    """Which toolings on which machine, and which cut; cuts that were tried stand beside the limits."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "machine": "m1",
+                    "toolings": [EXAMPLE],
+                    "cut": {"immersion": 0.5, "strategy": "down"},
+                    "speeds": {"from_rpm": 4000, "to_rpm": 20000, "step_rpm": 50},
+                    "max_depth_mm": 10.0,
+                }
+            ]
+        }
+    )
+
+    tested: list[TestedCut] = Field(default=[], max_length=MOST_TESTED, description="Cuts that were tried: how many are told right?")
+
+    def question(self, work_seconds: float) -> LobeQuestion:
+        """Return the query in SI, for one of its toolings."""
+        tested = tuple((each.spindle_speed_rpm * _RPM, each.axial_depth_mm * 1e-3, each.verdict) for each in self.tested)
+        return replace(super().question(work_seconds), tested=tested)
+
+
 class BestSpeed(Answer):
     """A pocket of the lobes."""
 
     spindle_speed_rpm: float
     limit_depth_mm: float | None = Field(description="null: stable up to the depth that was asked for.")
+
+
+class TestedTally(Answer):
+    """How many tested cuts are told right; in each name the prediction stands before what was seen."""
+
+    stable_stable: int
+    stable_chatter: int = Field(description="Chatter that was not expected.")
+    chatter_stable: int
+    chatter_chatter: int
+    stable_marginal: int
+    chatter_marginal: int
+    share_right: float | None = Field(description="Of the cuts that were stable or chattered.")
 
 
 class ToolingLobes(Answer):
@@ -192,6 +224,7 @@ class ToolingLobes(Answer):
     absolute_limit_mm: float | None
     absolute_frequency_hz: float | None
     best_speeds: list[BestSpeed]
+    tested: TestedTally | None = Field(None, description="null: no tested cuts were given.")
     warnings: list[str]
 
 
@@ -209,7 +242,7 @@ class PlannedQuery(Body):
     axial_depth_mm: Depth
 
 
-class AdviceQuery(LobeQuery):
+class AdviceQuery(Milled):
     """What a machinist asks; cut.feed_per_tooth_mm is needed."""
 
     model_config = ConfigDict(

@@ -26,10 +26,11 @@ from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
+from rcsa_ident.stability.tested import TestedCuts, Verdict
 from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.advice import highest_removal, planned_cut, speed_windows, usable_depths
-from rcsa_ident.workflows.limits import Limits, machine_limits, widened
+from rcsa_ident.workflows.limits import Limits, machine_limits, told_right, widened
 from rcsa_ident.workflows.lobes import MARCHING, LobeConditions, band_warning, best_speeds
 from rcsa_ident.workflows.tip import TooltipResponse
 from rcsa_ident.workflows.tip import tooltip as tip_response
@@ -138,6 +139,7 @@ def lobes(machine: MachineText, tooling: ToolingText, question: LobeQuestion) ->
     known, tool = _shelf.get(machine), tooling_of(tooling.text)
     process = _process(question.cut, tool, known)
     limits = _limits(known, tool, process, question, np.array(question.speeds))
+    tested = _tested(known, tool, process, question)
     found, band = limits.lobes, limits.band
     return {
         "tooling": tooling.name,
@@ -152,8 +154,25 @@ def lobes(machine: MachineText, tooling: ToolingText, question: LobeQuestion) ->
         "absolute_limit_mm": _number(found.absolute_limit * 1e3),
         "absolute_frequency_hz": _number(found.absolute_frequency / (2.0 * math.pi)),
         "best_speeds": [{"spindle_speed_rpm": _rpm(s), "limit_depth_mm": _number(d * 1e3)} for s, d in best_speeds(found)],
+        "tested": tested,
         "warnings": _told(known, limits, np.array(question.speeds)),
     }
+
+
+def _tested(known: Known, tool: Tooling, process: MillingProcess, question: LobeQuestion) -> dict[str, Any] | None:
+    """How many of the cuts that were tried the limits tell right; None without any."""
+    if not question.tested:
+        return None
+    speed, depth, verdict = zip(*question.tested, strict=True)
+    cuts = TestedCuts(np.array(speed), np.array(depth), tuple(Verdict(each) for each in verdict))
+    plain = replace(question, bands=False)
+
+    def limits(conditions: LobeConditions) -> Limits:
+        return _limits(known, tool, process, replace(plain, max_depth=conditions.max_depth), conditions.speeds)
+
+    conditions = LobeConditions(process, cuts.spindle_speed, question.max_depth, _METHODS[question.method]())
+    found = told_right(cuts, conditions, limits)
+    return asdict(found) | {"share_right": _number(found.share_right)}
 
 
 def advice(machine: MachineText, tooling: ToolingText, question: AdviceQuestion) -> dict[str, Any]:

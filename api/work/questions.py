@@ -112,6 +112,8 @@ class LobeQuestion:
     stiffness_spread : float
     work_seconds : float [s]
         Longer work is refused.
+    tested : tuple of (speed [rad/s], depth [m], "stable", "chatter" or "marginal")
+        Cuts that were tried.
     """
 
     cut: CutQuestion
@@ -121,6 +123,7 @@ class LobeQuestion:
     bands: bool
     stiffness_spread: float
     work_seconds: float
+    tested: tuple[tuple[float, float, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

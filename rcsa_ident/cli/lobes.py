@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -206,16 +206,10 @@ def tested_cuts(path: Path, subject: Subject, conditions: LobeConditions) -> Jud
 
 def judged(cuts: TestedCuts, subject: Subject, conditions: LobeConditions) -> Judged:
     """Return tested cuts with what the lobes say of them, each at its own speed."""
-    import numpy as np
-
     from rcsa_ident.report.lobes import Judged
-    from rcsa_ident.stability.tested import tally
+    from rcsa_ident.workflows.limits import told_right
 
-    deepest = 1.01 * float(cuts.axial_depth.max())
-    own = replace(conditions, speeds=np.unique(cuts.spindle_speed), max_depth=max(conditions.max_depth, deepest))
-    limits = subject.limits(own, False)
-    places = np.searchsorted(limits.lobes.spindle_speed, cuts.spindle_speed)
-    return Judged(cuts, tally(cuts, limits.lobes.limit_depth[places]))
+    return Judged(cuts, told_right(cuts, conditions, lambda own: subject.limits(own, False)))
 
 
 def _share(percent: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from rcsa_ident.stability.lobes import uncoupled_planes
 from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.surface import SurfaceError, surface_location_error
+from rcsa_ident.stability.tested import Tally, TestedCuts, tally
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.workflows.lobes import LobeConditions, drawn_limits, tooling_lobes
@@ -174,6 +175,22 @@ def _in_proportion(drawn: FloatArray, nominal: FloatArray, wanted: FloatArray) -
     """Limits that are to `wanted` as the drawn ones are to `nominal`; where one of these is infinite no proportion is known."""
     ratio = np.divide(wanted, nominal, out=np.ones(nominal.shape), where=np.isfinite(wanted) & np.isfinite(nominal))
     return np.where(np.isinf(nominal) & np.isfinite(wanted), wanted, drawn * ratio)
+
+
+def told_right(cuts: TestedCuts, conditions: LobeConditions, limits: Callable[[LobeConditions], Limits]) -> Tally:
+    """Return how many tested cuts lie on the side of the limit where they were seen, each asked at its own speed.
+
+    Parameters
+    ----------
+    conditions : LobeConditions
+        Its speeds do not count, and its depth only if it is deeper than all cuts.
+    limits : function
+        Of conditions with rising speeds.
+    """
+    deepest = 1.01 * float(cuts.axial_depth.max())
+    own = replace(conditions, speeds=np.unique(cuts.spindle_speed), max_depth=max(conditions.max_depth, deepest))
+    lobes = limits(own).lobes
+    return tally(cuts, lobes.limit_depth[np.searchsorted(lobes.spindle_speed, cuts.spindle_speed)])
 
 
 def machine_surface(

@@ -26,8 +26,10 @@ def later(client, id, *toolings, **further):
 
 def test_as_a_job_they_are_the_same(shop, store, tmp_path):
     client, id = shop
-    at_once = client.lobes(id, "T1", example(), speeds=SPEEDS)
-    job = later(client, id, "T1", example())
+    tested = [{"spindle_speed_rpm": 7777.0, "axial_depth_mm": 0.1, "verdict": "stable"}]
+    at_once = client.lobes(id, "T1", example(), speeds=SPEEDS, tested=tested)
+    assert at_once.toolings[0].tested.stable_stable == 1
+    job = later(client, id, "T1", example(), tested=tested)
     waiting = client.lobe_job(job)
     assert (waiting.job.kind, waiting.job.state, waiting.answer) == ("lobes", "queued", None)
     # what it was asked of is what was there then

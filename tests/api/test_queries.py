@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.materials import materials
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.io.curves import read_frf_csv
 from rcsa_ident.io.identifications import machine_from_json, speed_bands_from_json, workpiece_from_json
@@ -90,6 +91,46 @@ def test_the_cut_counts(shop):
     np.testing.assert_allclose(limits(feed_direction=-180.0), plain, rtol=1e-9)
     assert not np.allclose(limits(feed_direction="+Y"), plain, rtol=1e-2)
     assert not np.allclose(limits(strategy="up"), plain, rtol=1e-2)
+
+
+@pytest.mark.parametrize("method", ["zero-order", "full-discretisation"])
+def test_tested_cuts_are_counted(shop, method):
+    """Each at its own speed and to its own depth, whatever speeds and depth the lobes are asked for; in any order."""
+    client, id = shop
+    speeds = {"from_rpm": 7000, "to_rpm": 9000, "step_rpm": 1000}
+    first, _, last = client.lobes(id, "T1", speeds=speeds, method=method, bands=False).toolings[0].limit_depth_mm
+    seen = [
+        (9000, 0.95 * last, "stable"),
+        (9000, 1.05 * last, "marginal"),
+        (7000, 0.95 * first, "chatter"),
+        (7000, 1.05 * first, "chatter"),
+    ]
+    seen += [(7000, 1.05 * first, "stable"), (9000, 1.05 * last, "chatter"), (7000, 0.95 * first, "marginal")]
+    tested = [dict(zip(("spindle_speed_rpm", "axial_depth_mm", "verdict"), each, strict=True)) for each in seen]
+    asked = {"speeds": {"from_rpm": 8000, "to_rpm": 8000}, "max_depth_mm": 0.2, "method": method, "bands": False, "tested": tested}
+    (found,) = client.lobes(id, "T1", **asked).toolings
+    assert found.tested.model_dump() == {
+        "stable_stable": 1, "stable_chatter": 1, "chatter_stable": 1, "chatter_chatter": 2, "stable_marginal": 1, "chatter_marginal": 1,
+        "share_right": 0.6,
+    }  # fmt: skip
+    undecided = client.lobes(id, "T1", **asked | {"tested": tested[1:2]}).toolings[0].tested
+    assert (undecided.chatter_marginal, undecided.share_right) == (1, None)
+    assert client.lobes(id, "T1", **asked | {"tested": []}).toolings[0].tested is None
+    problem = refused(422, client.lobes, id, "T1", **asked | {"tested": [tested[0] | {"verdict": "loud"}]})
+    assert problem.errors[0].field == "tested.0.verdict"
+
+
+def test_materials_are_those_of_the_library(shop):
+    client, id = shop
+    listed = client.materials()
+    assert [each.name for each in listed] == [each.name for each in materials()]
+    steel = next(each for each in listed if each.name.startswith("Steel"))
+    given = {"ktc_mpa": steel.ktc_mpa, "krc": steel.krc, "kte_n_per_mm": steel.kte_n_per_mm, "kre_n_per_mm": steel.kre_n_per_mm}
+    by_name, by_number = (client.lobes(id, "T1", speeds=SPEEDS, cut=cut).toolings[0] for cut in ({"material": steel.name}, given))
+    np.testing.assert_allclose(by_name.limit_depth_mm, by_number.limit_depth_mm, rtol=1e-12)
+    spreads = [each.coefficients.tangential_spread for each in materials()]
+    np.testing.assert_allclose([each.ktc_spread_percent for each in listed], 100.0 * np.array(spreads), rtol=1e-12)
+    assert all(each.source for each in listed)
 
 
 @pytest.mark.parametrize("method", ["multi-frequency", "full-discretisation"])

@@ -1,5 +1,6 @@
 // What the charts of a tool change show: lobes with bands, tooltip FRFs with bands.
 import { axis, colour, DASHES, safe, SERIES } from "./charts.js";
+import { MARKS } from "./tested.js";
 import { factor, plain, text, unit } from "./units.js";
 
 const seriesOf = (i) => SERIES[i % SERIES.length];
@@ -10,7 +11,7 @@ export function removalPer(tooling, immersion, feed) {
 }
 
 /** Lobes of several toolings above, and below the frequency at which each would chatter. */
-export function lobeFigure(lobes, { maxDepth, removal, recommended = [] }) {
+export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested = [] }) {
   const times = factor("depth");
   const data = [];
   const annotations = [];
@@ -93,7 +94,20 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [] }) {
       }),
     );
   });
-  const top = Math.min(highest * 1.16, maxDepth * times * 1.1) || 1;
+  for (const [verdict, [symbol, , ink]] of Object.entries(MARKS)) {
+    const cuts = tested.filter((cut) => cut.verdict === verdict);
+    if (!cuts.length) continue;
+    data.push({
+      x: cuts.map((cut) => cut.spindle_speed_rpm),
+      y: cuts.map((cut) => cut.axial_depth_mm * times),
+      type: "scatter",
+      mode: "markers",
+      marker: { color: colour(ink), size: 9, symbol, line: { color: colour(ink), width: 2 } },
+      hoverinfo: "skip",
+    });
+  }
+  const deepest = Math.max(0, ...tested.map((cut) => cut.axial_depth_mm * times));
+  const top = Math.max(Math.min(highest * 1.16, maxDepth * times * 1.1), deepest * 1.08) || 1;
   const layout = {
     hovermode: "x unified",
     annotations,

@@ -49,6 +49,10 @@ const KINDS = {
     ["N/mm", 1, 2],
     ["lbf/in", INCH / POUND, 1],
   ],
+  indentation: [
+    ["N/m³", 1, 0],
+    ["lbf/in³", (INCH / 1000) ** 3 / POUND, 0],
+  ],
   speed: [
     ["rev/min", 1, 0],
     ["rev/min", 1, 0],

@@ -1,18 +1,20 @@
 // After a tool change: what is asked on the left, what it means for the cut on the right.
-import { all, post, Problem } from "../api.js";
+import { all, get, post, Problem } from "../api.js";
 import { add, empty, fill, h, head, link, note, waiting } from "../dom.js";
 import { busy, clearFaults, field, quantity, select, showProblem } from "../forms.js";
 import { remember, to } from "../router.js";
 import { allMachines, choose, machine } from "../state.js";
 import { followLobes } from "../jobs.js";
-import { text, unit } from "../units.js";
+import { plain, q, text, unit } from "../units.js";
 import { bodyOf, checked, METHODS, NUMBERS } from "./change_question.js";
 import { results } from "./change_results.js";
 
 const MOST = 12;
+/** What is folded away until an address says something of it. */
+const FURTHER = ["method", "material", "deep", "ktc", "krc", "land", "dent", "power", "torque"];
 
 export async function view(_args, query, place) {
-  const [machines, toolings] = await Promise.all([allMachines(), all("toolings")]);
+  const [machines, toolings, { items: materials }] = await Promise.all([allMachines(), all("toolings"), get("materials")]);
   const asked = query.get("machine");
   if (asked && machines.some((m) => m.id === asked)) choose(asked);
   const here = machine();
@@ -68,9 +70,26 @@ export async function view(_args, query, place) {
     query.get("fd") ?? "+X",
   );
   const method = select(METHODS, query.get("method") ?? "zero-order");
+  const material = select(
+    [["", "As in the identification"], ...materials.map((each) => [each.name, each.name])],
+    query.get("material") ?? "",
+  );
+  let tested = { name: "", cuts: [] };
   const answer = h("div", { class: "change-results", "aria-live": "off" });
   const ask = h("button", { class: "primary" }, "Compute");
   const picks = toolingPicks(toolings, chosen, () => changed(true));
+
+  // what stands behind a material of the library
+  const source = h("p", { class: "small soft below" });
+  const tellSource = () => {
+    const found = materials.find((each) => each.name === material.value);
+    const words = found && [
+      q("pressure", found.ktc_mpa),
+      `, radial ${plain(found.krc, 3)}, ±\u202f${plain(found.ktc_spread_percent)} %: ${found.condition} (${found.source})`,
+    ];
+    fill(source, words ?? null);
+    source.hidden = !words;
+  };
 
   // on a phone the answer stands higher than the conditions, which are told in a line
   const inShort = h("span", { class: "soft" });
@@ -106,8 +125,10 @@ export async function view(_args, query, place) {
     conditions,
     h(
       "details",
-      { open: ["method", "deep", "ktc", "krc", "power", "torque"].some((key) => query.has(key) && query.get(key) !== "zero-order") },
+      { open: FURTHER.some((key) => query.has(key) && query.get(key) !== "zero-order") },
       h("summary", null, "Material, spindle, method"),
+      field("Material", material, { name: "cut.material" }),
+      source,
       h(
         "div",
         { class: "fields" },
@@ -117,8 +138,14 @@ export async function view(_args, query, place) {
         fields.torque,
         fields.deep,
         field("Method", method, { name: "method" }),
+        fields.land,
+        fields.dent,
       ),
-      h("p", { class: "small soft" }, "Empty coefficients are those of the identification's workpiece."),
+      h(
+        "p",
+        { class: "small soft" },
+        "Empty coefficients are those of the material. Wear land and indentation together: process damping, which zero order leaves out.",
+      ),
     ),
     ask,
   );
@@ -132,6 +159,7 @@ export async function view(_args, query, place) {
     st: strategy.value,
     fd: direction.value,
     method: method.value,
+    material: material.value,
     ...Object.fromEntries(NUMBERS.map(([key, , usual]) => [key, fields[key].input.base === usual ? null : fields[key].input.base])),
   });
   const slow = () => method.value !== "zero-order";
@@ -151,12 +179,18 @@ export async function view(_args, query, place) {
     if (problem) return void showProblem(form, problem, { focus: false });
     const late = setTimeout(() => fill(answer, waiting("computing …")), answer.childElementCount ? 400 : 0);
     try {
-      const body = bodyOf(here.id, [...chosen], fields, strategy.value, direction.value, method.value);
+      const body = bodyOf(here.id, [...chosen], fields, {
+        strategy: strategy.value,
+        direction: direction.value,
+        method: method.value,
+        material: material.value,
+        tested: tested.cuts,
+      });
       const found = await answers(body, signal, answer, late);
       clearTimeout(late);
       if (signal.aborted) return;
       answer.removeAttribute("aria-busy");
-      results(answer, found, { toolings, body });
+      results(answer, found, { toolings, body, tested, ontested });
     } catch (error) {
       clearTimeout(late);
       if (error.name === "AbortError" || signal.aborted) return;
@@ -166,7 +200,13 @@ export async function view(_args, query, place) {
     }
   }
 
+  function ontested(next) {
+    tested = next;
+    compute();
+  }
+
   function changed(now = false) {
+    tellSource();
     ask.hidden = !slow();
     if (slow()) return;
     clearTimeout(timer);

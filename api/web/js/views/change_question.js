@@ -19,24 +19,30 @@ export const NUMBERS = [
   ["deep", "depth", 10, "max_depth_mm", 1e-3, 500, "Deepest that is asked for"],
   ["ktc", "pressure", null, "cut.ktc_mpa", 1, 50_000, "Tangential coefficient"],
   ["krc", "none", null, "cut.krc", -1, 5, "Radial over tangential"],
+  ["land", "displacement", null, "cut.wear_land_um", 0.01, 1000, "Wear land"],
+  ["dent", "indentation", null, "cut.indentation", 1e9, 1e17, "Indentation"],
   ["power", "power", null, "max_power_kw", 1e-3, 10_000, "Spindle power, at most"],
   ["torque", "torque", null, "max_torque_nm", 1e-3, 1e6, "Spindle torque, at most"],
 ];
 
-export function bodyOf(id, names, fields, strategy, direction, method) {
+export function bodyOf(id, names, fields, { strategy, direction, method, material, tested }) {
   const value = (key) => fields[key].input.base;
   const cut = { immersion: value("im") / 100, strategy, feed_direction: direction };
   for (const [key, name] of [
     ["fz", "feed_per_tooth_mm"],
     ["ktc", "ktc_mpa"],
     ["krc", "krc"],
+    ["land", "wear_land_um"],
+    ["dent", "indentation"],
   ])
     if (value(key) !== null) cut[name] = value(key);
+  if (material) cut.material = material;
   const speeds = { from_rpm: value("from"), to_rpm: value("to"), step_rpm: value("step") };
   const lobes = { machine: id, toolings: names, cut, speeds, max_depth_mm: value("deep"), method };
   const advice = value("fz") === null || method !== "zero-order" ? null : { ...lobes };
   if (advice && value("power") !== null) advice.max_power_kw = value("power");
   if (advice && value("torque") !== null) advice.max_torque_nm = value("torque");
+  if (tested.length) lobes.tested = tested;
   return { lobes, advice, tips: names.map((tooling) => ({ machine: id, tooling })) };
 }
 

@@ -4,20 +4,26 @@ import { add, card, choices, fill, h, note, save, table, whisper } from "../dom.
 import { chart, legend, SERIES } from "../charts.js";
 import { frfFigure, lobeFigure, removalPer } from "../figures.js";
 import { failed, quantity } from "../forms.js";
+import { testedCuts, testedLegend, toldRight } from "../tested.js";
 import { plain, q, u } from "../units.js";
 import { headline, reserve } from "./headline.js";
 
 let parts = "polar";
 let shown = "both";
 
-export function results(place, found, { toolings, body }) {
+export function results(place, found, { toolings, body, tested, ontested }) {
   const question = body.lobes;
   const summaries = found.lobes.map((each) => toolings.find((t) => t.name === each.tooling));
   const feed = question.cut.feed_per_tooth_mm ?? null;
   const removal = summaries.map((t) => (feed === null || !t ? null : removalPer(t, question.cut.immersion, feed)));
   const several = found.lobes.length > 1;
   fill(place, headline(found, removal, question), warnings(found));
-  add(place, lobesCard(found, removal, question), several ? comparison(found, summaries, question) : null, frfCard(found, body));
+  add(
+    place,
+    lobesCard(found, removal, question, tested, ontested),
+    several ? comparison(found, summaries, question) : null,
+    frfCard(found, body),
+  );
   whisper(
     [...place.querySelectorAll(".best")]
       .map((each) => each.querySelector("h2").textContent + ": " + (each.querySelector(".set")?.textContent ?? ""))
@@ -39,10 +45,15 @@ function at(lobes, rpm) {
   return k;
 }
 
-function lobesCard(found, removal, question) {
+function lobesCard(found, removal, question, tested, ontested) {
   const picture = chart("Stability lobes", "lobes");
   picture.draw(() =>
-    lobeFigure(found.lobes, { maxDepth: question.max_depth_mm, removal, recommended: found.advice?.map((a) => a.highest_removal[0]) }),
+    lobeFigure(found.lobes, {
+      maxDepth: question.max_depth_mm,
+      removal,
+      recommended: found.advice?.map((a) => a.highest_removal[0]),
+      tested: tested.cuts,
+    }),
   );
   const first = found.lobes[0];
   const start =
@@ -83,11 +94,14 @@ function lobesCard(found, removal, question) {
     { type: "button", class: "quiet", onclick: () => save("LOBES.csv", lobesCsv(found.lobes), "text/csv") },
     "LOBES.csv",
   );
+  const { choose, beside, fault } = testedParts(found.lobes, tested, ontested);
   return card(
     first.method === "zero-order" ? "Stability lobes" : `Stability lobes, ${first.method}`,
-    csv,
+    [choose, csv],
+    fault,
     several(found) ? legend(found.lobes.map((l, i) => ({ name: l.tooling, series: SERIES[i % SERIES.length] }))) : null,
     picture,
+    beside,
     h(
       "p",
       { class: "small soft" },
@@ -96,6 +110,36 @@ function lobesCard(found, removal, question) {
     ),
     h("div", { class: "reader" }, speed, read),
   );
+}
+
+/** Cuts that were tried: where they are chosen, how the limits stand to them, and what was wrong with their file. */
+function testedParts(lobes, tested, ontested) {
+  const fault = h("div");
+  const input = h("input", {
+    type: "file",
+    accept: ".csv,.txt,.tsv,text/csv",
+    class: "unseen",
+    tabindex: "-1",
+    "aria-hidden": "true",
+    onchange: async () => {
+      const [file] = input.files;
+      input.value = "";
+      if (!file) return;
+      try {
+        ontested({ name: file.name, cuts: testedCuts(file.name, await file.text()) });
+      } catch (error) {
+        failed(fault, error);
+      }
+    },
+  });
+  const pick = h("button", { type: "button", class: "quiet", onclick: () => input.click() }, "Tested cuts …");
+  const choose = h("span", null, pick, input);
+  if (!tested.cuts.length) return { choose, beside: null, fault };
+  const away = h("button", { type: "button", class: "quiet", onclick: () => ontested({ name: "", cuts: [] }) }, "Take them away");
+  const told = lobes.map((each) =>
+    h("li", null, lobes.length > 1 ? h("strong", null, `${each.tooling}: `) : `${tested.name}: `, toldRight(each.tested)),
+  );
+  return { choose, beside: h("div", { class: "tested-cuts" }, testedLegend(tested.cuts), away, h("ul", { class: "reads" }, told)), fault };
 }
 
 const several = (found) => found.lobes.length > 1;

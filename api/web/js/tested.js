@@ -1,0 +1,64 @@
+// Cuts that were tried: CUTS.csv as the commands read it, marks in the chart, and how many are told right.
+import { Problem } from "./api.js";
+import { h } from "./dom.js";
+
+const COLUMNS = ["spindle_speed_rpm", "axial_depth_mm", "verdict"];
+const VERDICTS = ["stable", "chatter", "marginal"];
+/** What marks a verdict: symbol in the chart, sign in the text, colour. */
+export const MARKS = {
+  stable: ["circle-open", "○", "good"],
+  chatter: ["x-thin-open", "✕", "bad"],
+  marginal: ["triangle-up-open", "△", "doubt"],
+};
+
+/** The cuts of a text table: comma, semicolon or tab, a decimal comma with the latter two. */
+export function testedCuts(name, text) {
+  const wrong = (field, found, allowed) => {
+    throw new Problem(0, { detail: `${name}: ${field}: found ${found || "nothing"}, allowed is ${allowed}` });
+  };
+  const lines = text
+    .replace(/^\ufeff/, "")
+    .split(/\r?\n/)
+    .map((line, i) => [i + 1, line.trim()])
+    .filter(([, line]) => line && !line.startsWith("#"));
+  const first = lines.shift()?.[1] ?? "";
+  const divider = ["\t", ";", ","].find((each) => first.includes(each)) ?? ",";
+  const header = first.split(divider).map((cell) => cell.trim());
+  const places = COLUMNS.map((column) => {
+    if (!header.includes(column)) wrong(`column ${column}`, `only ${header.join(", ")}`, `columns ${COLUMNS.join(", ")}`);
+    return header.indexOf(column);
+  });
+  if (!lines.length) wrong("cuts", "", "one at least");
+  return lines.map(([number, line]) => {
+    const [speed, depth, seen] = places.map((place) => line.split(divider)[place]?.trim() ?? "");
+    const positive = (field, written) => {
+      const value = Number(divider === "," ? written : written.replace(",", "."));
+      return written && value > 0 && Number.isFinite(value) ? value : wrong(`line ${number}, ${field}`, written, "a number above 0");
+    };
+    if (!VERDICTS.includes(seen.toLowerCase())) wrong(`line ${number}, verdict`, seen, VERDICTS.join(", "));
+    return { spindle_speed_rpm: positive(COLUMNS[0], speed), axial_depth_mm: positive(COLUMNS[1], depth), verdict: seen.toLowerCase() };
+  });
+}
+
+/** How a tooling's limits stand to them, in words. */
+export function toldRight(tally) {
+  const right = tally.stable_stable + tally.chatter_chatter;
+  const decided = right + tally.stable_chatter + tally.chatter_stable;
+  const more = [
+    tally.stable_chatter ? `${tally.stable_chatter} chattered where none was expected` : null,
+    tally.chatter_stable ? `${tally.chatter_stable} stable beyond the limit` : null,
+    tally.stable_marginal + tally.chatter_marginal ? `${tally.stable_marginal + tally.chatter_marginal} marginal` : null,
+  ].filter(Boolean);
+  const words = decided ? [`${right} of ${decided} told right (${Math.round(100 * tally.share_right)} %)`, ...more] : more;
+  return words.join(", ");
+}
+
+/** What the marks mean, of those that are there. */
+export function testedLegend(cuts) {
+  const seen = VERDICTS.filter((verdict) => cuts.some((cut) => cut.verdict === verdict));
+  return h(
+    "ul",
+    { class: "legend tested" },
+    seen.map((verdict) => h("li", null, h("span", { class: MARKS[verdict][2], "aria-hidden": "true" }, MARKS[verdict][1]), verdict)),
+  );
+}
