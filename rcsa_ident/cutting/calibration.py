@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.force import REFERENCE_RUNOUT, force_lines, runout_force_lines
+from rcsa_ident.cutting.force import REFERENCE_RUNOUT, unit_lines
 from rcsa_ident.cutting.regression import cluster_covariance, student_quantile
 from rcsa_ident.errors import InputError
 
@@ -23,7 +23,6 @@ LEAST_CUTS = 3
 _NORMAL_95 = 1.959964
 #: Condition number of the scaled regression from which on coefficients cannot be told apart.
 _WORST_CONDITION = 1e5
-Lines = Callable[[Cutter, CuttingConditions, CuttingCoefficients, np.ndarray], ComplexArray]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,20 +96,6 @@ class ForceCalibration:
         return min(factor * float(np.sqrt(max(float(slope @ self.covariance @ slope), 0.0))), 1.0)
 
 
-def unit_lines(lines: Lines, cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray) -> ComplexArray:
-    """Return a force's lines per unit K_tc, K_rc, K_te and K_re, shape (m, 2, 4): the force is linear in them.
-
-    Parameters
-    ----------
-    lines : callable
-        `force_lines`, or `runout_force_lines`.
-    """
-    unit = CuttingCoefficients(1.0, 0.0)
-    base = lines(cutter, conditions, unit, orders)
-    parts = [replace(unit, radial_ratio=1.0), replace(unit, tangential_edge=1.0), replace(unit, radial_edge=1.0)]
-    return np.stack([base, *(lines(cutter, conditions, part, orders) - base for part in parts)], axis=-1)
-
-
 def mean_force_matrix(cutter: Cutter, conditions: CuttingConditions) -> FloatArray:
     """Return the mean force of a cut per unit of each coefficient of `NAMES`, in machine axes X, Y and axial, shape (3, 6).
 
@@ -118,7 +103,7 @@ def mean_force_matrix(cutter: Cutter, conditions: CuttingConditions) -> FloatArr
     change it as long as every tooth cuts.
     """
     matrix = np.zeros((3, 6))
-    matrix[:2, :4] = unit_lines(force_lines, cutter, conditions, np.array([0]))[0].real
+    matrix[:2, :4] = unit_lines(cutter, conditions, np.array([0]))[0].real
     entry, exit_ = conditions.engagement.entry, conditions.engagement.exit
     share = cutter.teeth * conditions.axial_depth / (2.0 * np.pi)
     matrix[2, 4:] = share * conditions.feed_per_tooth * (np.cos(entry) - np.cos(exit_)), share * (exit_ - entry)
@@ -194,7 +179,7 @@ def _runout_effect(cutter: Cutter, conditions: CuttingConditions, solution: Floa
     # no tooth stands where the eccentricity is 0 or largest
     eccentric = replace(cutter, runout=runout * np.cos(cutter.tooth_angle - 0.125 * cutter.pitch[0]))
     order = np.array([0])
-    change = unit_lines(runout_force_lines, eccentric, conditions, order) - unit_lines(force_lines, cutter, conditions, order)
+    change = unit_lines(eccentric, conditions, order, runout=True) - unit_lines(cutter, conditions, order)
     return np.concatenate([(change[0].real @ known), [0.0]])
 
 

@@ -63,15 +63,18 @@ def force_lines(cutter: Cutter, conditions: CuttingConditions, coefficients: Cut
     integrals of e^{i (q - m) phi}; a helix multiplies line m by the mean of e^{-i m 2 z tan(helix) / D} over the depth.
     """
     orders = np.asarray(orders)
+    return _over_depth(_per_depth(cutter, conditions, orders, *_forms(coefficients)[::2]), cutter, conditions, orders)
+
+
+def _per_depth(cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray, chip: ComplexArray, edge: ComplexArray) -> ComplexArray:
+    """Lines of forces per depth whose forms are columns, shape (m, n)."""
     entry, exit_ = conditions.engagement.entry, conditions.engagement.exit
-    chip_lines, edge_lines = _trigonometric_form(coefficients)
     # teeth: sum_j e^{i m psi_j}, weighted by the feed that tooth j takes (its pitch)
     phases = np.exp(1j * np.outer(orders, cutter.tooth_angle))
     feed = conditions.feed_per_tooth * cutter.pitch * cutter.teeth / (2.0 * np.pi)
     q = np.arange(-2, 3)
     window = _exponential_integral(q[None, :] - orders[:, None], entry, exit_) / (2.0 * np.pi)
-    lines = (phases @ feed)[:, None] * (window @ chip_lines) + phases.sum(axis=1)[:, None] * (window @ edge_lines)
-    return _over_depth(lines, cutter, conditions, orders)
+    return (phases @ feed)[:, None] * (window @ chip) + phases.sum(axis=1)[:, None] * (window @ edge)
 
 
 def force_and_slope(
@@ -108,18 +111,22 @@ def _over_depth(lines: ComplexArray, cutter: Cutter, conditions: CuttingConditio
     return lines @ conditions.machine_from_feed.T
 
 
-def _trigonometric_form(coefficients: CuttingCoefficients) -> tuple[ComplexArray, ComplexArray]:
-    """Coefficients of e^{i q phi}, q = -2..2, of the (feed, normal) force per depth: per unit feed, and of the edge."""
+def _forms(coefficients: CuttingCoefficients) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Coefficients of e^{i q phi}, q = -2..2, of the (feed, normal) force per depth: per unit feed, per unit of chip, of the edge."""
     k, kr = coefficients.tangential, coefficients.tangential * coefficients.radial_ratio
+    return _sine_form(k, kr), _constant_form(k, kr), _constant_form(coefficients.tangential_edge, coefficients.radial_edge)
+
+
+def _sine_form(tangential: float, radial: float) -> ComplexArray:
+    """Of forces along the edge that are as sin phi, shape (5, 2)."""
     # rows q = -2..2 of sin cos, sin^2
     sin_cos = np.array([0.25j, 0, 0, 0, -0.25j])
     sin_sin = np.array([-0.25, 0, 0.5, 0, -0.25])
-    chip = np.stack([-k * sin_cos - kr * sin_sin, k * sin_sin - kr * sin_cos], axis=1)
-    return chip, _constant_form(coefficients.tangential_edge, coefficients.radial_edge)
+    return np.stack([-tangential * sin_cos - radial * sin_sin, tangential * sin_sin - radial * sin_cos], axis=1)
 
 
 def _constant_form(tangential: float, radial: float) -> ComplexArray:
-    """The same of a force per depth that does not depend on phi along the edge."""
+    """Of forces along the edge that do not depend on phi, shape (5, 2)."""
     cos = np.array([0, 0.5, 0, 0.5, 0])
     sin = np.array([0, 0.5j, 0, -0.5j, 0])
     return np.stack([-tangential * cos - radial * sin, tangential * sin - radial * cos], axis=1)
@@ -196,20 +203,51 @@ def runout_force_lines(
     which two of them, or one and zero, meet, each line is the integral that `force_lines` takes.
     """
     orders = np.asarray(orders)
-    per_feed, edge = _trigonometric_form(coefficients)
-    per_depth = _constant_form(coefficients.tangential, coefficients.tangential * coefficients.radial_ratio)
+    return _over_depth(_runout_per_depth(cutter, conditions, orders, *_forms(coefficients)), cutter, conditions, orders)
+
+
+def unit_lines(cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray, runout: bool = False) -> ComplexArray:
+    """Return the lines per unit K_tc, K_rc, K_te and K_re: the force is linear in them.
+
+    Parameters
+    ----------
+    orders : array of int, shape (m,)
+    runout : bool
+        Whether teeth may cut deeper, late or not at all, as with `runout_force_lines`.
+
+    Returns
+    -------
+    complex array, shape (m, 2, 4) [m^2, m^2, m, m]
+    """
+    orders = np.asarray(orders)
+    # (5, 2) of each coefficient side by side
+    none = np.zeros((5, 4), dtype=complex)
+    shear, edges = (np.hstack([form(1.0, 0.0), form(0.0, 1.0)]) for form in (_sine_form, _constant_form))
+    chip, offset, edge = np.hstack([shear, none]), np.hstack([edges, none]), np.hstack([none, edges])
+    if runout:
+        lines = _runout_per_depth(cutter, conditions, orders, chip, offset, edge)
+    else:
+        lines = _per_depth(cutter, conditions, orders, chip, edge)
+    columns = [_over_depth(lines[:, k : k + 2], cutter, conditions, orders) for k in range(0, 8, 2)]
+    return np.stack(columns, axis=-1)
+
+
+def _runout_per_depth(
+    cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray, per_feed: ComplexArray, per_depth: ComplexArray, edge: ComplexArray
+) -> ComplexArray:
+    """Lines of forces per depth whose forms are columns, piece by piece of each tooth's chip, shape (m, n)."""
     feed = conditions.feed_per_tooth * cutter.pitch * cutter.teeth / (2.0 * np.pi)
     q = np.arange(-2, 3)
-    lines = np.zeros((orders.size, 2), dtype=complex)
+    lines = np.zeros((orders.size, edge.shape[1]), dtype=complex)
     for j in range(cutter.teeth):
         moved, offset = _chip_bounds(j, feed, cutter.runout)
-        tooth = np.zeros((orders.size, 2), dtype=complex)
+        tooth = np.zeros_like(lines)
         for start, end, k in _chip_pieces(moved, offset, conditions.engagement):
             a, b = moved[k], offset[k]
             window = _exponential_integral(q[None, :] - orders[:, None], start, end) / (2.0 * np.pi)
             tooth += window @ (a * per_feed + b * per_depth + edge)
         lines += np.exp(1j * orders * cutter.tooth_angle[j])[:, None] * tooth
-    return _over_depth(lines, cutter, conditions, orders)
+    return lines
 
 
 def _chip_bounds(j: int, feed: FloatArray, runout: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -9,10 +9,10 @@ from itertools import pairwise, product
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.cutting.calibration import NAMES, ForceCalibration, plausible, unit_lines
+from rcsa_ident.cutting.calibration import NAMES, ForceCalibration, plausible
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.force import force_lines, runout_force_lines
+from rcsa_ident.cutting.force import unit_lines
 from rcsa_ident.cutting.regression import cluster_covariance, student_quantile
 from rcsa_ident.errors import InputError
 
@@ -155,8 +155,7 @@ class _Problem:
     def columns(self, k: int, theta: FloatArray) -> ComplexArray:
         """Lines per scaled coefficient as the sensors see them, shape (m, 2, 4)."""
         record, orders = self.records[k], self.orders[k]
-        lines = runout_force_lines if self.clampings else force_lines
-        columns = unit_lines(lines, self.cutter(k, theta), record.conditions, orders) * self.scale
+        columns = unit_lines(self.cutter(k, theta), record.conditions, orders, runout=bool(self.clampings)) * self.scale
         columns = columns * np.exp(1j * orders * theta[self.angles][k])[:, None, None]
         seen = np.einsum("ab,mbc->mac", self.axes, columns)
         return seen * self.dynamometer.response(orders * record.conditions.spindle_speed, theta[self.sensor])[:, :, None]

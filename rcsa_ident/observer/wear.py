@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.force import force_lines
+from rcsa_ident.cutting.force import unit_lines
 from rcsa_ident.errors import InputError, positive
 
 #: What a force consists of; shearing grows with the chip, rubbing with a worn edge.
@@ -128,7 +127,7 @@ def wear_indicators(
     if harmonic.size == 0:
         raise InputError("band", [w / (2.0 * np.pi) for w in band], "one that holds a tooth-passing harmonic [Hz]")
     lines = _revolution_lines(force, first, period, turns, harmonic, speed * step)
-    basis = _basis(cutter, conditions, harmonic, edges)
+    basis = unit_lines(cutter, conditions, harmonic)[:, :, : 4 if edges else 2]
     mean = lines.mean(axis=0)
     angle = _angle(mean, basis, harmonic, cutter) if angle is None else angle
     matrix = basis * np.exp(1j * harmonic * angle)[:, None, None]
@@ -158,19 +157,6 @@ def wear_indicators(
         float(angle % (2.0 * np.pi / cutter.teeth)) if cutter.equally_spaced else float(angle % (2.0 * np.pi)),
         float(np.linalg.norm(rest) / np.linalg.norm(data)),
     )
-
-
-def _basis(cutter: Cutter, conditions: CuttingConditions, harmonic: np.ndarray, edges: bool) -> ComplexArray:
-    """Lines per unit coefficient, shape (m, 2, c)."""
-
-    def lines(**values: float) -> ComplexArray:
-        return force_lines(cutter, conditions, replace(CuttingCoefficients(1.0, 0.0), **values), harmonic)
-
-    shear = lines()
-    columns = [shear, lines(radial_ratio=1.0) - shear]
-    if edges:
-        columns += [lines(tangential_edge=1.0) - shear, lines(radial_edge=1.0) - shear]
-    return np.stack(columns, axis=2)
 
 
 def _revolution_lines(force: FloatArray, first: int, period: float, turns: int, harmonic: np.ndarray, turn: float) -> ComplexArray:

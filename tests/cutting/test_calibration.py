@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsa_ident.cutting.calibration import NAMES, ForceCalibration, calibrate_mean_force, mean_force_matrix, plausible, unit_lines
+from rcsa_ident.cutting.calibration import NAMES, ForceCalibration, calibrate_mean_force, mean_force_matrix, plausible
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.force import force_history, force_lines, runout_force_lines
+from rcsa_ident.cutting.force import force_history, force_lines, runout_force_lines, unit_lines
 from rcsa_ident.errors import InputError
 
 CUTTER = Cutter(4, 0.012, np.radians(30.0))
@@ -48,7 +48,9 @@ def test_lines_are_linear_in_the_coefficients(lines):
     conditions = CuttingConditions(600.0, 1e-3, 8e-5, Engagement(0.3, 2.6))
     orders = np.arange(25)
     whole = lines(cutter, conditions, CuttingCoefficients(TRUE[0], TRUE[1] / TRUE[0], 0.0, TRUE[2], TRUE[3]), orders)
-    np.testing.assert_allclose(unit_lines(lines, cutter, conditions, orders) @ TRUE[:4], whole, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        unit_lines(cutter, conditions, orders, runout=lines is runout_force_lines) @ TRUE[:4], whole, rtol=1e-9, atol=1e-9
+    )
 
 
 @settings(max_examples=40, deadline=None)

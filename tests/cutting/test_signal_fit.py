@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -23,16 +24,23 @@ DOWN = Engagement(0.5 * np.pi, np.pi)
 ORDERS = 33
 
 
+@cache
+def true_lines(cutter, feed, engagement, depth):
+    """Of a sampled revolution with run-out."""
+    truth = replace(cutter, runout=eccentric(cutter, ECCENTRICITY))
+    angle = 2.0 * np.pi * np.arange(4096) / 4096
+    force = force_history(truth, CuttingConditions(630.0, depth, feed, engagement), COEFFICIENTS, angle, slices=64)[:, :2]
+    lines = np.fft.rfft(force, axis=0)[:ORDERS] / angle.size
+    lines[1:] *= 2.0
+    return lines
+
+
 def record(
     feed, rng, noise=0.02, axes=((1, 0), (0, 1)), cutter=CUTTER, response=None, engagement=DOWN, clamping="a", scale=1.0, depth=4e-4
 ):
     """Lines of a sampled revolution, seen through sensors with noise; eight blocks that scatter as the noise says."""
     conditions = CuttingConditions(630.0, depth, feed, engagement)
-    truth = replace(cutter, runout=eccentric(cutter, ECCENTRICITY))
-    angle = 2.0 * np.pi * np.arange(4096) / 4096
-    force = scale * force_history(truth, conditions, COEFFICIENTS, angle, slices=64)[:, :2] @ np.array(axes, dtype=float).T
-    lines = np.fft.rfft(force, axis=0)[:ORDERS] / angle.size
-    lines[1:] *= 2.0
+    lines = scale * true_lines(cutter, feed, engagement, depth) @ np.array(axes, dtype=float).T
     start = 2.0 * np.pi * rng.random()
     order = np.arange(ORDERS)
     lines = lines * np.exp(1j * order * start)[:, None]
