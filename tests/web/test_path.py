@@ -19,13 +19,16 @@ from tests.web.conftest import ROOT, SAMPLES, Served, drop
 EVERY = 4
 #: A tooling that never cut.
 NEVER_CUT = "S4-shrink"
-#: How many colours the live chart has.
+#: How many pixels of the live chart are of the colours of its two forces.
 _INKS = """() => {
   const canvas = document.querySelector('.live-chart canvas');
   const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
-  const found = new Set();
-  for (let i = 0; i < data.length; i += 4) if (data[i + 3]) found.add((data[i] << 16) | (data[i + 1] << 8) | data[i + 2]);
-  return found.size;
+  const found = { blue: 0, orange: 0 };
+  for (let i = 0; i < data.length; i += 4) {
+    if (data[i + 3] > 100 && data[i + 2] > data[i] + 40) found.blue += 1;
+    if (data[i + 3] > 100 && data[i] > data[i + 2] + 40) found.orange += 1;
+  }
+  return found;
 }"""
 
 
@@ -131,8 +134,10 @@ def forces(page: Page, machine: str) -> None:
     expect(page.locator("main .mark", has_text="over")).to_be_visible(timeout=30_000)
     facts = dict(zip(page.locator(".facts dt").all_inner_texts(), page.locator(".facts dd").all_inner_texts(), strict=True))
     assert (facts["Lost"], facts["Dropped"], facts["Samples"].replace("\u202f", "")) == ("0", "0", "7168")
-    # something was drawn: the canvas is not of one colour
-    assert page.evaluate(_INKS) > 3
+    # both forces were drawn, and neither covers the other
+    inks = page.evaluate(_INKS)
+    assert inks["blue"] > 3000
+    assert inks["orange"] > 3000
 
 
 def test_an_identification_is_cancelled_from_the_page(opened, client: Client):

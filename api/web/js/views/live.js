@@ -1,15 +1,15 @@
 // Forces as they come: a data logger's stream that is watched, or a recording that is played.
 import { get, Problem } from "../api.js";
 import { add, card, empty, fill, h, head, link, mark, note, table } from "../dom.js";
-import { colour, legend, SERIES, uplot } from "../charts.js";
+import { legend, SERIES, uplot } from "../charts.js";
+import { liveChart } from "../live_chart.js";
 import { field, select } from "../forms.js";
 import { to } from "../router.js";
 import { open, Window } from "../stream.js";
-import { factor, plain, q, unit } from "../units.js";
+import { factor, plain, q } from "../units.js";
 import { ground, recordingPicker, tabs } from "./forces.js";
 
-/** Buckets a second that a chart of this width has a use for, and the seconds that it shows. */
-const PER_SECOND = 500;
+/** The seconds that the chart shows. */
 const SECONDS = 4;
 
 export async function view(_args, query, place) {
@@ -52,6 +52,8 @@ export async function view(_args, query, place) {
   );
   add(place, head("Live forces", here.name, tabs("forces/live")), fault, screen, h("div", { class: "columns" }, streams, form));
 
+  // a bucket for each column of the picture
+  const perSecond = () => Math.max(100, Math.round(place.clientWidth / SECONDS));
   let close = null;
   let plot = null;
   let held = false;
@@ -72,7 +74,7 @@ export async function view(_args, query, place) {
         data = new Window(event.axes, event.sampling_rate_hz, bucket, seconds);
         fill(keys, legend(event.axes.map((a, k) => ({ name: `F${a.toLowerCase()}`, series: SERIES[k] }))));
         plot?.destroy();
-        plot = chartOf(uPlot, chartBox, event.axes, () => data);
+        plot = liveChart(uPlot, chartBox, event.axes, () => data);
       } else if (event.event === "status" || event.event === "end") fill(board, status(event, about));
       else if (event.event === "settling" || event.event === "restarted") fill(fault, note("doubt", event.detail));
     };
@@ -120,7 +122,7 @@ export async function view(_args, query, place) {
       () => null,
     );
     const times = Number(rate.value);
-    const envelope = Math.max(1, Math.round(((recording?.sampling_rate_hz ?? 25_600) * Math.min(1, times)) / PER_SECOND));
+    const envelope = Math.max(1, Math.round(((recording?.sampling_rate_hz ?? 25_600) * Math.min(1, times)) / perSecond()));
     start(
       { replay: { campaign: picker.which.value, recording: picker.recording.value, rate: times }, machine: here.id, envelope },
       picker.recording.value,
@@ -139,7 +141,7 @@ export async function view(_args, query, place) {
             ? table(
                 "Open streams",
                 [
-                  { name: "Stream", cell: (s) => s.name || s.session },
+                  { name: "Stream", cell: (s) => s.name || `…${s.session.slice(-6)}` },
                   { name: "Tooling", cell: (s) => s.tooling },
                   { name: "Samples", number: true, cell: (s) => plain(s.samples) },
                   { name: "Lost", number: true, cell: (s) => plain(s.lost) },
@@ -152,7 +154,7 @@ export async function view(_args, query, place) {
                           type: "button",
                           onclick: () =>
                             start(
-                              { watch: s.session, envelope: Math.max(1, Math.round(s.sampling_rate_hz / PER_SECOND)) },
+                              { watch: s.session, envelope: Math.max(1, Math.round(s.sampling_rate_hz / perSecond())) },
                               s.name || s.tooling,
                             ),
                         },
@@ -201,72 +203,6 @@ function status(event, about) {
     fact("Dropped", h("span", { class: event.dropped ? "fault" : null }, plain(event.dropped))),
     fact("Delay", `${plain(event.delay_ms, 1, 1)} ms`),
     fact("Waiting", plain(event.backlog)),
-    event.notes?.length ? fact("Notes", h("span", { class: "small" }, event.notes.join("; "))) : null,
+    event.notes?.length ? h("div", { class: "whole" }, h("dt", null, "Notes"), h("dd", null, event.notes.join("; "))) : null,
   ];
-}
-
-/** A chart of uPlot with a band for each axis. */
-function chartOf(uPlot, box, axes, data) {
-  let plot = null;
-  function make() {
-    const line = colour("line");
-    const words = {
-      stroke: colour("ink"),
-      grid: { stroke: line, width: 1 },
-      ticks: { stroke: line, width: 1 },
-      font: "13px system-ui, sans-serif",
-      labelFont: "13px system-ui, sans-serif",
-    };
-    const series = axes.flatMap((_, k) =>
-      ["low", "high"].map(() => ({ stroke: colour(SERIES[k]), width: 1, points: { show: false }, spanGaps: false })),
-    );
-    const options = {
-      width: box.clientWidth || 600,
-      height: box.clientHeight || 320,
-      legend: { show: false },
-      cursor: { show: false },
-      pxAlign: false,
-      scales: { x: { time: false } },
-      axes: [
-        { ...words, label: "Time [s]" },
-        { ...words, label: `Force [${unit("force")}]`, size: 64 },
-      ],
-      series: [{}, ...series],
-      bands: axes.map((_, k) => ({ series: [2 + 2 * k, 1 + 2 * k], fill: colour(SERIES[k], 0.45) })),
-    };
-    plot?.destroy();
-    box.replaceChildren();
-    plot = new uPlot(options, data().columns(factor("force")), box);
-  }
-  make();
-  const observer = new ResizeObserver(() => plot.setSize({ width: box.clientWidth, height: box.clientHeight }));
-  observer.observe(box);
-  return {
-    // all at once: one picture a frame
-    show: (columns, from, to) =>
-      plot.batch(() => {
-        plot.setData(columns, false);
-        plot.setScale("x", { min: from, max: to });
-        plot.setScale("y", reach(columns));
-      }),
-    repaint: make,
-    destroy: () => {
-      observer.disconnect();
-      plot.destroy();
-    },
-  };
-}
-
-/** A range for all columns behind the first; the few moments in which an observer finds its feet do not set it. */
-function reach(columns) {
-  const values = Float64Array.from(
-    columns
-      .slice(1)
-      .flat()
-      .filter((v) => v !== null && !Number.isNaN(v)),
-  ).sort();
-  if (!values.length) return { min: -1, max: 1 };
-  const [low, high] = [0.03, 0.97].map((share) => values[Math.round(share * (values.length - 1))]);
-  const room = 0.45 * (high - low) + 1e-3;
-  return { min: low - room, max: high + room };
 }
