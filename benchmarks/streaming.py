@@ -41,7 +41,9 @@ def run(seconds: float = 60.0, beside: bool = True) -> list[dict[str, Any]]:
         with Client(url) as client:
             machine = prepared(client)
             jobs = begun(client, machine) if beside else []
+            before = taken()
             found = paced(port, machine, turning, frames)
+            found["taken"] = taken() - before
             states = [client.job(job).state for job in jobs]
             state = f"; identifications one after the other, now {', '.join(states)}" if jobs else ""
             if jobs and "running" not in states:
@@ -167,6 +169,8 @@ def told(found: dict[str, Any], count: int, true: np.ndarray, rate: float, besid
             "from a frame's arrival to its forces, without the first 3 s",
         )
     )
+    share = 100.0 * found["taken"] / (count / rate) / (os.cpu_count() or 1)
+    rows.append(row("  of all cores, taken by the host of this virtual machine", share, None, "%", "while it does, nobody here is served"))
     rows.append(row("  from the first sample to an observer", found["ready"], None, "s", "1 s of it the samples that it is made from"))
     for name, share in found["shares"].items():
         rows.append(row(f"  share of a core, {name}", 100.0 * share, None, "%", ""))
@@ -176,6 +180,11 @@ def told(found: dict[str, Any], count: int, true: np.ndarray, rate: float, besid
         words = f"X {error[0]:.4f} Y {error[1]:.4f}; 300-4300 Hz, mean removed; live, of {np.std(true[part], axis=0).round(1)} N"
         rows.append(row(f"  rms error over rms force, {begin:.0f} to {finish:.0f} s", float(error.max()), None, "-", words))
     return rows
+
+
+def taken() -> float:
+    """Return the time that the host of a virtual machine has kept its cores for others [s]."""
+    return int(Path("/proc/stat").read_text().split(maxsplit=9)[8]) / os.sysconf("SC_CLK_TCK")
 
 
 def processes() -> dict[str, tuple[float, float]]:
