@@ -83,7 +83,9 @@ def test_wrong_tested_cuts_are_refused_in_words(opened, shop: str, tmp_path: Pat
         ("", "columns spindle_speed_rpm, axial_depth_mm, verdict"),
         (head, "cuts: found nothing"),
         (head + "8000,1,loud\n", "line 2, verdict: found loud, allowed is stable, chatter, marginal"),
-        (head + "\n8000,-1,stable\n", "line 3, axial_depth_mm: found -1, allowed is a number above 0"),
+        (head + "\n8000,-1,stable\n", "line 3, axial_depth_mm: found -1, allowed is a number above 0 and at most 500"),
+        (head + "133,1,stable\n50,1,stable\n", "line 3, spindle_speed_rpm: found 50, allowed is a number from 100 to 200000"),
+        (head + "8000,1,stable\n" * 1001, "cuts: found 1001, allowed is 1 to 1000"),
         (head + "8000\n", "line 2, verdict: found nothing"),
     ):
         file = tmp_path / "CUTS.csv"

@@ -4,6 +4,9 @@ import { h } from "./dom.js";
 
 const COLUMNS = ["spindle_speed_rpm", "axial_depth_mm", "verdict"];
 const VERDICTS = ["stable", "chatter", "marginal"];
+/** What the service takes: cuts, and the range of each number. */
+const MOST = 1000;
+const RANGES = { spindle_speed_rpm: [100, 200_000], axial_depth_mm: [0, 500] };
 /** What marks a verdict: symbol in the chart, sign in the text, colour. */
 export const MARKS = {
   stable: ["circle-open", "○", "good"],
@@ -28,15 +31,19 @@ export function testedCuts(name, text) {
     if (!header.includes(column)) wrong(`column ${column}`, `only ${header.join(", ")}`, `columns ${COLUMNS.join(", ")}`);
     return header.indexOf(column);
   });
-  if (!lines.length) wrong("cuts", "", "one at least");
+  if (!lines.length || lines.length > MOST) wrong("cuts", lines.length ? String(lines.length) : "", `1 to ${MOST} of them`);
   return lines.map(([number, line]) => {
     const [speed, depth, seen] = places.map((place) => line.split(divider)[place]?.trim() ?? "");
-    const positive = (field, written) => {
+    const within = (field, written) => {
       const value = Number(divider === "," ? written : written.replace(",", "."));
-      return written && value > 0 && Number.isFinite(value) ? value : wrong(`line ${number}, ${field}`, written, "a number above 0");
+      const [least, most] = RANGES[field];
+      const fits = written && value >= least && value > 0 && value <= most;
+      return fits
+        ? value
+        : wrong(`line ${number}, ${field}`, written, `a number ${least ? `from ${least} to` : "above 0 and at most"} ${most}`);
     };
     if (!VERDICTS.includes(seen.toLowerCase())) wrong(`line ${number}, verdict`, seen, VERDICTS.join(", "));
-    return { spindle_speed_rpm: positive(COLUMNS[0], speed), axial_depth_mm: positive(COLUMNS[1], depth), verdict: seen.toLowerCase() };
+    return { spindle_speed_rpm: within(COLUMNS[0], speed), axial_depth_mm: within(COLUMNS[1], depth), verdict: seen.toLowerCase() };
   });
 }
 
