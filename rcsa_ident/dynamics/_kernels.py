@@ -47,28 +47,47 @@ def independent_columns(columns, tolerance):
     Columns are taken at unit length; the basis ends where no remainder is longer than `tolerance`.
     """
     d, m = columns.shape
-    rest = np.empty((m, d))
-    size = np.empty(m)
+    most = min(d, m)
+    rest, size = np.empty((m, d)), np.empty(m)
     for j in range(m):
-        rest[j] = columns[:, j]
+        for i in range(d):
+            rest[j, i] = columns[i, j]
         length = math.sqrt(dot(rest[j], rest[j]))
         if length > 0.0:
-            rest[j] /= length
+            shrink(rest[j], length)
         size[j] = dot(rest[j], rest[j])
-    basis = np.empty((min(d, m), d))
-    for k in range(min(d, m)):
-        best = np.argmax(size)
+    basis = np.empty((most, d))
+    found = most
+    for k in range(most):
+        best = 0
+        for j in range(1, m):
+            if size[j] > size[best]:
+                best = j
         if math.sqrt(size[best]) <= tolerance:
-            return basis[:k].T.copy()
-        basis[k] = rest[best] / math.sqrt(size[best])
+            found = k
+            break
+        for i in range(d):
+            basis[k, i] = rest[best, i]
+        shrink(basis[k], math.sqrt(size[best]))
         # what the subtractions have lost to rounding is taken out again
         for i in range(k):
             take_out(basis[i], basis[k])
-        basis[k] /= math.sqrt(dot(basis[k], basis[k]))
+        shrink(basis[k], math.sqrt(dot(basis[k], basis[k])))
         for j in range(m):
             take_out(basis[k], rest[j])
             size[j] = dot(rest[j], rest[j])
-    return basis.T.copy()
+    answer = np.empty((d, found))
+    for k in range(found):
+        for i in range(d):
+            answer[i, k] = basis[k, i]
+    return answer
+
+
+@numba.njit(cache=True)
+def shrink(vector, length):
+    """Divide a vector by a length, in place."""
+    for i in range(vector.size):
+        vector[i] /= length
 
 
 @numba.njit(cache=True)

@@ -175,7 +175,9 @@ def envelopes(omega, x, y, alpha, stiffness, teeth, speeds):
             determinant[k] = turned * (x[i, k] * y[i, k])
             size += abs(trace[k].real) + abs(trace[k].imag) + abs(determinant[k].real) + abs(determinant[k].imag)
         if math.isfinite(size):
-            limits[i] = lowest_lobes(omega, trace, determinant, weights, stiffness, teeth, speeds)[0]
+            limit = lowest_lobes(omega, trace, determinant, weights, stiffness, teeth, speeds)[0]
+            for s in range(speeds.size):
+                limits[i, s] = limit[s]
     return limits
 
 
@@ -188,20 +190,25 @@ def lowest_lobes(omega, trace, determinant, weights, stiffness, teeth, speeds):
     lobes = np.full(m, -1, dtype=np.int64)
     root = roots_along(trace, determinant)
     n = omega.size
+    kept = np.empty(n - 1, dtype=np.int64)
     last_lobe = int(omega[n - 1] / (teeth * speeds[0])) + 1
     for sign in (1.0, -1.0):
         mu, start, end = phase_steps(trace, root, sign)
-        kept = np.flatnonzero(start == start)
-        if kept.size == 0:
+        # in scalars, as are all loops here: each array operation adds a second to what compiling takes
+        count, least, most = 0, np.inf, -np.inf
+        for k in range(n - 1):
+            if not math.isnan(start[k]):
+                kept[count] = k
+                count += 1
+                least, most = min(least, start[k], end[k]), max(most, start[k], end[k])
+        if count == 0:
             continue
-        lowest = min(start[kept].min(), end[kept].min()) / math.pi
-        highest = max(start[kept].max(), end[kept].max()) / math.pi
-        place = omega[kept + 1]
+        lowest, highest = least / math.pi, most / math.pi
         for lobe in range(last_lobe + 1):
             j = 0
             # w = teeth speed (lobe + psi / pi) bounds the intervals that can lie in the range of speeds
-            begin = np.searchsorted(place, teeth * speeds[0] * (lobe + lowest))
-            for k in kept[begin:]:
+            for p in range(first_ending_at(omega, kept, count, teeth * speeds[0] * (lobe + lowest)), count):
+                k = kept[p]
                 if omega[k] > teeth * speeds[m - 1] * (lobe + highest):
                     break
                 # the speeds between the interval's ends: w tau / 2 = psi + pi l, tau = 2 pi / (teeth speed)
@@ -229,6 +236,19 @@ def lowest_lobes(omega, trace, determinant, weights, stiffness, teeth, speeds):
                             lobes[i] = lobe
                     i += 1
     return limit, chatter, lobes
+
+
+@numba.njit(cache=True)
+def first_ending_at(omega, kept, count, value):
+    """Return the place of the first of the ascending intervals `kept` that ends at `value` or above it; `count` where none does."""
+    low, high = 0, count
+    while low < high:
+        middle = (low + high) // 2
+        if omega[kept[middle] + 1] < value:
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 @numba.njit(cache=True)
