@@ -116,7 +116,13 @@ def elements(rows, plan, degree):
                     place += plan[SPACING]
                 if far - near < _NARROW:
                     break
-    edges = np.sort(edges[:count])
+    for k in range(1, count):
+        # few, and compiled at once; a library's sort is not
+        value, place = edges[k], k
+        while place > 0 and edges[place - 1] > value:
+            edges[place] = edges[place - 1]
+            place -= 1
+        edges[place] = value
     kept = np.empty(count)
     kept[0], n = edges[0], 1
     for k in range(1, count):
@@ -160,7 +166,9 @@ def coefficients(rows, shapes, plan, places, points, table):
             weights[0], weights[1] = plan[DEPTH] * plan[KT], plan[DEPTH] * plan[KR]
             weights[2], weights[3] = plan[DEPTH] * plan[CT] / speed, plan[DEPTH] * plan[CR] / speed
             for w in range(rows.shape[0]):
-                pair[:] = 0.0
+                for i1 in range(2):
+                    for i2 in range(2):
+                        pair[0, i1, i2] = pair[1, i1, i2] = 0.0
                 add_window(theta, middle, rows[w], plan, weights, pair)
                 d = int(rows[w, 5])
                 for a in range(r):
@@ -177,17 +185,19 @@ def coefficients(rows, shapes, plan, places, points, table):
                 continue
             for step in range(int(places[e, 2])):
                 first = int(places[e, 3]) + step * q
-                for d in range(count):
-                    mean = np.zeros((r, r))
-                    for j in range(q + 1):
-                        mean += table[1, j] * stiffness[first + j, d]
-                    for j in range(q):
-                        stiffness[first + j, d] = mean
-                mean = np.zeros((r, r))
-                for j in range(q + 1):
-                    mean += table[1, j] * damping[first + j]
-                for j in range(q):
-                    damping[first + j] = mean
+                for a in range(r):
+                    for b in range(r):
+                        for d in range(count):
+                            mean = 0.0
+                            for j in range(q + 1):
+                                mean += table[1, j] * stiffness[first + j, d, a, b]
+                            for j in range(q):
+                                stiffness[first + j, d, a, b] = mean
+                        mean = 0.0
+                        for j in range(q + 1):
+                            mean += table[1, j] * damping[first + j, a, b]
+                        for j in range(q):
+                            damping[first + j, a, b] = mean
     return stiffness, damping, angle, time
 
 
@@ -231,18 +241,24 @@ def lookups(plan, places, points, angle, time, table):
                         value *= (x - table[0, i]) / (table[0, j] - table[0, i])
                 weight[p, d, j] = value
             # mostly a point stands there already: it alone counts
-            there = np.argmax(weight[p, d])
+            there = 0
+            for j in range(1, q + 1):
+                if weight[p, d, j] > weight[p, d, there]:
+                    there = j
             if abs(weight[p, d, there] - 1.0) < 1e-9:
                 where[p, d] += there
-                weight[p, d] = 0.0
-                weight[p, d, 0] = 1.0
+                for j in range(q + 1):
+                    weight[p, d, j] = 1.0 if j == 0 else 0.0
     return where, weight
 
 
 @numba.njit(cache=True)
 def _starts(places, point):
     """Whether an element starts with this point."""
-    return np.any(places[:, 3] == point)
+    found = False
+    for e in range(places.shape[0]):
+        found = found or places[e, 3] == point
+    return found
 
 
 @numba.njit(cache=True)

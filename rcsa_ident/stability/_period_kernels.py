@@ -2,7 +2,7 @@
 
 The structure moves exactly, p' = pole p + inputs F, y = 2 Re(outputs p) + constant F. Within a step F is a polynomial through
 Gauss-Lobatto nodes, and its response is exact. What the teeth do stands in `_cut_kernels`: a cut is laid out there once, so that the
-map is applied many times.
+map is applied many times. Loops over scalars throughout: an operation on whole arrays takes compiling a second or more, each.
 """
 
 from __future__ import annotations
@@ -42,23 +42,19 @@ def _exponential_moments(z, moments):
 
 
 @numba.njit(cache=True)
-def responses(h, pole, outputs, inputs, table):
-    """What a step of length h makes of a state and of forces at its nodes.
+def responses(h, pole, outputs, inputs, table, decay, drive, seen, echo):
+    """Write what a step of length h makes of a state and of forces at its nodes.
 
-    Returns
-    -------
+    Parameters
+    ----------
     decay (q + 1, m), drive (q + 1, m, r) : at the step's end, of p, and of F at each node
     seen (2, q, r, m) : y and y' at nodes 1..q, real part of it times p
-    echo (2, q, q + 1, r, r) : y and y' at nodes 1..q of F at each node, without the constant
+    echo (2, q, q + 1, r, r), zero before : y and y' at nodes 1..q of F at each node, without the constant
     """
     q, m, r = table.shape[1] - 1, pole.size, outputs.shape[0]
-    decay = np.empty((q + 1, m), dtype=np.complex128)
-    drive = np.empty((q + 1, m, r), dtype=np.complex128)
-    seen = np.empty((2, q, r, m), dtype=np.complex128)
-    echo = np.zeros((2, q, q + 1, r, r))
     moments = np.empty(q + 1, dtype=np.complex128)
-    decay[0] = 1.0
     for k in range(m):
+        decay[0, k] = 1.0
         for j in range(1, q + 1):
             x = table[0, j]
             decay[j, k] = _exponential_moments(pole[k] * h * x, moments)
@@ -80,7 +76,6 @@ def responses(h, pole, outputs, inputs, table):
                 if j == q:
                     for b in range(r):
                         drive[i, k, b] = weight * inputs[k, b]
-    return decay, drive, seen, echo
 
 
 @numba.njit(cache=True)
@@ -113,14 +108,24 @@ def _solve(matrix, right):
 
 
 @numba.njit(cache=True)
+def _identity(matrix):
+    """Write the identity."""
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            matrix[i, j] = 1.0 if i == j else 0.0
+
+
+@numba.njit(cache=True)
 def prepare(pole, outputs, inputs, constant, stiffness, damping, places, frozen, table):
     """Each element's responses, and each step's solution for the forces at its nodes.
 
     Returns
     -------
-    decay, drive, seen, echo : as `responses`, for each element
+    decay, drive, seen, echo : as `responses`, echo with the constant, for elements whose steps have a length of their own
+    same (e,) : the element where an element finds them
     first (n, r, r) : (1 - K R - C V)^-1 at points where the force has to be found anew, V the velocity that a force makes at once
     later (n, q r, q r) : the same for nodes 1..q of the step that starts at a point
+    total (n, r, r), kinds : stiffness of all delays; 2 where velocities matter, which they do to process damping only, else 1
     """
     q, m, r = table.shape[1] - 1, pole.size, outputs.shape[0]
     count, points = places.shape[0], damping.shape[0]
@@ -129,33 +134,46 @@ def prepare(pole, outputs, inputs, constant, stiffness, damping, places, frozen,
     seen = np.zeros((count, 2, q, r, m), dtype=np.complex128)
     echo = np.zeros((count, 2, q, q + 1, r, r))
     first, later = np.zeros((points, r, r)), np.zeros((points, q * r, q * r))
-    total = stiffness.sum(axis=1)
+    total, kinds = np.zeros((points, r, r)), 1
+    for point in range(points):
+        for a in range(r):
+            for b in range(r):
+                for d in range(stiffness.shape[1]):
+                    total[point, a, b] += stiffness[point, d, a, b]
+                if damping[point, a, b] != 0.0:
+                    kinds = 2
     jump = np.zeros((r, r))
     for a in range(r):
         for b in range(r):
             for k in range(m):
                 jump[a, b] += (2.0 * outputs[a, k] * inputs[k, b]).real
+    same, small, matrix = np.arange(count), np.empty((r, r)), np.empty((q * r, q * r))
     for e in range(count):
         if places[e, 3] < 0:
-            decay[e, q] = np.exp(pole * places[e, 1])
+            for k in range(m):
+                decay[e, q, k] = np.exp(pole[k] * places[e, 1])
             continue
-        done = -1
-        for other in range(e):
+        for other in range(e - 1, -1, -1):
             if places[other, 3] >= 0 and abs(places[other, 1] - places[e, 1]) < 1e-12 * places[e, 1]:
-                done = other
-        if done >= 0:
-            decay[e], drive[e], seen[e], echo[e] = decay[done], drive[done], seen[done], echo[done]
-        else:
-            decay[e], drive[e], seen[e], echo[e] = responses(places[e, 1], pole, outputs, inputs, table)
+                same[e] = other
+        if same[e] == e:
+            responses(places[e, 1], pole, outputs, inputs, table, decay[e], drive[e], seen[e], echo[e])
             for j in range(q):
-                echo[e, 0, j, j + 1] += constant
+                for a in range(r):
+                    for b in range(r):
+                        echo[e, 0, j, j + 1, a, b] += constant[a, b]
         for step in range(int(places[e, 2])):
             start = int(places[e, 3]) + step * q
             if step == 0 or frozen:
-                matrix = np.eye(r) - total[start] @ constant - damping[start] @ jump
-                first[start] = np.eye(r)
-                _solve(matrix, first[start])
-            matrix = np.eye(q * r)
+                for a in range(r):
+                    for b in range(r):
+                        value = 1.0 if a == b else 0.0
+                        first[start, a, b] = value
+                        for c in range(r):
+                            value -= total[start, a, c] * constant[c, b] + damping[start, a, c] * jump[c, b]
+                        small[a, b] = value
+                _solve(small, first[start])
+            _identity(matrix)
             for j in range(q):
                 node = start if frozen else start + j + 1
                 for i in range(q):
@@ -163,11 +181,12 @@ def prepare(pole, outputs, inputs, constant, stiffness, damping, places, frozen,
                         for b in range(r):
                             for c in range(r):
                                 matrix[j * r + a, i * r + b] -= (
-                                    total[node, a, c] * echo[e, 0, j, i + 1, c, b] + damping[node, a, c] * echo[e, 1, j, i + 1, c, b]
+                                    total[node, a, c] * echo[same[e], 0, j, i + 1, c, b]
+                                    + damping[node, a, c] * echo[same[e], 1, j, i + 1, c, b]
                                 )
-            later[start] = np.eye(q * r)
+            _identity(later[start])
             _solve(matrix, later[start])
-    return decay, drive, seen, echo, first, later, total
+    return decay, drive, seen, echo, same, first, later, total, kinds
 
 
 @numba.njit(cache=True)
@@ -185,16 +204,15 @@ def _earlier(motion, where, weight, point, delay, row):
 @numba.njit(cache=True)
 def march(state, motion, force, pole, outputs, constant, stiffness, damping, places, frozen, table, where, weight, prepared):
     """Move by one period. `motion` (2 n, r) holds y at all points, the last period's first; `force` (n, r) and the rest is written."""
-    decay, drive, seen, echo, first, later, total = prepared
+    decay, drive, seen, echo, same, first, later, total, kinds = prepared
     q, m, r = table.shape[1] - 1, state.size, constant.shape[0]
     points, delays = damping.shape[0], stiffness.shape[1]
     free, right, pull = np.zeros((2, q, r)), np.empty(q * r), np.empty(r)
-    # velocities matter only to process damping
-    kinds = 2 if np.any(damping) else 1
     for e in range(places.shape[0]):
+        own = same[e]
         if places[e, 3] < 0:
             for k in range(m):
-                state[k] *= decay[e, q, k]
+                state[k] *= decay[own, q, k]
             continue
         for step in range(int(places[e, 2])):
             start = int(places[e, 3]) + step * q
@@ -231,9 +249,9 @@ def march(state, motion, force, pole, outputs, constant, stiffness, damping, pla
                     for kind in range(kinds):
                         y = 0.0
                         for k in range(m):
-                            y += seen[e, kind, j, a, k].real * state[k].real - seen[e, kind, j, a, k].imag * state[k].imag
+                            y += seen[own, kind, j, a, k].real * state[k].real - seen[own, kind, j, a, k].imag * state[k].imag
                         for b in range(r):
-                            y += echo[e, kind, j, 0, a, b] * force[start, b]
+                            y += echo[own, kind, j, 0, a, b] * force[start, b]
                         free[kind, j, a] = y
                 for d in range(delays):
                     for b in range(r):
@@ -262,13 +280,13 @@ def march(state, motion, force, pole, outputs, constant, stiffness, damping, pla
                     value = free[0, j, a]
                     for i in range(q):
                         for b in range(r):
-                            value += echo[e, 0, j, i + 1, a, b] * force[start + i + 1, b]
+                            value += echo[own, 0, j, i + 1, a, b] * force[start + i + 1, b]
                     motion[points + start + j + 1, a] = value
             for k in range(m):
-                value = decay[e, q, k] * state[k]
+                value = decay[own, q, k] * state[k]
                 for i in range(q + 1):
                     for b in range(r):
-                        value += drive[e, i, k, b] * force[start + i, b]
+                        value += drive[own, i, k, b] * force[start + i, b]
                 state[k] = value
 
 
@@ -279,11 +297,13 @@ def largest_of_hessenberg(hessenberg):
     Shifted QR steps by Givens rotations in complex arithmetic, the vector by inverse iteration.
     """
     n = hessenberg.shape[0]
-    a = hessenberg.astype(np.complex128)
+    a = np.empty((n, n), dtype=np.complex128)
     size = 0.0
     for i in range(n):
-        for j in range(max(i - 1, 0), n):
-            size = max(size, abs(a[i, j]))
+        for j in range(n):
+            a[i, j] = hessenberg[i, j]
+            if j >= i - 1:
+                size = max(size, abs(hessenberg[i, j]))
     cosines, sines = np.empty(n), np.empty(n, dtype=np.complex128)
     value = 0.0j
     last, tries = n - 1, 0
@@ -333,15 +353,20 @@ def largest_of_hessenberg(hessenberg):
                 a[i, k + 1] = c * v - s * u
         for k in range(start, last + 1):
             a[k, k] += shift
-    shifted = hessenberg.astype(np.complex128)
-    vector = np.ones((n, 1), dtype=np.complex128)
+    column, vector = np.ones((n, 1), dtype=np.complex128), np.empty(n, dtype=np.complex128)
     for _ in range(2):
-        shifted[:] = hessenberg
-        for k in range(n):
-            shifted[k, k] -= value * (1.0 + 1e-13) + 1e-15 * size
-        _solve(shifted, vector)
-        vector /= math.sqrt(np.sum(np.abs(vector) ** 2))
-    return value, vector[:, 0]
+        for i in range(n):
+            for j in range(n):
+                a[i, j] = hessenberg[i, j]
+            a[i, i] -= value * (1.0 + 1e-13) + 1e-15 * size
+        _solve(a, column)
+        length = 0.0
+        for i in range(n):
+            length += column[i, 0].real ** 2 + column[i, 0].imag ** 2
+        for i in range(n):
+            column[i, 0] /= math.sqrt(length)
+            vector[i] = column[i, 0]
+    return value, vector
 
 
 @numba.njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
@@ -370,6 +395,25 @@ def orthogonalised(basis, count, vector, parts):
 
 
 @numba.njit(cache=True)
+def _length(vector):
+    """Euclidean length of a real vector."""
+    total = 0.0
+    for i in range(vector.size):
+        total += vector[i] * vector[i]
+    return math.sqrt(total)
+
+
+@numba.njit(cache=True)
+def _unpack(vector, state, motion, kept):
+    """Write a Krylov vector into the state and into the last period's motion from the point `kept` on."""
+    m, r = state.size, motion.shape[1]
+    for k in range(m):
+        state[k] = complex(vector[k], vector[m + k])
+    for i in range((motion.shape[0] // 2 - kept) * r):
+        motion[kept + i // r, i % r] = vector[2 * m + i]
+
+
+@numba.njit(cache=True)
 def multiplier(pole, outputs, inputs, constant, cut, table, frozen, tolerance, waves, start):
     """The period map's eigenvalue of largest magnitude by Arnoldi's method without restarts.
 
@@ -392,48 +436,47 @@ def multiplier(pole, outputs, inputs, constant, cut, table, frozen, tolerance, w
     vector (complex) : state and motion that it belongs to
     force (complex) : at the points, of that vector
     """
-    m, r = pole.size, outputs.shape[0]
     places, stiffness, damping, where, weight, _ = cut
-    points, delays = damping.shape[0], stiffness.shape[1]
+    m, r, points = pole.size, outputs.shape[0], damping.shape[0]
     prepared = prepare(pole, outputs, inputs, constant, stiffness, damping, places, frozen, table)
-    kept = points
-    for p in range(points):
-        for d in range(delays):
-            kept = min(kept, where[p, d])
+    kept = min(points, where.min())
     size = 2 * m + (points - kept) * r
     most = min(_MOST, size)
     basis, hessenberg = np.zeros((most + 1, size)), np.zeros((most + 1, most))
     motion, force, state = np.zeros((2 * points, r)), np.zeros((points, r)), np.empty(m, dtype=np.complex128)
+    norm = _length(start) if start.size == size else 0.0
     # a start without any symmetry: the golden ratio's multiples, beside what is known
     for i in range(size):
-        basis[0, i] = 0.5 * ((i + 1) * 0.6180339887498949 % 1.0 - 0.5)
-    norm = np.sqrt(np.sum(start**2))
-    if start.size == size and norm > 0.0:
-        basis[0] += start / norm
-    basis[0] /= np.sqrt(np.sum(basis[0] ** 2))
+        basis[0, i] = 0.5 * ((i + 1) * 0.6180339887498949 % 1.0 - 0.5) + (start[i] / norm if norm > 0.0 else 0.0)
+    norm = _length(basis[0])
+    for i in range(size):
+        basis[0, i] /= norm
     value, residual, used = 0.0j, 1.0, 0
     ritz = np.zeros(1, dtype=np.complex128)
     # as many eigenvalues as the structure itself has near the largest: fewer vectors may hide one of them
-    last = places.shape[0] - 1
-    duration = places[last, 0] + places[last, 1] * places[last, 2]
-    slowest = np.max(pole.real)
-    look = _FIRST
+    duration = places[-1, 0] + places[-1, 1] * places[-1, 2]
+    look, slowest = _FIRST, -np.inf
+    for k in range(m):
+        slowest = max(slowest, pole[k].real)
     for k in range(m):
         if pole[k].real * duration > -_LASTS and (pole[k].real - slowest) * duration > -0.5 * _LASTS:
             look += 2
     for n in range(most):
-        state[:] = basis[n, :m] + 1j * basis[n, m : 2 * m]
-        motion[kept:points] = basis[n, 2 * m :].reshape(points - kept, r)
+        _unpack(basis[n], state, motion, kept)
         march(state, motion, force, pole, outputs, constant, stiffness, damping, places, frozen, table, where, weight, prepared)
         after = basis[n + 1]
-        after[:m], after[m : 2 * m] = state.real, state.imag
-        after[2 * m :] = motion[points + kept :].reshape((points - kept) * r)
+        for k in range(m):
+            after[k], after[m + k] = state[k].real, state[k].imag
+        for point in range(points - kept):
+            for a in range(r):
+                after[2 * m + point * r + a] = motion[points + kept + point, a]
         length = orthogonalised(basis, n + 1, after, hessenberg[:, n])
         hessenberg[n + 1, n] = length
         used = n + 1
-        ends = used == most or length < 1e-14 * np.sqrt(np.sum(hessenberg[:used, n] ** 2))
+        ends = used == most or length < 1e-14 * _length(hessenberg[:used, n])
         if not ends:
-            after /= length
+            for i in range(size):
+                after[i] /= length
         if used >= look or ends:
             look = used + _EVERY
             value, ritz = largest_of_hessenberg(hessenberg[:used, :used])
@@ -442,12 +485,16 @@ def multiplier(pole, outputs, inputs, constant, cut, table, frozen, tolerance, w
                 break
     vector = np.zeros(size, dtype=np.complex128)
     for i in range(used):
-        vector += ritz[i] * basis[i]
+        for k in range(size):
+            vector[k] += ritz[i] * basis[i, k]
+    along = np.empty(size)
     forces = np.zeros((points, r), dtype=np.complex128)
     for part in range(2 if waves else 0):
-        along = vector.real if part == 0 else vector.imag
-        state[:] = along[:m] + 1j * along[m : 2 * m]
-        motion[kept:points] = np.ascontiguousarray(along[2 * m :]).reshape(points - kept, r)
+        for i in range(size):
+            along[i] = vector[i].real if part == 0 else vector[i].imag
+        _unpack(along, state, motion, kept)
         march(state, motion, force, pole, outputs, constant, stiffness, damping, places, frozen, table, where, weight, prepared)
-        forces += (1.0 if part == 0 else 1j) * force
+        for point in range(points):
+            for a in range(r):
+                forces[point, a] += (1.0 if part == 0 else 1j) * force[point, a]
     return value, residual, used, vector, forces

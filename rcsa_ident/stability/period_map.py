@@ -154,7 +154,7 @@ class PeriodMap:
             Of the eigenvalue, as a share of it, at which the search for it ends.
         """
         cut = self._laid_out(speed, depth, step)
-        first = np.zeros(0) if start is None else start.real
+        first = np.zeros(0) if start is None else np.ascontiguousarray(start.real)
         value, left, _, vector, force = _period_kernels.multiplier(
             self.pole, self.outputs, self.inputs, self.constant, cut, self.table, self.frozen, residual, waves, first
         )

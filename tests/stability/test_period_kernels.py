@@ -31,7 +31,10 @@ def test_responses(degree):
     pole = np.array([-90.0 + 5000.0j, -400.0 + 0.0j, -2000.0 + 21000.0j])
     outputs, inputs = (rng.standard_normal(s) + 1j * rng.standard_normal(s) for s in ((2, 3), (3, 2)))
     table, h = lobatto(degree), 3e-4
-    decay, drive, seen, echo = kernels.responses(h, pole, outputs, inputs, table)
+    q, m, r = table.shape[1] - 1, pole.size, outputs.shape[0]
+    decay, drive, seen = (np.empty(shape, dtype=complex) for shape in ((q + 1, m), (q + 1, m, r), (2, q, r, m)))
+    echo = np.zeros((2, q, q + 1, r, r))
+    kernels.responses(h, pole, outputs, inputs, table, decay, drive, seen, echo)
     start, force = rng.standard_normal(3) + 1j * rng.standard_normal(3), rng.standard_normal((degree + 1, 2))
     for j in range(1, degree + 1):
         x = table[0, j]
