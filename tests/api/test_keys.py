@@ -29,6 +29,7 @@ CALLS = [
     ("DELETE", "/toolings/t", None, "upload"),
     ("POST", "/toolings/drawing", example(), "read"),
     ("POST", "/toolings/import", {"data": []}, "upload"),
+    ("GET", "/materials", None, "read"),
     ("GET", "/examples", None, "read"),
     ("GET", "/examples/n", None, "read"),
     ("POST", "/forces", {"machine": "m", "tooling": "t", "campaign": "c", "recording": "n"}, "run"),
