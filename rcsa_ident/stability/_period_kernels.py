@@ -153,10 +153,11 @@ def prepare(pole, outputs, inputs, constant, stiffness, damping, places, frozen,
             for k in range(m):
                 decay[e, q, k] = np.exp(pole[k] * places[e, 1])
             continue
-        for other in range(e - 1, -1, -1):
+        for other in range(e):
             if places[other, 3] >= 0 and abs(places[other, 1] - places[e, 1]) < 1e-12 * places[e, 1]:
-                same[e] = other
-        if same[e] == e:
+                same[e] = same[other]
+        own = same[e]
+        if own == e:
             responses(places[e, 1], pole, outputs, inputs, table, decay[e], drive[e], seen[e], echo[e])
             for j in range(q):
                 for a in range(r):
@@ -181,8 +182,7 @@ def prepare(pole, outputs, inputs, constant, stiffness, damping, places, frozen,
                         for b in range(r):
                             for c in range(r):
                                 matrix[j * r + a, i * r + b] -= (
-                                    total[node, a, c] * echo[same[e], 0, j, i + 1, c, b]
-                                    + damping[node, a, c] * echo[same[e], 1, j, i + 1, c, b]
+                                    total[node, a, c] * echo[own, 0, j, i + 1, c, b] + damping[node, a, c] * echo[own, 1, j, i + 1, c, b]
                                 )
             _identity(later[start])
             _solve(matrix, later[start])
@@ -483,11 +483,10 @@ def multiplier(pole, outputs, inputs, constant, cut, table, frozen, tolerance, w
             residual = 0.0 if ends and used == size else length * abs(ritz[used - 1]) / max(abs(value), 1e-300)
             if residual < tolerance or ends:
                 break
-    vector = np.zeros(size, dtype=np.complex128)
+    vector, along = np.zeros(size, dtype=np.complex128), np.empty(size)
     for i in range(used):
         for k in range(size):
             vector[k] += ritz[i] * basis[i, k]
-    along = np.empty(size)
     forces = np.zeros((points, r), dtype=np.complex128)
     for part in range(2 if waves else 0):
         for i in range(size):

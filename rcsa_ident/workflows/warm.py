@@ -27,6 +27,7 @@ from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.time_domain import TimeDomain
+from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.virtual.milling import mill_cut
@@ -96,7 +97,11 @@ def _lobes() -> None:
     tip = modal_tip({Dof.X: normal_modes(np.array([5000.0]), np.array([0.05]), np.ones((1, 1)), (Coordinate("tip", Dof.X),))})
     speeds = np.linspace(800.0, 1000.0, 3)
     for cutter in (_CUTTER, Cutter(2, 0.012, 0.0, np.array([3.0, 2.0 * np.pi - 3.0]))):
-        LobeConditions(MillingProcess(cutter, _COEFFICIENTS, _CONDITIONS.engagement), speeds, 0.01).lobes(tip)
+        process = MillingProcess(cutter, _COEFFICIENTS, _CONDITIONS.engagement)
+        LobeConditions(process, speeds, 0.01).lobes(tip)
+        # and of machines that were drawn, for bands
+        direct = np.ascontiguousarray(tip.values[:, 0, 0])[None]
+        ZeroOrder().depths(tip.omega, (direct, 0.0 * direct), process, speeds, 0.01)
 
 
 def _lobes_in_time() -> None:

@@ -89,6 +89,23 @@ def test_largest_of_a_rotation():
     np.testing.assert_allclose(matrix @ vector, value * vector, atol=1e-9)
 
 
+def test_elements_of_nearly_equal_steps_share_what_was_computed():
+    """Also where the first and the last of them differ by more than neighbours do."""
+    cut = PeriodMap(tip(ONE), mill(2, 0.5), 2, False)
+    m, r, h, shape = cut.pole.size, cut.outputs.shape[0], 3e-4, (9, cut.outputs.shape[0], cut.outputs.shape[0])
+    places = np.array([[0.0, h * (1.0 + 0.7e-12 * k), 1.0, 3.0 * k, 0.0] for k in range(3)])
+    system = cut.pole, cut.outputs, cut.inputs
+    decay, drive, seen, echo, same, *_ = kernels.prepare(
+        *system, cut.constant, np.zeros((9, 1, r, r)), np.zeros(shape), places, False, cut.table
+    )
+    wanted = np.empty((3, m), dtype=complex), np.empty((3, m, r), dtype=complex), np.empty((2, 2, r, m), dtype=complex)
+    kernels.responses(h, *system, cut.table, *wanted, np.zeros((2, 2, 3, r, r)))
+    for e in same:
+        for found, each in zip((decay, drive, seen), wanted, strict=True):
+            np.testing.assert_allclose(found[e], each, rtol=1e-9)
+        assert np.any(echo[e])
+
+
 def dense(cut: PeriodMap, speed: float, depth: float, step: float) -> np.ndarray:
     """The map of a period written down, column by column."""
     layout = _cut_kernels.lay_out(*cut._rows(speed, depth), plan_of(cut, speed, depth, step), cut.table)
