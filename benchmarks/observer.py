@@ -12,6 +12,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -211,7 +212,7 @@ def step_rows(kalman: KalmanFilter, measured: np.ndarray, name: str) -> list[dic
         peer = filterpy_run(kalman, few[:count], constant)
         size = np.max(np.abs(peer))
         apart = float(np.max(np.abs(peer[: min(count, own.size)] - own[:count])) / size)
-        cost = best_of(lambda count=count, constant=constant: filterpy_run(kalman, few[:count], constant), repeats=3, seconds=0.05) / count  # type: ignore[misc]
+        cost = best_of(partial(filterpy_run, kalman, few[:count], constant), repeats=3, seconds=0.05) / count
         claim = f"observer, {name}, {states} states: a step and axis in steady state; peer: filterpy, {title}"
         rows.append(row(claim, seconds * 1e6, cost * 1e6, "us", f"forces agree to {apart:.1e}"))
     return rows

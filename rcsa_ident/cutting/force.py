@@ -63,7 +63,8 @@ def force_lines(cutter: Cutter, conditions: CuttingConditions, coefficients: Cut
     integrals of e^{i (q - m) phi}; a helix multiplies line m by the mean of e^{-i m 2 z tan(helix) / D} over the depth.
     """
     orders = np.asarray(orders)
-    return _over_depth(_per_depth(cutter, conditions, orders, *_forms(coefficients)[::2]), cutter, conditions, orders)
+    chip, _, edge = _forms(coefficients)
+    return _over_depth(_per_depth(cutter, conditions, orders, chip, edge), cutter, conditions, orders)
 
 
 def _per_depth(cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray, chip: ComplexArray, edge: ComplexArray) -> ComplexArray:
