@@ -11,11 +11,11 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
 from api import problems
+from api.access import AccessMonitor
+from api.components import Components, JobCounts, Metrics, Rates
 from api.files import Files
-from api.jobs.crew import Crew
-from api.jobs.feeds import Feeds
-from api.observe import Observed
-from api.parts import JobCounts, Metrics, Parts, Rates
+from api.jobs.event_feed import EventFeeds
+from api.jobs.supervisor import Supervisor
 from api.reading.reader import Limits, Reader, Reading
 from api.reading.uploads import Uploads
 from api.routes import (
@@ -28,12 +28,12 @@ from api.routes import (
     libraries,
     machines,
     materials,
-    page,
-    queries,
+    multi_upload,
     recordings,
-    resumed,
+    resumable_upload,
+    static_files,
     streams,
-    together,
+    tool_change,
     toolings,
 )
 from api.schemas.campaigns import NewCampaign
@@ -41,7 +41,7 @@ from api.schemas.common import ProblemDocument
 from api.schemas.forces import ForceQuery, ForceUpload
 from api.security import HEADER
 from api.settings import Settings
-from api.stores.records import Store
+from api.stores.entities import Store
 from api.stores.sql import open_store
 from api.streams.hub import Hub, StreamLimits
 from api.streams.process import Host, StreamProcess
@@ -59,7 +59,7 @@ def create_app(
     work: Work | None = None,
     reader: Reading | None = None,
     host: Host | None = None,
-    crew: Crew | None = None,
+    crew: Supervisor | None = None,
 ) -> FastAPI:
     """Return the service.
 
@@ -68,7 +68,7 @@ def create_app(
     settings : Settings
     store, work, reader, host : optional
         In place of the database and the processes that the settings name.
-    crew : Crew, optional
+    crew : Supervisor, optional
         Who carries out jobs; without one they wait for workers that run elsewhere.
     """
     if store is None and not settings.database:
@@ -82,7 +82,9 @@ def create_app(
     rates, metrics = Rates(settings.requests_per_minute, settings.burst), Metrics(lambda: float(workers.waiting))
     hub = Hub(StreamProcess() if host is None else host, _stream_limits(settings), metrics)
     metrics.streams.set_function(lambda: float(len(hub.sessions)))
-    parts = Parts(settings, kept, workers, files, readers, uploads, rates, metrics, hub, Feeds(kept.jobs, settings.watchers), crew)
+    parts = Components(
+        settings, kept, workers, files, readers, uploads, rates, metrics, hub, EventFeeds(kept.jobs, settings.watchers), crew
+    )
     metrics.registry.register(JobCounts(kept.jobs))
 
     @asynccontextmanager
@@ -114,11 +116,11 @@ def create_app(
     app.state.parts = parts
     problems.install(app)
     app.include_router(health.router)
-    app.include_router(page.router)
+    app.include_router(static_files.router)
     about = (keys, machines, toolings, libraries, materials, examples)
-    for each in (*about, campaigns, recordings, resumed, together, queries, identifications, forces, streams):
+    for each in (*about, campaigns, recordings, resumable_upload, multi_upload, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
-    app.add_middleware(Observed, parts=parts)
+    app.add_middleware(AccessMonitor, parts=parts)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
     return app
 

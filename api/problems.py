@@ -13,7 +13,7 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.keys import describe
+from rcsa_ident.io.validated_table import describe
 
 MEDIA_TYPE = "application/problem+json"
 _LONGEST = 200

@@ -17,9 +17,9 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
 from starlette.requests import HTTPConnection
 
-from api.parts import Parts, parts_of
+from api.components import Components, parts_of
 from api.problems import Problem
-from api.stores.records import Key
+from api.stores.entities import Key
 
 SCOPES = ("read", "upload", "run", "admin")
 HEADER = "X-API-Key"
@@ -73,7 +73,7 @@ def hash_of(secret: str) -> str:
     return hashlib.sha256(secret.encode("utf-8", "replace")).hexdigest()
 
 
-def caller_of(request: HTTPConnection, parts: Parts, given: str | None = None) -> Caller:
+def caller_of(request: HTTPConnection, parts: Components, given: str | None = None) -> Caller:
     """Return who asks; without a key only where none is asked for.
 
     Parameters

@@ -83,11 +83,11 @@ def worker(
     import signal
     import threading
 
-    from api.jobs.crew import Crew
+    from api.jobs.supervisor import Supervisor
 
     settings = context.obj
     _log()
-    crew = Crew(count or max(settings.job_workers, 1), job_worker, settings, settings.job_nice)
+    crew = Supervisor(count or max(settings.job_workers, 1), job_worker, settings, settings.job_nice)
     ended = threading.Event()
     for each in (signal.SIGTERM, signal.SIGINT):
         signal.signal(each, lambda *_: ended.set())
@@ -141,8 +141,8 @@ def job_worker(settings: Any, ready: Callable[[], None], stop: Event) -> None:
 
     from api.files import Files
     from api.jobs import identification, lobes
+    from api.jobs.cluster import over_cluster
     from api.jobs.durable import Durable
-    from api.jobs.spread import over_cluster
     from api.jobs.worker import Carrier, JobWorker
     from api.reading.campaigns import load_campaign
     from api.stores.sql import open_store
@@ -156,7 +156,7 @@ def job_worker(settings: Any, ready: Callable[[], None], stop: Event) -> None:
 
 
 def _log() -> None:
-    from api.observe import JsonLines
+    from api.access import JsonLines
 
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(JsonLines())
@@ -166,15 +166,15 @@ def _log() -> None:
 def _run(settings: object) -> None:
     import uvicorn
 
-    from api.jobs.crew import Crew
+    from api.access import Patient
+    from api.jobs.supervisor import Supervisor
     from api.main import create_app
-    from api.observe import Patient
     from api.settings import Settings
 
     assert isinstance(settings, Settings)
     _log()
     try:
-        service = create_app(settings, crew=Crew(settings.job_workers, job_worker, settings, settings.job_nice))
+        service = create_app(settings, crew=Supervisor(settings.job_workers, job_worker, settings, settings.job_nice))
     except InputError as error:
         _fail(error)
     except OSError as error:

@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.timing import best_of, row
 from rcsa_ident.identification._kernels import cross_frf, modal_cross_frf
-from rcsa_ident.identification.paper import modal_fractions
+from rcsa_ident.identification.genetic_algorithm import modal_fractions
 
 LINES, TOOLINGS, MODES = 164, 2, 10
 

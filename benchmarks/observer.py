@@ -38,7 +38,7 @@ from rcsa_ident.virtual.milling import mill_cut
 from rcsa_ident.virtual.reduction import poles, reduced
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from rcsa_ident.virtual.sensors import clamp, padding, record, sample
-from rcsa_ident.workflows.monitor import MonitoredCut, observe
+from rcsa_ident.workflows.estimate_forces import MonitoredCut, observe
 from rcsa_ident.workflows.simulate import OVERSAMPLING
 from rcsa_ident.workflows.speeds import MachineOverSpeed
 

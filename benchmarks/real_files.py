@@ -20,10 +20,10 @@ from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.io.frf_files import Source, read_tap_tests
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import StabilityMethod
-from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tested import Tally, TestedCuts, Verdict, tally
+from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, Verdict, tally
+from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.lobes import LobeConditions, measured_tip
 

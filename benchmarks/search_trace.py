@@ -30,9 +30,9 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.data import IdentificationData
-from rcsa_ident.identification.default import DefaultMethod
+from rcsa_ident.identification.evidence import EvidenceSelection
+from rcsa_ident.identification.genetic_algorithm import NoiseWeightedCost, PaperGeneticAlgorithm
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.paper import NoiseWeightedCost, PaperGeneticAlgorithm
 from rcsa_ident.identification.parameters import Layout, joint_of, modes_of, plain, split, unpack
 from rcsa_ident.identification.search import starts
 
@@ -85,7 +85,7 @@ class Candidates:
     """The default's cost of vectors of one axis, with the delays profiled inside, and the box around its starts."""
 
     def __init__(self, data: IdentificationData, seed: int) -> None:
-        method = DefaultMethod()
+        method = EvidenceSelection()
         # the flange's motion as one output, as the default's exploration has it
         data = data.summed()
         self.misfit = Misfit(data, method.priors, (SHARE,))
@@ -118,7 +118,7 @@ def by_default(data: IdentificationData, seed: int, seconds: float) -> Recorder:
             lowest[kind] = cost
             recorder.add(cost, (np.array(theta), layout))
 
-    found = DefaultMethod().run(data, seed, map, follow)
+    found = EvidenceSelection().run(data, seed, map, follow)
     recorder.points.append((recorder.seconds, np.nan, (found.axes[AXIS].modes, found.axes[AXIS].joint)))
     return recorder
 

@@ -22,8 +22,8 @@ from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.stability.deformation import ToolDeflection, deflected_edge, deflected_engagement
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
-from rcsa_ident.stability.map import stability_map
-from rcsa_ident.stability.modes import TipModes
+from rcsa_ident.stability.stability_map import stability_map
+from rcsa_ident.stability.tip_modes import TipModes
 
 RPM = np.pi / 30.0
 #: Insperger & Stepan's mill.

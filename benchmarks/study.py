@@ -33,8 +33,8 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cli.simulation import simulate_campaign
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.data import IdentificationData
-from rcsa_ident.identification.default import DefaultMethod
-from rcsa_ident.identification.paper import WIDE, NoiseWeightedCost, PaperGeneticAlgorithm
+from rcsa_ident.identification.evidence import EvidenceSelection
+from rcsa_ident.identification.genetic_algorithm import WIDE, NoiseWeightedCost, PaperGeneticAlgorithm
 from rcsa_ident.identification.posterior import MachineAxis
 from rcsa_ident.io.curves import read_frf_csv
 from rcsa_ident.io.identifications import identification_to_json, machine_from_json
@@ -44,15 +44,15 @@ from rcsa_ident.io.results import read_result, write_result
 from rcsa_ident.io.setups import read_campaign, read_tooling
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.signals.recording import Recording
+from rcsa_ident.workflows.compile_kernels import STEPS
 from rcsa_ident.workflows.identify import JudgedCut, Method, data_of, judge
 from rcsa_ident.workflows.tip import tooltip
-from rcsa_ident.workflows.warm import STEPS
 
 MACHINES = Path(__file__).resolve().parent.parent / "data" / "machines"
 #: The machine that lies inside the search space of the published algorithm, seed of its cuts.
 INSIDE, INSIDE_SEED = "table2", 101
 METHODS: dict[str, Method] = {
-    "default": DefaultMethod(),
+    "default": EvidenceSelection(),
     "paper, literal": PaperGeneticAlgorithm(),
     "paper, noise weights": PaperGeneticAlgorithm(NoiseWeightedCost()),
     "paper, noise weights, wide boxes": PaperGeneticAlgorithm(NoiseWeightedCost(), WIDE),

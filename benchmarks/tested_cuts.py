@@ -68,7 +68,7 @@ def _case(folder: Path, number: int, name: str, radial_mm: float, feed: str) -> 
     from rcsa_ident.io.machines import read_machine
     from rcsa_ident.io.setups import FEED_DIRECTIONS, read_tooling
     from rcsa_ident.stability.lobes import stability_lobes
-    from rcsa_ident.stability.modes import TIP
+    from rcsa_ident.stability.tip_modes import TIP
     from rcsa_ident.virtual.limit import multiplier
     from rcsa_ident.virtual.reduction import poles, reduced
     from rcsa_ident.virtual.rotor import rotor

@@ -25,14 +25,14 @@ NOUNS = (
     "rcsa_ident.identification.misfit.Residual",
     "rcsa_ident.identification.misfit.Linearisation",
     "rcsa_ident.identification.misfit.Evaluation",
-    "rcsa_ident.identification.polish.Solution",
-    "rcsa_ident.identification.final.AxisSearch",
+    "rcsa_ident.identification.levenberg_marquardt.Solution",
+    "rcsa_ident.identification.joint_fit.AxisSearch",
     "rcsa_ident.cutting.conditions.Engagement",
     "rcsa_ident.cutting.process.ProcessDamping",
-    "api.work.questions.MachineText",
-    "api.work.questions.ToolingText",
-    "api.work.questions.CutQuestion",
-    "api.work.questions.LobeQuestion",
+    "api.work.requests.MachineText",
+    "api.work.requests.ToolingText",
+    "api.work.requests.CutQuestion",
+    "api.work.requests.LobeQuestion",
 )
 _PLACES = {place.rpartition(".")[2]: place for place in NOUNS}
 

@@ -13,17 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from api.jobs.desk import Desk, Spread
+from api.jobs.job_context import JobContext, Spread
+from api.stores.entities import digest_of
 from api.stores.jobs import Applied, Job, Outcome
-from api.stores.records import digest_of
-from api.work import answers
-from api.work.known import posteriors
+from api.work import tasks
+from api.work.machine_cache import posteriors
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.data import IdentificationData
-from rcsa_ident.identification.default import SMOOTH_ERROR, DefaultMethod
+from rcsa_ident.identification.evidence import SMOOTH_ERROR, EvidenceSelection
+from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.paper import PaperGeneticAlgorithm
 from rcsa_ident.identification.parameters import Layout
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.io.identifications import identification_to_json
@@ -41,7 +41,7 @@ CHUNK, POINTS = 4, 300
 _STAGES = {"_search_axis": "search", "_from_other_axis": "from the other axis", "_from_start": "both axes", "_search": "search"}
 
 
-def carry(load: Load, job: Job, desk: Desk, spread: Spread = map) -> Outcome:
+def carry(load: Load, job: Job, desk: JobContext, spread: Spread = map) -> Outcome:
     """Identify a machine.
 
     Parameters
@@ -96,7 +96,7 @@ def _planned(campaign: Campaign, plan: list[list[str]]) -> Campaign:
     return replace(campaign, cuts=tuple(cuts))
 
 
-def _judged(campaign: Campaign, read: ReadCut, desk: Desk) -> list[JudgedCut]:
+def _judged(campaign: Campaign, read: ReadCut, desk: JobContext) -> list[JudgedCut]:
     def reading(cut: Cut) -> Reading:
         desk.check()
         return judge_cut(campaign, anonymous, cut)
@@ -121,17 +121,17 @@ def _all(reading: Callable[[Cut], Reading], cuts: Iterable[Cut]) -> list[Reading
     return [reading(cut) for cut in cuts]
 
 
-def _method(name: str, start: str | None, desk: Desk, job: Job) -> Method:
+def _method(name: str, start: str | None, desk: JobContext, job: Job) -> Method:
     if name == "paper":
         return PaperGeneticAlgorithm()
     known = None if start is None else posteriors(json.loads(start))
-    return _Telling(DefaultMethod(start=known), desk, datetime.fromisoformat(str(job.started)))
+    return _Telling(EvidenceSelection(start=known), desk, datetime.fromisoformat(str(job.started)))
 
 
 class _Steps:
     """A map whose every result is a step of the job."""
 
-    def __init__(self, desk: Desk, spread: Spread) -> None:
+    def __init__(self, desk: JobContext, spread: Spread) -> None:
         self.desk, self.spread, self.calls = desk, spread, 0
 
     def __call__(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterable[Any]:
@@ -144,8 +144,8 @@ class _Steps:
 class _Telling:
     """The default method, which says where it is."""
 
-    method: DefaultMethod
-    desk: Desk
+    method: EvidenceSelection
+    desk: JobContext
     begun: datetime
 
     def run(self, data: IdentificationData, seed: int, map: Spread) -> Identification:
@@ -160,7 +160,7 @@ class _Telling:
 class _Story:
     """What is told of a search: cost for cost, and now and then the lines beside the model's."""
 
-    def __init__(self, desk: Desk, data: IdentificationData, method: DefaultMethod, begun: datetime) -> None:
+    def __init__(self, desk: JobContext, data: IdentificationData, method: EvidenceSelection, begun: datetime) -> None:
         self.desk, self.method = desk, method
         # the time that went by while nobody worked on it belongs to it, too
         self.start = time.monotonic() - max((datetime.now(UTC) - begun).total_seconds(), 0.0)
@@ -236,7 +236,7 @@ def _report(found: Identification, campaign: Campaign, judged: list[JudgedCut], 
 def _applied(text: str) -> tuple[Applied | None, str | None]:
     """What becomes the machine's identification, or why it can not."""
     try:
-        summary = answers.check(text)
+        summary = tasks.check(text)
     except InputError as error:
         return None, json.dumps({"detail": f"it is not made the machine's identification: {error}", "errors": []})
     return (Applied(text, json.dumps(summary), digest_of(text)) if summary["status"] != "failed" else None), None

@@ -8,11 +8,11 @@ from functools import partial
 from typing import Any
 
 from api.jobs.codec import decode, encode
-from api.jobs.desk import Desk
+from api.jobs.job_context import JobContext
 from api.stores.jobs import Job, Outcome
-from api.work import answers
+from api.work import tasks
 from api.work.pool import guarded
-from api.work.questions import LobeQuestion, MachineText, ToolingText
+from api.work.requests import LobeQuestion, MachineText, ToolingText
 
 
 def asked(machine: MachineText, toolings: Sequence[ToolingText], question: LobeQuestion) -> str:
@@ -20,12 +20,12 @@ def asked(machine: MachineText, toolings: Sequence[ToolingText], question: LobeQ
     return encode((machine, tuple(toolings), question))
 
 
-def carry(job: Job, desk: Desk) -> Outcome:
+def carry(job: Job, desk: JobContext) -> Outcome:
     """Compute the lobes of all toolings, whose questions are the job's text ``question``."""
     machine, toolings, question = decode(str(desk.jobs.text(job.id, "question")))
     found: list[dict[str, Any]] = []
     for i, tooling in enumerate(toolings):
         desk.progress("lobes", i, len(toolings))
-        found.append(desk.remember(f"lobes.{i}", partial(guarded, answers.lobes, machine, tooling, question)))
+        found.append(desk.remember(f"lobes.{i}", partial(guarded, tasks.lobes, machine, tooling, question)))
     desk.progress("lobes", len(toolings), len(toolings))
     return Outcome("done", "", texts={"answer": json.dumps({"machine": job.machine, "toolings": found}, allow_nan=False)})

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from api.jobs.backend import JobBackend, Remember
-from api.jobs.desk import Desk, Faulty, Stopped
+from api.jobs.job_context import Faulty, JobContext, Stopped
+from api.stores.entities import Unavailable
 from api.stores.jobs import Job, Jobs, Outcome, Worker
-from api.stores.records import Unavailable
 from rcsa_ident.errors import InputError
 
 log = logging.getLogger("rcsa_ident.jobs")
@@ -28,7 +28,7 @@ LOOK, BEAT, ROUND, LEASE = 0.5, 4.0, 3.0, 20.0
 #: Jobs that somebody waits for at the screen come first.
 PRIORITY = {"lobes": 1}
 #: Carries out a job of one kind and returns how it ended, seconds left out.
-Carrier = Callable[[Job, Desk], Outcome]
+Carrier = Callable[[Job, JobContext], Outcome]
 
 
 def carry(
@@ -65,7 +65,7 @@ def carry(
 def _outcome(jobs: Jobs, carrier: Carrier, job: Job, token: str, remember: Remember, leave: Callable[[int], Any]) -> Outcome | None:
     """How the job ended; None where it was stopped."""
     try:
-        with Desk(jobs, job.id, token, remember, leave) as desk:
+        with JobContext(jobs, job.id, token, remember, leave) as desk:
             return carrier(job, desk)
     except Stopped:
         return None

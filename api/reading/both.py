@@ -8,6 +8,6 @@ from typing import Any
 
 def recording_and_air(cut: Path, air: Path | None) -> tuple[Any, Any]:
     """Return a recording and its air cut, where there is one."""
-    from api.reading.normalised import read_normalised
+    from api.reading.samples import read_normalised
 
     return read_normalised(cut), None if air is None else read_normalised(air)

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from api.files import NORMALISED, Files
-from api.reading.declared import campaign_of_text
-from api.stores.records import Store
+from api.reading.campaign_text import campaign_of_text
+from api.stores.entities import Store
 from rcsa_ident.errors import InputError
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.signals.recording import Recording
@@ -24,7 +24,7 @@ def load_campaign(store: Store, files: Files, group: str, campaign_id: str) -> t
     InputError
         The campaign is gone, or no cut of it is uploaded.
     """
-    from api.reading.normalised import read_cut_normalised
+    from api.reading.samples import read_cut_normalised
 
     row = store.campaigns.get(group, campaign_id)
     if row is None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from api.reading.declared import Upload
+from api.reading.campaign_text import Upload
 from rcsa_ident.signals.recording import Sensor
 
 
 def read_plain(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) -> dict[str, Any]:
     """Return rate, duration and channels of an upload."""
-    from api.reading import look
+    from api.reading import examine
 
-    return look.told(look.read_upload(upload, sensors, rate))
+    return examine.told(examine.read_upload(upload, sensors, rate))

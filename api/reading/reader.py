@@ -17,7 +17,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Protocol
 
-from api.reading import calls
+from api.reading import reader_tasks
 from api.work.pool import Busy
 from rcsa_ident.errors import InputError
 
@@ -84,7 +84,7 @@ class Reader:
         What the process does first, outside of the limits.
     """
 
-    def __init__(self, limits: Limits, queue: int, prepare: Callable[[], None] = calls.warm) -> None:
+    def __init__(self, limits: Limits, queue: int, prepare: Callable[[], None] = reader_tasks.warm) -> None:
         self.limits, self.queue, self.prepare, self.waiting = limits, queue, prepare, 0
         self.threads: ThreadPoolExecutor | None = None
         self.child: _Child | None = None

@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from api.files import NORMALISED, UPLOADS, Files
-from api.reading import calls
-from api.reading.declared import Upload, files_of
+from api.reading import reader_tasks
+from api.reading.campaign_text import Upload, files_of
 from api.reading.reader import Reading
 from api.stores.campaigns import Campaign, FileKey, Recording
-from api.stores.records import Store, Taken, Unavailable
+from api.stores.entities import Store, Taken, Unavailable
 from api.work.pool import Busy
 from rcsa_ident.errors import InputError
 
@@ -97,7 +97,7 @@ class Uploads:
         target = self.files.spare(campaign.group)
         try:
             upload = Upload(received.path, name, target)
-            found = await self.reader.run(calls.look, upload, campaign.text, cut, role, self._path(air))
+            found = await self.reader.run(reader_tasks.look, upload, campaign.text, cut, role, self._path(air))
             recording = Recording(
                 campaign.group,
                 campaign.id,
@@ -172,7 +172,7 @@ class Uploads:
         path = self._path(recording)
         assert path is not None
         try:
-            verdict = await self.reader.run(calls.judge, campaign.text, cut, path, self._path(air))
+            verdict = await self.reader.run(reader_tasks.judge, campaign.text, cut, path, self._path(air))
         except InputError as error:
             verdict = refused_verdict(str(error))
         text = json.dumps(json.loads(recording.found) | {"verdict": verdict}, allow_nan=False)

@@ -12,10 +12,10 @@ from fastapi import APIRouter, Path, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
+from api.components import Components, ThisService
 from api.files import UPLOADS
-from api.parts import Parts, ThisService
 from api.problems import Problem
-from api.reading.declared import LARGEST, declare, toml_text
+from api.reading.campaign_text import LARGEST, declare, toml_text
 from api.routes.archives import zipped
 from api.routes.common import BODY, After, Limit, MachineId, found_or_404, guard, page, problems, utf8
 from api.routes.machines import Repeat
@@ -23,7 +23,7 @@ from api.schemas.campaigns import EXAMPLE, CampaignAnswer, CampaignSummary, CutA
 from api.schemas.common import ID_PATTERN, Page, body_of
 from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.campaigns import Campaign, Counts, Recording
-from api.stores.records import Taken
+from api.stores.entities import Taken
 from api.work.toolings import parsed, toml_of
 
 router = APIRouter(tags=["campaigns"], route_class=Guarded)
@@ -77,7 +77,7 @@ async def make(
     return await run_in_threadpool(_answer, parts, campaign)
 
 
-def _tooling(parts: Parts, group: str, name: str) -> str | None:
+def _tooling(parts: Components, group: str, name: str) -> str | None:
     document = parts.store.toolings.get(group, name)
     return None if document is None else document.text
 
@@ -146,12 +146,12 @@ def forget(id: CampaignId, parts: ThisService, caller: WhoAsks) -> Response:
     return Response(status_code=204)
 
 
-def known_campaign(parts: Parts, group: str, id: str) -> Campaign:
+def known_campaign(parts: Components, group: str, id: str) -> Campaign:
     """Return a campaign that is there."""
     return found_or_404(parts.store.campaigns.get(group, id), "campaign")
 
 
-def _answer(parts: Parts, campaign: Campaign) -> CampaignAnswer:
+def _answer(parts: Components, campaign: Campaign) -> CampaignAnswer:
     data = json.loads(campaign.text)
     rows = {row.name: row for row in parts.store.recordings.list(campaign.group, campaign.id, "", 1_000_000)}
     cuts = [_cut(cut, rows) for cut in data["cuts"]]
@@ -179,7 +179,7 @@ def _cut(cut: dict[str, Any], rows: dict[str, Recording]) -> CutAnswer:
     return CutAnswer(**cut | files, verdict=verdict)
 
 
-def _members(parts: Parts, campaign: Campaign, rows: dict[str, Recording]) -> Iterator[tuple[str, bytes | FilePath]]:
+def _members(parts: Components, campaign: Campaign, rows: dict[str, Recording]) -> Iterator[tuple[str, bytes | FilePath]]:
     yield "campaign.toml", toml_text(campaign.text, rows.__contains__).encode()
     for name, text in json.loads(campaign.text)["toolings"].items():
         yield f"toolings/{name}.toml", text.encode()

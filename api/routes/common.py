@@ -9,7 +9,7 @@ from fastapi import Path, Query, Request
 
 from api.problems import MEDIA_TYPE, Problem, title
 from api.schemas.common import ID_PATTERN, NAME_PATTERN
-from api.stores.records import ABSENT
+from api.stores.entities import ABSENT
 
 Item = TypeVar("Item")
 MachineId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a machine.")]

@@ -9,7 +9,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Response
 from fastapi.responses import FileResponse, StreamingResponse
 
-from api.parts import Parts, ThisService
+from api.components import Components, ThisService
 from api.problems import Problem
 from api.routes.archives import zipped, zipped_bytes
 from api.routes.common import guard, problems
@@ -62,7 +62,7 @@ def get_example(name: Annotated[str, Path(pattern=r"^[A-Za-z0-9.-]{1,64}$")], pa
     return StreamingResponse(zipped(members), media_type=_TYPES[".zip"], headers=headers)
 
 
-def _sample(parts: Parts) -> list[tuple[str, Folder]]:
+def _sample(parts: Components) -> list[tuple[str, Folder]]:
     """What the folder of the settings holds of a campaign, by name in the archive; nothing where there is none."""
     folder = parts.settings.examples
     try:

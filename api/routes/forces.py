@@ -12,21 +12,21 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
-from api.parts import Parts, ThisService
+from api.components import Components, ThisService
 from api.problems import Problem
-from api.reading.declared import FORMATS, Upload
+from api.reading.campaign_text import FORMATS, Upload
 from api.reading.plain import read_plain
 from api.reading.uploads import Received
 from api.routes.common import BODY, guard, problems
-from api.routes.forms import FORM, form
 from api.routes.machines import known_machine
-from api.routes.openings import given_sensors, reader, uploaded
-from api.routes.queries import tooling_text
+from api.routes.multipart import FORM, form
+from api.routes.stream_opening import given_sensors, reader, uploaded
+from api.routes.tool_change import tooling_text
 from api.schemas.common import body_of
 from api.schemas.forces import ForceAnswer, ForceQuery, ForceUpload
 from api.security import Guarded, WhoAsks
-from api.work.forces import ForceQuestion, ReadBoth, forces, sensors_of
-from api.work.questions import MachineText, ToolingText
+from api.work.forces import ForceQuestion, ReadPair, forces, sensors_of
+from api.work.requests import MachineText, ToolingText
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Sensor
 
@@ -77,13 +77,13 @@ async def estimate(request: Request, parts: ThisService, caller: WhoAsks) -> Any
                 return await _answered(parts, caller.group, machine, tooling, question, source, csv)
 
 
-def _of_campaign(parts: Parts, group: str, query: ForceQuery) -> tuple[MachineText, ToolingText, ForceQuestion, ReadBoth]:
+def _of_campaign(parts: Components, group: str, query: ForceQuery) -> tuple[MachineText, ToolingText, ForceQuestion, ReadPair]:
     found = uploaded(parts, group, query.campaign, query.recording)
     tooling = found.tooling if query.tooling is None else tooling_text(parts, group, query.tooling)
     return known_machine(parts, group, query.machine), tooling, query.question(found.speed), reader(found.cut, found.air)
 
 
-def _of_upload(parts: Parts, group: str, upload: ForceUpload) -> tuple[MachineText, ToolingText, ForceQuestion, tuple[Sensor, ...]]:
+def _of_upload(parts: Components, group: str, upload: ForceUpload) -> tuple[MachineText, ToolingText, ForceQuestion, tuple[Sensor, ...]]:
     machine = known_machine(parts, group, upload.machine)
     sensors = given_sensors(upload.sensors) or sensors_of(machine.text)
     return machine, tooling_text(parts, group, upload.tooling), upload.question(), sensors
@@ -91,8 +91,8 @@ def _of_upload(parts: Parts, group: str, upload: ForceUpload) -> tuple[MachineTe
 
 @contextlib.asynccontextmanager
 async def _read(
-    parts: Parts, group: str, files: Mapping[str, tuple[str, Received]], sensors: tuple[Sensor, ...], rate: float | None
-) -> AsyncIterator[ReadBoth]:
+    parts: Components, group: str, files: Mapping[str, tuple[str, Received]], sensors: tuple[Sensor, ...], rate: float | None
+) -> AsyncIterator[ReadPair]:
     """What reads the samples of a form's files, which the reader process has taken from them; nothing is kept."""
     targets: dict[str, Path] = {}
     try:
@@ -108,7 +108,7 @@ async def _read(
 
 
 async def _answered(
-    parts: Parts, group: str, machine: MachineText, tooling: ToolingText, question: ForceQuestion, source: ReadBoth, csv: bool
+    parts: Components, group: str, machine: MachineText, tooling: ToolingText, question: ForceQuestion, source: ReadPair, csv: bool
 ) -> Any:
     if not csv:
         return ForceAnswer.model_validate(await parts.work.run(forces, machine, tooling, question, source))

@@ -7,7 +7,7 @@ from typing import Literal
 from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
-from api.parts import ThisService
+from api.components import ThisService
 from api.problems import Problem
 from api.routes.common import problems
 from api.schemas.common import Answer

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import StreamingResponse
 
-from api.parts import ThisService
+from api.components import ThisService
 from api.routes import jobs
 from api.routes.common import BODY, After, Limit, found_or_404, guard, page, problems
 from api.routes.jobs import ACCEPTED, RETRY, STREAM, JobId, Prefer, Seen
@@ -19,8 +19,8 @@ from api.schemas.jobs import FittedLines, JobAnswer, JobState, NewIdentification
 from api.schemas.machines import Identification, Modes
 from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.jobs import Job
-from api.work import answers
-from api.work.known import posteriors
+from api.work import tasks
+from api.work.machine_cache import posteriors
 from rcsa_ident.errors import InputError
 
 router = APIRouter(prefix="/identifications", tags=["identifications"], route_class=Guarded)
@@ -106,7 +106,7 @@ async def events(id: JobId, parts: ThisService, caller: WhoAsks, seen: Seen = No
 
 @router.get("/{id}/modes", summary="Modes with their uncertainties", openapi_extra=guard("read"), responses=problems(404, 409, 422))
 def modes(id: JobId, parts: ThisService, caller: WhoAsks) -> Modes:
-    return Modes.model_validate(answers.modes(json.loads(jobs.finished(parts, caller.group, id, KIND, "result"))))
+    return Modes.model_validate(tasks.modes(json.loads(jobs.finished(parts, caller.group, id, KIND, "result"))))
 
 
 @router.get("/{id}/frf", summary="Measured lines beside the model's", openapi_extra=guard("read"), responses=problems(404, 409, 422))

@@ -12,15 +12,15 @@ from fastapi import Header, Path, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse, StreamingResponse
 
-from api.jobs.feeds import Crowded
-from api.parts import Parts
+from api.components import Components
+from api.jobs.event_feed import Crowded
 from api.problems import Problem
 from api.routes.common import found_or_404
 from api.schemas.common import ID_PATTERN
 from api.schemas.jobs import JobAnswer
 from api.security import now
+from api.stores.entities import Taken
 from api.stores.jobs import OPEN, Full, Job
-from api.stores.records import Taken
 
 EVENTS = "text/event-stream"
 #: Seconds after which a client may ask again, and between two signs that a stream without events is still there.
@@ -74,7 +74,7 @@ def accepted(job: Job) -> JSONResponse:
     return JSONResponse(answer(job).model_dump(mode="json"), 202, {"Location": place(job), "Retry-After": AGAIN})
 
 
-def submit(parts: Parts, job: Job, texts: Mapping[str, str], repeat: tuple[str, str] | None) -> Job:
+def submit(parts: Components, job: Job, texts: Mapping[str, str], repeat: tuple[str, str] | None) -> Job:
     """Keep a job; from then on it is carried out."""
     try:
         return parts.store.jobs.add(job, texts, parts.settings.job_queue, repeat)
@@ -87,13 +87,13 @@ def submit(parts: Parts, job: Job, texts: Mapping[str, str], repeat: tuple[str, 
         raise Problem(404, "there is no such machine") from None
 
 
-def job_of(parts: Parts, group: str, id: str, kind: str) -> Job:
+def job_of(parts: Components, group: str, id: str, kind: str) -> Job:
     """Return a job of a group and kind."""
     found = parts.store.jobs.get(group, id)
     return found_or_404(found if found is not None and found.kind == kind else None, "job")
 
 
-async def awaited(parts: Parts, group: str, id: str, kind: str, prefer: str | None) -> Job:
+async def awaited(parts: Components, group: str, id: str, kind: str, prefer: str | None) -> Job:
     """Return a job, and where the client prefers so, when it has ended."""
     job = await run_in_threadpool(job_of, parts, group, id, kind)
     wanted = re.search(r"(?:^|[,;\s])wait\s*=\s*\"?(\d{1,6})", prefer or "")
@@ -104,7 +104,7 @@ async def awaited(parts: Parts, group: str, id: str, kind: str, prefer: str | No
     return job
 
 
-def cancel(parts: Parts, group: str, id: str, kind: str, response: Response) -> JobAnswer:
+def cancel(parts: Components, group: str, id: str, kind: str, response: Response) -> JobAnswer:
     """End a job; one that has ended answers 409."""
     job_of(parts, group, id, kind)
     job, cancelled = found_or_404(parts.store.jobs.cancel(group, id, now()), "job")
@@ -114,7 +114,7 @@ def cancel(parts: Parts, group: str, id: str, kind: str, response: Response) -> 
     return answer(job)
 
 
-def finished(parts: Parts, group: str, id: str, kind: str, name: str) -> str:
+def finished(parts: Components, group: str, id: str, kind: str, name: str) -> str:
     """Return what a job has found."""
     job = job_of(parts, group, id, kind)
     if job.state != "done":
@@ -122,7 +122,7 @@ def finished(parts: Parts, group: str, id: str, kind: str, name: str) -> str:
     return found_or_404(parts.store.jobs.text(id, name), "result")
 
 
-async def events(parts: Parts, group: str, id: str, kind: str, seen: str | None) -> StreamingResponse:
+async def events(parts: Components, group: str, id: str, kind: str, seen: str | None) -> StreamingResponse:
     """Return the stream of a job's events behind a number."""
     job = await run_in_threadpool(job_of, parts, group, id, kind)
     try:
@@ -141,7 +141,7 @@ async def events(parts: Parts, group: str, id: str, kind: str, seen: str | None)
     return StreamingResponse(stream(), media_type=EVENTS, headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"})
 
 
-async def _told(parts: Parts, job: Job, after: int) -> AsyncIterator[str]:
+async def _told(parts: Components, job: Job, after: int) -> AsyncIterator[str]:
     end = time.monotonic() + parts.settings.watch_seconds
     # what is known at once; without a number, so that it is no event that could be missed
     yield f"retry: 2000\n{_event(None, 'progress', answer(job).model_dump_json())}"

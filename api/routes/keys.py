@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Response
 
-from api.parts import ThisService
+from api.components import ThisService
 from api.problems import Problem
 from api.routes.common import BODY, After, KeyId, Limit, guard, page, problems
 from api.schemas.common import Page
 from api.schemas.keys import KeyAnswer, MadeKey, NewKey
 from api.security import Guarded, WhoAsks, make_key
-from api.stores.records import Key
+from api.stores.entities import Key
 
 router = APIRouter(prefix="/keys", tags=["keys"], route_class=Guarded)
 

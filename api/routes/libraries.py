@@ -8,14 +8,14 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 from fastapi.concurrency import run_in_threadpool
 
-from api.parts import ThisService
+from api.components import ThisService
 from api.problems import Problem
 from api.routes.common import BODY, found_or_404, guard, problems
 from api.routes.toolings import summary
 from api.schemas.common import NAME_PATTERN
 from api.schemas.libraries import ImportAnswer, ImportedTool
 from api.security import Guarded, WhoAsks, now
-from api.stores.records import ABSENT, Document, Stale, digest_of
+from api.stores.entities import ABSENT, Document, Stale, digest_of
 from api.work.libraries import LARGEST_LIBRARY, imported
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.tool_libraries import Assumptions

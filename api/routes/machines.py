@@ -9,15 +9,15 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
-from api.parts import Parts, ThisService
+from api.components import Components, ThisService
 from api.problems import Problem
 from api.routes.common import BODY, After, Limit, MachineId, expected, found_or_404, guard, page, problems, tagged, unchanged, utf8
 from api.schemas.common import Page
 from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes, NewMachine
 from api.security import Guarded, WhoAsks, new_id, now
-from api.stores.records import Document, Machine, Stale, Taken, digest_of
-from api.work import answers
-from api.work.questions import MachineText
+from api.stores.entities import Document, Machine, Stale, Taken, digest_of
+from api.work import tasks
+from api.work.requests import MachineText
 from rcsa_ident.errors import InputError
 
 router = APIRouter(prefix="/machines", tags=["machines"], route_class=Guarded)
@@ -76,7 +76,7 @@ def forget(id: MachineId, parts: ThisService, caller: WhoAsks) -> Response:
 async def identify(id: MachineId, request: Request, response: Response, parts: ThisService, caller: WhoAsks) -> IdentificationSummary:
     await run_in_threadpool(_machine, parts, caller.group, id)
     text = utf8(await request.body())
-    summary = await parts.work.run(answers.check, text)
+    summary = await parts.work.run(tasks.check, text)
     document = Document(caller.group, id, text, json.dumps(summary), digest_of(text), now())
     kept = parts.store.identifications
 
@@ -113,7 +113,7 @@ def result(id: MachineId, request: Request, parts: ThisService, caller: WhoAsks)
     "/{id}/identification/modes", summary="Modes with their uncertainties", openapi_extra=guard("read"), responses=problems(404, 422)
 )
 def modes(id: MachineId, parts: ThisService, caller: WhoAsks) -> Modes:
-    return Modes.model_validate(answers.modes(json.loads(_document(parts, caller.group, id).text)))
+    return Modes.model_validate(tasks.modes(json.loads(_document(parts, caller.group, id).text)))
 
 
 @router.get(
@@ -131,10 +131,10 @@ async def frf(
     step_hz: Annotated[float, Query(ge=0.01, le=1000.0, allow_inf_nan=False)] = 2.0,
 ) -> Frf:
     machine = await run_in_threadpool(known_machine, parts, caller.group, id)
-    return Frf.model_validate(await parts.work.run(answers.flange_frf, machine, (from_hz, to_hz, step_hz), parts.settings.work_seconds))
+    return Frf.model_validate(await parts.work.run(tasks.flange_frf, machine, (from_hz, to_hz, step_hz), parts.settings.work_seconds))
 
 
-def known_machine(parts: Parts, group: str, id: str) -> MachineText:
+def known_machine(parts: Components, group: str, id: str) -> MachineText:
     """Return the identification of a machine that one can compute with."""
     document = _document(parts, group, id)
     if not json.loads(document.summary)["axes"]:
@@ -142,11 +142,11 @@ def known_machine(parts: Parts, group: str, id: str) -> MachineText:
     return MachineText(document.digest, document.text)
 
 
-def _machine(parts: Parts, group: str, id: str) -> Machine:
+def _machine(parts: Components, group: str, id: str) -> Machine:
     return found_or_404(parts.store.machines.get(group, id), "machine")
 
 
-def _document(parts: Parts, group: str, id: str) -> Document:
+def _document(parts: Components, group: str, id: str) -> Document:
     _machine(parts, group, id)
     return found_or_404(parts.store.identifications.get(group, id), "identification of the machine")
 
@@ -159,7 +159,7 @@ def _summary(document: Document) -> IdentificationSummary:
     return IdentificationSummary(**json.loads(document.summary), changed=document.changed, etag=document.digest)
 
 
-def _answer(parts: Parts, machine: Machine) -> MachineAnswer:
+def _answer(parts: Components, machine: Machine) -> MachineAnswer:
     document = parts.store.identifications.brief(machine.group, machine.id)
     summary = None if document is None else _summary(document)
     return MachineAnswer(id=machine.id, name=machine.name, description=machine.description, created=machine.created, identification=summary)

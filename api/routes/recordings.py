@@ -12,20 +12,20 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
+from api.components import Components, ThisService
 from api.files import NORMALISED, UPLOADS
-from api.parts import Parts, ThisService
 from api.problems import Problem
-from api.reading import calls
-from api.reading.declared import File, files_of
+from api.reading import reader_tasks
+from api.reading.campaign_text import File, files_of
 from api.reading.uploads import Received
+from api.routes.body_stream import append, arriving, check_digest, complete, plain, room, told_digest, told_length
 from api.routes.campaigns import CampaignId, known_campaign
 from api.routes.common import BODY, Limit, found_or_404, guard, page, problems, tagged, unchanged
-from api.routes.receiving import append, arriving, check_digest, complete, plain, room, told_digest, told_length
 from api.schemas.campaigns import RecordingAnswer, SignalAnswer, SpectrumAnswer
 from api.schemas.common import Page
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign, Recording
-from api.stores.records import Taken
+from api.stores.entities import Taken
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
 BINARY = "application/octet-stream"
@@ -67,7 +67,7 @@ async def put(
     return answer(campaign, kept)
 
 
-async def take(parts: Parts, campaign: Campaign, name: str, received: Received, replacing: bool) -> tuple[int, Recording]:
+async def take(parts: Components, campaign: Campaign, name: str, received: Received, replacing: bool) -> tuple[int, Recording]:
     """Keep what has come, or say why not."""
     try:
         return await parts.uploads.take(campaign, name, received, replacing)
@@ -129,14 +129,14 @@ async def spectrum(id: CampaignId, name: RecordingName, parts: ThisService, call
     _, row = await run_in_threadpool(_kept, parts, caller.group, id, name)
     path = parts.files.path(caller.group, NORMALISED, row.normalised)
     speed = json.loads(row.found)["spindle_speed_rpm"]
-    return SpectrumAnswer.model_validate(await parts.work.run(calls.spectrum, path, speed, points))
+    return SpectrumAnswer.model_validate(await parts.work.run(reader_tasks.spectrum, path, speed, points))
 
 
 @router.get("/{name}/signal", summary="The outline over time", openapi_extra=guard("read"), responses=problems(404, 422))
 async def signal(id: CampaignId, name: RecordingName, parts: ThisService, caller: WhoAsks, points: Points = 1000) -> SignalAnswer:
     _, row = await run_in_threadpool(_kept, parts, caller.group, id, name)
     path = parts.files.path(caller.group, NORMALISED, row.normalised)
-    return SignalAnswer.model_validate(await parts.work.run(calls.envelope, path, points))
+    return SignalAnswer.model_validate(await parts.work.run(reader_tasks.envelope, path, points))
 
 
 @router.delete(
@@ -157,7 +157,7 @@ def _form(name: str) -> str:
     return unicodedata.normalize("NFC", name)
 
 
-def named(parts: Parts, group: str, id: str, name: str) -> tuple[Campaign, str, File]:
+def named(parts: Components, group: str, id: str, name: str) -> tuple[Campaign, str, File]:
     """Return a campaign and a recording that it names."""
     campaign = known_campaign(parts, group, id)
     found = files_of(campaign.text).get(_form(name))
@@ -166,7 +166,7 @@ def named(parts: Parts, group: str, id: str, name: str) -> tuple[Campaign, str, 
     return campaign, _form(name), found
 
 
-def _kept(parts: Parts, group: str, id: str, name: str) -> tuple[Campaign, Recording]:
+def _kept(parts: Components, group: str, id: str, name: str) -> tuple[Campaign, Recording]:
     campaign = known_campaign(parts, group, id)
     return campaign, found_or_404(parts.store.recordings.get(group, id, _form(name)), "recording")
 

@@ -16,12 +16,12 @@ from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocketDisconnect, WebSocketState
 
 from api import problems
-from api.parts import Parts, ThisService
+from api.components import Components, ThisService
 from api.problems import Problem
 from api.routes.common import guard
 from api.routes.common import problems as documented
-from api.routes.openings import logger, replayed
-from api.routes.serving import LINGER, UNEXPECTED, ended, owned, watched
+from api.routes.stream_connection import LINGER, UNEXPECTED, ended, owned, watched
+from api.routes.stream_opening import logger, replayed
 from api.schemas.common import body_of
 from api.schemas.forces import Hello, ReplayHello, StreamHello, StreamsAnswer, StreamSummary, WatchHello
 from api.security import HEADER, Caller, Guarded, WhoAsks, caller_of, new_id
@@ -66,7 +66,7 @@ def _summary(session: Session) -> StreamSummary:
 
 @router.websocket("/forces/stream")
 async def stream(websocket: WebSocket) -> None:
-    parts: Parts = websocket.app.state.parts
+    parts: Components = websocket.app.state.parts
     id = new_id()
     try:
         caller = await _admitted(websocket, parts)
@@ -89,7 +89,7 @@ async def stream(websocket: WebSocket) -> None:
             await _farewell(websocket, end, id)
 
 
-async def _admitted(websocket: HTTPConnection, parts: Parts) -> Caller | None:
+async def _admitted(websocket: HTTPConnection, parts: Components) -> Caller | None:
     """Return who asks, None where the first message is to tell; a page from elsewhere is not let in, whatever the browser would send."""
     origin, host = websocket.headers.get("origin"), websocket.headers.get("host", "")
     if origin is not None and (urlsplit(origin).scheme not in ("http", "https") or urlsplit(origin).netloc.lower() != host.lower()):
@@ -101,13 +101,13 @@ async def _admitted(websocket: HTTPConnection, parts: Parts) -> Caller | None:
     return await run_in_threadpool(caller_of, websocket, parts)
 
 
-def _paced(parts: Parts, who: str) -> None:
+def _paced(parts: Components, who: str) -> None:
     seconds = parts.rates.wait(who)
     if seconds > 0.0:
         raise Problem(429, "too many streams are opened", headers={"Retry-After": str(math.ceil(seconds))})
 
 
-async def _served(websocket: WebSocket, parts: Parts, caller: Caller | None, id: str) -> End:
+async def _served(websocket: WebSocket, parts: Components, caller: Caller | None, id: str) -> End:
     """Read the first message, do what it says, and return how it ended."""
     raw = await _hello(websocket)
     data = object_of(raw)

@@ -8,13 +8,13 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
-from api.parts import ThisService
+from api.components import ThisService
 from api.problems import Problem
 from api.routes.common import BODY, After, Limit, ToolingName, expected, found_or_404, guard, page, problems, tagged, unchanged, utf8
 from api.schemas.common import Page, body_of
 from api.schemas.toolings import EXAMPLE, ToolingAnswer, ToolingKeys, ToolingSummary
 from api.security import Guarded, WhoAsks, now
-from api.stores.records import Document, Stale, digest_of
+from api.stores.entities import Document, Stale, digest_of
 from api.work.toolings import LARGEST, parsed, toml_of, tooling_of
 from rcsa_ident.report.drawing import tooling_svg
 

@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field
 from api.schemas.common import Answer, Body, Id, Line, Name
 from api.schemas.machines import Curve
 from api.schemas.toolings import EXAMPLE, ToolingKeys
-from api.work.questions import AdviceQuestion, CutQuestion, LobeQuestion, TipQuestion
+from api.work.requests import AdviceQuestion, CutQuestion, LobeQuestion, TipQuestion
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.errors import InputError

@@ -11,7 +11,7 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, IntegrityError, NoSuchModuleError, OperationalError, TimeoutError
 
 from api.stores import tables
-from api.stores.records import Unavailable
+from api.stores.entities import Unavailable
 from rcsa_ident.errors import InputError
 
 _BUSY_MS = 5000

@@ -11,9 +11,9 @@ from sqlalchemy.exc import IntegrityError
 from api.stores import tables
 from api.stores.campaigns import Campaigns, Recordings
 from api.stores.database import Database, open_engine
+from api.stores.entities import ABSENT, Document, Documents, Key, Keys, Machine, Machines, Stale, Taken
+from api.stores.idempotency import earlier, forget_old
 from api.stores.jobs import Jobs
-from api.stores.records import ABSENT, Document, Documents, Key, Keys, Machine, Machines, Stale, Taken
-from api.stores.repeats import earlier, forget_old
 from api.stores.sql_campaigns import SqlCampaigns, SqlRecordings, delete_campaigns
 from api.stores.sql_jobs import SqlJobs, forget_jobs
 

@@ -13,8 +13,8 @@ from sqlalchemy.exc import IntegrityError
 from api.stores import tables
 from api.stores.campaigns import Campaign, Counts, FileKey, Recording
 from api.stores.database import Database
-from api.stores.records import Taken
-from api.stores.repeats import earlier, forget_old
+from api.stores.entities import Taken
+from api.stores.idempotency import earlier, forget_old
 
 _C, _R, _K = tables.campaigns, tables.recordings, tables.campaign_repeats
 _CAMPAIGN = [_C.c[name] for name in Campaign.__dataclass_fields__]

@@ -11,8 +11,8 @@ from sqlalchemy.exc import IntegrityError
 
 from api.stores import tables
 from api.stores.database import Database
+from api.stores.idempotency import earlier, forget_old
 from api.stores.jobs import OPEN, Event, Full, Job, Outcome, Worker
-from api.stores.repeats import earlier, forget_old
 
 
 class SqlJobs:

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from api.streams.engine import Column, Plan
-from api.work.forces import ReadBoth, observed
-from api.work.known import read
-from api.work.questions import MachineText, ToolingText
+from api.work.forces import ReadPair, observed
+from api.work.machine_cache import read
+from api.work.requests import MachineText, ToolingText
 from api.work.toolings import tooling_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
@@ -47,7 +47,7 @@ class StreamQuestion:
 
 
 def design(
-    machine: MachineText, tooling: ToolingText, question: StreamQuestion, first: int, raw: bytes, air: ReadBoth | None
+    machine: MachineText, tooling: ToolingText, question: StreamQuestion, first: int, raw: bytes, air: ReadPair | None
 ) -> tuple[bytes, dict[str, Any]]:
     """Return the plan of a stream, pickled for the process of the streams, and what its client is told.
 
@@ -66,7 +66,7 @@ def design(
     return _planned(machine, tooling, question, first, recording, still, follow=True)
 
 
-def design_replay(machine: MachineText, tooling: ToolingText, question: StreamQuestion, source: ReadBoth) -> tuple[bytes, dict[str, Any]]:
+def design_replay(machine: MachineText, tooling: ToolingText, question: StreamQuestion, source: ReadPair) -> tuple[bytes, dict[str, Any]]:
     """Return the same for a recording: its forces are those of the recording as a whole, to the last digit.
 
     Parameters
@@ -89,7 +89,7 @@ def _planned(
     air: Recording | None,
     follow: bool,
 ) -> tuple[bytes, dict[str, Any]]:
-    from rcsa_ident.workflows.live import live_observer
+    from rcsa_ident.workflows.stream_forces import live_observer
 
     known, tool = read(machine.text), tooling_of(tooling.text)
     found = observed(known, tool, recording, air, question.speed, question.method)

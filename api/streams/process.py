@@ -117,10 +117,10 @@ def serve(connection: socket.socket) -> None:
     with contextlib.suppress(OSError), open("/proc/self/comm", "w") as name:
         # what a list of processes calls it
         name.write("rcsa-streams")
-    from rcsa_ident.workflows.warm import STEPS
+    from rcsa_ident.workflows.compile_kernels import STEPS
 
     STEPS["force observer"]()
-    import rcsa_ident.workflows.live  # noqa: F401
+    import rcsa_ident.workflows.stream_forces  # noqa: F401
 
     engine, source = Engine(), connection.makefile("rb", buffering=1 << 16)
     with contextlib.suppress(OSError):

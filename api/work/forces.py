@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from api.work.known import Known, read
-from api.work.questions import MachineText, ToolingText
+from api.work.machine_cache import Known, read
+from api.work.requests import MachineText, ToolingText
 from api.work.toolings import tooling_of, weigh
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.errors import InputError
@@ -23,7 +23,7 @@ BUCKETS, MOST_SAMPLES = 2000, 8_000_000
 #: The commands' options are other fields here.
 _FIELDS = {"--speed-rpm": "spindle_speed_rpm", "speed": "spindle_speed_rpm", "--idle-percent": "idle_percent", "idle share": "idle_percent"}
 
-ReadBoth = Callable[[], tuple[Recording, Recording | None]]
+ReadPair = Callable[[], tuple[Recording, Recording | None]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ def sensors_of(text: str) -> tuple[Sensor, ...]:
         raise InputError("sensors", found, "a table of sensors, as in campaign.toml") from None
 
 
-def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, source: ReadBoth, csv: Path | None = None) -> Any:
+def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, source: ReadPair, csv: Path | None = None) -> Any:
     """Return the forces of a recording as an answer, or write FORCES.csv and return None.
 
     Parameters
@@ -84,7 +84,7 @@ def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, 
     csv : Path, optional
     """
     from rcsa_ident.io.forces import write_forces_csv
-    from rcsa_ident.observer.force import lifted
+    from rcsa_ident.observer.force import restore_mean_force
 
     known, tool = read(machine.text), tooling_of(tooling.text)
     cut, air = source()
@@ -92,7 +92,7 @@ def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, 
     estimate, level = found.estimate, None
     settled = min(max(each.kalman.gain.shape[0] for each in found.observer.axes), estimate.force.shape[0] // 2)
     if question.idle is not None:
-        estimate, level = lifted(estimate, question.idle, settled)
+        estimate, level = restore_mean_force(estimate, question.idle, settled)
     if csv is not None:
         columns = (
             {axis.upper(): values[:, i] for i, axis in enumerate(estimate.axes)} for values in (estimate.force, estimate.standard_deviation)
@@ -131,7 +131,7 @@ def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, 
 def observed(known: Known, tool: Any, cut: Recording, air: Recording | None, speed: float | None, method: str, smooth: bool = False) -> Any:
     """Return a `MonitoredCut`; errors name fields of the query."""
     from rcsa_ident.observer.tuning import PaperWalk, Resonators
-    from rcsa_ident.workflows.monitor import observe
+    from rcsa_ident.workflows.estimate_forces import observe
 
     samples = cut.samples.shape[0] + (0 if air is None else air.samples.shape[0])
     if samples > MOST_SAMPLES:
@@ -162,7 +162,7 @@ def _harmonics(force: Any, rate: float, speed: float, band: tuple[float, float])
 def _wear(found: Any, tool: Any, question: WornQuestion) -> dict[str, Any]:
     from rcsa_ident.cutting.conditions import CuttingConditions
     from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.workflows.monitor import wear_of
+    from rcsa_ident.workflows.estimate_forces import wear_of
 
     if set(found.estimate.axes) != {Dof.X, Dof.Y}:
         raise InputError("cut", f"forces of axis {', '.join(found.estimate.axes)} alone", "wear from forces of both axes, X and Y")

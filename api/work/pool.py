@@ -111,9 +111,9 @@ def _begin(machines: int) -> None:
         os._exit(1)
 
     threading.Thread(target=follow, daemon=True).start()
-    from api.work import answers
+    from api.work import tasks
 
-    answers.keep(machines)
+    tasks.keep(machines)
 
 
 def guarded(call: Callable[..., T], *arguments: Any) -> T:
@@ -135,7 +135,7 @@ def guarded(call: Callable[..., T], *arguments: Any) -> T:
 
 def warm() -> None:
     """Run a small job through every kernel that a quick answer needs, so that they are compiled, or read from the cache."""
-    from rcsa_ident.workflows.warm import STEPS
+    from rcsa_ident.workflows.compile_kernels import STEPS
 
     for step in ("tool-holder", "lobes"):
         STEPS[step]()
@@ -143,7 +143,7 @@ def warm() -> None:
 
 def warm_observer() -> None:
     """The same for what an observer of forces is made with: a stream waits for it."""
-    from rcsa_ident.workflows.warm import STEPS
+    from rcsa_ident.workflows.compile_kernels import STEPS
 
     STEPS["force observer"]()
-    import rcsa_ident.workflows.live  # noqa: F401
+    import rcsa_ident.workflows.stream_forces  # noqa: F401

@@ -81,7 +81,7 @@ def advise(
     json_: Json = False,
 ) -> None:
     """Tell the best speeds for a depth, the highest removal rate within power and torque, and the margin of planned cuts."""
-    from rcsa_ident.workflows.limits import widened
+    from rcsa_ident.workflows.limits import pad_speeds
 
     check_plot(plot)
     if out is not None:
@@ -102,7 +102,7 @@ def advise(
             line(i, len(subjects))
             process = process_of(cut, speeds, subject)
             asked = speeds_of(speeds, process)
-            wide = widened(asked.speeds, tolerance / 100.0, [speed for speed, _ in cuts])
+            wide = pad_speeds(asked.speeds, tolerance / 100.0, [speed for speed, _ in cuts])
             if i == 0:
                 warn_outside(subject, asked.speeds)
             answered.append(
@@ -178,7 +178,7 @@ class _Answer:
     @property
     def common(self) -> FloatArray | None:
         """What is stable on all machines that were drawn [m]."""
-        return None if self.limits.drawn is None else self.limits.trusted(1.0)[self.inside]
+        return None if self.limits.drawn is None else self.limits.limit_quantile(1.0)[self.inside]
 
     @property
     def depths(self) -> Depths:

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from rcsa_ident.cutting.process import MillingProcess
     from rcsa_ident.dynamics.receptance import Receptance
     from rcsa_ident.machining_setup import Tooling
-    from rcsa_ident.stability.map import StabilityMap
-    from rcsa_ident.stability.modes import TipModes
-    from rcsa_ident.stability.surface import SurfaceError
+    from rcsa_ident.stability.stability_map import StabilityMap
+    from rcsa_ident.stability.surface_error import SurfaceError
+    from rcsa_ident.stability.tip_modes import TipModes
     from rcsa_ident.workflows.limits import Limits
     from rcsa_ident.workflows.lobes import LobeConditions
     from rcsa_ident.workflows.speeds import MachineOverSpeed
@@ -100,15 +100,15 @@ class Subject:
 
     def surface(self, process: MillingProcess, speeds: FloatArray, depth: float) -> SurfaceError:
         """Return the surface location error."""
-        from rcsa_ident.stability.modes import TipModes
-        from rcsa_ident.stability.surface import surface_location_error
+        from rcsa_ident.stability.surface_error import surface_location_error
+        from rcsa_ident.stability.tip_modes import TipModes
         from rcsa_ident.workflows.limits import machine_surface
-        from rcsa_ident.workflows.lobes import from_rest
+        from rcsa_ident.workflows.lobes import receptance_from_dc
 
         if self.machine is not None:
             return machine_surface(self.machine, self.tooling.assembly, self.omega(BEYOND), process, speeds, depth)
         assert self.tip is not None
-        tip = from_rest(self.tip) if isinstance(self.tip, TipModes) else self.tip
+        tip = receptance_from_dc(self.tip) if isinstance(self.tip, TipModes) else self.tip
         return surface_location_error(tip, process, speeds, depth)
 
 
@@ -148,7 +148,7 @@ def subjects_of(
 def _tip_of(options: TipOptions) -> Receptance | TipModes:
     """Return the tip's modes from a modal model, or its receptance from tap tests."""
     from rcsa_ident.io.modes import read_modes
-    from rcsa_ident.stability.modes import TipModes
+    from rcsa_ident.stability.tip_modes import TipModes
 
     if options.modes is not None:
         return TipModes.of(read_modes(options.modes))

@@ -17,7 +17,7 @@ from rcsa_ident.errors import InputError, positive
 if TYPE_CHECKING:
     from rcsa_ident.machining_setup import Tooling
     from rcsa_ident.observer.wear import WearIndicators
-    from rcsa_ident.workflows.monitor import MonitoredCut
+    from rcsa_ident.workflows.estimate_forces import MonitoredCut
 
 _RPM = 30.0 / math.pi
 
@@ -75,9 +75,9 @@ def forces(
     from rcsa_ident.io.forces import sensors_of_result, write_forces_csv
     from rcsa_ident.io.recordings import read_recording
     from rcsa_ident.io.setups import read_tooling
-    from rcsa_ident.observer.force import lifted
+    from rcsa_ident.observer.force import restore_mean_force
     from rcsa_ident.observer.tuning import PaperWalk, Resonators
-    from rcsa_ident.workflows.monitor import observe
+    from rcsa_ident.workflows.estimate_forces import observe
 
     for path, option in ((out, "--out"), (plot, "--plot"), (wear, "--wear")):
         if path is not None:
@@ -105,7 +105,7 @@ def forces(
     level = None
     if idle_percent is not None:
         settled = max(each.kalman.gain.shape[0] for each in found.observer.axes)
-        raised, level = lifted(found.estimate, idle_percent / 100.0, min(settled, found.estimate.force.shape[0] // 2))
+        raised, level = restore_mean_force(found.estimate, idle_percent / 100.0, min(settled, found.estimate.force.shape[0] // 2))
         found = replace(found, estimate=raised)
     estimate = found.estimate
     write_forces_csv(
@@ -200,7 +200,7 @@ def _wear(
     from rcsa_ident.cutting.conditions import CuttingConditions
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.io.files import write_text
-    from rcsa_ident.workflows.monitor import wear_of
+    from rcsa_ident.workflows.estimate_forces import wear_of
 
     if set(found.estimate.axes) != {Dof.X, Dof.Y}:
         raise InputError("--wear", f"axis {', '.join(found.estimate.axes)}", "forces of both axes, X and Y")

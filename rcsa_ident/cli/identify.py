@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rcsa_ident.arrays import FloatArray
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.data import IdentificationData
-    from rcsa_ident.identification.default import DefaultMethod
+    from rcsa_ident.identification.evidence import EvidenceSelection
     from rcsa_ident.identification.posterior import Posterior
     from rcsa_ident.identification.result import Identification
     from rcsa_ident.machining_setup import Campaign
@@ -52,7 +52,7 @@ class Method(StrEnum):
 @answers
 def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask = None, json_: Json = False) -> None:
     """Read everything and give a verdict on every recording; nothing is identified."""
-    from rcsa_ident.report.rows import recording_rows
+    from rcsa_ident.report.summaries import recording_rows
 
     stages = Stages(quiet=json_)
     with workers_or_cluster(processes, dask) as pool:
@@ -178,7 +178,7 @@ def read_start(path: Path) -> Mapping[Dof, Posterior]:
 class _Telling:
     """The default method, which says where it is."""
 
-    method: DefaultMethod
+    method: EvidenceSelection
 
     def run(self, data: IdentificationData, seed: int, map: Map) -> Identification:
         return self.method.run(data, seed, map, tell)
@@ -198,13 +198,13 @@ def search(
 
     chosen: workflow.Method
     if method is Method.paper:
-        from rcsa_ident.identification.paper import PaperGeneticAlgorithm
+        from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 
         chosen = PaperGeneticAlgorithm()
     else:
-        from rcsa_ident.identification.default import DefaultMethod
+        from rcsa_ident.identification.evidence import EvidenceSelection
 
-        chosen = _Telling(DefaultMethod(start=start)) if stages.visible else DefaultMethod(start=start)
+        chosen = _Telling(EvidenceSelection(start=start)) if stages.visible else EvidenceSelection(start=start)
     with stages.stage("identification") as line, pool.listening(line.tell):
         return workflow.identify(campaign, judged, chosen, seed, pool.map)
 
@@ -213,14 +213,14 @@ def search_bands(
     campaign: Campaign, judged: list[JudgedCut], count: int, whole: Identification, seed: int, pool: Workers, stages: Stages
 ) -> list[SpeedBand]:
     """Return a model for each of `count` ranges of spindle speed, from the whole campaign's on; none where only one is wanted."""
-    from rcsa_ident.identification.default import DefaultMethod
+    from rcsa_ident.identification.evidence import EvidenceSelection
     from rcsa_ident.workflows.speed_bands import speed_bands
 
     start = {axis: part.posterior for axis, part in whole.axes.items() if part.posterior is not None}
     if count == 1 or not start:
         return []
     with stages.stage("speed bands"):
-        return speed_bands(campaign, judged, count, DefaultMethod(start=start), seed, pool.map)
+        return speed_bands(campaign, judged, count, EvidenceSelection(start=start), seed, pool.map)
 
 
 def result_of(

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.posterior import MachineAxis
     from rcsa_ident.report.lobes import Judged
-    from rcsa_ident.stability.map import StabilityMap
     from rcsa_ident.stability.result import StabilityLobes
-    from rcsa_ident.stability.surface import SurfaceError
-    from rcsa_ident.stability.tested import TestedCuts
+    from rcsa_ident.stability.stability_map import StabilityMap
+    from rcsa_ident.stability.surface_error import SurfaceError
+    from rcsa_ident.stability.tested_cuts import TestedCuts
     from rcsa_ident.workflows.lobes import LobeConditions
     from rcsa_ident.workflows.tip import TooltipResponse
 
@@ -207,9 +207,9 @@ def tested_cuts(path: Path, subject: Subject, conditions: LobeConditions) -> Jud
 def judged(cuts: TestedCuts, subject: Subject, conditions: LobeConditions) -> Judged:
     """Return tested cuts with what the lobes say of them, each at its own speed."""
     from rcsa_ident.report.lobes import Judged
-    from rcsa_ident.workflows.limits import told_right
+    from rcsa_ident.workflows.limits import classify_tested_cuts
 
-    return Judged(cuts, told_right(cuts, conditions, lambda own: subject.limits(own, False)))
+    return Judged(cuts, classify_tested_cuts(cuts, conditions, lambda own: subject.limits(own, False)))
 
 
 def _share(percent: float) -> float:
@@ -249,7 +249,7 @@ def peaks_of(frequency: FloatArray, response: TooltipResponse) -> dict[Dof, Any]
     """Return, per axis, the peak and two standard deviations of the magnitude there (NaN without bands)."""
     import numpy as np
 
-    from rcsa_ident.report.rows import peak_row
+    from rcsa_ident.report.summaries import peak_row
 
     peaks = {}
     for axis in response.coupled:

@@ -35,7 +35,7 @@ def simulate(
 @answers
 def warm(json_: Json = False) -> None:
     """Compile the numerical kernels once and cache them; the first command is then as fast as any other."""
-    from rcsa_ident.workflows.warm import STEPS
+    from rcsa_ident.workflows.compile_kernels import STEPS
 
     stages = Stages(quiet=json_)
     for name, step in STEPS.items():

@@ -18,7 +18,7 @@ from rcsa_ident.errors import InputError, positive
 if TYPE_CHECKING:
     from rcsa_ident.cutting.coefficients import CuttingCoefficients
     from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.identification.design import Goal
+    from rcsa_ident.identification.experiment_design import Goal
     from rcsa_ident.identification.posterior import MachineAxis
     from rcsa_ident.workflows.plan import PlannedCut, PlannedCuts
 
@@ -74,12 +74,12 @@ def plan(
     from rcsa_ident.cli.results import read_machine
     from rcsa_ident.io.files import write_text
     from rcsa_ident.io.setups import read_tooling
-    from rcsa_ident.workflows.plan import Allowed, plan_cuts
+    from rcsa_ident.workflows.plan import CutConstraints, plan_cuts
 
     writable(out)
     machine, data = read_machine(result)
     wanted = None if band is None else 1e-2 * positive("--band", band, "%")
-    allowed = Allowed(
+    allowed = CutConstraints(
         *_speeds(machine, speed_from, speed_to),
         _depths(depths_mm),
         positive("--feed-per-tooth-mm", feed_per_tooth_mm, "mm") * 1e-3,
@@ -195,7 +195,7 @@ def _model_errors(machine: dict[Dof, MachineAxis], data: dict[str, Any]) -> dict
 
 
 def _goal(name: GoalName) -> Goal:
-    from rcsa_ident.identification.design import MeanVariance, Volume
+    from rcsa_ident.identification.experiment_design import MeanVariance, Volume
 
     goals: dict[GoalName, Callable[[], Goal]] = {GoalName.tooltip: MeanVariance, GoalName.unknowns: Volume}
     return goals[name]()

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 #: Reading and searching do not get faster beyond it.
 MOST_PROCESSES = 8
 #: What a worker imports while the main process still reads the campaign's file.
-EARLY = ("rcsa_ident.io.recordings", "rcsa_ident.workflows.identify", "rcsa_ident.identification.default")
+EARLY = ("rcsa_ident.io.recordings", "rcsa_ident.workflows.identify", "rcsa_ident.identification.evidence")
 #: Seconds between two words of one process.
 PAUSE = 0.1
 

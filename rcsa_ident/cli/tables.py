@@ -11,9 +11,9 @@ from rich.table import Table
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import Identification
-from rcsa_ident.report.rows import RecordingRow, coefficient_rows, mode_rows, two_digits
+from rcsa_ident.report.summaries import RecordingRow, coefficient_rows, mode_rows, two_digits
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tested import Tally
+from rcsa_ident.stability.tested_cuts import Tally
 from rcsa_ident.workflows.advice import OperatingPoint, PlannedCut, SpeedWindow
 
 _RPM = 9.549296585513721

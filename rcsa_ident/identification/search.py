@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import (
     DAMPING_UNIT,
@@ -19,7 +20,6 @@ from rcsa_ident.identification.parameters import (
     split,
     unpack,
 )
-from rcsa_ident.identification.polish import Solution, polish
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ def explore(
         improved = []
         for individual in offspring:
             theta = _by_frequency(np.asarray(individual.X, dtype=float), settings.modes)
-            solution = polish(misfit, theta, layout, np.zeros((len(misfit.data.cut_ids), 2)), settings.steps, grid=32)
+            solution = refine(misfit, theta, layout, np.zeros((len(misfit.data.cut_ids), 2)), settings.steps, grid=32)
             inside = np.clip(solution.theta, problem.xl, problem.xu)
             reached[inside.tobytes()] = solution
             improved.append(inside)

@@ -9,11 +9,11 @@ import numpy as np
 
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.keys import Table
 from rcsa_ident.io.setups import feed_angle_of, read_toml, read_tooling
 from rcsa_ident.io.tested_cuts import read_tested_cuts
+from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machining_setup import Tooling
-from rcsa_ident.stability.tested import TestedCuts
+from rcsa_ident.stability.tested_cuts import TestedCuts
 
 _CASE = (
     "name", "tooling", "feed_direction", "radial_depth_mm", "strategy", "entry_angle_deg", "exit_angle_deg", "feed_per_tooth_mm", "tests",

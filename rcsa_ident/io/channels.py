@@ -9,8 +9,8 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE
-from rcsa_ident.io.keys import listed
 from rcsa_ident.io.time_base import uniform
+from rcsa_ident.io.validated_table import listed
 
 RATE = "sampling_rate_hz"
 TIME_COLUMNS = ("time", "time_s")

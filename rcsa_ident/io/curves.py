@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.delimited import TextTable, read_table
 from rcsa_ident.io.files import write_text
-from rcsa_ident.io.keys import listed
+from rcsa_ident.io.text_columns import TextTable, read_table
+from rcsa_ident.io.validated_table import listed
 
 AXES = ("X", "Y")
 FREQUENCY = "frequency_hz"

@@ -11,8 +11,8 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.delimited import read_table
 from rcsa_ident.io.files import write_text
+from rcsa_ident.io.text_columns import read_table
 from rcsa_ident.machine.measured import MeasuredFlange
 
 #: Entries of [[tF, tM], [rF, rM]]; a flange is reciprocal, so rF is tM.

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.delimited import read_table
 from rcsa_ident.io.files import write_text
-from rcsa_ident.io.keys import Table, listed
 from rcsa_ident.io.setups import sensor_of
+from rcsa_ident.io.text_columns import read_table
+from rcsa_ident.io.validated_table import Table, listed
 from rcsa_ident.signals.recording import Sensor
 
 TIME = "time_s"

@@ -16,7 +16,6 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import FREQUENCY, read_frf_csv
 from rcsa_ident.io.files import MEGABYTE, read_bytes
-from rcsa_ident.io.keys import listed
 from rcsa_ident.io.uff import (
     ACCELERATION,
     DISPLACEMENT,
@@ -28,6 +27,7 @@ from rcsa_ident.io.uff import (
     UffFunction,
     read_uff,
 )
+from rcsa_ident.io.validated_table import listed
 
 _STANDARD_GRAVITY = 9.80665
 _INCH = 0.0254

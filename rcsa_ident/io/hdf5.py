@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io.files import MEGABYTE, existing_file, replacing
-from rcsa_ident.io.keys import listed
+from rcsa_ident.io.validated_table import listed
 
 RATE = "sampling_rate_hz"
 #: Of the file on disk, and of the channels as they are declared.
@@ -85,7 +85,7 @@ def read_vectors(path: Path, names: Sequence[str], wished: Sequence[str], kinds:
     Parameters
     ----------
     kinds : sequence of str
-        Allowed values of the attribute ``MATLAB_class``; without it the type of the samples decides.
+        CutConstraints values of the attribute ``MATLAB_class``; without it the type of the samples decides.
     """
     where = str(path)
     size = existing_file(path, "recording", LARGEST_FILE).stat().st_size

@@ -15,8 +15,8 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.parameters import JOINT, AxisLayout
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.result import AxisResult, Identification
-from rcsa_ident.io.keys import Table, describe
 from rcsa_ident.io.results import AXES, SCHEMA_VERSION, spindle_from_json, spindle_to_json
+from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.io.workpieces import workpiece_keys, workpiece_of
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machining_setup import Campaign, Workpiece

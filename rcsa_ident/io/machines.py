@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.io.keys import Table, as_number, describe
 from rcsa_ident.io.setups import RPM, beam_segments, feed_angle_of, material_library, read_toml
+from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Workpiece
 from rcsa_ident.virtual.machine import Bearing, CutPlan, FlangeJoint, Housing, PerAxis, VirtualSpindle

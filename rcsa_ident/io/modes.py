@@ -8,8 +8,8 @@ import numpy as np
 
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel, normal_modes
-from rcsa_ident.io.keys import Table
 from rcsa_ident.io.setups import read_toml
+from rcsa_ident.io.validated_table import Table
 
 _MODE = ("natural_frequency_hz", "damping_ratio", "modal_mass_kg", "stiffness_n_per_m")
 

@@ -27,8 +27,8 @@ from rcsa_ident.io.channels import (
     the_only,
 )
 from rcsa_ident.io.files import MEGABYTE, read_bytes
-from rcsa_ident.io.keys import listed
 from rcsa_ident.io.time_base import Irregular
+from rcsa_ident.io.validated_table import listed
 
 COMPLETE = "a complete Parquet file"
 LARGEST_FOOTER = 2 * MEGABYTE

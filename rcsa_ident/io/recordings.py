@@ -9,7 +9,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.io import delimited, hdf5, matlab, parquet, tdms, universal_records, wav
+from rcsa_ident.io import hdf5, matlab, parquet, tdms, text_columns, uff_records, wav
 from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
@@ -22,10 +22,10 @@ Reader = Callable[[Path, Sequence[str], float | None], tuple[float, list[FloatAr
 READERS: dict[str, Reader] = {
     ".h5": hdf5.read_channels,
     ".hdf5": hdf5.read_channels,
-    ".csv": delimited.read_channels,
+    ".csv": text_columns.read_channels,
     ".tdms": tdms.read_channels,
-    ".uff": universal_records.read_channels,
-    ".unv": universal_records.read_channels,
+    ".uff": uff_records.read_channels,
+    ".unv": uff_records.read_channels,
     ".wav": wav.read_channels,
     ".mat": matlab.read_channels,
     ".parquet": parquet.read_channels,

@@ -15,7 +15,7 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes, write_text
-from rcsa_ident.io.keys import Table, as_number, describe
+from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.io.workpieces import workpiece_of
 from rcsa_ident.signals.recording import Quantity
 

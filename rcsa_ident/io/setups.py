@@ -15,7 +15,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes
-from rcsa_ident.io.keys import Table, as_number, describe
+from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Campaign, Cut, Tooling
 from rcsa_ident.signals.recording import Quantity, Sensor

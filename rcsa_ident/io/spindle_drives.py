@@ -8,8 +8,8 @@ import numpy as np
 
 from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.delimited import read_table
-from rcsa_ident.io.keys import listed
+from rcsa_ident.io.text_columns import read_table
+from rcsa_ident.io.validated_table import listed
 
 SPEED, POWER, TORQUE = "spindle_speed_rpm", "power_kw", "torque_nm"
 _RPM = np.pi / 30.0

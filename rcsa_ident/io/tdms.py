@@ -20,7 +20,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.io.channels import LARGEST_FILE, RATE, cannot_be_read, check_declared, check_lengths, lacks, snapped, the_only
 from rcsa_ident.io.files import read_bytes
-from rcsa_ident.io.keys import listed
+from rcsa_ident.io.validated_table import listed
 
 COMPLETE = "a complete TDMS file"
 MOST_SEGMENTS = 100_000

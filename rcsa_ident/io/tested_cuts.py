@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.delimited import read_table
-from rcsa_ident.io.keys import listed
-from rcsa_ident.stability.tested import TestedCuts, Verdict
+from rcsa_ident.io.text_columns import read_table
+from rcsa_ident.io.validated_table import listed
+from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict
 
 COLUMNS = ("spindle_speed_rpm", "axial_depth_mm", "verdict")
 _RPM = np.pi / 30.0

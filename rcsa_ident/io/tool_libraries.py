@@ -19,8 +19,8 @@ from typing import Any, NamedTuple, NoReturn
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes
-from rcsa_ident.io.keys import Table, listed
 from rcsa_ident.io.setups import tooling_of
+from rcsa_ident.io.validated_table import Table, listed
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
 

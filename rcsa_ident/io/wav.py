@@ -13,7 +13,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.channels import LARGEST_FILE, RATE, check_declared, the_only
 from rcsa_ident.io.files import read_bytes
-from rcsa_ident.io.keys import listed
+from rcsa_ident.io.validated_table import listed
 
 COMPLETE = "a complete WAV file"
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.io.keys import Table
+from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machining_setup import Workpiece
 
 #: Edge forces of a workpiece: key and unit in N/m.

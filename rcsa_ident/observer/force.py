@@ -250,7 +250,7 @@ class ForceObserver:
         return ForceEstimate(tuple(each.axis for each in self.axes), self.step_time, frozen(force), frozen(deviation), frozen(consistency))
 
 
-def lifted(estimate: ForceEstimate, idle: float, first: int = 0) -> tuple[ForceEstimate, FloatArray]:
+def restore_mean_force(estimate: ForceEstimate, idle: float, first: int = 0) -> tuple[ForceEstimate, FloatArray]:
     """Return the estimate with the mean that an interrupted cut gives away: between its teeth the force is zero.
 
     Parameters

@@ -17,7 +17,7 @@ from rcsa_ident.identification.result import AxisResult, Identification
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.report import figures
 from rcsa_ident.report.lobes import stability_figure
-from rcsa_ident.report.rows import coefficient_rows, mode_rows, peak_row, recording_rows, two_digits
+from rcsa_ident.report.summaries import coefficient_rows, mode_rows, peak_row, recording_rows, two_digits
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.result import StabilityLobes
 

@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS, _grid
-from rcsa_ident.stability.map import StabilityMap
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.surface import SurfaceError
-from rcsa_ident.stability.tested import Tally, TestedCuts, Verdict
+from rcsa_ident.stability.stability_map import StabilityMap
+from rcsa_ident.stability.surface_error import SurfaceError
+from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, Verdict
 
 _RPM = 30.0 / np.pi
 _GREY, _GREEN, _RED = "#52606d", "#00704f", "#a33f12"

@@ -10,7 +10,7 @@ from scipy.fft import next_fast_len
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals._kernels import order_signal, order_sums
-from rcsa_ident.signals.windows import hann
+from rcsa_ident.signals.steady_part import hann
 
 #: Share of the programmed speed within which the true one is looked for.
 SPEED_SEARCH = 0.01

@@ -12,7 +12,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum, refine_speed, segment_lines
-from rcsa_ident.signals.windows import steady_part
+from rcsa_ident.signals.steady_part import steady_part
 
 #: Least number of revolutions of a steady part.
 LEAST_REVOLUTIONS = 8.0

@@ -9,7 +9,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, follow_speed, line_spectrum, refine_speed
-from rcsa_ident.signals.windows import hann
+from rcsa_ident.signals.steady_part import hann
 
 #: Equal samples in a row that a live analogue channel does not produce.
 FROZEN_SAMPLES = 12

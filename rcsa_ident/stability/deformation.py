@@ -11,7 +11,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError, non_negative, positive
-from rcsa_ident.stability.period_map import EngagementProfile
+from rcsa_ident.stability.monodromy import EngagementProfile
 
 #: Nodes per metre of depth, and at least so many.
 _NODES, _FEWEST = 20_000.0, 12

@@ -8,10 +8,10 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.stability.marching import check_resolution, marched_lobes
-from rcsa_ident.stability.modes import TipModes, modes_of
-from rcsa_ident.stability.period_map import EngagementProfile, PeriodMap
+from rcsa_ident.stability.monodromy import EngagementProfile, MonodromyOperator
+from rcsa_ident.stability.multiplier_limits import check_resolution, marched_lobes
 from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.tip_modes import TipModes, modes_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +46,9 @@ class FullDiscretisation:
         if not 1 <= self.degree <= 8:
             raise InputError("degree", self.degree, "a whole number from 1 to 8")
 
-    def cut(self, tip: Receptance | TipModes, process: MillingProcess) -> PeriodMap:
+    def cut(self, tip: Receptance | TipModes, process: MillingProcess) -> MonodromyOperator:
         """Return the cut's map of a period."""
-        return PeriodMap(modes_of(tip, "full-discretisation"), process, self.degree, engagements=self.engagements)
+        return MonodromyOperator(modes_of(tip, "full-discretisation"), process, self.degree, engagements=self.engagements)
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""

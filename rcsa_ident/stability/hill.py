@@ -12,7 +12,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability._kernels import receptance_at
-from rcsa_ident.stability.branches import Branches, Crossing, crossings_between
+from rcsa_ident.stability.eigenvalue_tracking import Branches, Crossing, crossings_between
 
 #: Largest change of a harmonic's receptance from one frequency to the next, as a share of it and of the largest one.
 _STEP, _FLOOR = 0.25, 0.05

@@ -11,8 +11,8 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
 
 _ZERO_ORDER = ZeroOrder()

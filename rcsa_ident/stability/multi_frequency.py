@@ -11,8 +11,8 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.hill import Hill, PeriodicTeeth, TipMotion
-from rcsa_ident.stability.modes import TipModes, receptance_of
 from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.tip_modes import TipModes, receptance_of
 
 #: Share of the peak that the receptance may still have at the top of its band: 15 % there changed limits by 0.1 %, 57 % by 6 %.
 _LEFT = 0.2

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.stability.marching import check_resolution, marched_lobes
-from rcsa_ident.stability.modes import TipModes, modes_of
-from rcsa_ident.stability.period_map import PeriodMap
+from rcsa_ident.stability.monodromy import MonodromyOperator
+from rcsa_ident.stability.multiplier_limits import check_resolution, marched_lobes
 from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.tip_modes import TipModes, modes_of
 
 #: Of the polynomials that stand for the exact answer within a step: at 24 steps a wave they leave 1e-7 of the multiplier.
 _DEGREE = 3
@@ -40,9 +40,9 @@ class SemiDiscretisation:
     def __post_init__(self) -> None:
         check_resolution(self.intervals, self.tolerance)
 
-    def cut(self, tip: Receptance | TipModes, process: MillingProcess) -> PeriodMap:
+    def cut(self, tip: Receptance | TipModes, process: MillingProcess) -> MonodromyOperator:
         """Return the cut's map of a period."""
-        return PeriodMap(modes_of(tip, "semi-discretisation"), process, _DEGREE, frozen=True)
+        return MonodromyOperator(modes_of(tip, "semi-discretisation"), process, _DEGREE, frozen=True)
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""

@@ -11,10 +11,10 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.stability import _time_kernels as kernels
-from rcsa_ident.stability.first_loss import first_loss
-from rcsa_ident.stability.modes import TipModes, modes_of
-from rcsa_ident.stability.period_map import common_period, surely_stable
+from rcsa_ident.stability.first_instability import first_loss
+from rcsa_ident.stability.monodromy import common_period, stable_depth_bound
 from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.tip_modes import TipModes, modes_of
 
 #: Steps per wave of the highest mode that counts, and per tooth period at least.
 _STEPS, _FEWEST = 40.0, 60
@@ -95,7 +95,7 @@ class TimeDomain:
         limit = np.full(speeds.size, np.inf)
         chatter, lobe = np.full(speeds.size, np.nan), np.full(speeds.size, -1, dtype=np.intp)
         flip = np.zeros(speeds.size, dtype=bool)
-        low = surely_stable(modes, process)
+        low = stable_depth_bound(modes, process)
         for i, speed in enumerate(speeds):
             cut = _Cut(modes, process, float(speed), self.contact_loss)
             depth = first_loss(lambda d, cut=cut: cut.growth(d, self.periods), low, max_depth, self.tolerance, _RATIO)  # type: ignore[misc]

@@ -13,8 +13,8 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability._kernels import envelope, envelopes, largest_real_part, pitch_envelope
-from rcsa_ident.stability.modes import TipModes, receptance_of
 from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.tip_modes import TipModes, receptance_of
 
 #: Teeth in the cut, on average, below which the mean directional matrix no longer tells the whole story.
 FEWEST_TEETH_IN_CUT = 1.0

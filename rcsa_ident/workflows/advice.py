@@ -11,7 +11,7 @@ from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.power import SpindleDrive, spindle_load
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.workflows.limits import Limits, robust
+from rcsa_ident.workflows.limits import Limits, least_within_tolerance
 from rcsa_ident.workflows.lobes import peaks
 
 
@@ -87,7 +87,7 @@ def usable_depths(
     if not 0.0 <= margin < 1.0:
         raise InputError("margin", margin, "a share from 0 to below 1")
     speed = limits.lobes.spindle_speed
-    stable = (1.0 - margin) * robust(speed, limits.trusted(probability), tolerance)
+    stable = (1.0 - margin) * least_within_tolerance(speed, limits.limit_quantile(probability), tolerance)
     # both grow in proportion to the depth
     load = spindle_load(process.cutter, process.conditions(1.0, 1.0), process.coefficients)
     by_torque = np.minimum(drive.torque_at(speed) / load.torque, limits.max_depth)
@@ -242,7 +242,7 @@ def planned_cut(
     tolerance: float = 0.0,
     probability: float = 0.95,
 ) -> PlannedCut:
-    """Return how a cut stands; its speed is one of those of the limits (`widened` puts it among them)."""
+    """Return how a cut stands; its speed is one of those of the limits (`pad_speeds` puts it among them)."""
     depth = positive("depth", depth, "m")
     speeds = limits.lobes.spindle_speed
     place = int(np.argmin(np.abs(speeds - positive("speed", speed, "rad/s"))))
@@ -257,7 +257,7 @@ def planned_cut(
     power, torque = drive.power_at(speeds[place : place + 1])[0], drive.torque_at(speeds[place : place + 1])[0]
     with np.errstate(divide="ignore"):
         share = float(np.max(np.array([load.power, load.torque]) / np.array([power, torque])))
-    lowest = robust(speeds, limits.trusted(probability), tolerance)[place]
+    lowest = least_within_tolerance(speeds, limits.limit_quantile(probability), tolerance)[place]
     return PlannedCut(
         float(speeds[place]),
         depth,

@@ -18,12 +18,12 @@ from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.signals._kernels import order_sums
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import line_spectrum, refine_speed
+from rcsa_ident.signals.steady_part import hann, steady_part
 from rcsa_ident.signals.verdict import chatter
-from rcsa_ident.signals.windows import hann, steady_part
 
 #: Highest line of the full-signal fit [Hz]: below the resonance of most dynamometers.
 MAX_FREQUENCY = 2000.0
-#: Fewest revolutions of a usable record, and most blocks that it is divided into.
+#: ShortestPlan revolutions of a usable record, and most blocks that it is divided into.
 LEAST_REVOLUTIONS, MOST_BLOCKS = 16.0, 24
 #: Largest share of lost samples; they are bridged by straight lines.
 LOST_SHARE = 1e-3

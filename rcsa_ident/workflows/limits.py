@@ -14,10 +14,10 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.lobes import uncoupled_planes
-from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.surface import SurfaceError, surface_location_error
-from rcsa_ident.stability.tested import Tally, TestedCuts, tally
+from rcsa_ident.stability.surface_error import SurfaceError, surface_location_error
+from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, tally
+from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.workflows.lobes import LobeConditions, drawn_limits, tooling_lobes
@@ -70,7 +70,7 @@ class Limits:
         low, high = np.quantile(limits, (0.025, 0.975), axis=0, method="nearest")
         return low, high
 
-    def trusted(self, probability: float) -> FloatArray:
+    def limit_quantile(self, probability: float) -> FloatArray:
         """Return the depth up to which at least this share of the drawn machines is stable, shape (n,) [m]; 1 is what all have in common.
 
         Without drawn machines it is the nominal limit.
@@ -87,7 +87,7 @@ class Limits:
         return None if self.drawn is None else float(np.mean(self.drawn[:, place] >= depth))
 
 
-def robust(speed: FloatArray, limit: FloatArray, tolerance: float) -> FloatArray:
+def least_within_tolerance(speed: FloatArray, limit: FloatArray, tolerance: float) -> FloatArray:
     """Return the smallest limit within a share of each speed on both sides, shape (n,).
 
     Parameters
@@ -109,7 +109,7 @@ def robust(speed: FloatArray, limit: FloatArray, tolerance: float) -> FloatArray
     return np.array([min(edge, limit[a:b].min()) for edge, a, b in zip(least.tolist(), first.tolist(), last.tolist(), strict=True)])
 
 
-def widened(speeds: FloatArray, tolerance: float, also: Sequence[float] = ()) -> FloatArray:
+def pad_speeds(speeds: FloatArray, tolerance: float, also: Sequence[float] = ()) -> FloatArray:
     """Return the speeds with as many beyond both ends as a tolerance needs, and some of their own between them, rising."""
     speeds = np.unique(np.asarray(speeds, dtype=float))
     step = float(np.min(np.diff(speeds), initial=0.02 * speeds[0] if speeds.size < 2 else np.inf))
@@ -177,7 +177,7 @@ def _in_proportion(drawn: FloatArray, nominal: FloatArray, wanted: FloatArray) -
     return np.where(np.isinf(nominal) & np.isfinite(wanted), wanted, drawn * ratio)
 
 
-def told_right(cuts: TestedCuts, conditions: LobeConditions, limits: Callable[[LobeConditions], Limits]) -> Tally:
+def classify_tested_cuts(cuts: TestedCuts, conditions: LobeConditions, limits: Callable[[LobeConditions], Limits]) -> Tally:
     """Return how many tested cuts lie on the side of the limit where they were seen, each asked at its own speed.
 
     Parameters

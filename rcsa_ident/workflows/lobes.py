@@ -15,10 +15,10 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import StabilityMethod, stability_lobes, uncoupled_planes
-from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.time_domain import TimeDomain
+from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.tip import TooltipResponse
 from rcsa_ident.workflows.tip_fit import fitted_modes
@@ -210,7 +210,7 @@ def modal_tip(models: Mapping[Dof, ModalModel]) -> Receptance:
     return TipModes.of(models).receptance()
 
 
-def from_rest(modes: TipModes) -> Receptance:
+def receptance_from_dc(modes: TipModes) -> Receptance:
     """Return the receptance of modes from 0 Hz to four times the highest, at frequencies that resolve the sharpest."""
     fine = modes.receptance().omega
     omega = np.arange(0.0, 2.0 * fine[-1], fine[1] - fine[0])

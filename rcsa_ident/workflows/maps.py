@@ -11,9 +11,9 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import uncoupled_planes
-from rcsa_ident.stability.map import StabilityMap, stability_map
-from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
+from rcsa_ident.stability.stability_map import StabilityMap, stability_map
+from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.workflows.lobes import LobeConditions
 from rcsa_ident.workflows.speeds import MachineOverSpeed, responses_over_speed

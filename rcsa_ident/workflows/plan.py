@@ -16,11 +16,11 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.identification.data import prepare
-from rcsa_ident.identification.default import SMOOTH_ERROR
-from rcsa_ident.identification.design import (
+from rcsa_ident.identification.evidence import SMOOTH_ERROR
+from rcsa_ident.identification.experiment_design import (
+    CandidateCuts,
     Goal,
     MeanVariance,
-    Prospects,
     compressed,
     deviations,
     exchanged,
@@ -49,7 +49,7 @@ LOBE_FREQUENCIES = (100.0, 2.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Allowed:
+class CutConstraints:
     """Which cuts may be made.
 
     Parameters
@@ -115,7 +115,7 @@ class PlannedCut:
 
 
 @dataclass(frozen=True, slots=True)
-class Fewest:
+class ShortestPlan:
     """How many of a plan's cuts a wanted band takes.
 
     Parameters
@@ -166,19 +166,19 @@ class PlannedCuts:
         object.__setattr__(self, "band", frozen(self.band))
         object.__setattr__(self, "even", frozen(self.even))
 
-    def fewest(self, wanted: float) -> Fewest:
+    def fewest(self, wanted: float) -> ShortestPlan:
         """Return the fewest of the first cuts after which no target's band is wider than `wanted` [-]."""
         widest = self.band.max(axis=1)
         enough = np.flatnonzero(widest <= positive("wanted band", wanted))
         cuts = int(enough[0]) if enough.size else len(self.cuts)
-        return Fewest(cuts, float(widest[cuts]), bool(enough.size))
+        return ShortestPlan(cuts, float(widest[cuts]), bool(enough.size))
 
 
 def plan_cuts(
     machine: Mapping[Dof, MachineAxis],
     toolings: Sequence[Tooling],
     targets: Sequence[Tooling],
-    allowed: Allowed,
+    allowed: CutConstraints,
     coefficients: CuttingCoefficients,
     noise: float,
     model_error: Mapping[Dof, float],
@@ -197,7 +197,7 @@ def plan_cuts(
         To cut with.
     targets : sequence of Tooling
         Whose tooltip FRFs are wanted; they need not be cut with.
-    allowed : Allowed
+    allowed : CutConstraints
     coefficients : CuttingCoefficients
         With the spreads of what is not known about them.
     noise : float [m]
@@ -277,7 +277,7 @@ def _check(
 
 
 def _candidates(
-    machine: Mapping[Dof, MachineAxis], toolings: Sequence[Tooling], allowed: Allowed, coefficients: CuttingCoefficients
+    machine: Mapping[Dof, MachineAxis], toolings: Sequence[Tooling], allowed: CutConstraints, coefficients: CuttingCoefficients
 ) -> tuple[list[PlannedCut], int, float]:
     """All stable cuts, tooling by tooling, speed by speed; how many may chatter; the deepest that would be stable anywhere [m]."""
     omega = 2.0 * np.pi * np.arange(LOBE_FREQUENCIES[0], MAX_FREQUENCY, LOBE_FREQUENCIES[1])
@@ -317,7 +317,7 @@ def _prospects(
     noise: float,
     model_error: Mapping[Dof, float],
     band_hz: tuple[float, float],
-) -> Prospects:
+) -> CandidateCuts:
     """What the candidates would tell, and what of it matters to the targets' tooltips."""
     named, axes = {t.name: t for t in toolings}, list(posteriors)
     forces, cuts = {}, []
@@ -350,7 +350,7 @@ def _prospects(
             least += (float(np.linalg.norm(tip_changes(posterior, stiffer)[0] - value)) / norm) ** 2
         wanted.append(weights.reshape(size, -1))
         floor.append(least)
-    return Prospects(rows, tuple(wanted), tuple(floor), _apart(candidates))
+    return CandidateCuts(rows, tuple(wanted), tuple(floor), _apart(candidates))
 
 
 def _apart(candidates: Sequence[PlannedCut]) -> np.ndarray:
@@ -361,7 +361,7 @@ def _apart(candidates: Sequence[PlannedCut]) -> np.ndarray:
     return (tooling[:, None] == tooling[None, :]) & (ratio < np.log1p(SPACING) * (1.0 - 1e-6))
 
 
-def _shortest(prospects: Prospects, order: list[int], goal: Goal, wanted: float) -> list[int]:
+def _shortest(prospects: CandidateCuts, order: list[int], goal: Goal, wanted: float) -> list[int]:
     """The fewest cuts that are found to reach a band: the greedy choice's, then ever fewer as long as an exchange reaches it."""
     band = deviations(prospects, order).max(axis=1)
     if band[0] <= wanted:
@@ -378,7 +378,7 @@ def _shortest(prospects: Prospects, order: list[int], goal: Goal, wanted: float)
     return best
 
 
-def _even(candidates: Sequence[PlannedCut], toolings: Sequence[Tooling], allowed: Allowed, count: int) -> list[int]:
+def _even(candidates: Sequence[PlannedCut], toolings: Sequence[Tooling], allowed: CutConstraints, count: int) -> list[int]:
     """As many cuts as a plan has, shared evenly among the toolings, at stable speeds nearest to even distances, as deep as allowed."""
     chosen: list[int] = []
     present = [t.name for t in toolings if any(c.tooling == t.name for c in candidates)]

@@ -10,7 +10,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.rational import RationalFit, rational_fit
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.stability.modes import TipModes
+from rcsa_ident.stability.tip_modes import TipModes
 
 #: What a fit of a receptance may be beside it, root mean square.
 FIT_TOLERANCE = 2e-3
@@ -32,7 +32,7 @@ def fitted_modes(tip: Receptance) -> tuple[TipModes, float]:
     parts = []
     for rows in [[0, 1]] if coupled else [[i] for i in range(2) if np.any(values[:, i, i])]:
         block = values[:, rows][:, :, rows]
-        own = _calmed(rational_fit(omega, block, tolerance=FIT_TOLERANCE), omega, block).modes()
+        own = _damp_poles_outside_band(rational_fit(omega, block, tolerance=FIT_TOLERANCE), omega, block).modes()
         unit = np.eye(2)[:, rows]
         parts.append((own.pole, unit @ own.outputs, own.inputs @ unit.T, unit @ own.constant @ unit.T))
     if not parts:
@@ -42,7 +42,7 @@ def fitted_modes(tip: Receptance) -> tuple[TipModes, float]:
     return modes, float(np.linalg.norm(modes.at(omega) - values) / np.linalg.norm(values))
 
 
-def _calmed(fit: RationalFit, omega: FloatArray, values: ComplexArray) -> RationalFit:
+def _damp_poles_outside_band(fit: RationalFit, omega: FloatArray, values: ComplexArray) -> RationalFit:
     """The fit with well damped poles outside the band: residues by least squares, so that the peaks of the band stay what they are."""
     size = np.abs(fit.pole)
     strange = ((size < omega[0]) | (size > omega[-1])) & (-fit.pole.real < STRANGE * size)

@@ -16,7 +16,7 @@ from api.main import create_app
 from api.schemas.toolings import EXAMPLE
 from api.security import make_key, new_id, now
 from api.settings import Settings
-from api.stores.records import Machine, Store
+from api.stores.entities import Machine, Store
 from api.stores.sql import open_store
 from api.streams.engine import HEADER, Engine, Message
 from api.work.pool import guarded

@@ -15,8 +15,8 @@ from api.jobs import identification, lobes
 from api.jobs.worker import Carrier, carry
 from api.reading.campaigns import load_campaign
 from api.security import new_id, now
+from api.stores.entities import Store
 from api.stores.jobs import Job
-from api.stores.records import Store
 
 SAMPLES = Path(__file__).resolve().parents[2] / "data" / "sample_runs"
 #: Cuts of one tooling, along one axis: enough for a search with all its steps, and soon done.

@@ -23,7 +23,7 @@ from api.backups.load import restore
 from api.backups.save import backup
 from api.files import NORMALISED, UPLOADS, Files
 from api.serve import app
-from api.stores.records import Document
+from api.stores.entities import Document
 from api.stores.sql import open_store
 from api.stores.tables import SCHEMA_VERSION
 from rcsa_ident.errors import InputError

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from api.reading.campaign_text import FORMATS, campaign_of_text, declare, files_of, recording_name, toml_text
 from api.reading.campaigns import load_campaign
-from api.reading.declared import FORMATS, campaign_of_text, declare, files_of, recording_name, toml_text
 from api.routes.archives import zipped
 from api.work.toolings import toml_of
 from rcsa_ident.errors import InputError

@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from api.jobs.codec import NOUNS, Unknown, _noun, decode, encode
-from api.work.questions import CutQuestion, LobeQuestion
+from api.work.requests import CutQuestion, LobeQuestion
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Evaluation, Residual
 from rcsa_ident.identification.parameters import AxisLayout, Layout
-from rcsa_ident.identification.polish import Solution
 from rcsa_ident.signals.verdict import Verdict
 
 DTYPES = st.sampled_from(["<f8", ">f8", "<c16", "<i8", "<i4", "<u2", "?", "<f4"])

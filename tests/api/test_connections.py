@@ -11,9 +11,9 @@ from contextlib import contextmanager
 import pytest
 import uvicorn
 
-from api import observe
+from api import access
+from api.access import Patient
 from api.main import create_app
-from api.observe import Patient
 from api.settings import Settings
 from tests.api.conftest import Here, Near
 
@@ -42,7 +42,7 @@ def listening(app):
 
 @pytest.fixture
 def port(store, tmp_path, monkeypatch):
-    monkeypatch.setattr(observe, "BODY_SECONDS", 0.5)
+    monkeypatch.setattr(access, "BODY_SECONDS", 0.5)
     with listening(create_app(Settings(data=tmp_path), store, Here(), Here(), Near())) as found:
         yield found
 

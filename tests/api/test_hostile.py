@@ -8,7 +8,7 @@ import json
 import pytest
 
 from api.problems import MEDIA_TYPE
-from api.stores.records import Unavailable
+from api.stores.entities import Unavailable
 from api.work.pool import Busy
 from tests.api.conftest import Here, embedded, example, service
 
@@ -169,7 +169,7 @@ def test_one_line_of_log_for_each_request(http, caplog):
     (record,) = [r for r in caplog.records if r.message == "request"]
     told = record.fields
     assert (told["request_id"], told["method"], told["status"], told["group"]) == ("r1", "GET", 200, "local")
-    from api.observe import JsonLines
+    from api.access import JsonLines
 
     line = json.loads(JsonLines().format(record))
     assert line["event"] == "request"

@@ -17,11 +17,11 @@ from typer.testing import CliRunner
 
 from api.client import Client
 from api.jobs import identification as work
-from api.jobs.desk import Desk
-from api.jobs.feeds import Crowded, Feeds
+from api.jobs.event_feed import Crowded, EventFeeds
+from api.jobs.job_context import JobContext
 from api.security import new_id, now
+from api.stores.entities import Machine
 from api.stores.jobs import Event, Job, Outcome
-from api.stores.records import Machine
 from rcsa_ident.cli import app
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import read_cut
@@ -358,7 +358,7 @@ def test_many_watch_at_the_cost_of_one(store):
         return [event.data for event in seen if event.kind == "trace"]
 
     async def main():
-        feeds = Feeds(Counted(), 3)
+        feeds = EventFeeds(Counted(), 3)
         watching = [asyncio.create_task(watch(feeds)) for _ in range(100)]
         for k in range(4):
             await asyncio.sleep(0.4)
@@ -373,7 +373,7 @@ def test_many_watch_at_the_cost_of_one(store):
 
 
 def test_too_many_watchers_are_told_so(store):
-    feeds = Feeds(store.jobs, 1)
+    feeds = EventFeeds(store.jobs, 1)
     with feeds.stream(), pytest.raises(Crowded), feeds.stream():
         pass
     with feeds.stream():
@@ -403,7 +403,7 @@ def test_a_job_reads_what_was_there_when_it_began(tmp_path, store):
     steps = Steps()
 
     def judged(found):
-        desk = Desk(store.jobs, job.id, "w", partial(steps.remember, job.id))
+        desk = JobContext(store.jobs, job.id, "w", partial(steps.remember, job.id))
         plan = desk.remember("plan", lambda: [work._files(cut) for cut in found.cuts])
         planned = work._planned(found, plan)
         read = partial(read_cut, sensors, campaign.sampling_rate)

@@ -15,9 +15,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from api.jobs import desk as desks
+from api.jobs import job_context as desks
 from api.jobs.backend import Carried
-from api.jobs.desk import Desk
+from api.jobs.job_context import JobContext
 from api.jobs.worker import LEASE, JobWorker, carry, gone, place, process
 from api.security import now
 from api.stores.jobs import Worker
@@ -33,7 +33,7 @@ class Quiet:
         self.steps, self.codes = Steps(), []
 
     def desk(self, token="w"):
-        return Desk(self.store.jobs, self.id, token, partial(self.steps.remember, self.id), self.codes.append)
+        return JobContext(self.store.jobs, self.id, token, partial(self.steps.remember, self.id), self.codes.append)
 
 
 @pytest.fixture
@@ -87,7 +87,7 @@ def test_wherever_it_is_interrupted_each_task_is_done_once(calls, killed_after):
         return texts[name]
 
     def work(budget):
-        desk = Desk(None, "j", "w", partial(engine, budget=budget), left)
+        desk = JobContext(None, "j", "w", partial(engine, budget=budget), left)
 
         def task(x):
             done.append(x)

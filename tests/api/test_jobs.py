@@ -9,8 +9,8 @@ from functools import partial
 import pytest
 
 from api.security import new_id, now
+from api.stores.entities import Document, Machine, Taken, digest_of
 from api.stores.jobs import Applied, Event, Full, Outcome, Worker
-from api.stores.records import Document, Machine, Taken, digest_of
 from tests.api.conftest import BOTH
 from tests.api.identifying import job, running
 

@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from api.client import Client
-from api.parts import Rates
+from api.components import Rates
 from api.security import SCOPES
 from tests.api.conftest import example, service
 from tests.api.test_machines import refused

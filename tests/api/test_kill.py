@@ -17,10 +17,10 @@ from api.client import Client
 from api.jobs import lobes
 from api.jobs.worker import gone, process
 from api.security import new_id, now
+from api.stores.entities import Machine, Store, digest_of
 from api.stores.jobs import Job
-from api.stores.records import Machine, Store, digest_of
 from api.stores.sql import open_store
-from api.work.questions import CutQuestion, LobeQuestion, MachineText, ToolingText
+from api.work.requests import CutQuestion, LobeQuestion, MachineText, ToolingText
 from rcsa_ident.cutting.conditions import Engagement
 from tests.api.conftest import POSTGRESQL, SQLITE, database, example
 from tests.api.identifying import uploaded

@@ -9,7 +9,7 @@ import re
 
 import pytest
 
-from api.routes.page import FOLDER
+from api.routes.static_files import FOLDER
 from tests.api.conftest import example
 from tests.api.test_machines import refused
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from api.reading.normalised import blocks, length, read_normalised, write_normalised
-from api.reading.pictures import envelope, spectrum
+from api.reading.previews import envelope, spectrum
 from api.reading.reader import Limits, Reader
+from api.reading.samples import blocks, length, read_normalised, write_normalised
 from api.work.pool import Busy
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError

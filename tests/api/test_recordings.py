@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from api.files import NORMALISED, UPLOADS
-from api.reading.normalised import read_normalised
+from api.reading.samples import read_normalised
 from rcsa_ident.io.recordings import read_recording, write_hdf5
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.api.conftest import service

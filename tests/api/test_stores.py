@@ -13,7 +13,7 @@ from sqlalchemy import text
 from api.security import make_key, new_id, now
 from api.stores import tables
 from api.stores.campaigns import Campaign, Counts, Recording
-from api.stores.records import ABSENT, Document, Machine, Stale, Taken, Unavailable, digest_of
+from api.stores.entities import ABSENT, Document, Machine, Stale, Taken, Unavailable, digest_of
 from api.stores.sql import open_store
 from rcsa_ident.errors import InputError
 from tests.api.postgres import postgres, postgres_server  # noqa: F401

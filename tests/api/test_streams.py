@@ -8,19 +8,19 @@ import time
 
 import numpy as np
 import pytest
+from tests.workflows.test_live import RATE, streamed
 
 from api.streams.engine import FAILED, Message
 from api.streams.frames import unpacked
 from api.streams.process import StreamProcess
 from api.work.forces import observed
-from api.work.known import read
+from api.work.machine_cache import read
 from api.work.toolings import tooling_of
 from benchmarks.observer import relative_error
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from tests.api.conftest import Near
 from tests.api.streaming import CHANNELS, SENSITIVITY, STREAM, closed, hello, result, send, signals, streaming, tooling, until
-from tests.workflows.test_live import RATE, streamed
 
 SETTLE = round(0.2 * RATE)
 

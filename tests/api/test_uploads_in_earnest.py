@@ -268,7 +268,7 @@ def test_no_room_is_told_in_words(store, tmp_path, monkeypatch):
 #: Where a process ends without a word: function, calls of it that are survived, and whether what has come is kept then.
 STEPS = [
     ("api.files.Part.sync", 0, False),
-    ("api.reading.look.read_upload", 0, False),
+    ("api.reading.examine.read_upload", 0, False),
     ("api.files.Files.keep", 0, False),
     ("api.files.Files.keep", 1, False),
     ("api.stores.sql_campaigns._changed", 0, False),
@@ -279,7 +279,7 @@ REPLACING = [*STEPS[3:5], ("api.reading.uploads.Uploads._release", 0, True), STE
 CODE = """
 import importlib, json, os, sys
 from pathlib import Path
-import api.reading.look
+import api.reading.examine
 from tests.api.conftest import embedded, service
 
 def upload(folder, id, target, survived, replacing):

@@ -22,8 +22,8 @@ from benchmarks.study_table import counts, line, table
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.identification.default import DefaultMethod
-from rcsa_ident.identification.paper import PaperGeneticAlgorithm
+from rcsa_ident.identification.evidence import EvidenceSelection
+from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.posterior import MachineAxis
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.io.curves import write_frf_csv
@@ -215,8 +215,8 @@ def test_a_search_is_followed_and_measured(scratch, coarse):
 
 
 def test_the_default_is_followed_to_its_end(scratch, coarse, monkeypatch):
-    quick = DefaultMethod(search=SearchSettings(modes=3, population=4, generations=1, steps=1), candidates=1)
-    monkeypatch.setattr(search_trace, "DefaultMethod", lambda: quick)
+    quick = EvidenceSelection(search=SearchSettings(modes=3, population=4, generations=1, steps=1), candidates=1)
+    monkeypatch.setattr(search_trace, "EvidenceSelection", lambda: quick)
     points = np.array(search_trace.perform(scratch, "hpm", "default", 1, 0.0)["points"])
     assert len(points) > 2
     assert np.all(np.diff(points[:, 0]) > 0.0)

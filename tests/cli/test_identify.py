@@ -120,7 +120,8 @@ def test_notes_and_coefficients_are_printed_and_written(warm):
 
 def test_a_method_sees_the_cuts_of_its_band_alone(tmp_path, small_campaign, monkeypatch):
     """The whole way through the command with a method that only counts, since the search itself has its own tests."""
-    from rcsa_ident.identification import default
+
+    from rcsa_ident.identification import evidence
 
     seen = []
 
@@ -132,7 +133,7 @@ def test_a_method_sees_the_cuts_of_its_band_alone(tmp_path, small_campaign, monk
             seen.append((data.cut_ids, data.speed_range, self.start))
             return by_hand.identification()
 
-    monkeypatch.setattr(default, "DefaultMethod", Counting)
+    monkeypatch.setattr(evidence, "EvidenceSelection", Counting)
     out = tmp_path / "R.json"
     monkeypatch.setattr("rcsa_ident.workflows.speed_bands.FEWEST_CUTS", 4)
     # the ids of the hand-made answer are not the campaign's: only the bands' part of the file is of interest

@@ -15,11 +15,11 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
-from rcsa_ident.stability.map import stability_map
-from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
+from rcsa_ident.stability.stability_map import stability_map
 from rcsa_ident.stability.time_domain import TimeDomain
+from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
 
 MODE = normal_modes([2.0 * np.pi * 922.0], [0.011], [[1.0 / np.sqrt(0.03993)]], (Coordinate("tip", Dof.X),))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rcsa_ident.identification.design import MeanVariance, Prospects, deviations, exchanged, greedy
+from rcsa_ident.identification.experiment_design import CandidateCuts, MeanVariance, deviations, exchanged, greedy
 
 # h = 1 / (k (1 - r^2 + 2 i zeta r)), r = omega / omega_n; unknowns: logarithms of k, omega_n, zeta, each known to 5 %
 STIFFNESS, NATURAL, ZETA, KNOWN = 2e7, 2.0 * np.pi * 1200.0, 0.04, 0.05
@@ -36,7 +36,7 @@ def test_four_cuts():
     speeds = np.linspace(6000.0, 30000.0, 97) * np.pi / 30.0
     wanted, h = slopes(2.0 * np.pi * np.linspace(600.0, 2400.0, 200))
     target = np.concatenate([wanted.real, wanted.imag]).T / np.linalg.norm(h)
-    prospects = Prospects(tuple(cut(s) for s in speeds), (target,), (0.0,), np.eye(speeds.size, dtype=bool))
+    prospects = CandidateCuts(tuple(cut(s) for s in speeds), (target,), (0.0,), np.eye(speeds.size, dtype=bool))
     chosen = exchanged(prospects, greedy(prospects, 4, MeanVariance()), MeanVariance())
     planned, even = (deviations(prospects, order)[:, 0] for order in (chosen, [0, 32, 64, 96]))
     assert planned[-1] < 0.5 * even[-1] < 0.1 * even[0]

@@ -13,7 +13,7 @@ from rcsa_ident.dynamics.modal import ModalModel, damped_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.identification import _kernels as kernels
 from rcsa_ident.identification.data import LEVER
-from rcsa_ident.identification.paper import modal_fractions
+from rcsa_ident.identification.genetic_algorithm import modal_fractions
 
 
 def substructure(rng, omega):

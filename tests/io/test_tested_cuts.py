@@ -7,7 +7,7 @@ import pytest
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.tested_cuts import read_tested_cuts
-from rcsa_ident.stability.tested import Verdict
+from rcsa_ident.stability.tested_cuts import Verdict
 
 HEADER = "spindle_speed_rpm,axial_depth_mm,verdict\n"
 

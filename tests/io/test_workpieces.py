@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.keys import Table
 from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.io.validated_table import Table
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_keys, workpiece_of
 from rcsa_ident.machining_setup import Workpiece
 

@@ -9,9 +9,9 @@ import pytest
 
 from benchmarks.observer import relative_error, true_response
 from rcsa_ident.errors import InputError
-from rcsa_ident.observer.force import RunOut, force_observer, lifted
+from rcsa_ident.observer.force import RunOut, force_observer, restore_mean_force
 from rcsa_ident.observer.tuning import PaperWalk, Resonators, Tuning, harmonics
-from rcsa_ident.workflows.monitor import observe
+from rcsa_ident.workflows.estimate_forces import observe
 from tests.observer.flange_machine import BAND, flange_machine, paper_cut
 
 RATE = 25600.0
@@ -182,15 +182,15 @@ def test_oscillators_follow_a_change_within_the_response_time(oscillating, signa
 def test_the_mean_comes_from_the_time_between_the_teeth(oscillating):
     """Two teeth, half immersed: for a third of the time no edge cuts (the helix lags a little)."""
     made, first = paper_cut(), 2000
-    raised, level = lifted(oscillating.estimate, 0.4, first)
+    raised, level = restore_mean_force(oscillating.estimate, 0.4, first)
     mean = np.mean(made.force[first:], axis=0)
     np.testing.assert_allclose(level, mean, atol=0.04 * np.std(made.force, axis=0).max())
     np.testing.assert_allclose(raised.force, oscillating.estimate.force + level)
-    again, more = lifted(raised, 0.4, first)
+    again, more = restore_mean_force(raised, 0.4, first)
     np.testing.assert_allclose(more, 0.0, atol=1e-9)
     np.testing.assert_allclose(again.force, raised.force, atol=1e-9)
     with pytest.raises(InputError, match="idle"):
-        lifted(oscillating.estimate, 0.0)
+        restore_mean_force(oscillating.estimate, 0.0)
 
 
 def test_signals_are_checked(oscillating, signals):

@@ -11,8 +11,8 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel, normal_modes
 from rcsa_ident.stability import _cut_kernels as kernels
-from rcsa_ident.stability.modes import TipModes
-from rcsa_ident.stability.period_map import PeriodMap
+from rcsa_ident.stability.monodromy import MonodromyOperator
+from rcsa_ident.stability.tip_modes import TipModes
 from tests.oracles.literature import FOUR_MODES, INSPERGER_STEPAN
 
 RPM = np.pi / 30.0
@@ -52,7 +52,7 @@ def mill(teeth: int = 2, immersion: float = 0.5, strategy: str = "down", helix: 
     return MillingProcess(Cutter(teeth, 0.012, helix, **own), coefficients, Engagement.from_immersion(immersion, strategy), **more)
 
 
-def plan_of(cut: PeriodMap, speed: float, depth: float, step: float) -> np.ndarray:
+def plan_of(cut: MonodromyOperator, speed: float, depth: float, step: float) -> np.ndarray:
     """The scalars that the kernels take."""
     process = cut.process
     c, d, v = process.coefficients, process.damping, process.speed_variation

@@ -8,7 +8,7 @@ import scipy.integrate
 
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
 from rcsa_ident.stability import _cut_kernels as kernels
-from rcsa_ident.stability.period_map import PeriodMap, lobatto
+from rcsa_ident.stability.monodromy import MonodromyOperator, lobatto
 from tests.oracles import naive
 from tests.stability.mills import RPM, SKEWED, mill, plan_of, tip
 
@@ -27,7 +27,7 @@ CASES = {
 @pytest.fixture(params=CASES)
 def laid_out(request):
     """Plan, windows, how they push, elements with their number of points, and the table of a cut."""
-    cut = PeriodMap(tip(SKEWED), CASES[request.param], 4)
+    cut = MonodromyOperator(tip(SKEWED), CASES[request.param], 4)
     plan = plan_of(cut, SPEED, DEPTH, 2e-4)
     rows, shapes = cut._rows(SPEED, DEPTH)
     return plan, rows, shapes, *kernels.elements(rows, plan, 4), lobatto(4)
@@ -112,7 +112,7 @@ def test_coefficients_at_the_points(laid_out):
 
 def test_means_of_steps():
     """Semi-discretisation: what stands at a step's nodes is its mean, here against a fine sum."""
-    cut = PeriodMap(tip(SKEWED), mill(2, 0.3, helix=0.5, damping=ProcessDamping(5e13, 6e-5)), 3, frozen=True)
+    cut = MonodromyOperator(tip(SKEWED), mill(2, 0.3, helix=0.5, damping=ProcessDamping(5e13, 6e-5)), 3, frozen=True)
     plan, (rows, shapes) = plan_of(cut, SPEED, DEPTH, 1.5e-4), cut._rows(SPEED, DEPTH)
     places, points = kernels.elements(rows, plan, 3)
     stiffness, damping, *_ = kernels.coefficients(rows, shapes, plan, places, points, lobatto(3))

@@ -19,7 +19,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.stability.deformation import ToolDeflection, deflected_edge, deflected_engagement
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
-from rcsa_ident.stability.modes import TipModes
+from rcsa_ident.stability.tip_modes import TipModes
 from tests.oracles.literature import DEFORMED_LIMIT_MM, DEFORMED_LIMIT_WITH_SHAPES_MM, DEFORMED_TOOL, TIP_DEFLECTION_MM
 from tests.stability.mills import RPM, SKEWED, mill, tip
 

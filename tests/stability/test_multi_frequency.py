@@ -19,8 +19,8 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
-from rcsa_ident.stability.modes import TipModes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
+from rcsa_ident.stability.tip_modes import TipModes
 from tests.oracles import naive
 
 RPM = 2.0 * np.pi / 60.0

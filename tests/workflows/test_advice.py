@@ -23,7 +23,7 @@ from rcsa_ident.stability.lobes import uncoupled_planes
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.advice import Bound, highest_removal, planned_cut, speed_windows, usable_depths
-from rcsa_ident.workflows.limits import Limits, machine_limits, machine_surface, robust, tip_limits, widened
+from rcsa_ident.workflows.limits import Limits, least_within_tolerance, machine_limits, machine_surface, pad_speeds, tip_limits
 from rcsa_ident.workflows.lobes import LobeConditions, lobe_bands, tooling_lobes
 from rcsa_ident.workflows.speeds import MachineOverSpeed, lobes_over_speed
 from rcsa_ident.workflows.tip import MachineAxis, tooltip
@@ -45,10 +45,12 @@ def limits(depth, speed=None, drawn=None, deepest=10e-3):
 def test_the_lowest_limit_within_a_tolerance():
     speed = np.array([100.0, 110.0, 120.0, 130.0])
     depth = np.array([4.0, 2.0, 6.0, 8.0])
-    np.testing.assert_array_equal(robust(speed, depth, 0.0), depth)
+    np.testing.assert_array_equal(least_within_tolerance(speed, depth, 0.0), depth)
     # 5 % of 100 is half the way down to 2; of 120 it reaches 114, with 2 + 4 * 0.4
-    np.testing.assert_allclose(robust(speed, depth, 0.05), [3.0, 2.0, 3.6, 2.0 + 0.4 * 0.0 + (123.5 - 120.0) / 10.0 * 2.0 + 4.0])
-    assert robust(speed, depth, 0.1)[2] == 2.0
+    np.testing.assert_allclose(
+        least_within_tolerance(speed, depth, 0.05), [3.0, 2.0, 3.6, 2.0 + 0.4 * 0.0 + (123.5 - 120.0) / 10.0 * 2.0 + 4.0]
+    )
+    assert least_within_tolerance(speed, depth, 0.1)[2] == 2.0
 
 
 @settings(max_examples=50, deadline=None)
@@ -56,20 +58,20 @@ def test_the_lowest_limit_within_a_tolerance():
 def test_more_tolerance_never_allows_more(depths, tolerance, more):
     speed = np.linspace(300.0, 900.0, len(depths))
     depth = np.array(depths)
-    small, large = robust(speed, depth, tolerance), robust(speed, depth, tolerance + more)
+    small, large = least_within_tolerance(speed, depth, tolerance), least_within_tolerance(speed, depth, tolerance + more)
     assert np.all(large <= small + 1e-12)
     assert np.all(small <= depth)
     assert np.all(large >= depth.min())
 
 
 def test_speeds_reach_beyond_the_range_by_the_tolerance():
-    found = widened(np.arange(500.0, 601.0, 10.0), 0.05, also=[523.0])
+    found = pad_speeds(np.arange(500.0, 601.0, 10.0), 0.05, also=[523.0])
     assert found[0] <= 475.0
     assert found[-1] >= 630.0
     assert 523.0 in found
     assert set(np.arange(500.0, 601.0, 10.0)) <= set(found)
-    np.testing.assert_array_equal(widened([500.0, 600.0], 0.0), [500.0, 600.0])
-    assert widened([500.0], 0.1)[-1] >= 550.0
+    np.testing.assert_array_equal(pad_speeds([500.0, 600.0], 0.0), [500.0, 600.0])
+    assert pad_speeds([500.0], 0.1)[-1] >= 550.0
     with pytest.raises(InputError, match="speeds that rise"):
         limits([1e-3, 2e-3], [600.0, 500.0])
 
@@ -77,19 +79,19 @@ def test_speeds_reach_beyond_the_range_by_the_tolerance():
 def test_what_all_machines_have_in_common():
     drawn = np.array([[1.0, 9.0], [2.0, 8.0], [3.0, 7.0], [4.0, np.inf]]) * 1e-3
     here = limits([2.5e-3, 8e-3], drawn=drawn)
-    np.testing.assert_allclose(here.trusted(1.0), [1e-3, 7e-3])
-    np.testing.assert_allclose(here.trusted(0.75), [2e-3, 8e-3])
-    np.testing.assert_allclose(here.trusted(0.25), [4e-3, 10e-3])
+    np.testing.assert_allclose(here.limit_quantile(1.0), [1e-3, 7e-3])
+    np.testing.assert_allclose(here.limit_quantile(0.75), [2e-3, 8e-3])
+    np.testing.assert_allclose(here.limit_quantile(0.25), [4e-3, 10e-3])
     assert here.probability(0, 2e-3) == 0.75
     assert limits([1e-3, 2e-3]).probability(0, 2e-3) is None
-    np.testing.assert_allclose(limits([1e-3, np.inf]).trusted(0.9), [1e-3, 10e-3])
+    np.testing.assert_allclose(limits([1e-3, np.inf]).limit_quantile(0.9), [1e-3, 10e-3])
 
 
 @settings(max_examples=40, deadline=None)
 @given(st.floats(0.01, 1.0), st.integers(1, 40))
 def test_trusted_depths_keep_their_promise(probability, draws):
     drawn = np.random.default_rng(draws).uniform(1e-3, 9e-3, (draws, 3))
-    trusted = limits([5e-3] * 3, drawn=drawn).trusted(probability)
+    trusted = limits([5e-3] * 3, drawn=drawn).limit_quantile(probability)
     share = np.mean(drawn >= trusted, axis=0)
     assert np.all(share >= probability - 1e-9)
     # a deeper cut that every draw tells apart would break it
@@ -165,8 +167,8 @@ def test_a_planned_cut_and_its_way_to_the_limit():
     [
         (lambda: usable_depths(limits([1e-3, 2e-3]), replace(PROCESS, feed_per_tooth=None), FREE), "feed_per_tooth"),
         (lambda: usable_depths(limits([1e-3, 2e-3]), PROCESS, FREE, margin=1.0), "margin"),
-        (lambda: robust(np.array([1.0, 2.0]), np.array([1.0, 2.0]), 0.5), "tolerance"),
-        (lambda: limits([1e-3, 2e-3]).trusted(0.0), "probability"),
+        (lambda: least_within_tolerance(np.array([1.0, 2.0]), np.array([1.0, 2.0]), 0.5), "tolerance"),
+        (lambda: limits([1e-3, 2e-3]).limit_quantile(0.0), "probability"),
         (lambda: speed_windows(usable_depths(limits([1e-3, 2e-3]), PROCESS, FREE), 0.0), "depth"),
         (lambda: limits([1e-3, 2e-3], drawn=np.ones((3, 4))), "drawn"),
     ],
@@ -197,7 +199,7 @@ def test_limits_of_a_machine_are_those_of_the_lobes(shop):
     found = machine_limits(machine, tooling.assembly, omega, conditions, draws=60)
     lobes, band = lobes_over_speed(machine, tooling.assembly, omega, conditions)
     np.testing.assert_allclose(found.lobes.limit_depth, lobes.limit_depth)
-    np.testing.assert_allclose(found.drawn.min(axis=0), found.trusted(1.0))
+    np.testing.assert_allclose(found.drawn.min(axis=0), found.limit_quantile(1.0))
     low, high = np.quantile(found.drawn, (0.025, 0.975), axis=0, method="nearest")
     np.testing.assert_allclose(low, band[0])
     np.testing.assert_allclose(high, band[1])

@@ -11,20 +11,20 @@ from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.identification.design import Volume
+from rcsa_ident.identification.experiment_design import Volume
 from rcsa_ident.identification.parameters import AxisLayout, AxisParameters, pack
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.workflows.lobes import LobeConditions, tooling_lobes
-from rcsa_ident.workflows.plan import Allowed, line_noise, plan_cuts
+from rcsa_ident.workflows.plan import CutConstraints, line_noise, plan_cuts
 from rcsa_ident.workflows.tip import tooltip
 from tests.identification.conftest import open_shop
 
 TOOLINGS = Path(__file__).parents[2] / "data" / "machines" / "toolings"
 RPM = np.pi / 30.0
 COEFFICIENTS = CuttingCoefficients(902e6, 0.26, tangential_spread=0.01, ratio_spread=0.01)
-ALLOWED = Allowed(8000.0 * RPM, 20000.0 * RPM, (0.2e-3, 0.6e-3), 1e-4, Engagement.from_immersion(0.5, "down"))
+ALLOWED = CutConstraints(8000.0 * RPM, 20000.0 * RPM, (0.2e-3, 0.6e-3), 1e-4, Engagement.from_immersion(0.5, "down"))
 BAND = (600.0, 4000.0)
 
 

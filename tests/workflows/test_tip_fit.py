@@ -14,9 +14,9 @@ from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
-from rcsa_ident.stability.modes import TIP, TipModes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
-from rcsa_ident.workflows.lobes import LobeConditions, from_rest, modal_tip
+from rcsa_ident.stability.tip_modes import TIP, TipModes
+from rcsa_ident.workflows.lobes import LobeConditions, modal_tip, receptance_from_dc
 from rcsa_ident.workflows.tip_fit import STRANGE, fitted_modes
 
 #: Natural frequencies [Hz], damping ratios, stiffnesses [N/m] of a plane; the last mode lies above the band.
@@ -81,7 +81,7 @@ def test_lobes_of_the_fit_are_those_of_the_receptance():
 
 def test_from_rest_begins_at_0_hz():
     modes = TipModes.of(models())
-    tip = from_rest(modes)
+    tip = receptance_from_dc(modes)
     assert tip.omega[0] == 0.0
     assert tip.omega[-1] > 2.0 * np.pi * 4900.0 * 3.9
     np.testing.assert_allclose(tip.values[0], np.diag([sum(1.0 / k for *_, k in PLANES[a]) for a in (Dof.X, Dof.Y)]), rtol=1e-9)

@@ -1,0 +1,90 @@
+"""What jobs tell, for many who watch: one look at the store for all of them, and one reading of what is new."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from api.stores.entities import Unavailable
+from api.stores.jobs import Event, Jobs
+
+#: Seconds between two looks, and events that are read at once.
+LOOK, BATCH = 0.3, 500
+
+
+class Crowded(Exception):
+    """As many watch as are allowed."""
+
+
+class EventFeeds:
+    """Events of jobs.
+
+    Parameters
+    ----------
+    jobs : Jobs
+    most : int
+        Streams at once.
+    """
+
+    def __init__(self, jobs: Jobs, most: int) -> None:
+        self.jobs, self.most = jobs, most
+        self.streams = 0
+        self.numbers: dict[str, int] = {}
+        self.bells: dict[str, set[asyncio.Event]] = {}
+        self.readings: dict[tuple[str, int], tuple[float, asyncio.Task[Sequence[Event]]]] = {}
+        self.looking: asyncio.Task[None] | None = None
+
+    @contextmanager
+    def stream(self) -> Iterator[None]:
+        """Count one who watches; raises `Crowded` where there are too many."""
+        if self.streams >= self.most:
+            raise Crowded
+        self.streams += 1
+        try:
+            yield
+        finally:
+            self.streams -= 1
+
+    async def events(self, job: str, after: int) -> Sequence[Event]:
+        """Return events behind a number; those who wait for the same read once."""
+        now = time.monotonic()
+        self.readings = {key: value for key, value in self.readings.items() if now - value[0] < LOOK}
+        if (job, after) not in self.readings:
+            self.readings[job, after] = now, asyncio.create_task(asyncio.to_thread(self.jobs.events, job, after, BATCH))
+        return await asyncio.shield(self.readings[job, after][1])
+
+    async def wait(self, job: str, after: int, seconds: float) -> bool:
+        """Return whether there is an event behind a number, after so many seconds at the latest."""
+        end = time.monotonic() + seconds
+        bell = asyncio.Event()
+        self.bells.setdefault(job, set()).add(bell)
+        if self.looking is None or self.looking.done():
+            self.looking = asyncio.create_task(self._look())
+        try:
+            while self.numbers.get(job, 0) <= after:
+                try:
+                    await asyncio.wait_for(bell.wait(), max(end - time.monotonic(), 0.0))
+                except TimeoutError:
+                    return False
+                bell.clear()
+            return True
+        finally:
+            self.bells[job].discard(bell)
+            if not self.bells[job]:
+                del self.bells[job]
+                self.numbers.pop(job, None)
+
+    async def _look(self) -> None:
+        while self.bells:
+            try:
+                found = await asyncio.to_thread(self.jobs.numbers, list(self.bells))
+            except Unavailable:
+                found = {}
+            for job, number in found.items():
+                if number > self.numbers.get(job, 0):
+                    self.numbers[job] = number
+                    for bell in self.bells.get(job, ()):
+                        bell.set()
+            await asyncio.sleep(LOOK)

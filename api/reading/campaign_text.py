@@ -1,0 +1,222 @@
+"""Campaigns as they were declared: keys as in campaign.toml, toolings by their texts, recordings by the last part of their paths."""
+
+from __future__ import annotations
+
+import json
+import re
+import unicodedata
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any, NoReturn
+
+from api.work.toolings import parsed, toml_of, weigh
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.setups import campaign_of
+from rcsa_ident.io.setups import tooling_of as tooling_of_keys
+from rcsa_ident.io.validated_table import Table
+from rcsa_ident.machining_setup import Campaign, Tooling
+
+#: Suffixes of recordings, in lower case.
+FORMATS = (".h5", ".hdf5", ".csv", ".tdms", ".uff", ".unv", ".wav", ".mat", ".parquet")
+#: Largest text of a campaign, and of its toolings together.
+LARGEST, LARGEST_TOOLINGS = 1_000_000, 4_000_000
+MOST_CUTS, MOST_SENSORS, MOST_TOOLINGS = 2000, 64, 200
+#: Frequency up to which toolings are weighed [Hz].
+HIGHEST_HZ = 5000.0
+TOOLING_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._+()-]{0,63}")
+_FORBIDDEN = frozenset('/\\:*?"<>|')
+_LONGEST_NAME = 128
+
+#: Given a name, returns the text of a tooling of the library, or None.
+Library = Callable[[str], str | None]
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """A recording that a campaign names.
+
+    Parameters
+    ----------
+    role : str
+        cut or air.
+    cuts : tuple of str
+        Ids of the cuts that it serves.
+    """
+
+    role: str
+    cuts: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Upload:
+    """A file that came, and what it should be.
+
+    Parameters
+    ----------
+    path : Path
+        Where it is; its name says nothing.
+    name : str
+        As the client calls it: its suffix says the format.
+    target : Path
+        Where its samples are written; nothing is there.
+    """
+
+    path: Path
+    name: str
+    target: Path
+
+
+def recording_name(text: str) -> str:
+    """Return the last part of a path as the service writes it: one form for letters that have two."""
+    return unicodedata.normalize("NFC", re.split(r"[/\\]", text)[-1])
+
+
+def declare(data: Mapping[str, Any], library: Library) -> tuple[str, str, int]:
+    """Return name, text and number of cuts of a campaign, after every check that `rcsa-ident check` makes before it reads recordings.
+
+    Parameters
+    ----------
+    data : mapping
+        The keys of campaign.toml; a tooling may also be a name of the library or a table of its own.
+    library : callable
+
+    Raises
+    ------
+    InputError
+        Names the key, what was found and what is allowed.
+    """
+    for key, most in (("sensors", MOST_SENSORS), ("cuts", MOST_CUTS), ("toolings", MOST_TOOLINGS)):
+        if isinstance(data.get(key), Mapping | list) and len(data[key]) > most:
+            raise InputError(key, f"{len(data[key])} of them", f"at most {most}")
+    top = Table(data, "")
+    cuts = _cuts(top)
+    plain = {**data, "toolings": _toolings(top, cuts, library), "cuts": cuts}
+    campaign = _campaign(plain, lambda name: Path(name))
+    for tooling in campaign.toolings.values():
+        weigh(tooling.assembly, HIGHEST_HZ)
+    _check_files(plain["cuts"])
+    lines = {"campaign.name": campaign.name} | {f"cuts[{i}].id": cut.id for i, cut in enumerate(campaign.cuts)}
+    for field, text in lines.items():
+        if len(text) > 200 or not text.isprintable():
+            raise InputError(field, repr(text[:80]), "a line of at most 200 characters")
+    return campaign.name, json.dumps(plain, ensure_ascii=False, allow_nan=False), len(campaign.cuts)
+
+
+def _cuts(top: Table) -> list[dict[str, Any]]:
+    """Cuts with the last parts of their recordings' paths."""
+    cuts = [dict(table.data) for table in top.tables("cuts")]
+    paths: dict[str, str] = {}
+    for i, cut in enumerate(cuts):
+        for key in ("cut", "air"):
+            text = cut.get(key)
+            if not isinstance(text, str):
+                continue
+            cut[key] = name = _checked_name(f"cuts[{i}].{key}", text)
+            if paths.setdefault(name, text) != text:
+                raise InputError(f"cuts[{i}].{key}", f'"{text}" beside "{paths[name]}"', "files that differ in the last part of their path")
+    return cuts
+
+
+def _checked_name(field: str, text: str) -> str:
+    name = recording_name(text)
+    allowed = f'a file name of at most {_LONGEST_NAME} characters without control characters and : * ? " < > |'
+    odd = not name.isprintable() or _FORBIDDEN & set(name) or name.startswith(".") or name != name.strip()
+    if odd or not 1 <= len(name) <= _LONGEST_NAME:
+        raise InputError(field, repr(text[:80]), allowed)
+    if PurePosixPath(name).suffix.lower() not in FORMATS:
+        raise InputError(field, repr(text[-80:]), f"a file that ends in one of {', '.join(FORMATS)}")
+    return name
+
+
+def _check_files(cuts: list[dict[str, Any]]) -> None:
+    """A cut has a file of its own, which is nobody's air cut."""
+    owner: dict[str, int] = {}
+    for i, cut in enumerate(cuts):
+        if cut["cut"] in owner:
+            raise InputError(f"cuts[{i}].cut", f'"{cut["cut"]}", which is the file of cuts[{owner[cut["cut"]]}]', "a file of its own")
+        owner[cut["cut"]] = i
+    for i, cut in enumerate(cuts):
+        if cut.get("air") in owner:
+            raise InputError(f"cuts[{i}].air", f'"{cut["air"]}", which is the file of a cut', "a recording without cutting")
+
+
+def _toolings(top: Table, cuts: list[dict[str, Any]], library: Library) -> dict[str, str]:
+    """The text of every tooling."""
+    if "toolings" in top:
+        given = dict(top.table("toolings").data)
+    else:
+        names = dict.fromkeys(name for cut in cuts if isinstance(name := cut.get("tooling"), str))
+        given = {name: name for name in names}
+    texts: dict[str, str] = {}
+    for key, what in given.items():
+        field = f"toolings.{key[:80]}"
+        if not TOOLING_NAME.fullmatch(key):
+            raise InputError("toolings", repr(key[:80]), "names of letters, digits, blanks and . _ + - ( ), at most 64")
+        if isinstance(what, Mapping):
+            tooling_of_keys(what, "", key)
+            texts[key] = toml_of(what)
+            continue
+        if not isinstance(what, str):
+            raise InputError(field, what, "a name of the library, the path of a tooling file, or a table of the tooling's keys")
+        # a path means the tooling of the library that has the key as its name
+        name = key if what.endswith(".toml") else what
+        text = library(name) if TOOLING_NAME.fullmatch(name) else None
+        if text is None:
+            raise InputError(
+                field, f'"{name[:80]}", which the library has not', "a tooling of the library (PUT /v1/toolings/NAME writes one)"
+            )
+        texts[key] = text
+    if sum(map(len, texts.values())) > LARGEST_TOOLINGS:
+        raise InputError("toolings", "very long ones", f"at most {LARGEST_TOOLINGS // 1000} kB together")
+    return texts
+
+
+def _campaign(plain: Mapping[str, Any], locate: Callable[[str], Path]) -> Campaign:
+    def tooling(table: Table, key: str) -> Tooling:
+        return tooling_of_keys(parsed(table.data[key]), "", key)
+
+    def file(table: Table, key: str) -> Path:
+        return locate(table.text(key, allowed="the name of a recording"))
+
+    return campaign_of(plain, "", "campaign", tooling, file)
+
+
+def campaign_of_text(text: str, locate: Callable[[str], Path] = Path) -> Campaign:
+    """Return a declared campaign; `locate` turns a recording's name into its file."""
+    return _campaign(json.loads(text), locate)
+
+
+def files_of(text: str) -> dict[str, File]:
+    """Return the recordings that a campaign names, in its order."""
+    found: dict[str, File] = {}
+    for cut in json.loads(text)["cuts"]:
+        found[cut["cut"]] = File("cut", (cut["id"],))
+        if "air" in cut:
+            served = found[cut["air"]].cuts if cut["air"] in found else ()
+            found[cut["air"]] = File("air", (*served, cut["id"]))
+    return found
+
+
+def toml_text(text: str, there: Callable[[str], bool] = lambda _: True) -> str:
+    """Return campaign.toml of a folder with ``toolings/`` and ``recordings/``.
+
+    Parameters
+    ----------
+    there : callable
+        Whether the folder holds a recording; cuts without theirs are left out.
+    """
+    data = json.loads(text)
+    for cut in (cuts := [cut for cut in data["cuts"] if there(cut["cut"])]):
+        if "air" in cut and not there(cut["air"]):
+            del cut["air"]
+        for key in {"cut", "air"} & cut.keys():
+            cut[key] = f"recordings/{cut[key]}"
+    head = {key: value for key, value in data.items() if key != "cuts"}
+    head["toolings"] = {name: f"toolings/{name}.toml" for name in data["toolings"]}
+    return toml_of(head) + "".join(f"[[cuts]]\n{toml_of(cut)}" for cut in cuts)
+
+
+def refuse_name(name: str, known: Mapping[str, File]) -> NoReturn:
+    """Raise for a recording that a campaign does not name."""
+    raise InputError("name", f'"{name[:80]}"', "a recording that the campaign names: " + ", ".join(list(known)[:5]) + ", ...")

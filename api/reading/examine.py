@@ -1,0 +1,133 @@
+"""What the reader process does with an upload: read it, write its samples in one form, and tell what was found. Answers are plain."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from api.reading.campaign_text import Upload, campaign_of_text
+from api.reading.samples import read_normalised, write_normalised
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.recordings import in_si, read_signals
+from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.report.summaries import recording_rows
+from rcsa_ident.signals.measurement import Reading, judge_air, measure_cut
+from rcsa_ident.signals.recording import Recording, Sensor
+from rcsa_ident.signals.steady import measured_axes
+from rcsa_ident.signals.verdict import Verdict
+
+_RPM = 30.0 / np.pi
+
+
+def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) -> Recording:
+    """Return the samples of an upload in SI, and write them; errors name the file as the client does.
+
+    Parameters
+    ----------
+    rate : float or None [Hz]
+        For a file that carries none.
+    """
+    try:
+        found, signals = read_signals(upload.path, [sensor.name for sensor in sensors], rate, Path(upload.name).suffix)
+        write_normalised(upload.target, found, signals, sensors)
+        return in_si(found, signals, sensors)
+    except InputError as error:
+        raise _told(error, upload) from None
+    except RecursionError:
+        raise InputError("recording", "one that cannot be read (nested without end)", "a complete file", upload.name) from None
+
+
+def _told(error: InputError, upload: Upload) -> InputError:
+    found = error.found.replace(str(upload.path), upload.name) if isinstance(error.found, str) else error.found
+    return InputError(error.field, found, error.allowed.replace(str(upload.path), upload.name), upload.name)
+
+
+def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) -> dict[str, Any]:
+    """Read an upload of a campaign and return what was found in it.
+
+    Parameters
+    ----------
+    text : str
+        The campaign as declared.
+    cut_id, role : str
+        The cut that it belongs to, one of them where it is an air cut.
+    air : Path or None
+        Samples of the air cut, where the upload is a cut and they are there.
+    """
+    campaign = campaign_of_text(text)
+    cut = next(each for each in campaign.cuts if each.id == cut_id)
+    recording = read_upload(upload, campaign.sensors, campaign.sampling_rate)
+    try:
+        beside = None if air is None else read_normalised(air)
+    except InputError:
+        # it went in this moment: the verdict is looked at once more anyway
+        beside = None
+    verdict, reading = judged(campaign, cut, recording, beside, role)
+    speed = reading.spindle_speed
+    return told(recording) | {
+        "verdict": verdict,
+        "spindle_speed_rpm": speed * _RPM if speed is not None and np.isfinite(speed) else None,
+        "harmonics_above_noise": {axis.upper(): reading.harmonics.get(axis, 0) for axis in measured_axes(recording)},
+    }
+
+
+def judge(text: str, cut_id: str, cut: Path, air: Path | None) -> dict[str, Any]:
+    """Return the verdict on samples of a cut that are there already."""
+    campaign = campaign_of_text(text)
+    declared = next(each for each in campaign.cuts if each.id == cut_id)
+    return judged(campaign, declared, read_normalised(cut), None if air is None else read_normalised(air), "cut")[0]
+
+
+def told(recording: Recording) -> dict[str, Any]:
+    """Return what needs no analysis."""
+    return {
+        "sampling_rate_hz": recording.rate,
+        "duration_s": recording.samples.shape[0] / recording.rate,
+        "channels": [sensor.name for sensor in recording.sensors],
+    }
+
+
+def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | None, role: str) -> tuple[dict[str, Any], Reading]:
+    """Return the verdict on a cut, beside its air cut where there is one, or on an air cut alone; and what it rests on."""
+    cutter = campaign.toolings[cut.tooling].cutter
+    try:
+        with np.errstate(all="ignore"):
+            if role == "air":
+                reading = judge_air(recording, cut.conditions)
+            else:
+                coefficients = campaign.workpiece.coefficients
+                reading = measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, coefficients)
+    except InputError as error:
+        reading = Reading(Verdict((str(error),)))
+    except (ArithmeticError, np.linalg.LinAlgError):
+        reading = Reading(Verdict(("numbers of these samples have no finite answer",)))
+    (row,) = recording_rows([(cut, reading)])
+    verdict = {
+        "usable": row.usable,
+        "reasons": list(row.reasons),
+        "notes": list(row.notes),
+        "spindle_speed_rpm": row.found_rpm,
+        "lines": row.lines,
+        "signal_to_noise_db": {axis: value for axis, value in row.signal_to_noise_db.items() if np.isfinite(value)},
+    }
+    return verdict, reading
+
+
+def warm() -> None:
+    """Judge a small record, so that what a verdict needs is imported and compiled."""
+    from rcsa_ident.cutting.coefficients import CuttingCoefficients
+    from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+    from rcsa_ident.cutting.cutter import Cutter
+    from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.signals.recording import Quantity
+
+    rate, speed, rng = 20000.0, 200.0 * np.pi, np.random.default_rng(1)
+    time = np.arange(4000) / rate
+    wave = 1e-6 * np.sum([np.cos(m * speed * time) for m in range(1, 9)], axis=0)
+    both = (Sensor("x", Quantity.DISPLACEMENT, Dof.X), Sensor("y", Quantity.DISPLACEMENT, Dof.Y))
+    conditions = CuttingConditions(speed, 1e-4, 1e-4, Engagement.from_immersion(0.5, "down"))
+    for sensors in (both[:1], both):
+        made = Recording(rate, wave[:, None] + 1e-9 * rng.standard_normal((wave.size, len(sensors))), sensors)
+        measure_cut("warm", "warm", made, made, Cutter(2, 0.012), conditions, CuttingCoefficients(9e8, 0.3))

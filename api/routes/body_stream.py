@@ -1,0 +1,167 @@
+"""Bodies that are files: streamed to the disk in blocks, counted, hashed, and given up where they are too large or too slow."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import binascii
+import errno
+import re
+import time
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
+
+from fastapi import Request
+from fastapi.concurrency import run_in_threadpool
+from starlette.requests import ClientDisconnect
+
+from api.components import Components
+from api.files import Full, Part, TooLarge
+from api.problems import Problem
+from api.reading.uploads import Received
+
+#: Of a write, and of what is written between two looks at the free space.
+BLOCK, LOOK = 1 << 20, 64 << 20
+_DIGEST = re.compile(r"(?:^|,)\s*sha-256=:([A-Za-z0-9+/=]*):")
+
+
+async def blocks(request: Request, parts: Components) -> AsyncIterator[bytearray]:
+    """Yield the body in blocks; what arrives too slowly, or not at all, ends it.
+
+    Raises
+    ------
+    Problem
+        408 where the client is too slow, 400 where it has gone.
+    HTTPException
+        413 where the body is larger than an upload may be.
+    """
+    settings, waited, seen, buffer = parts.settings, 0.0, 0, bytearray()
+    request.state.body.most = settings.max_upload_bytes
+    stream = request.stream()
+    while True:
+        start = time.monotonic()
+        try:
+            async with asyncio.timeout(settings.upload_idle_seconds):
+                chunk = await anext(stream, b"")
+        except TimeoutError:
+            raise Problem(408, f"nothing has come for {settings.upload_idle_seconds:g} s") from None
+        except ClientDisconnect:
+            if buffer:
+                yield buffer
+            raise Problem(400, "the client has gone") from None
+        if not chunk:
+            break
+        # the time that writing takes is not the client's
+        waited, seen = waited + time.monotonic() - start, seen + len(chunk)
+        if waited > settings.upload_seconds or seen < (waited - settings.upload_idle_seconds) * settings.upload_bytes_per_second:
+            raise Problem(408, f"{seen} bytes have come in {waited:.0f} s, which is too slow")
+        buffer += chunk
+        if len(buffer) >= BLOCK:
+            yield buffer
+            buffer = bytearray()
+    if buffer:
+        yield buffer
+
+
+async def append(request: Request, parts: Components, group: str, part: Part) -> None:
+    """Write a body behind a part; the disk keeps what it has to keep."""
+    seen = 0
+    async for block in blocks(request, parts):
+        seen += len(block)
+        await write(parts, group, part, block, seen)
+
+
+async def write(parts: Components, group: str, part: Part, block: bytes | bytearray, seen: int) -> None:
+    """Write a block, `seen` being the bytes of this request so far."""
+    with spacious():
+        if seen // LOOK != (seen - len(block)) // LOOK:
+            await run_in_threadpool(parts.files.check_space, group)
+        await run_in_threadpool(part.write, block)
+
+
+async def room(parts: Components, group: str, told: int) -> None:
+    """Refuse an upload of so many bytes that has no place."""
+    if told > parts.settings.max_upload_bytes:
+        raise Problem(413, f"the body is too large: at most {parts.settings.max_upload_bytes} bytes")
+    with spacious():
+        await run_in_threadpool(parts.files.check_space, group, told)
+
+
+@contextmanager
+def spacious() -> Iterator[None]:
+    """Tell in words that there is no more room."""
+    try:
+        yield
+    except TooLarge as error:
+        raise Problem(413, str(error)) from None
+    except Full:
+        raise Problem(503, "the disk has to keep the little space that it has left", headers={"Retry-After": "600"}) from None
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        raise Problem(503, "the disk is full", headers={"Retry-After": "600"}) from None
+
+
+@asynccontextmanager
+async def arriving(parts: Components, group: str) -> AsyncIterator[Part]:
+    """A new part, which is gone afterwards unless it has become something else."""
+    with spacious():
+        part = await run_in_threadpool(parts.files.part, group)
+    try:
+        yield part
+    finally:
+        part.drop()
+
+
+async def complete(part: Part) -> Received:
+    """Return a part that is written to its end: on the disk, with its hash."""
+
+    def finish() -> Received:
+        part.sync()
+        return Received(part.path, part.size, part.sha256())
+
+    with spacious():
+        return await run_in_threadpool(finish)
+
+
+def plain(request: Request) -> None:
+    """Refuse what would have to be unpacked."""
+    coding = request.headers.get("content-encoding", "identity").strip().lower()
+    if coding not in ("", "identity"):
+        raise Problem(415, f"found content encoding {coding[:80]}, allowed is none: send the file as it is")
+
+
+def told_length(request: Request) -> int:
+    """Return the length that a request tells, 0 where it does not."""
+    text = request.headers.get("content-length", "")
+    return int(text[:20]) if text.isdecimal() and text.isascii() else 0
+
+
+def told_digest(request: Request, *headers: str) -> str | None:
+    """Return the SHA-256, hexadecimal, that one of the headers tells (RFC 9530); other hashes are left alone."""
+    for header in headers:
+        text = request.headers.get(header, "")
+        found = _DIGEST.search(text)
+        if found is None and "sha-256" in text:
+            raise _digest_fault(header, text)
+        if found is not None:
+            try:
+                value = base64.b64decode(found[1], validate=True)
+            except binascii.Error:
+                raise _digest_fault(header, text) from None
+            if len(value) != 32:
+                raise _digest_fault(header, text)
+            return value.hex()
+    return None
+
+
+def _digest_fault(header: str, text: str) -> Problem:
+    fault = {"field": header, "found": text[:120], "allowed": "sha-256=:BASE64:, of 32 bytes"}
+    return Problem(422, f"{header} is not understood", [fault])
+
+
+def check_digest(told: str | None, found: str, header: str = "Repr-Digest") -> None:
+    """Refuse a content that is not the one that was told of."""
+    if told is not None and told != found:
+        fault = {"field": header, "found": f"content with the SHA-256 {found}", "allowed": told}
+        raise Problem(422, "the content is not the one that the digest tells: it was damaged on its way", [fault])

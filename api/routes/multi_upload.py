@@ -1,0 +1,88 @@
+"""Several recordings in one body, as browsers send forms: each is kept, or refused, on its own."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request
+from fastapi.concurrency import run_in_threadpool
+
+from api.components import Components, ThisService
+from api.files import Part
+from api.problems import Problem, of_input
+from api.reading.campaign_text import files_of
+from api.routes.body_stream import complete, plain, room, told_length, write
+from api.routes.campaigns import CampaignId, known_campaign
+from api.routes.common import BODY, guard, problems
+from api.routes.multipart import FORM, Head, events
+from api.routes.recordings import answer, take
+from api.schemas.campaigns import ItemProblem, UploadAnswer, UploadItem
+from api.schemas.common import Fault
+from api.security import Guarded, WhoAsks
+from api.stores.campaigns import Campaign
+from api.work.pool import Busy
+from rcsa_ident.errors import InputError
+
+router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
+_FORM = {
+    "required": True,
+    "content": {
+        FORM: {
+            "schema": {
+                "type": "object",
+                "properties": {"files": {"type": "array", "items": {"type": "string", "format": "binary"}}},
+            }
+        }
+    },
+}
+
+
+@router.post(
+    "",
+    summary="Upload several recordings",
+    description="Each file is a part, whose file name's last part is a name of the campaign. A file that is refused does not "
+    "hold up the others.",
+    openapi_extra=guard("upload", requestBody=_FORM, **{"x-content-types": (FORM,)}),
+    responses=problems(404, 408, *BODY),
+)
+async def post(id: CampaignId, request: Request, parts: ThisService, caller: WhoAsks, replace: bool = False) -> UploadAnswer:
+    campaign = await run_in_threadpool(known_campaign, parts, caller.group, id)
+    plain(request)
+    known = files_of(campaign.text)
+    with parts.uploads.admitted():
+        await room(parts, caller.group, told_length(request))
+        items: list[UploadItem] = []
+        name, part, seen = "", None, 0
+        try:
+            async for event in events(request, parts):
+                if isinstance(event, Head):
+                    name, part = event.name or event.field, None
+                    if event.name in known:
+                        part = await run_in_threadpool(parts.files.part, caller.group)
+                elif event is not None:
+                    seen += len(event)
+                    if part is not None:
+                        await write(parts, caller.group, part, event, seen)
+                else:
+                    items.append(await _item(parts, campaign, name, part, replace))
+                    if part is not None:
+                        part.drop()
+        finally:
+            if part is not None:
+                part.drop()
+    return UploadAnswer(items=items)
+
+
+async def _item(parts: Components, campaign: Campaign, name: str, part: Part | None, replacing: bool) -> UploadItem:
+    """Keep one file, or say why not."""
+    try:
+        if part is None:
+            raise Problem(404, "the campaign names no such recording")
+        status, kept = await take(parts, campaign, name, await complete(part), replacing)
+        return UploadItem(name=name, status=status, recording=answer(campaign, kept), problem=None)
+    except Problem as error:
+        problem = error
+    except InputError as error:
+        problem = of_input(error)
+    except Busy:
+        problem = Problem(503, "too many uploads wait to be read")
+    faults = [Fault.model_validate(each) for each in problem.errors] or None
+    return UploadItem(name=name[:200], status=problem.status, recording=None, problem=ItemProblem(detail=problem.detail, errors=faults))

@@ -1,0 +1,140 @@
+"""Bodies of several parts (multipart/form-data), taken apart while they come: no part of a file stays in memory."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Collection
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass
+
+from fastapi import Request
+from python_multipart.exceptions import FormParserError
+from python_multipart.multipart import MultipartParser, parse_options_header
+
+from api.components import Components
+from api.files import Part
+from api.problems import Problem
+from api.reading.campaign_text import recording_name
+from api.reading.uploads import Received
+from api.routes.body_stream import arriving, blocks, complete, write
+
+FORM = "multipart/form-data"
+MOST_PARTS, LARGEST_TEXT = 1000, 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What a part says of itself.
+
+    Parameters
+    ----------
+    field : str
+    name : str or None
+        The last part of the file's name, None where the part is no file.
+    """
+
+    field: str
+    name: str | None
+
+
+async def events(request: Request, parts: Components) -> AsyncIterator[Head | bytes | None]:
+    """Yield of each part its head, its content in pieces, and None at its end.
+
+    Raises
+    ------
+    Problem
+        400 for a body that is no form, 408 and 413 as `blocks`.
+    """
+    told = parse_options_header(request.headers.get("content-type", ""))[1]
+    found: list[Head | bytes | None] = []
+    heads: dict[bytes, bytes] = {}
+    name, value, count, whole = bytearray(), bytearray(), 0, False
+
+    def begin() -> None:
+        nonlocal count
+        count += 1
+        if count > MOST_PARTS:
+            raise Problem(413, f"the body is too large: at most {MOST_PARTS} parts")
+        heads.clear()
+
+    def header() -> None:
+        heads[bytes(name).lower()] = bytes(value)
+        name.clear()
+        value.clear()
+
+    def end() -> None:
+        nonlocal whole
+        whole = True
+
+    try:
+        parser = MultipartParser(
+            told.get(b"boundary", b""),
+            {
+                "on_part_begin": begin,
+                "on_header_field": lambda data, start, end: name.extend(data[start:end]),
+                "on_header_value": lambda data, start, end: value.extend(data[start:end]),
+                "on_header_end": header,
+                "on_headers_finished": lambda: found.append(_head(heads)),
+                "on_part_data": lambda data, start, end: found.append(bytes(data[start:end])),
+                "on_part_end": lambda: found.append(None),
+                "on_end": end,
+            },
+        )
+        if not told.get(b"boundary"):
+            raise FormParserError
+        async for block in blocks(request, parts):
+            parser.write(bytes(block))
+            for each in found:
+                yield each
+            found.clear()
+        parser.finalize()
+        if not whole:
+            # the last part may be cut off, which the parser does not mind
+            raise FormParserError
+    except FormParserError:
+        raise Problem(400, "the body can not be read: it is no complete multipart/form-data") from None
+
+
+def _head(heads: dict[bytes, bytes]) -> Head:
+    options = parse_options_header(heads.get(b"content-disposition", b""))[1]
+    name = options.get(b"filename")
+    found = None if name is None else recording_name(name.decode("utf-8", "replace"))
+    return Head(options.get(b"name", b"").decode("utf-8", "replace"), found)
+
+
+@asynccontextmanager
+async def form(
+    request: Request, parts: Components, group: str, texts: Collection[str], files: Collection[str]
+) -> AsyncIterator[tuple[dict[str, bytes], dict[str, tuple[str, Received]]]]:
+    """The named texts and files of a form; files, by name and content, are on the disk until the end of the block.
+
+    Raises
+    ------
+    Problem
+        422 for a part of another name, one that comes twice, and a text that is too long.
+    """
+    found: dict[str, bytes] = {}
+    received: dict[str, tuple[str, Received]] = {}
+    async with AsyncExitStack() as stack:
+        head, text, part, seen = Head("", None), bytearray(), None, 0
+        async for event in events(request, parts):
+            if isinstance(event, Head):
+                head, text, part = event, bytearray(), None
+                if head.field in found or head.field in received or head.field not in {*texts, *files}:
+                    allowed = f"each once: {', '.join([*texts, *files])}"
+                    fault = {"field": head.field[:80] or "part", "found": "such a part", "allowed": allowed}
+                    raise Problem(422, f"a part of the form: found {head.field[:80]!r}, allowed is {allowed}", [fault])
+                if head.field in files:
+                    part = await stack.enter_async_context(arriving(parts, group))
+            elif event is None:
+                if isinstance(part, Part):
+                    received[head.field] = (head.name or "", await complete(part))
+                else:
+                    found[head.field] = bytes(text)
+            elif isinstance(part, Part):
+                seen += len(event)
+                await write(parts, group, part, event, seen)
+            else:
+                text += event
+                if len(text) > LARGEST_TEXT:
+                    raise Problem(413, f"the body is too large: {head.field} has at most {LARGEST_TEXT // 1000} kB")
+        yield found, received

@@ -1,0 +1,242 @@
+"""An open stream: frames are taken, the observer is made, forces are sent, and every end has its reason."""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import logging
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from fastapi import WebSocket
+from fastapi.concurrency import run_in_threadpool
+from fastapi.exceptions import RequestValidationError
+from starlette.websockets import WebSocketDisconnect
+
+from api import problems
+from api.components import Components
+from api.problems import Problem
+from api.routes.stream_opening import Opening
+from api.schemas.forces import Hello
+from api.security import LOCAL_KEY, Caller
+from api.stores.entities import Unavailable
+from api.streams.frames import TooLarge, WrongKind, object_of, samples_of, samples_of_text
+from api.streams.hub import Full, Hub
+from api.streams.listener import Listener
+from api.streams.session import End, Session, Stage
+from api.work.pool import Busy
+from rcsa_ident.errors import InputError
+
+log = logging.getLogger("rcsa_ident.service")
+#: Time for what waits for a reader at the end, and for a steady part that an observer can be made from [s].
+LINGER, SETTLING = 5.0, 120.0
+#: Fields of errors that the next part of a stream may not have, and what lies between two attempts [s].
+UNSTEADY, PAUSE = ("recording", "recording length", "spindle_speed_rpm", "trigger"), 0.5
+#: Between two looks at the key [s].
+LOOK = 20.0
+#: An index further ahead is a fault of its sender, not a gap [s].
+MOST_AHEAD = 3600.0
+UNEXPECTED = End(1011, 500, "something unexpected happened; the log has it under this session")
+_WORDS = {1009: 413, 1003: 415}
+
+
+async def owned(websocket: WebSocket, parts: Components, caller: Caller, session: Session, opening: Opening, hello: Hello) -> End:
+    """Serve the client that a session belongs to."""
+    hub, listener = parts.streams, Listener(len(session.about.axes), hello.format == "json", hello.envelope)
+    hub.listen(session, listener)
+    about = session.about
+    listener.tell("opened", session=about.id, axes=list(about.axes), sampling_rate_hz=about.rate, settle_samples=opening.settle)
+    tasks = [
+        _told(hub, session, _received(websocket, hub, session, hello.format == "json", opening.source is None)),
+        _told(hub, session, _prepared(parts, session, opening)),
+        _told(hub, session, _allowed(parts, caller)),
+    ]
+    return await _until_over(websocket, session, listener, tasks)
+
+
+async def watched(websocket: WebSocket, parts: Components, caller: Caller, session: Session, hello: Hello) -> End:
+    """Serve a viewer; a session does not end with it."""
+    listener, about = Listener(len(session.about.axes), hello.format == "json", hello.envelope), session.about
+    parts.streams.listen(session, listener)
+    listener.tell("watching", session=about.id, name=about.name, axes=list(about.axes), sampling_rate_hz=about.rate)
+    if session.stage is Stage.LIVE:
+        listener.tell("ready", **session.ready)
+    try:
+        tasks = [asyncio.create_task(_silent(websocket)), asyncio.create_task(_allowed(parts, caller))]
+        return await _until_over(websocket, session, listener, tasks)
+    finally:
+        session.listeners.remove(listener)
+
+
+async def _silent(websocket: WebSocket) -> None:
+    """Return when a viewer goes; what it says meanwhile nobody needs."""
+    while (await websocket.receive())["type"] != "websocket.disconnect":
+        pass
+    raise WebSocketDisconnect
+
+
+async def _allowed(parts: Components, caller: Caller) -> None:
+    """Look now and then whether the key is still one."""
+    while True:
+        await asyncio.sleep(LOOK)
+        if caller.id != LOCAL_KEY and await run_in_threadpool(parts.store.keys.get, caller.id) is None:
+            raise Problem(401, "the key has been withdrawn")
+
+
+def _told(hub: Hub, session: Session, doing: Awaitable[None]) -> asyncio.Task[None]:
+    """Do something for a session; what fails ends it with the reason."""
+
+    async def guarded() -> None:
+        try:
+            await doing
+        except WebSocketDisconnect:
+            hub.close(session, End())
+            raise
+        except Exception as error:
+            end = ended(error)
+            if end.status == 500:
+                log.error("unexpected", exc_info=error, extra={"fields": {"session": session.about.id}})
+            hub.close(session, end)
+
+    return asyncio.create_task(guarded())
+
+
+async def _until_over(websocket: WebSocket, session: Session, listener: Listener, tasks: list[asyncio.Task[None]]) -> End:
+    """Send what there is until the session is over, or its reader has gone."""
+    sending = asyncio.create_task(_sent(websocket, session, listener))
+    over = asyncio.create_task(session.over.wait())
+    try:
+        waiting: set[asyncio.Task[Any]] = {over, sending, *tasks}
+        while not over.done() and not sending.done():
+            done, waiting = await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                # a reader that has gone
+                task.result()
+        # who does not read does not hold the end up for long
+        await asyncio.wait_for(sending, LINGER)
+    except TimeoutError:
+        pass
+    finally:
+        await _ended({sending, over, *tasks})
+    return session.end
+
+
+async def _ended(tasks: set[asyncio.Task[Any]]) -> None:
+    """Have tasks ended; what became of them has been told."""
+    for task in tasks:
+        task.cancel()
+    # not gathered: were this task cancelled meanwhile, it would be told that they were
+    for task in (await asyncio.wait(tasks))[0]:
+        if not task.cancelled():
+            task.exception()
+
+
+async def _sent(websocket: WebSocket, session: Session, listener: Listener) -> None:
+    while not session.over.is_set() or listener.pending:
+        await listener.awake.wait()
+        for each in listener.taken():
+            await (websocket.send_text(each) if isinstance(each, str) else websocket.send_bytes(each))
+        if session.over.is_set():
+            listener.awake.set()
+
+
+async def _received(websocket: WebSocket, hub: Hub, session: Session, text: bool, feeds: bool) -> None:
+    """Take frames until the client has no more."""
+    channels = session.about.channels
+    while True:
+        message = await websocket.receive()
+        if message["type"] == "websocket.disconnect":
+            raise WebSocketDisconnect(message.get("code", 1006))
+        raw, words = message.get("bytes"), message.get("text")
+        if words is not None and len(words) < 100 and object_of(words).get("event") == "end":
+            break
+        if not feeds:
+            raise WrongKind("message", "a frame", 'nothing but {"event": "end"}: the samples are those of the recording')
+        if (words is not None) is not text:
+            raise WrongKind("frame", "bytes" if raw is not None else "text", "JSON" if text else "bytes, as the hello says")
+        first, samples = samples_of_text(words, channels) if words is not None else samples_of(raw or b"", channels)
+        ahead = first - session.counts.following
+        if session.counts.following >= 0 and ahead > MOST_AHEAD * session.about.rate:
+            raise InputError("first", first, f"an index at most an hour ahead of the last one, {session.counts.following}")
+        hub.offer(session, first, samples)
+    await finished(hub, session)
+
+
+async def finished(hub: Hub, session: Session) -> None:
+    """End a session when all its samples have their forces, those among them that an observer still has to be made from."""
+    session.finishing = True
+    session.arrived.set()
+    if session.stage is not Stage.LIVE or session.counts.backlog:
+        await session.drained.wait()
+    if session.stage is Stage.ENDED:
+        return
+    hub.tell_status(session, "end")
+    hub.close(session, End())
+
+
+async def _prepared(parts: Components, session: Session, opening: Opening) -> None:
+    """Have the observer made, then stream; of a replay also feed it."""
+    hub, loop = parts.streams, asyncio.get_running_loop()
+    limit, refused = loop.time() + SETTLING, None
+    while session.stage is not Stage.LIVE:
+        window = (0, None) if opening.source is not None else session.window(opening.settle)
+        if session.stage is Stage.ENDED:
+            return
+        if window is None and session.finishing:
+            # too few samples for an observer, and no more will come
+            session.drained.set()
+            return
+        if window is None:
+            session.arrived.clear()
+            await session.arrived.wait()
+            continue
+        session.stage = Stage.DESIGNING
+        try:
+            plan, ready = await _patiently(functools.partial(opening.design, parts.work, *window))
+        except InputError as error:
+            if opening.source is not None or error.field not in UNSTEADY or loop.time() > limit:
+                raise refused or error from None
+            # perhaps the spindle has still come up to speed, or the tool has entered: the next second may do
+            refused, detail = error, problems.of_input(error)
+            for listener in session.listeners:
+                listener.tell("settling", detail=detail.detail, errors=detail.errors)
+            session.stage = Stage.SETTLING if session.stage is Stage.DESIGNING else session.stage
+            parts.metrics.missed(0, session.skip(window[0] + opening.settle))
+            await asyncio.sleep(PAUSE)
+            continue
+        hub.begin(session, plan, window[0], {"session": session.about.id, **ready})
+    if opening.source is not None:
+        await opening.feed(hub, session)
+        await finished(hub, session)
+
+
+async def _patiently(call: Callable[[], Awaitable[Any]], seconds: float = 30.0) -> Any:
+    """Return what a call answers; where too much waits, ask again."""
+    loop = asyncio.get_running_loop()
+    limit = loop.time() + seconds
+    while True:
+        try:
+            return await call()
+        except Busy:
+            if loop.time() > limit:
+                raise
+            await asyncio.sleep(0.5)
+
+
+def ended(error: Exception) -> End:
+    """Return how an error ends a stream."""
+    found: Problem
+    if isinstance(error, InputError):
+        found = problems.of_input(error)
+        code = 1009 if isinstance(error, TooLarge) else 1003 if isinstance(error, WrongKind) else 1008
+        return End(code, _WORDS.get(code, 422), found.detail, tuple(found.errors))
+    if isinstance(error, RequestValidationError):
+        found = problems.of_validation(error.errors())
+        return End(1008, 422, found.detail, tuple(found.errors))
+    if isinstance(error, Problem):
+        return End(1008, error.status, error.detail, tuple(error.errors))
+    if isinstance(error, Full):
+        return End(1013, 503, str(error))
+    if isinstance(error, Busy | Unavailable):
+        return End(1013, 503, "too much waits for an answer, or the store does not answer now")
+    return UNEXPECTED

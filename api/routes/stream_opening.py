@@ -1,0 +1,228 @@
+"""What a stream opens with: machine, tooling, channels, and where the samples come from."""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+import json
+import math
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fastapi.concurrency import iterate_in_threadpool, run_in_threadpool
+
+from api.components import Components
+from api.files import NORMALISED
+from api.problems import Problem
+from api.reading.both import recording_and_air
+from api.reading.campaign_text import campaign_of_text
+from api.routes.common import found_or_404
+from api.routes.machines import known_machine
+from api.routes.tool_change import tooling_text
+from api.schemas.forces import ReplayHello, SensorKeys, StreamHello
+from api.security import now
+from api.stores.campaigns import Recording as Kept
+from api.streams.design import StreamQuestion, design, design_replay
+from api.streams.hub import Hub
+from api.streams.session import About, Session, Stage
+from api.work.forces import ReadPair, sensors_of
+from api.work.pool import Work
+from api.work.requests import MachineText, ToolingText
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.errors import InputError
+from rcsa_ident.signals.recording import Quantity, Sensor
+
+_RPM = math.pi / 30.0
+#: That an observer is made from, at least.
+REVOLUTIONS = 12
+#: Of a replay [s]: what is read at once, and what comes at once.
+PART, TICK = 1.0, 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """An uploaded recording, and its air cut where there is one."""
+
+    cut: Path
+    air: Path | None
+    rate: float
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """What a session begins with.
+
+    Parameters
+    ----------
+    machine, tooling
+    machine_id, name : str
+    question : StreamQuestion
+    settle : int
+        Samples that an observer is made from; 0 of a replay.
+    air : callable or None
+        Reads an uploaded air cut.
+    source : Source or None
+        Of a replay.
+    """
+
+    machine: MachineText
+    tooling: ToolingText
+    machine_id: str
+    name: str
+    question: StreamQuestion
+    settle: int
+    air: ReadPair | None = None
+    source: Source | None = None
+
+    def about(self, id: str, group: str, seconds: float) -> About:
+        """Return what a session is of."""
+        rate, q = self.question.rate, self.question
+        return About(
+            id, group, self.name, self.machine_id, self.tooling.name, now(), rate, q.axes, len(q.sensors), math.ceil(seconds * rate)
+        )
+
+    async def design(self, work: Work, first: int, samples: FloatArray | None) -> tuple[bytes, dict[str, Any]]:
+        """Return plan and what the client is told, from a worker."""
+        if self.source is not None:
+            return await work.run(design_replay, self.machine, self.tooling, self.question, reader(self.source.cut, self.source.air))
+        assert samples is not None
+        raw = samples.astype("<f8").tobytes()
+        return await work.run(design, self.machine, self.tooling, self.question, first, raw, self.air)
+
+    async def feed(self, hub: Hub, session: Session) -> None:
+        """Play the recording at its pace; where the service is behind, the recording waits."""
+        from api.reading.samples import blocks
+
+        assert self.source is not None
+        loop, rate = asyncio.get_running_loop(), self.question.rate
+        begin, tick = loop.time(), max(1, round(TICK * rate * max(self.source.rate, 1.0)))
+        async for start, part in iterate_in_threadpool(blocks(self.source.cut, math.ceil(PART * rate))):
+            for first in range(0, part.samples.shape[0], tick):
+                await session.room.wait()
+                if session.stage is Stage.ENDED or session.finishing:
+                    return
+                samples = part.samples[first : first + tick]
+                due = begin + (start + first + samples.shape[0]) / (rate * self.source.rate)
+                await asyncio.sleep(max(due - loop.time(), 0.0))
+                hub.offer(session, start + first, samples)
+
+
+async def logger(parts: Components, group: str, hello: StreamHello) -> Opening:
+    """Return the opening of a data logger's stream."""
+
+    def look() -> Opening:
+        known = known_machine(parts, group, hello.machine)
+        tooling = tooling_text(parts, group, hello.tooling)
+        channels = channels_of(hello.channels, given_sensors(hello.sensors) or sensors_of(known.text))
+        speed = None if hello.spindle_speed_rpm is None else hello.spindle_speed_rpm * _RPM
+        if speed is None and not any(sensor.quantity is Quantity.TRIGGER for sensor in channels):
+            raise InputError("spindle_speed_rpm", "nothing, and no channel of a trigger", "the programmed speed [rev/min]")
+        axes = tuple(hello.axes) if hello.axes is not None else displacement_axes(channels)
+        if len(set(axes)) < len(axes):
+            raise InputError("axes", list(axes), "each axis once")
+        seconds = max(hello.settle_s, 0.0 if speed is None else REVOLUTIONS * 2.0 * math.pi / speed)
+        if seconds > 0.5 * parts.settings.stream_buffer_seconds:
+            raise InputError("spindle_speed_rpm", hello.spindle_speed_rpm, f"a speed of which {REVOLUTIONS} revolutions can wait")
+        settle = math.ceil(seconds * hello.sampling_rate_hz)
+        air = None
+        if hello.air is not None:
+            if hello.begins == "air":
+                raise InputError("air", "a recording, and a stream that begins in air", "one of them")
+            air = air_cut(parts, group, hello.air.campaign, hello.air.recording)
+        question = StreamQuestion(hello.sampling_rate_hz, speed, channels, axes, hello.begins, hello.method)
+        return Opening(known, tooling, hello.machine, hello.name, question, settle, air)
+
+    return await run_in_threadpool(look)
+
+
+async def replayed(parts: Components, group: str, hello: ReplayHello) -> Opening:
+    """Return the opening of a recording that is played."""
+
+    def look() -> Opening:
+        found = uploaded(parts, group, hello.replay.campaign, hello.replay.recording)
+        machine_id = hello.machine or found.machine
+        known = known_machine(parts, group, machine_id)
+        tooling = found.tooling if hello.tooling is None else tooling_text(parts, group, hello.tooling)
+        axes = displacement_axes(found.sensors)
+        question = StreamQuestion(found.rate, found.speed, found.sensors, axes, "cut", hello.method)
+        source = Source(found.cut, found.air, hello.replay.rate)
+        return Opening(known, tooling, machine_id, hello.name or hello.replay.recording, question, 0, None, source)
+
+    return await run_in_threadpool(look)
+
+
+@dataclass(frozen=True, slots=True)
+class Uploaded:
+    """A cut's recording in a campaign, with what the campaign says of it; speed in rad/s."""
+
+    machine: str
+    tooling: ToolingText
+    cut: Path
+    air: Path | None
+    sensors: tuple[Sensor, ...]
+    rate: float
+    speed: float
+
+
+def uploaded(parts: Components, group: str, campaign: str, recording: str) -> Uploaded:
+    """Return a cut's recording that was uploaded; its air cut is the campaign's, where it is there."""
+    row = found_or_404(parts.store.campaigns.get(group, campaign), "campaign")
+    name = unicodedata.normalize("NFC", recording)
+    declared = campaign_of_text(row.text)
+    cut = next((each for each in declared.cuts if each.recording == Path(name)), None)
+    if cut is None:
+        raise Problem(404, f"the campaign has no cut with a recording {recording}")
+    kept = _kept(parts, group, campaign, name)
+    found = json.loads(kept.found)
+    air = None if cut.air is None else parts.store.recordings.get(group, campaign, cut.air.name)
+    tooling = ToolingText(cut.tooling, json.loads(row.text)["toolings"][cut.tooling])
+    sensors = channels_of(found["channels"], declared.sensors)
+    still = None if air is None else parts.files.path(group, NORMALISED, air.normalised)
+    path = parts.files.path(group, NORMALISED, kept.normalised)
+    return Uploaded(row.machine, tooling, path, still, sensors, found["sampling_rate_hz"], cut.conditions.spindle_speed)
+
+
+def air_cut(parts: Components, group: str, campaign: str, recording: str) -> ReadPair:
+    """Return what reads an uploaded recording alone."""
+    kept = _kept(parts, group, campaign, unicodedata.normalize("NFC", recording))
+    return reader(parts.files.path(group, NORMALISED, kept.normalised), None)
+
+
+def _kept(parts: Components, group: str, campaign: str, name: str) -> Kept:
+    return found_or_404(parts.store.recordings.get(group, campaign, name), "recording")
+
+
+def reader(cut: Path, air: Path | None) -> ReadPair:
+    """Return what reads a recording and its air cut in a worker."""
+    return functools.partial(recording_and_air, cut, air)
+
+
+def given_sensors(keys: dict[str, SensorKeys] | None) -> tuple[Sensor, ...]:
+    """Return sensors that a query brings."""
+    return tuple(each.sensor(name) for name, each in (keys or {}).items())
+
+
+def channels_of(names: Sequence[str], sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
+    """Return the sensors of channels, in their order."""
+    known = {sensor.name: sensor for sensor in sensors}
+    if len(set(names)) < len(names):
+        raise InputError("channels", list(names), "each channel once")
+    for name in names:
+        if name not in known:
+            raise InputError("channels", name, f"some of {', '.join(known)}")
+    found = tuple(known[name] for name in names)
+    kinds = [(sensor.quantity, sensor.axis) for sensor in found]
+    if len(set(kinds)) < len(kinds):
+        raise InputError("channels", list(names), "one channel of each quantity and axis")
+    return found
+
+
+def displacement_axes(channels: Sequence[Sensor]) -> tuple[str, ...]:
+    """Return the axes with a displacement sensor, X first."""
+    axes = tuple(sorted(s.axis.upper() for s in channels if s.quantity is Quantity.DISPLACEMENT and s.axis is not None))
+    if not axes:
+        raise InputError("channels", "no displacement", "a displacement sensor for X or Y")
+    return axes

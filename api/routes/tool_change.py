@@ -1,0 +1,149 @@
+"""After a tool change: what the tip does, and what cuts are stable."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Header, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import StreamingResponse
+
+from api.components import Components, ThisService
+from api.jobs.lobes import asked
+from api.problems import Problem
+from api.routes import jobs
+from api.routes.common import BODY, guard, problems
+from api.routes.machines import Repeat, known_machine
+from api.routes.toolings import toml_text
+from api.schemas.jobs import JobAnswer, LobeJob
+from api.schemas.queries import AdviceAnswer, AdviceQuery, LobeAnswer, LobeQuery, TipAnswer, TipQuery
+from api.schemas.toolings import ToolingKeys
+from api.security import Guarded, WhoAsks, new_id, now
+from api.stores.jobs import Job
+from api.work import tasks
+from api.work.requests import MachineText, ToolingText, TooLong
+
+router = APIRouter(tags=["tool change"], route_class=Guarded)
+CSV, LOBES = "text/csv", "lobes"
+Later = Annotated[str | None, Header(alias="Prefer", max_length=200, description="`respond-async`: as a job in any case.")]
+
+
+@router.post(
+    "/tooltip",
+    summary="Tooltip FRF of a tooling, with bands; Accept: text/csv for FRF.csv",
+    openapi_extra=guard("run"),
+    response_model=TipAnswer,
+    responses={200: {"description": "Receptances.", "content": {CSV: {"schema": {"type": "string"}}}}, **problems(404, *BODY)},
+)
+async def tooltip(body: TipQuery, request: Request, parts: ThisService, caller: WhoAsks) -> Any:
+    machine, (tooling,) = await _subject(parts, caller.group, body.machine, [body.tooling])
+    csv = CSV in request.headers.get("accept", "")
+    answer = await parts.work.run(tasks.tooltip, machine, tooling, body.question(parts.settings.work_seconds), csv)
+    return Response(answer, media_type=CSV) if csv else TipAnswer.model_validate(answer)
+
+
+@router.post(
+    "/lobes",
+    summary="Stability lobes of one tooling or several; what takes long becomes a job",
+    description="At once where that is quick, as always with zero-order; else, or with `Prefer: respond-async`, 202 and a job.",
+    openapi_extra=guard("run"),
+    response_model=LobeAnswer,
+    responses={202: jobs.ACCEPTED, **problems(404, 409, *BODY)},
+)
+async def lobes(body: LobeQuery, parts: ThisService, caller: WhoAsks, prefer: Later = None, repeat: Repeat = None) -> Any:
+    question = body.question(parts.settings.work_seconds)
+    machine, toolings = await _subject(parts, caller.group, body.machine, body.toolings)
+    most = parts.settings.job_work_seconds
+    if "respond-async" not in (prefer or "").lower():
+        try:
+            found = await _each(parts, tasks.lobes, machine, toolings, question)
+            return LobeAnswer.model_validate({"machine": body.machine, "toolings": found})
+        except TooLong as error:
+            if error.seconds * len(toolings) > most:
+                raise
+    text = asked(machine, toolings, body.question(most))
+    request = body.model_dump_json()
+    job = Job(new_id(), caller.group, LOBES, body.machine, None, request, "queued", now())
+    digest = hashlib.sha256(request.encode()).hexdigest()
+    again = None if repeat is None else (repeat, digest)
+    return jobs.accepted(await run_in_threadpool(jobs.submit, parts, job, {"question": text}, again))
+
+
+@router.get(
+    "/lobes/{id}",
+    summary="Lobes that were computed as a job",
+    openapi_extra=guard("read"),
+    responses={200: {"description": "The job, with its answer once it is done.", "headers": jobs.RETRY}, **problems(404, 422)},
+)
+async def lobe_job(id: jobs.JobId, parts: ThisService, caller: WhoAsks, response: Response, prefer: jobs.Prefer = None) -> LobeJob:
+    job = await jobs.awaited(parts, caller.group, id, LOBES, prefer)
+    text = await run_in_threadpool(parts.store.jobs.text, job.id, "answer") if job.state == "done" else None
+    if job.finished is None:
+        response.headers["Retry-After"] = jobs.AGAIN
+    return LobeJob(job=jobs.answer(job), answer=None if text is None else LobeAnswer.model_validate_json(text))
+
+
+@router.get(
+    "/lobes/{id}/events",
+    summary="What lobes as a job tell on their way",
+    openapi_extra=guard("read"),
+    response_class=StreamingResponse,
+    responses={200: jobs.STREAM, **problems(404, 422)},
+)
+async def lobe_events(id: jobs.JobId, parts: ThisService, caller: WhoAsks, seen: jobs.Seen = None) -> StreamingResponse:
+    return await jobs.events(parts, caller.group, id, LOBES, seen)
+
+
+@router.delete(
+    "/lobes/{id}",
+    status_code=202,
+    summary="Cancel lobes as a job",
+    openapi_extra=guard("run"),
+    responses=problems(404, 409, 422),
+)
+def cancel_lobes(id: jobs.JobId, parts: ThisService, caller: WhoAsks, response: Response) -> JobAnswer:
+    return jobs.cancel(parts, caller.group, id, LOBES, response)
+
+
+@router.post(
+    "/advice",
+    summary="Highest removal rate, speeds for a depth, margin of planned cuts",
+    openapi_extra=guard("run"),
+    responses=problems(404, *BODY),
+)
+async def advice(body: AdviceQuery, parts: ThisService, caller: WhoAsks) -> AdviceAnswer:
+    question = body.advice(parts.settings.work_seconds)
+    machine, toolings = await _subject(parts, caller.group, body.machine, body.toolings)
+    found = await _each(parts, tasks.advice, machine, toolings, question)
+    return AdviceAnswer.model_validate({"machine": body.machine, "toolings": found})
+
+
+async def _each(parts: Components, call: Any, machine: MachineText, toolings: list[ToolingText], question: Any) -> list[Any]:
+    """Ask for every tooling, on as many workers as are free; the first failure is the answer."""
+    found = await asyncio.gather(*(parts.work.run(call, machine, tooling, question) for tooling in toolings), return_exceptions=True)
+    for answer in found:
+        if isinstance(answer, BaseException):
+            raise answer
+    return found
+
+
+async def _subject(parts: Components, group: str, machine: str, toolings: list[str | ToolingKeys]) -> tuple[MachineText, list[ToolingText]]:
+    """Return the machine and the toolings, each from the library or as it came."""
+
+    def look() -> tuple[MachineText, list[ToolingText]]:
+        known = known_machine(parts, group, machine)
+        return known, [tooling_text(parts, group, tooling, i + 1) for i, tooling in enumerate(toolings)]
+
+    return await run_in_threadpool(look)
+
+
+def tooling_text(parts: Components, group: str, tooling: str | ToolingKeys, number: int = 1) -> ToolingText:
+    """Return a tooling from the library, or as it came; without a name it has a number."""
+    if isinstance(tooling, ToolingKeys):
+        return ToolingText(tooling.name or f"tooling {number}", toml_text(tooling))
+    document = parts.store.toolings.get(group, tooling)
+    if document is None:
+        raise Problem(404, f"there is no tooling {tooling}")
+    return ToolingText(tooling, document.text)

@@ -1,0 +1,154 @@
+"""Every reason why an answer should not be believed at once, and what the data cannot tell, in words with numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.cutting.force import SLOPES
+from rcsa_ident.dynamics.coordinates import plane
+from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
+from rcsa_ident.identification.joint_fit import AxisSearch
+from rcsa_ident.identification.levenberg_marquardt import Solution
+from rcsa_ident.identification.misfit import Misfit
+from rcsa_ident.identification.parameters import JOINT
+from rcsa_ident.identification.posterior import Posterior, spread
+
+#: Above this share of unexplained signal the force model or the recordings are wrong.
+WORST_MODEL_ERROR = 0.02
+#: Solutions whose evidence lies closer than this are told apart by chance only.
+EVIDENCE_TIE = 6.0
+#: Relative difference of two such solutions, and deviation of the answer, from which on they matter.
+LARGEST_DIFFERENCE, LARGEST_BAND = 0.02, 0.01
+FEWEST_CUTS = 8
+#: Share of the cuts that may contradict the others before the whole is in doubt.
+MOST_BAD_CUTS = 0.1
+#: Half of the lines must carry at least this many times their noise (its amplitude's root mean square).
+LEAST_SIGNAL = 3.0
+#: A posterior narrower than this share of its prior was told by the data.
+TOLD = 0.5
+_JOINT = ("translational stiffness", "rotational stiffness", "translational damping", "rotational damping")
+
+
+def diagnose(
+    data: IdentificationData, searched: list[AxisSearch], solution: Solution, misfit: Misfit, posteriors: Sequence[Posterior]
+) -> list[str]:
+    """Return the reasons for `suspect`; `posteriors` are those of the axes."""
+    reasons = []
+    if not solution.converged:
+        reasons.append(f"not converged: the polish still gained after {solution.steps} steps")
+    for axis in data.axes:
+        noise = np.sqrt(2.0 * axis.noise)
+        signal = float(np.median(np.abs(axis.measured) / np.where(noise > 0.0, noise, 1e-300)))
+        if signal < LEAST_SIGNAL:
+            reasons.append(f"{str(axis.axis).upper()}: half of the lines are below {signal:.2g} times their noise")
+    for axis, share in zip(data.axes, misfit.model_error, strict=True):
+        if share > WORST_MODEL_ERROR:
+            reasons.append(
+                f"{str(axis.axis).upper()}: {100 * share:.1f} % of each line stay unexplained (at most {100 * WORST_MODEL_ERROR:g} %): "
+                "cutting coefficients, toolings, tooth count or sensor signs may be wrong, or the dynamics change with speed"
+            )
+    bad = misfit.cut_weight < 1.0
+    if np.mean(bad) > MOST_BAD_CUTS:
+        reasons.append(f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, {_named(data, bad, misfit)}")
+    for axis, found in zip(data.axes, searched, strict=True):
+        if len(found.solutions) > 1 and found.evidences[1] - found.evidences[0] < EVIDENCE_TIE:
+            difference, band = _difference(axis, *found.solutions[:2])
+            if difference > max(LARGEST_DIFFERENCE, 3.0 * band):
+                reasons.append(
+                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.1f} % in what a tooltip "
+                    f"feels of the machine, more than their deviation of {100 * band:.1f} %"
+                )
+    for axis, posterior in zip(data.axes, posteriors, strict=True):
+        band = _band(posterior, axis)
+        if band > LARGEST_BAND:
+            reasons.append(
+                f"{str(axis.axis).upper()}: what a tooltip feels of the machine is known to {100 * band:.1f} % only (at most "
+                f"{100 * LARGEST_BAND:g} %), and with tools that were never cut to several times that: more or quieter cuts are wanted"
+            )
+    if len(data.toolings) < 2:
+        reasons.append("one tooling only: flange translation and slope can't be told apart; cut with a second, different holder")
+    for t, name in enumerate(data.toolings):
+        count = int(np.sum(data.cut_tooling == t))
+        if count < FEWEST_CUTS:
+            reasons.append(f"few cuts: {count} with {name}, at least {FEWEST_CUTS} are wanted")
+    return reasons
+
+
+def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covariance: FloatArray) -> list[str]:
+    """Return what the data cannot tell, and what was done about single cuts."""
+    words = []
+    layout, priors = solution.layout, misfit.priors
+    deviation = np.sqrt(np.diag(covariance))
+    for name, std in zip(_JOINT, deviation[layout.joint], strict=True):
+        if std > TOLD * priors.joint_spread:
+            words.append(
+                f"joint: its {name} cannot be told from the flange's own compliance (known to a factor of {np.exp(std):.1f}); "
+                "both together are what the tooltip feels"
+            )
+    for i, axis in enumerate(data.axes):
+        natural = np.exp(solution.theta[layout.axis(i)][: layout.axes[i].modes]) / (2.0 * np.pi)
+        low, high = float(axis.omega.min() / (2.0 * np.pi)), float(axis.omega.max() / (2.0 * np.pi))
+        outside = np.sort(natural[(natural < low) | (natural > high)])
+        if outside.size:
+            listed = ", ".join(f"{f:.0f}" for f in outside)
+            words.append(
+                f"{str(axis.axis).upper()}: modes at {listed} Hz lie outside the excited band of {low:.0f} to {high:.0f} Hz: "
+                "they stand for all that the machine does there"
+            )
+    for c, name in enumerate(data.coefficient_names):
+        std, before = deviation[layout.force][c], data.coefficient_spread[c]
+        if std > TOLD * before and name.split(" of ")[0] != SLOPES[-1]:
+            words.append(f"{name}: the cuts say little about it; it is known to {100.0 * min(std, before):.1f} %, nearly as before")
+    bad = misfit.cut_weight < 1.0
+    if 0.0 < np.mean(bad) <= MOST_BAD_CUTS:
+        words.append(f"cuts that contradict the others and count less: {_named(data, bad, misfit)}")
+    return words
+
+
+def _named(data: IdentificationData, bad: np.ndarray, misfit: Misfit) -> str:
+    worst = [k for k in np.argsort(misfit.cut_weight, kind="stable") if bad[k]]
+    rest = f" and {len(worst) - 5} more" if len(worst) > 5 else ""
+    return ", ".join(f"{data.cut_ids[k]} ({1.0 / misfit.cut_weight[k]:.0f} times its variance)" for k in worst[:5]) + rest
+
+
+def _machine_contribution(axis: AxisData) -> Callable[[ModalModel, LumpedJoint], ComplexArray]:
+    """What a tooltip feels of the machine, a^T (A22 + K^-1 + B)^-1 a with a = A21 of the cut toolings, at the axis' lines."""
+    lever = np.array([[1.0, LEVER], [LEVER, LEVER**2]])
+    flange = axis.flange[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
+    directions = tuple(c.dof for c in plane("flange", axis.axis))
+
+    def felt(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
+        soft = joint.compliance_along(axis.omega, directions)[:, :, None] * np.eye(2)
+        together = flange + lever * (soft + modes.receptance(axis.omega).values)
+        return np.einsum("ni,ni->n", axis.tip, np.linalg.solve(together, axis.tip[:, :, None])[:, :, 0])
+
+    return felt
+
+
+def _band(posterior: Posterior, axis: AxisData) -> float:
+    """Relative standard deviation of what a tooltip feels of the machine."""
+    felt = _machine_contribution(axis)
+    value = felt(*posterior.machine(axis.axis))
+    return float(np.linalg.norm(spread(posterior, axis.axis, felt)) / max(float(np.linalg.norm(value)), 1e-300))
+
+
+def _difference(axis: AxisData, one: Solution, two: Solution) -> tuple[float, float]:
+    """Relative difference of two solutions in what a tooltip feels, and the first one's deviation."""
+    felt = _machine_contribution(axis)
+    first, second = (_flange_posterior(s) for s in (one, two))
+    value, other = felt(*first.machine(axis.axis)), felt(*second.machine(axis.axis))
+    size = np.linalg.norm(value)
+    if size == 0.0:
+        return 0.0, 0.0
+    return float(np.linalg.norm(value - other) / size), _band(first, axis)
+
+
+def _flange_posterior(solution: Solution) -> Posterior:
+    size = solution.layout.tail + JOINT
+    covariance = np.linalg.inv(solution.evaluation.hessian)[:size, :size]
+    return Posterior(solution.theta[:size], covariance, solution.layout.axes[0])

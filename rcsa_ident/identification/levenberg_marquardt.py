@@ -1,0 +1,127 @@
+"""Damped Gauss-Newton steps down to the nearest minimum (Levenberg-Marquardt with Marquardt's scaling)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.identification.misfit import DELAY_UNIT, Evaluation, Misfit
+from rcsa_ident.identification.parameters import Layout
+
+#: No parameter (all are logarithms or of order one) moves further in one step.
+LARGEST_STEP = 1.0
+#: Share of a step at which the residual's bend is probed, and the largest acceleration over velocity that is believed.
+PROBE = 0.1
+LARGEST_BEND = 0.75
+#: Times the damping is raised fourfold for one step: from the least to far beyond any scale.
+RETRIES = 20
+_CUT_UNITS = np.array([DELAY_UNIT, 1.0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """A vector, its cost, and how it was reached.
+
+    Parameters
+    ----------
+    theta : array, shape (p,)
+    layout : Layout
+    evaluation : Evaluation
+        With normal equations.
+    converged : bool
+        False where the steps ran out.
+    steps : int
+    """
+
+    theta: FloatArray
+    layout: Layout
+    evaluation: Evaluation
+    converged: bool
+    steps: int
+
+    @property
+    def cost(self) -> float:
+        """chi2 with priors."""
+        return self.evaluation.cost
+
+
+def refine(
+    misfit: Misfit,
+    theta: FloatArray,
+    layout: Layout,
+    nuisance: FloatArray,
+    max_steps: int,
+    grid: int = 0,
+    tolerance: float = 1e-4,
+) -> Solution:
+    """Return the minimum near `theta`.
+
+    Parameters
+    ----------
+    misfit : Misfit
+    theta : array, shape (p,)
+    layout : Layout
+    nuisance : array, shape (k, 2)
+        Where the cuts' own fits start.
+    max_steps : int
+    grid : int
+        Delays tried over a tooth-passing period at every step: needed far from the minimum.
+    tolerance : float
+        Stop where two steps in a row lower the cost by less than this share.
+    """
+    here = misfit.evaluate(theta, layout, nuisance, grid, normal=True)
+    damping = 1e-2
+    quiet = 0
+    for step_number in range(max_steps):
+        trial = None
+        for _ in range(RETRIES):
+            step = _step(misfit, theta, layout, here, damping)
+            if step is not None:
+                assert here.linear is not None
+                ahead = here.nuisance + here.linear.follow(step) * _CUT_UNITS
+                candidate = misfit.evaluate(theta + step, layout, ahead, grid)
+                if candidate.cost < here.cost:
+                    trial = candidate
+                    break
+            damping *= 4.0
+        if trial is None or step is None:
+            # no descent at any damping: rounding is reached, or the model is stuck on a ridge; without a step nothing is reached
+            return Solution(theta, layout, here, step is not None, step_number)
+        gained = here.cost - trial.cost
+        theta = theta + step
+        damping = max(0.2 * damping, 1e-8)
+        here = misfit.evaluate(theta, layout, trial.nuisance, grid, normal=True)
+        quiet = quiet + 1 if gained < tolerance * here.cost else 0
+        if quiet == 2:
+            return Solution(theta, layout, here, True, step_number + 1)
+    return Solution(theta, layout, here, False, max_steps)
+
+
+def _step(misfit: Misfit, theta: FloatArray, layout: Layout, here: Evaluation, damping: float) -> FloatArray | None:
+    """Damped step with geodesic acceleration (Transtrum & Sethna, 2012): it bends along the valley, not into its wall."""
+    linear = here.linear
+    assert linear is not None
+    scale = np.sqrt(np.maximum(np.diag(linear.hessian), 1e-12))
+    matrix = linear.hessian / np.outer(scale, scale)
+    matrix[np.diag_indices_from(matrix)] += damping
+    try:
+        factor = scipy.linalg.cho_factor(matrix, check_finite=False)
+    except scipy.linalg.LinAlgError:
+        return None
+    velocity = -scipy.linalg.cho_solve(factor, linear.gradient / scale, check_finite=False) / scale
+    largest = float(np.max(np.abs(velocity)))
+    if not np.isfinite(largest):
+        return None
+    if largest > LARGEST_STEP:
+        return velocity * (LARGEST_STEP / largest)
+    cuts = linear.follow(velocity)
+    ahead = here.nuisance + PROBE * cuts * _CUT_UNITS
+    change = misfit.residual_at(theta + PROBE * velocity, layout, ahead).minus(here.residual)
+    bend = change.times(1.0 / PROBE).minus(linear.push(velocity, cuts)).times(2.0 / PROBE)
+    acceleration = -0.5 * scipy.linalg.cho_solve(factor, linear.pull(bend) / scale, check_finite=False) / scale
+    # where the bend is as large as the step, the expansion says nothing
+    bent = 2.0 * np.linalg.norm(acceleration * scale) < LARGEST_BEND * np.linalg.norm(velocity * scale)
+    return velocity + acceleration if bent else velocity

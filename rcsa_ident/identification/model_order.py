@@ -1,0 +1,276 @@
+"""How many modes: as many as the data pay for, by Laplace's approximation of the evidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.identification.levenberg_marquardt import Solution, refine
+from rcsa_ident.identification.misfit import Misfit
+from rcsa_ident.identification.parameters import AxisParameters, Layout, pack, unpack, with_mode, without_mode
+from rcsa_ident.identification.priors import log_volume, prior_rows
+
+#: Walks down end where the evidence lies this far behind the best seen: nothing below comes back from there. The second one is
+#: for a model that a walk has ended with before.
+GIVE_UP, GIVE_UP_SOON = 60.0, 15.0
+#: Omissions of which the cost is lowest before anything is fitted anew; the others are not tried.
+TRIED = 5
+#: Steps of a polish on the way down, and how many times the best trial's cost another one may have to be polished, too.
+WALK, FAR = 10, 3.0
+#: Mean square of a cut's residuals, over the median of all cuts, above which it contradicts the others.
+OUTLYING = 25.0
+#: Damping ratios with which a new mode is tried, and at how many frequencies.
+NEW_DAMPING = (0.015, 0.06, 0.25)
+PLACES = 30
+#: Modes whose frequencies lie closer than this ratio may be one.
+CLOSE = 1.2
+
+#: Told of a stage: its name, the cost or evidence that it came to, its solution.
+Report = Callable[[str, float, Solution], None]
+
+
+def evidence(solution: Solution, misfit: Misfit) -> float:
+    """Return minus twice the log evidence, up to a constant of the data: less is better.
+
+    cost + log det(lines' covariance) + log det(posterior information) - log det(prior information); a mode that the data do
+    not need costs the determinants, one that they need costs the first term.
+    """
+    sign, volume = np.linalg.slogdet(solution.evaluation.hessian)
+    # modes may stand in any order and each shape may have either sign: as many equal minima
+    alike = 2.0 * sum(math.lgamma(a.modes + 1) + a.modes * math.log(2.0) for a in solution.layout.axes)
+    known = log_volume(solution.layout, misfit.priors, misfit.data.coefficient_spread[: solution.layout.coefficients])
+    noise = -2.0 * sum(float(np.sum(np.log(misfit.weight(i)))) for i in range(len(misfit.data.axes)))
+    value = float(solution.cost + noise + volume - known - alike)
+    return value if sign > 0.0 and np.isfinite(value) else np.inf
+
+
+def drop_modes(solution: Solution, misfit: Misfit, report: Report | None = None, smallest: int = 2, give_up: float = GIVE_UP) -> Solution:
+    """Return the best of the models with ever fewer modes.
+
+    Every mode of every axis in turn is left out, and close modes are merged; the likeliest omissions get two steps, the two best
+    of them are polished and the better one is kept, until the evidence has clearly turned.
+
+    Parameters
+    ----------
+    solution : Solution
+        Polished.
+    smallest : int
+        ShortestPlan modes of an axis.
+    """
+    best, best_evidence = solution, evidence(solution, misfit)
+    here = solution
+    while True:
+        trials = []
+        for i, layout in enumerate(here.layout.axes):
+            axis = unpack(here.theta[here.layout.axis(i)], layout)
+            fewer = [without_mode(axis, mode) for mode in range(axis.order)] + merged(axis) if axis.order > smallest else []
+            for each in fewer:
+                theta, changed = _with_axis(here, i, each)
+                trials.append((misfit.evaluate(theta, changed, here.evaluation.nuisance).cost, theta, changed))
+        if not trials:
+            break
+        trials.sort(key=lambda t: t[0])
+        tried = [refine(misfit, theta, layout, here.evaluation.nuisance, max_steps=2) for _, theta, layout in trials[:TRIED]]
+        here = _polished(tried, misfit, 2, WALK)
+        value = evidence(here, misfit)
+        if report is not None:
+            report(f"{sum(a.modes for a in here.layout.axes)} modes", value, here)
+        if value < best_evidence:
+            best, best_evidence = here, value
+        elif value > best_evidence + give_up:
+            break
+    return best if best is solution else _polished([best], misfit, 1)
+
+
+def exchange_modes(
+    solution: Solution, misfit: Misfit, band_hz: tuple[float, float], report: Report | None = None, rounds: int = 3
+) -> Solution:
+    """Return the best model that is reached by adding a mode where it helps most and dropping those that are not needed.
+
+    A walk downwards alone can't mend a mode that once settled in the wrong place; this one can. It ends with the first round
+    that gains nothing.
+
+    Parameters
+    ----------
+    solution : Solution
+        Polished.
+    band_hz : (float, float)
+        Lowest and highest line.
+    rounds : int
+        Most rounds.
+    """
+    best, best_evidence = solution, evidence(solution, misfit)
+    for _ in range(rounds):
+        trials = []
+        for i in range(len(best.layout.axes)):
+            for axis in promising(best, misfit, i, band_hz):
+                theta, layout = _with_axis(best, i, axis)
+                trials.append(refine(misfit, theta, layout, best.evaluation.nuisance, max_steps=6))
+        reached = drop_modes(_polished(trials, misfit, 2), misfit, give_up=GIVE_UP_SOON)
+        value = evidence(reached, misfit)
+        if report is not None:
+            report("exchange", reached.cost, reached)
+        if value >= best_evidence - 1.0:
+            break
+        best, best_evidence = reached, value
+    return best
+
+
+def grow_modes(solution: Solution, misfit: Misfit, band_hz: tuple[float, float]) -> Solution:
+    """Return the model with one more mode for each axis, whether or not the evidence asks for it.
+
+    A machine has more modes than the data can show. A model that leaves them out is sure of what it cannot know; with them the
+    posterior is as wide as it should be.
+    """
+    for i in range(len(solution.layout.axes)):
+        trials = []
+        for axis in promising(solution, misfit, i, band_hz):
+            theta, layout = _with_axis(solution, i, axis)
+            trials.append(refine(misfit, theta, layout, solution.evaluation.nuisance, max_steps=6))
+        solution = _polished(trials, misfit, 1)
+    return solution
+
+
+def promising(solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, float], count: int = 3) -> list[AxisParameters]:
+    """Return axis `i` with one more mode, at the frequencies where the linearised misfit promises most.
+
+    A mode with shape psi adds psi psi^T / (omega_n^2 - omega^2 + 2 i zeta omega_n omega) to the flange's receptance: linear in
+    the entries of psi psi^T, so that all frequencies are judged by one least-squares solution each, the other unknowns and the
+    cuts' delays following.
+    """
+    linear = solution.evaluation.linear
+    assert linear is not None
+    data, residual = misfit.data.axes[i], solution.evaluation.residual
+    places = 2.0 * np.pi * np.geomspace(0.3 * band_hz[0], 2.5 * band_hz[1], PLACES)
+    frequency, damping = np.tile(places, len(NEW_DAMPING)), np.repeat(NEW_DAMPING, PLACES)
+    omega, size = data.omega[:, None], np.sqrt(misfit.weight(i))
+    shape = 1.0 / (frequency**2 - omega**2 + 2j * damping * frequency * omega)
+    # change of the whitened lines, shape (n o, places, 3)
+    columns = -linear.compliance[i][:, :, None, :] * shape[:, None, :, None] * size[:, :, None, None]
+    columns = columns.reshape(-1, frequency.size * 3)
+    gradient, own, mixed = linear.border(i, np.concatenate([columns.real, columns.imag]), residual)
+    posterior = np.linalg.solve(solution.evaluation.hessian, np.column_stack([mixed, linear.gradient]))
+    promise, shapes = np.zeros(frequency.size), np.zeros((frequency.size, 2))
+    for k in range(frequency.size):
+        entries = slice(3 * k, 3 * k + 3)
+        matrix = own[k] - mixed[:, entries].T @ posterior[:, entries] + 1e-9 * np.trace(own[k]) * np.eye(3)
+        right = gradient[entries] - mixed[:, entries].T @ posterior[:, -1]
+        shapes[k] = _rank_one(-np.linalg.solve(matrix, right))
+        # what the nearest rank-one shape keeps of the promise
+        kept = np.array([shapes[k, 0] ** 2, shapes[k, 0] * shapes[k, 1], shapes[k, 1] ** 2])
+        promise[k] = 2.0 * kept @ right + kept @ matrix @ kept
+    best = promise.reshape(len(NEW_DAMPING), PLACES).argmin(axis=0) * PLACES + np.arange(PLACES)
+    hill = promise[best]
+    # one of each hill: its neighbours lead to the same place
+    tops = np.flatnonzero((hill <= np.append(np.inf, hill[:-1])) & (hill <= np.append(hill[1:], np.inf)))
+    chosen = best[tops[np.argsort(hill[tops], kind="stable")][:count]]
+    axis = unpack(solution.theta[solution.layout.axis(i)], solution.layout.axes[i])
+    return [with_mode(axis, float(frequency[k]), (float(shapes[k, 0]), float(shapes[k, 1])), float(damping[k])) for k in chosen]
+
+
+def merged(axis: AxisParameters) -> list[AxisParameters]:
+    """Return the axis with each two neighbours that stand close made one: together they may do what one mode does."""
+    order = np.argsort(axis.omega_n, kind="stable")
+    found = []
+    for low, high in pairwise(order.tolist()):
+        if axis.omega_n[high] < CLOSE * axis.omega_n[low]:
+            both = axis.psi[[low, high]]
+            psi, omega_n, fixture = axis.psi.copy(), axis.omega_n.copy(), axis.fixture.copy()
+            psi[low] = _rank_one(np.array([both[:, 0] @ both[:, 0], both[:, 0] @ both[:, 1], both[:, 1] @ both[:, 1]]))
+            # both modes' motion of the fixture, and whichever sign the new shape has
+            fixture[low] = psi[low] @ (axis.fixture[[low, high]] @ both) / (psi[low] @ psi[low])
+            share = np.sum(both**2, axis=1) / max(float(np.sum(both**2)), 1e-300)
+            omega_n[low] = np.exp(share @ np.log(axis.omega_n[[low, high]]))
+            found.append(without_mode(replace(axis, psi=psi, omega_n=omega_n, fixture=fixture), high))
+    return found
+
+
+def _rank_one(entries: FloatArray) -> FloatArray:
+    """Shape psi whose psi psi^T is nearest to a symmetric matrix (tt, tr, rr)."""
+    values, vectors = np.linalg.eigh(np.array([[entries[0], entries[1]], [entries[1], entries[2]]]))
+    return np.sqrt(max(values[1], 1e-4)) * vectors[:, 1]
+
+
+def _polished(trials: list[Solution], misfit: Misfit, count: int, steps: int = 30) -> Solution:
+    """The best of the first `count` trials after they have been polished; what lies far behind is left out."""
+    trials = sorted(trials, key=lambda s: s.cost)[:count]
+    near = [trials[0], *(t for t in trials[1:] if t.cost < FAR * trials[0].cost)]
+    return min((refine(misfit, t.theta, t.layout, t.evaluation.nuisance, steps) for t in near), key=lambda s: s.cost)
+
+
+def _with_axis(solution: Solution, i: int, axis: AxisParameters) -> tuple[FloatArray, Layout]:
+    """The vector with another axis in place of axis `i`."""
+    old = solution.layout
+    axes = tuple(replace(a, modes=axis.order) if k == i else a for k, a in enumerate(old.axes))
+    block = old.axis(i)
+    theta = np.concatenate([solution.theta[: block.start], pack(axis, axes[i]), solution.theta[block.stop :]])
+    return theta, replace(old, axes=axes)
+
+
+def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> tuple[float, ...]:
+    """Return, per axis, the share of each line that the residuals show to be unexplained beyond the records' noise.
+
+    The share f solves sum |rest|^2 / (variance + f^2 |h|^2 / 2) = degrees of freedom, the data's less those that parameters
+    and cuts have used.
+
+    Parameters
+    ----------
+    smallest : float
+        Floor: no simulated force is better than that.
+    """
+    layout, data = solution.layout, misfit.data
+    jacobian = prior_rows(layout, misfit.priors, data.coefficient_spread[: layout.coefficients]).jacobian
+    # parameters that the data have moved away from their priors
+    used = solution.theta.size - float(np.trace(np.linalg.solve(solution.evaluation.hessian, jacobian.T @ jacobian)))
+    used += 2.0 * len(data.cut_ids)
+    free = max(1.0 - used / misfit.points, 0.1)
+    shares = []
+    for i, (axis, rest) in enumerate(zip(data.axes, solution.evaluation.residual.lines, strict=True)):
+        weight = misfit.weight(i).ravel()
+        # a cut that contradicts the others does not count against them here, either
+        counted = np.repeat(misfit.cut_weight[axis.cut], axis.outputs)
+        squares = counted * (rest[: weight.size] ** 2 + rest[weight.size :] ** 2) / weight
+        size = np.abs(axis.lines[:, :, 0] - axis.lines[:, :, 1]).ravel() ** 2
+        shares.append(_share(squares, axis.variance.ravel(), size, 2.0 * weight.size * free, smallest))
+    return tuple(shares)
+
+
+def cut_weights(solution: Solution, misfit: Misfit) -> FloatArray:
+    """Return a factor on each cut's weights, shape (k,): 1, or less for a cut whose lines miss the model far more than most do.
+
+    A cut whose mean square is more than `OUTLYING` times the median gets as much variance as it shows.
+    """
+    cuts = len(misfit.data.cut_ids)
+    squares, lines = np.zeros(cuts), np.zeros(cuts)
+    for i, (axis, rest) in enumerate(zip(misfit.data.axes, solution.evaluation.residual.lines, strict=True)):
+        weight = misfit.weight(i)
+        each = (rest[: weight.size] ** 2 + rest[weight.size :] ** 2).reshape(weight.shape).sum(axis=1)
+        squares += np.bincount(axis.cut, each, minlength=cuts)
+        lines += 2.0 * axis.outputs * np.bincount(axis.cut, minlength=cuts)
+    # as the cut would stand with its full weight
+    mean = squares / np.maximum(lines, 1.0) / misfit.cut_weight
+    usual = float(np.median(mean[lines > 0.0])) if np.any(lines > 0.0) else 0.0
+    out = mean > OUTLYING * usual
+    return np.where(out & (usual > 0.0), usual / np.maximum(mean, 1e-300), 1.0)
+
+
+def _share(squares: FloatArray, noise: FloatArray, size: FloatArray, freedom: float, smallest: float) -> float:
+    """Solve for the share by bisection of its logarithm: the sum falls with it."""
+    low, high = smallest, 1.0
+    # lines of nothing, in a record without noise, say nothing about shares
+    told = (noise > 0.0) | (size > 0.0)
+    squares, noise, size = squares[told], noise[told], size[told]
+    if np.sum(squares / (noise + 0.5 * low**2 * size)) <= freedom:
+        return smallest
+    for _ in range(60):
+        middle = float(np.sqrt(low * high))
+        if np.sum(squares / (noise + 0.5 * middle**2 * size)) > freedom:
+            low = middle
+        else:
+            high = middle
+    return high

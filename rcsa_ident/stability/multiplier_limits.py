@@ -1,0 +1,147 @@
+"""Limits from multipliers: the first loss of stability at each speed, with a step that an estimate of the error chose."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.errors import InputError
+from rcsa_ident.stability.first_instability import first_loss
+from rcsa_ident.stability.monodromy import RESIDUAL, MonodromyOperator, Multiplier, stable_depth_bound
+from rcsa_ident.stability.result import StabilityLobes
+
+#: Share of the strongest mode's peak below which a mode does not decide on the length of a step.
+_WEAK = 0.02
+#: Nodes per period of the highest mode that counts, with polynomials of high degree and as many more with those of low degree;
+#: steps, where coefficients stand still.
+_NODES, _LOW_DEGREE, _STEPS = 9.0, 4.0, 24.0
+#: Depth over axial pitch beyond which islands may stand under a limit: at 5 % immersion and 30 degrees one stands at 0.2, at 20 % and
+#: 17 degrees at 0.03.
+ISLANDS = 0.03
+#: Residual of the multiplier for a first look.
+ROUGH = 1e-4
+#: How much finer the step is by which the error is told, and how often the search is repeated with it.
+_FINER, _REPEATS = 1.6, 5
+
+
+def check_resolution(intervals: int | None, tolerance: float) -> None:
+    """Raise `InputError` where one of them is not usable."""
+    if intervals is not None and not 1 <= intervals <= 5000:
+        raise InputError("intervals", intervals, "None, or a whole number from 1 to 5000")
+    if not 1e-8 <= tolerance <= 0.1:
+        raise InputError("tolerance", tolerance, "a share from 1e-8 to 0.1")
+
+
+class Growth:
+    """Logarithm of the multiplier per tooth period over the depth, at one speed and step; remembers where it started."""
+
+    def __init__(self, cut: MonodromyOperator, speed: float, step: float, residual: float = RESIDUAL) -> None:
+        self.cut, self.speed, self.step, self.residual = cut, speed, step, residual
+        self.start: ComplexArray | None = None
+        self.calls = 0
+        self.teeth = cut.period * cut.process.cutter.teeth / (2.0 * np.pi)
+
+    def __call__(self, depth: float) -> float:
+        self.calls += 1
+        found = self.cut.multiplier(self.speed, depth, self.step, self.start, residual=self.residual)
+        self.start = found.vector
+        return float(np.log(max(abs(found.value), 1e-300))) / self.teeth
+
+
+def longest_step(cut: MonodromyOperator) -> float:
+    """Length of a step that is good to some thousandths of the limit [s]."""
+    strength = cut.modes.strength
+    wave = 2.0 * np.pi / float(np.max(np.abs(cut.pole)[strength >= _WEAK * strength.max()]))
+    degree = cut.table.shape[1] - 1
+    return wave / _STEPS if cut.frozen else degree * wave / (_NODES * (1.0 + _LOW_DEGREE / degree**2))
+
+
+def islands_from(cut: MonodromyOperator) -> float:
+    """The depth beyond which islands of instability may stand under the first limit.
+
+    Where a helix spreads an interrupted cut over the angle, period doubling ends above as well as below, at depths that are shares
+    of the axial pitch.
+    """
+    process = cut.process
+    in_cut = process.cutter.teeth * (process.engagement.exit - process.engagement.entry) / (2.0 * np.pi)
+    if process.cutter.helix < 1e-6 or in_cut >= 1.0:
+        return np.inf
+    return float(ISLANDS * np.pi * process.cutter.diameter / (process.cutter.teeth * np.tan(process.cutter.helix)))
+
+
+def marched_lobes(
+    cut: MonodromyOperator, speeds: FloatArray, max_depth: float, intervals: int | None, tolerance: float, method: str
+) -> StabilityLobes:
+    """Return the lobes of a cut by its multipliers: the first loss of stability at each speed, and how the tool vibrates there."""
+    limit = np.full(speeds.size, np.inf)
+    chatter = np.full(speeds.size, np.nan)
+    lobe, flip = np.full(speeds.size, -1, dtype=np.intp), np.zeros(speeds.size, dtype=bool)
+    low, lost = stable_depth_bound(cut.modes, cut.process), 0
+    for i, speed in enumerate(speeds):
+        depth, step, good = _limit(cut, float(speed), low, max_depth, intervals, tolerance)
+        lost += not good
+        if depth is None:
+            continue
+        found = cut.multiplier(float(speed), depth, step, waves=True)
+        limit[i], chatter[i] = depth, dominant(found)
+        lobe[i] = int(chatter[i] / (speed * cut.process.cutter.teeth))
+        # a quasi-periodic vibration may pass -1, too, but as one of a pair
+        flip[i] = found.value.real < 0.0 and abs(found.value.imag) < 1e-6 * abs(found.value)
+    doubts = [f"at {lost} of {speeds.size} speeds the limit is not converged to {100.0 * tolerance:g} %"] if lost else []
+    return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), method, tuple(doubts), flip)
+
+
+def dominant(found: Multiplier) -> float:
+    """The frequency at which the tip vibrates most [rad/s]."""
+    return float(found.omega[np.argmax(found.motion)])
+
+
+def _limit(
+    cut: MonodromyOperator, speed: float, low: float, max_depth: float, intervals: int | None, tolerance: float
+) -> tuple[float | None, float, bool]:
+    """The limit, the step that it was found with, and whether a finer one agrees."""
+    tooth = 2.0 * np.pi / (cut.process.cutter.teeth * speed)
+    if intervals is not None:
+        step = tooth / intervals
+        return first_loss(Growth(cut, speed, step), low, max_depth, 1e-3 * tolerance, careful_from=islands_from(cut)), step, True
+    # a search that is a little too deep and a little rough, then the limit from where it ended
+    step = longest_step(cut)
+    depth = first_loss(Growth(cut, speed, step, ROUGH), low, 1.1 * max_depth, 10.0 * tolerance, careful_from=islands_from(cut))
+    if depth is None:
+        return None, step, True
+    for _ in range(_REPEATS):
+        growth = Growth(cut, speed, step)
+        found = _polished(growth, depth, tolerance)
+        if found is None:
+            # not there with the finer step: looked for again
+            depth = first_loss(growth, low, 1.1 * max_depth, tolerance, careful_from=islands_from(cut))
+            if depth is None:
+                return None, step, True
+            found = depth, (growth(1.01 * depth) - growth(0.99 * depth)) / (0.02 * depth)
+        depth, slope = found
+        step /= _FINER
+        finer = Growth(cut, speed, step)
+        finer.start = growth.start
+        # what a step that is shorter by the same share again and again would add, too
+        change = finer(depth) / slope / (1.0 - _FINER**-cut.order)
+        if abs(change) < 0.5 * tolerance * depth:
+            depth -= change
+            return (depth if depth <= max_depth else None), step, True
+    return (depth if depth <= max_depth else None), step, False
+
+
+def _polished(growth: Growth, depth: float, tolerance: float) -> tuple[float, float] | None:
+    """The root next to a depth by the secant method, with the slope there; None if it leaves the neighbourhood."""
+    a, b = depth, depth * (1.0 + 0.01)
+    at_a, at_b = growth(a), growth(b)
+    for _ in range(12):
+        slope = (at_b - at_a) / (b - a)
+        if not slope > 0.0:
+            return None
+        c = b - at_b / slope
+        if not 0.7 * depth < c < 1.4 * depth:
+            return None
+        if abs(c - b) < 0.2 * tolerance * depth:
+            return c, slope
+        a, at_a, b, at_b = b, at_b, c, growth(c)
+    return None

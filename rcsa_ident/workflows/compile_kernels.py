@@ -1,0 +1,141 @@
+"""Small jobs that call every kernel in the signatures that the commands use, so that all are compiled and cached."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.force import force_and_slope
+from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+from rcsa_ident.dynamics.modal import normal_modes
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.identification.data import IdentificationData, prepare
+from rcsa_ident.identification.evidence import EvidenceSelection
+from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
+from rcsa_ident.identification.search import SearchSettings
+from rcsa_ident.observer.force_model import RandomWalk, augmented
+from rcsa_ident.observer.kalman import kalman_filter
+from rcsa_ident.observer.transfer_function import SampledModes
+from rcsa_ident.signals.measurement import AxisLines, CutMeasurement, measure_cut
+from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.time_domain import TimeDomain
+from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.stability.zero_order import ZeroOrder
+from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, ToolAssembly
+from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.virtual.milling import mill_cut
+from rcsa_ident.virtual.reduction import Poles
+from rcsa_ident.workflows.lobes import LobeConditions, modal_tip
+
+_CUTTER = Cutter(2, 0.012)
+_COEFFICIENTS = CuttingCoefficients(9e8, 0.3)
+_SPEED = 200.0 * np.pi
+_CONDITIONS = CuttingConditions(_SPEED, 1e-4, 1e-4, Engagement.from_immersion(0.5, "down"))
+
+
+def _assembly() -> ToolAssembly:
+    steel = MATERIALS["steel"]
+    return ToolAssembly((BeamSegment(0.08, 0.012, steel),), (BeamSegment(0.05, 0.05, steel, 0.012),), 0.03, Contact(2e10, 6e5, 6e4, 9.0))
+
+
+def _tool_holder() -> None:
+    tool_holder_receptance(_assembly(), 2.0 * np.pi * np.linspace(100.0, 2000.0, 20))
+
+
+def _recordings() -> None:
+    rng = np.random.default_rng(1)
+    rate, time = 20000.0, np.arange(4000) / 20000.0
+    cut, air = (1e-6 * np.sum([np.cos(m * _SPEED * time) for m in range(1, 9)], axis=0) for _ in range(2))
+    both = (Sensor("x", Quantity.DISPLACEMENT, Dof.X), Sensor("y", Quantity.DISPLACEMENT, Dof.Y))
+    # one channel and several lie differently in memory
+    for sensors in (both[:1], both):
+        records = []
+        for each in (cut, 0.1 * air):
+            records.append(Recording(rate, each[:, None] + 1e-9 * rng.standard_normal((each.size, len(sensors))), sensors))
+        measure_cut("warm", "warm", records[0], records[1], _CUTTER, _CONDITIONS, _COEFFICIENTS)
+
+
+def _lines(outputs: int) -> IdentificationData:
+    """Lines of a few cuts at several speeds with a trigger, the flange's motion alone or gap and fixture."""
+    rng = np.random.default_rng(1)
+    measurements = []
+    for k in range(4):
+        speed = _SPEED * (1.0 + 0.1 * k)
+        order = 2 * np.arange(1, 6)
+        value = 1e-8 * (rng.standard_normal((5, outputs)) + 1j * rng.standard_normal((5, outputs)))
+        force, slope = force_and_slope(_CUTTER, _CONDITIONS, _COEFFICIENTS, order)
+        variance = np.full((5, outputs), 1e-20)
+        lines = AxisLines(order, order * speed, value, 0.1 * value, variance, np.ones(5), force[:, 0], slope[:, 0])
+        measurements.append(CutMeasurement(f"{k}", "warm", speed, {Dof.X: lines}, 0.01, 1e-3, 1e-6, tooth_angle_known=False))
+    assembly = _assembly()
+
+    def receptance(omega: FloatArray) -> Receptance:
+        return tool_holder_receptance(assembly, omega)
+
+    return prepare(measurements, {"warm": receptance}, {"warm": 2}, (0.05, 0.05, 0.0, 0.0))
+
+
+def _default_method() -> None:
+    method = EvidenceSelection(search=SearchSettings(modes=3, population=4, generations=1, steps=1), candidates=1)
+    for outputs in (1, 2):
+        # uncertain forces, an unknown tooth angle and stiffness that changes with speed come in with the last polish
+        method.run(_lines(outputs), 1)
+
+
+def _paper_method() -> None:
+    PaperGeneticAlgorithm(population=4, generations=1).run(_lines(1), 1)
+
+
+def _lobes() -> None:
+    tip = modal_tip({Dof.X: normal_modes(np.array([5000.0]), np.array([0.05]), np.ones((1, 1)), (Coordinate("tip", Dof.X),))})
+    speeds = np.linspace(800.0, 1000.0, 3)
+    for cutter in (_CUTTER, Cutter(2, 0.012, 0.0, np.array([3.0, 2.0 * np.pi - 3.0]))):
+        process = MillingProcess(cutter, _COEFFICIENTS, _CONDITIONS.engagement)
+        LobeConditions(process, speeds, 0.01).lobes(tip)
+        # and of machines that were drawn, for bands
+        direct = np.ascontiguousarray(tip.values[:, 0, 0])[None]
+        ZeroOrder().depths(tip.omega, (direct, 0.0 * direct), process, speeds, 0.01)
+
+
+def _lobes_in_time() -> None:
+    model = normal_modes(np.array([5000.0]), np.array([0.05]), np.ones((1, 1)), (Coordinate("tip", Dof.X),))
+    process, speeds = MillingProcess(_CUTTER, _COEFFICIENTS, _CONDITIONS.engagement), np.array([900.0])
+    for method in (FullDiscretisation(), TimeDomain(periods=20)):
+        LobeConditions(process, speeds, 1e-3, method).lobes(TipModes.of({Dof.X: model}))
+
+
+def _observer() -> None:
+    plant = SampledModes(np.array([0.9 + 0.2j]), np.array([1e-8 + 0.0j]), 0.0, 1e-4)
+    kalman = kalman_filter(augmented(plant, RandomWalk(10.0, 100.0), 1e-8), 2)
+    measured = plant.run(plant.init(), np.zeros(8))[1]
+    kalman.smooth(kalman.run(kalman.init(), measured)[1])
+    kalman.run_lagged(kalman.init(), measured, kalman.lag_weights(2))
+
+
+def _virtual_machine() -> None:
+    places = [f"{place}.{axis}" for place in ("tip", "flange", "fixture") for axis in "xy"]
+    pole = np.array([-100.0 + 5000.0j, -100.0 + 6000.0j])
+    shape = np.array([[0.01 - 0.01j, 0.0], [0.0, 0.01 - 0.01j]])
+    outputs = np.concatenate([shape, 0.1 * shape, 0.01 * shape])
+    dynamics = Poles(pole, shape, outputs, tuple(Coordinate.parse(place) for place in places))
+    mill_cut(dynamics, _CUTTER, _CONDITIONS, _COEFFICIENTS, 5e-6, 200)
+
+
+#: Name and job, in the order of the chain.
+STEPS: dict[str, Callable[[], None]] = {
+    "tool-holder": _tool_holder,
+    "recordings": _recordings,
+    "default method": _default_method,
+    "paper's method": _paper_method,
+    "lobes": _lobes,
+    "lobes in time": _lobes_in_time,
+    "force observer": _observer,
+    "virtual machine": _virtual_machine,
+}

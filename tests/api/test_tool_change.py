@@ -1,0 +1,261 @@
+"""Queries after a tool change, beside what the workflows say."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.materials import materials
+from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.io.curves import read_frf_csv
+from rcsa_ident.io.identifications import machine_from_json, speed_bands_from_json, workpiece_from_json
+from rcsa_ident.workflows.limits import machine_limits
+from rcsa_ident.workflows.lobes import LobeConditions
+from rcsa_ident.workflows.speeds import MachineOverSpeed
+from rcsa_ident.workflows.tip import tooltip
+from tests.api.conftest import example, result_text
+from tests.api.test_machines import refused
+from tests.cli import by_hand
+
+SPEEDS = {"from_rpm": 6000, "to_rpm": 9000, "step_rpm": 500}
+RPM = math.pi / 30.0
+
+
+def by_workflow(result, tooling, speeds, draws=60):
+    import json
+
+    data = json.loads(result)
+    machine = MachineOverSpeed(machine_from_json(data, ""), speed_bands_from_json(data, ""))
+    process = MillingProcess(tooling.cutter, workpiece_from_json(data, "").coefficients, Engagement.from_immersion(0.5, "down"))
+    omega = 2.0 * np.pi * np.arange(100.0, data["band_hz"][1] + 0.5)
+    return machine_limits(machine, tooling.assembly, omega, LobeConditions(process, speeds, 0.01), draws, 5e-4)
+
+
+@pytest.fixture
+def tooling(tmp_path):
+    return by_hand.campaign(tmp_path).toolings["T1"]
+
+
+@pytest.mark.parametrize("softening", [False, True])
+def test_lobes_are_those_of_the_command(client, tmp_path, tooling, softening):
+    """With bands, for a machine that stays the same at all speeds and for one that changes."""
+    result = result_text(tmp_path, softening)
+    id = client.make_machine("m").id
+    client.identify(id, result)
+    client.write_tooling("T1", by_hand.TOOLING)
+    (found,) = client.lobes(id, "T1", speeds=SPEEDS).toolings
+    expected = by_workflow(result, tooling, np.arange(6000.0, 9001.0, 500.0) * RPM)
+    assert found.spindle_speed_rpm == [6000.0, 6500.0, 7000.0, 7500.0, 8000.0, 8500.0, 9000.0]
+    np.testing.assert_allclose(found.limit_depth_mm, expected.lobes.limit_depth * 1e3, rtol=1e-9)
+    np.testing.assert_allclose(found.chatter_frequency_hz, expected.lobes.chatter_frequency / (2.0 * np.pi), rtol=1e-8)
+    np.testing.assert_allclose([found.limit_depth_low_mm, found.limit_depth_high_mm], np.array(expected.band) * 1e3, rtol=1e-4)
+    assert found.lobe == expected.lobes.lobe.tolist()
+    assert found.tooling == "T1"
+    assert found.warnings[0].startswith("the identification is suspect")
+    assert any(w.startswith("interrupted cut") for w in found.warnings) == (tooling.cutter.teeth * 90 < 360)
+    assert len(found.best_speeds) >= 1
+
+
+def test_several_toolings_are_compared(shop):
+    client, id = shop
+    long = example()
+    long["tool"]["stickout_mm"] = 60.0
+    found = client.lobes(id, "T1", example(), long, speeds=SPEEDS, bands=False).toolings
+    assert [f.tooling for f in found] == ["T1", "S1-ER32", "S1-ER32"]
+    assert found[1].limit_depth_mm != found[2].limit_depth_mm
+    assert found[0].limit_depth_low_mm is None
+
+
+def test_stable_speeds_are_null(shop):
+    client, id = shop
+    (found,) = client.lobes(id, "T1", speeds=SPEEDS, max_depth_mm=1e-3).toolings
+    assert found.limit_depth_mm == found.chatter_frequency_hz == found.lobe == [None] * 7
+    assert found.best_speeds[0].limit_depth_mm is None
+
+
+def test_the_cut_counts(shop):
+    """Twice the coefficient, half the depth; a material of the library in the workpiece's place; a feed of two axes alike."""
+    client, id = shop
+
+    def limits(**cut):
+        return np.array(client.lobes(id, "T1", speeds=SPEEDS, bands=False, cut=cut).toolings[0].limit_depth_mm)
+
+    plain = limits(ktc_mpa=902.0, krc=0.26)
+    np.testing.assert_allclose(limits(), plain, rtol=1e-12)
+    np.testing.assert_allclose(limits(ktc_mpa=1804.0, krc=0.26), 0.5 * plain, rtol=1e-9)
+    np.testing.assert_allclose(limits(material="EN AW-6082"), limits(material="en aw-6082"), rtol=0)
+    np.testing.assert_allclose(limits(entry_deg=90, exit_deg=180), plain, rtol=1e-9)
+    np.testing.assert_allclose(limits(feed_direction=-180.0), plain, rtol=1e-9)
+    assert not np.allclose(limits(feed_direction="+Y"), plain, rtol=1e-2)
+    assert not np.allclose(limits(strategy="up"), plain, rtol=1e-2)
+
+
+@pytest.mark.parametrize("method", ["zero-order", "full-discretisation"])
+def test_tested_cuts_are_counted(shop, method):
+    """Each at its own speed and to its own depth, whatever speeds and depth the lobes are asked for; in any order."""
+    client, id = shop
+    speeds = {"from_rpm": 7000, "to_rpm": 9000, "step_rpm": 1000}
+    first, _, last = client.lobes(id, "T1", speeds=speeds, method=method, bands=False).toolings[0].limit_depth_mm
+    seen = [
+        (9000, 0.95 * last, "stable"),
+        (9000, 1.05 * last, "marginal"),
+        (7000, 0.95 * first, "chatter"),
+        (7000, 1.05 * first, "chatter"),
+    ]
+    seen += [(7000, 1.05 * first, "stable"), (9000, 1.05 * last, "chatter"), (7000, 0.95 * first, "marginal")]
+    tested = [dict(zip(("spindle_speed_rpm", "axial_depth_mm", "verdict"), each, strict=True)) for each in seen]
+    asked = {"speeds": {"from_rpm": 8000, "to_rpm": 8000}, "max_depth_mm": 0.2, "method": method, "bands": False, "tested": tested}
+    (found,) = client.lobes(id, "T1", **asked).toolings
+    assert found.tested.model_dump() == {
+        "stable_stable": 1, "stable_chatter": 1, "chatter_stable": 1, "chatter_chatter": 2, "stable_marginal": 1, "chatter_marginal": 1,
+        "share_right": 0.6,
+    }  # fmt: skip
+    undecided = client.lobes(id, "T1", **asked | {"tested": tested[1:2]}).toolings[0].tested
+    assert (undecided.chatter_marginal, undecided.share_right) == (1, None)
+    assert client.lobes(id, "T1", **asked | {"tested": []}).toolings[0].tested is None
+    problem = refused(422, client.lobes, id, "T1", **asked | {"tested": [tested[0] | {"verdict": "loud"}]})
+    assert problem.errors[0].field == "tested.0.verdict"
+
+
+def test_materials_are_those_of_the_library(shop):
+    client, id = shop
+    listed = client.materials()
+    assert [each.name for each in listed] == [each.name for each in materials()]
+    steel = next(each for each in listed if each.name.startswith("Steel"))
+    given = {"ktc_mpa": steel.ktc_mpa, "krc": steel.krc, "kte_n_per_mm": steel.kte_n_per_mm, "kre_n_per_mm": steel.kre_n_per_mm}
+    by_name, by_number = (client.lobes(id, "T1", speeds=SPEEDS, cut=cut).toolings[0] for cut in ({"material": steel.name}, given))
+    np.testing.assert_allclose(by_name.limit_depth_mm, by_number.limit_depth_mm, rtol=1e-12)
+    spreads = [each.coefficients.tangential_spread for each in materials()]
+    np.testing.assert_allclose([each.ktc_spread_percent for each in listed], 100.0 * np.array(spreads), rtol=1e-12)
+    assert all(each.source for each in listed)
+
+
+@pytest.mark.parametrize("method", ["multi-frequency", "full-discretisation"])
+def test_slower_methods_answer_for_few_speeds(shop, method):
+    client, id = shop
+    (found,) = client.lobes(id, "T1", method=method, bands=False, speeds={"from_rpm": 8000, "to_rpm": 8000}).toolings
+    assert found.method == method
+    assert found.limit_depth_mm[0] > 0.0
+
+
+def test_advice_has_its_limit_of_work(shop):
+    client, id = shop
+    wide = {"from_rpm": 100, "to_rpm": 5000, "step_rpm": 1}
+    problem = refused(422, client.advice, id, *["T1"] * 12, speeds=wide, cut={"feed_per_tooth_mm": 0.1})
+    assert problem.errors[0].field == "speeds"
+    assert "of work" in problem.detail
+
+
+def test_tooltip_is_that_of_the_command(shop, result, tooling, tmp_path):
+    import json
+
+    client, id = shop
+    machine = machine_from_json(json.loads(result), "")
+    kept = client.tooltip(id, "T1")
+    own = client.tooltip(id, "T1", from_hz=500, to_hz=900, step_hz=2.5)
+    assert own.frequency_hz == [500.0 + 2.5 * k for k in range(161)]
+    for found in (kept, own):
+        omega = 2.0 * np.pi * np.array(found.frequency_hz)
+        expected = tooltip(machine, tooling.assembly, omega, True)
+        for axis, curve in found.axes.items():
+            np.testing.assert_allclose(np.array(curve.re) + 1j * np.array(curve.im), expected.tip(axis.lower()), rtol=1e-8)
+            np.testing.assert_allclose([curve.re_std, curve.im_std], expected.deviation[axis.lower()], rtol=1e-5)
+    path = tmp_path / "FRF.csv"
+    path.write_text(client.tooltip_file(id, "T1"), encoding="utf-8")
+    file = read_frf_csv(path)
+    np.testing.assert_array_equal(file.values["X"].real, kept.axes["X"].re)
+    np.testing.assert_array_equal(file.bands["Y_im_std"], kept.axes["Y"].im_std)
+    assert client.tooltip(id, "T1", bands=False).axes["X"].re_std is None
+    assert any("extrapolated" in w for w in client.tooltip(id, "T1", to_hz=5000).warnings)
+
+
+def test_a_speed_that_the_machine_was_not_cut_at(client, tmp_path):
+    id = client.make_machine("m").id
+    client.identify(id, result_text(tmp_path, True))
+    inside, outside = (client.tooltip(id, example(), spindle_speed_rpm=n, step_hz=10) for n in (9000, 30000))
+    assert not any("identified from" in w for w in inside.warnings)
+    assert any("identified from 5730 to 13369 rev/min" in w for w in outside.warnings)
+    assert inside.axes["X"].re != outside.axes["X"].re
+
+
+def test_advice_stands_by_the_lobes(shop):
+    client, id = shop
+    cut = {"feed_per_tooth_mm": 0.1}
+    planned = [{"spindle_speed_rpm": 7000, "axial_depth_mm": 0.5}]
+    (told,) = client.advice(id, "T1", cut=cut, speeds=SPEEDS, planned=planned, depth_mm=0.02, max_power_kw=15).toolings
+    (lobes,) = client.lobes(id, "T1", speeds=SPEEDS).toolings
+    limit = dict(zip(lobes.spindle_speed_rpm, lobes.limit_depth_mm, strict=True))[7000.0]
+    (one,) = told.planned
+    assert one.limit_depth_mm == pytest.approx(limit, rel=1e-9)
+    assert one.margin == pytest.approx(limit / 0.5 - 1.0, rel=1e-9)
+    assert one.stable == (limit >= 0.5)
+    best = told.highest_removal[0]
+    # a_p a_e v_f, half immersion of 12 mm, four teeth
+    assert best.removal_rate_cm3_per_min == pytest.approx(best.axial_depth_mm * 6.0 * 0.1 * 4 * best.spindle_speed_rpm * 1e-3, rel=1e-9)
+    assert told.stickout_mm == pytest.approx(60.0)
+    assert refused(422, client.advice, id, "T1").errors[0].field == "cut.feed_per_tooth_mm"
+    deep = [{"spindle_speed_rpm": 7000, "axial_depth_mm": 50}]
+    assert refused(422, client.advice, id, "T1", cut=cut, planned=deep).errors[0].field == "planned.0.axial_depth_mm"
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"cut": {"immersion": 0}}, "cut.immersion"),
+        ({"cut": {"immersion": 1.5}}, "cut.immersion"),
+        ({"cut": {"entry_deg": 90}}, "cut.exit_deg"),
+        ({"cut": {"entry_deg": 90, "exit_deg": 90}}, "cut.exit_deg"),
+        ({"cut": {"material": "cheese"}}, "material"),
+        ({"cut": {"runout_um": [1, 2]}}, "cut.runout_um"),
+        ({"cut": {"wear_land_um": 80}}, "cut.indentation"),
+        ({"cut": {"feed_direction": "up"}}, "cut.feed_direction"),
+        ({"speeds": {"from_rpm": 9000, "to_rpm": 4000}}, "speeds.to_rpm"),
+        ({"speeds": {"from_rpm": 100, "to_rpm": 200000, "step_rpm": 1}}, "speeds.to_rpm"),
+        ({"method": "magic"}, "method"),
+        ({"max_depth_mm": 0}, "max_depth_mm"),
+        ({"depth": 1}, "depth"),
+        ({"bands": "yes"}, "bands"),
+        ({"stiffness_spread_percent": 51}, "stiffness_spread_percent"),
+    ],
+)
+def test_the_field_at_fault_is_named(shop, change, field):
+    client, id = shop
+    assert refused(422, client.lobes, id, "T1", **change).errors[0].field.startswith(field)
+
+
+def test_what_is_not_there(shop):
+    client, id = shop
+    refused(404, client.lobes, "nobody", "T1")
+    refused(404, client.lobes, id, "T9")
+    refused(422, client.lobes, id)
+    refused(422, client.lobes, id, *["T1"] * 13)
+    bare = client.make_machine("bare").id
+    assert "identification" in refused(404, client.lobes, bare, "T1").detail
+
+
+def test_numbers_that_lead_nowhere_are_told_not_thrown(shop):
+    client, id = shop
+    contact = {"translational_stiffness": 1e300, "rotational_stiffness": 1e300, "translational_damping": 1e308, "rotational_damping": 1e308}
+    refused(422, client.lobes, id, example(contact=contact))
+    refused(422, client.tooltip, id, example(contact=contact))
+
+
+def test_a_posterior_that_is_too_large_to_keep_is_weighed(shop, monkeypatch):
+    """The plain road gives the same limits; where it would take too long it is refused, and so are too many frequencies."""
+
+    from api.work import machine_cache
+
+    client, id = shop
+    quick = client.lobes(id, "T1", speeds=SPEEDS).toolings[0]
+    monkeypatch.setattr(machine_cache, "MOST_KEPT", 10)
+    slow = client.lobes(id, "T1", speeds=SPEEDS).toolings[0]
+    np.testing.assert_allclose(slow.limit_depth_low_mm, quick.limit_depth_low_mm, rtol=1e-4)
+    np.testing.assert_allclose(slow.limit_depth_mm, quick.limit_depth_mm, rtol=1e-9)
+    monkeypatch.setattr(machine_cache, "SPREAD_COST", 1.0)
+    assert refused(422, client.lobes, id, "T1", speeds=SPEEDS).errors[0].field == "speeds"
+    assert refused(422, client.tooltip, id, "T1").errors[0].field == "step_hz"
+    assert refused(422, client.frf, id).errors[0].field == "step_hz"
+    assert client.tooltip(id, "T1", bands=False).axes["X"].re_std is None

@@ -1,0 +1,339 @@
+"""The whole method on lines of the virtual machine, whose spindle is not of the form that is fitted."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.receptance import dissipation
+from rcsa_ident.identification.evidence import EvidenceSelection
+from rcsa_ident.identification.parameters import AxisLayout, parameter_names
+from rcsa_ident.identification.posterior import MachineAxis
+from rcsa_ident.identification.result import Status
+from rcsa_ident.identification.search import SearchSettings
+from rcsa_ident.machine.spindle import Spindle
+from rcsa_ident.workflows.tip import tooltip
+from tests.identification.conftest import AXES, TIP_OMEGA, open_shop
+
+SMALL = EvidenceSelection(search=SearchSettings(modes=8, population=4, generations=2, steps=6), candidates=2)
+#: For what must not crash, whatever comes out.
+TINY = EvidenceSelection(search=SearchSettings(modes=3, population=2, generations=1, steps=1), candidates=1)
+RPM = np.pi / 30.0
+
+
+def tip_errors(shop, found, speed=None, told=None):
+    """Relative error of the tooltip FRF of a tooling that never cut, each axis, at a speed; `told` is the speed the model is asked for."""
+    machine = {axis: MachineAxis(Spindle(r.modes), r.joint, r.posterior) for axis, r in found.axes.items()}
+    response = tooltip(machine, shop.held_out.assembly, TIP_OMEGA, bands=False, speed=speed if told is None else told)
+    true = shop.tip(14000.0 * RPM if speed is None else speed)
+    return {a: np.linalg.norm(response.tip(a) - true[:, i]) / np.linalg.norm(true[:, i]) for i, a in enumerate(AXES) if a in machine}
+
+
+def off(found, data, delays):
+    """Errors of the delays, in the tooth-passing period that is nearest [s]."""
+    period = data.cut_prior[:, 3]
+    miss = found.delay - delays
+    return miss - period * np.round(miss / period)
+
+
+def trimmed(cut, axis, count):
+    lines = cut.axes[axis]
+    return replace(cut, axes={**cut.axes, axis: replace(lines, **{f.name: getattr(lines, f.name)[:count] for f in fields(lines)})})
+
+
+@pytest.fixture(scope="module")
+def campaign(shop):
+    cuts, delays = shop.measurements(np.random.default_rng(0))
+    return shop.prepare(cuts), delays, cuts
+
+
+@pytest.fixture(scope="module")
+def told():
+    return []
+
+
+@pytest.fixture(scope="module")
+def found(campaign, told):
+    return SMALL.run(campaign[0], 102, progress=lambda *step: told.append(step))
+
+
+def test_tooltip_of_a_tooling_that_never_cut(shop, found):
+    assert found.status is Status.CONVERGED, found.reasons
+    assert max(tip_errors(shop, found).values()) < 0.03
+
+
+def test_bands_hold_the_truth(shop, found):
+    machine = {axis: MachineAxis(Spindle(r.modes), r.joint, r.posterior) for axis, r in found.axes.items()}
+    response = tooltip(machine, shop.held_out.assembly, TIP_OMEGA)
+    true = shop.tip(14000.0 * RPM)
+    for i, axis in enumerate(AXES):
+        error = response.tip(axis) - true[:, i]
+        z = np.concatenate([error.real / response.deviation[axis][0], error.imag / response.deviation[axis][1]])
+        # neighbouring frequencies are wrong together: one draw of a few unknowns
+        assert 0.2 < np.sqrt(np.mean(z**2)) < 2.5
+        # and they are not wide because they say nothing
+        width = np.hypot(*response.deviation[axis])
+        assert np.median(width / np.abs(true[:, i])) < 0.05
+
+
+def test_delays_without_a_trigger(campaign, found):
+    data, delays, _ = campaign
+    assert np.degrees(np.abs(off(found, data, delays)) * data.spindle_speed).max() < 1.0
+    assert np.all(found.delay_std > 0.0)
+    assert np.degrees(found.delay_std * data.spindle_speed).max() < 1.0
+
+
+def test_the_result_tells_its_story(campaign, found):
+    data = campaign[0]
+    assert found.method == "default"
+    assert (found.seed, found.reasons, found.cut_ids) == (102, (), data.cut_ids)
+    assert {stage for _, stage, _ in found.trace} >= {"search", "refine", "learn noise", "exchange", "grow", "polish"}
+    assert found.coefficients == {}
+    for axis, result in found.axes.items():
+        assert 0.3 < result.chi2_per_point < 1.2
+        assert set(result.per_tooling) == set(data.toolings)
+        assert result.model_error < 0.01
+        posterior = result.posterior
+        assert posterior.layout == AxisLayout(result.modes.omega_n.size)
+        assert result.parameters == parameter_names(posterior.layout)
+        assert posterior.theta.size == len(result.parameters) == posterior.covariance.shape[0]
+        assert np.linalg.eigvalsh(posterior.covariance).min() > 0.0
+        assert posterior.speed_range == data.speed_range
+        modes, joint = posterior.machine(axis)
+        np.testing.assert_array_equal(modes.phi, result.modes.phi)
+        assert joint == result.joint
+        # the one that the evidence alone would have chosen has fewer modes
+        assert len(posterior.rivals) == 1
+        assert posterior.machine(axis, posterior.rivals[0])[0].omega_n.size < modes.omega_n.size
+        omega = 2.0 * np.pi * np.geomspace(10.0, 10000.0, 200)
+        assert dissipation(omega, result.modes.receptance(omega).values).min() > -1e-9
+        assert str(result.modes.coordinates[0]) == f"flange.{axis}"
+        error = np.abs(result.measured["value"] - result.measured["model"])
+        assert np.median(error / np.abs(result.measured["value"])) < 0.03
+        assert {each.shape for each in result.measured.values()} == {(data.axes[0].omega.size,)}
+
+
+def test_progress_is_told_of_every_step_of_the_trace(found, told):
+    assert [(axis, stage, cost) for axis, stage, cost, _, _ in told if axis == "both"] == [t for t in found.trace if t[0] == "both"]
+    for axis in ("x", "y"):
+        assert sorted(step[:3] for step in told if step[0] == axis) == sorted(t for t in found.trace if t[0] == axis)
+    for axis, _, cost, theta, layout in told:
+        assert np.isfinite(cost)
+        assert theta.size == layout.size
+        assert len(layout.axes) == (2 if axis == "both" else 1)
+
+
+def test_same_seed_same_answer_in_any_order(shop, campaign):
+    data = shop.prepare(campaign[2][::8], spread=(0.05, 0.05, 0.0, 0.0))
+
+    def backwards(function, jobs):
+        return [function(job) for job in reversed(list(jobs))][::-1]
+
+    one, again, other = TINY.run(data, 5), TINY.run(data, 5, backwards), TINY.run(data, 6)
+    np.testing.assert_array_equal(again.delay, one.delay)
+    np.testing.assert_array_equal(again.delay_std, one.delay_std)
+    assert (again.trace, again.reasons, again.notes) == (one.trace, one.reasons, one.notes)
+    assert other.trace != one.trace
+    for axis in AXES:
+        np.testing.assert_array_equal(again.axes[axis].posterior.theta, one.axes[axis].posterior.theta)
+        np.testing.assert_array_equal(again.axes[axis].posterior.covariance, one.axes[axis].posterior.covariance)
+
+
+def test_warm_start_comes_to_the_same_machine_sooner(shop, campaign, found, told):
+    warm = replace(SMALL, start={axis: result.posterior for axis, result in found.axes.items()})
+    steps = []
+    again = warm.run(campaign[0], 7, progress=lambda *step: steps.append(step))
+    assert again.status is Status.CONVERGED
+    assert len(steps) < 0.75 * len(told)
+    assert "search" not in {stage for _, stage, *_ in steps}
+    assert max(tip_errors(shop, again).values()) < 0.03
+    machines = [{a: MachineAxis(Spindle(r.modes), r.joint, r.posterior) for a, r in f.axes.items()} for f in (found, again)]
+    one, two = (tooltip(machine, shop.held_out.assembly, TIP_OMEGA) for machine in machines)
+    for axis in AXES:
+        width = np.sqrt(np.sum(np.abs(one.spread[axis]) ** 2, axis=0))
+        assert np.sqrt(np.mean((np.abs(one.tip(axis) - two.tip(axis)) / width) ** 2)) < 2.0
+
+
+@pytest.fixture(scope="module")
+def believed(shop):
+    """The cutting force is simulated with a K_tc that is 10 % too high."""
+    known = shop.machine.workpiece.coefficients
+    return replace(known, tangential=1.1 * known.tangential)
+
+
+@pytest.fixture(scope="module")
+def clamped_cuts(shop, believed):
+    """Triggers whose tooth angle nobody knows, and the wrong K_tc with a prior of 7 %."""
+    first, second = shop.truth
+    cuts, delays = shop.measurements(np.random.default_rng(0), trigger={first: (0.7, False), second: (-0.4, False)}, believed=believed)
+    return shop.prepare(cuts, spread=(0.07, 0.05, 0.0, 0.0)), delays
+
+
+@pytest.fixture(scope="module")
+def clamped(clamped_cuts):
+    return SMALL.run(clamped_cuts[0], 102)
+
+
+def test_a_wrong_cutting_coefficient_is_found(shop, clamped_cuts, clamped):
+    assert clamped.status is Status.CONVERGED, clamped.reasons
+    scale, std = clamped.coefficients["tangential coefficient"]
+    assert scale == pytest.approx(-np.log(1.1), abs=3.0 * std)
+    assert std < 0.02
+    ratio, std = clamped.coefficients["radial ratio"]
+    assert ratio == pytest.approx(0.0, abs=3.0 * std)
+    assert std < 0.01
+    # the smooth errors behind them have no name
+    assert tuple(clamped.coefficients) == clamped_cuts[0].coefficient_names
+    assert max(tip_errors(shop, clamped).values()) < 0.03
+
+
+def test_what_a_wrong_coefficient_costs_where_nobody_asks(shop, clamped_cuts, clamped):
+    """The same lines with forces taken for exact."""
+    named = len(clamped_cuts[0].coefficient_names)
+    axes = tuple(replace(a, force_slope=a.force_slope[:, named:]) for a in clamped_cuts[0].axes)
+    data = replace(clamped_cuts[0], axes=axes, coefficient_names=(), coefficient_spread=())
+    warm = replace(SMALL, start={axis: result.posterior for axis, result in clamped.axes.items()})
+    deaf = warm.run(data.only(Dof.Y), 1)
+    assert tip_errors(shop, deaf)[Dof.Y] > 2.0 * tip_errors(shop, clamped)[Dof.Y]
+
+
+def test_delays_by_what_is_known_of_the_tooth_angle(shop, campaign, found, clamped_cuts, clamped, believed):
+    """No trigger, a trigger of unknown tooth angle, one of known: each knows more."""
+    first, second = shop.truth
+    cuts, delays = shop.measurements(np.random.default_rng(0), trigger={first: (0.7, True), second: (-0.4, True)}, believed=believed)
+    data = shop.prepare(cuts, spread=(0.07, 0.05, 0.0, 0.0))
+    warm = replace(SMALL, start={axis: result.posterior for axis, result in clamped.axes.items()})
+    known = warm.run(data, 1)
+    assert known.status is Status.CONVERGED, known.reasons
+    assert max(tip_errors(shop, known).values()) < 0.03
+    std, error = [], []
+    for each, of, true in ((found, campaign[0], campaign[1]), (clamped, *clamped_cuts), (known, data, delays)):
+        std.append(np.median(each.delay_std * of.spindle_speed))
+        error.append(np.sqrt(np.mean((off(each, of, true) * of.spindle_speed) ** 2)))
+        assert error[-1] < 3.0 * std[-1]
+    assert std[2] < 0.7 * std[1] < 0.7 * 0.9 * std[0]
+    assert error[2] < error[1] < error[0]
+    # a known tooth angle tells the very turn
+    np.testing.assert_allclose(known.delay, delays, atol=2e-6)
+
+
+def softer(spindle):
+    """A fifth of the bearings' stiffness is lost on the way to the highest speed."""
+    return replace(spindle, bearings=tuple(replace(b, softening=0.2 / (20000.0 * RPM)) for b in spindle.bearings))
+
+
+def test_a_machine_that_softens_with_speed():
+    shop = open_shop(14, softer)
+    found = SMALL.run(shop.prepare(shop.measurements(np.random.default_rng(0), axes=(Dof.X,))[0]), 102)
+    assert found.status is Status.CONVERGED, found.reasons
+    assert found.axes[Dof.X].posterior.layout.softening
+    assert found.axes[Dof.X].model_error < 0.005
+    for rpm in (8000.0, 14000.0, 20000.0):
+        assert tip_errors(shop, found, rpm * RPM)[Dof.X] < 0.03, rpm
+    # a machine that is taken to be the same at all speeds is off by far more
+    for rpm in (8000.0, 20000.0):
+        assert tip_errors(shop, found, rpm * RPM, told=14000.0 * RPM)[Dof.X] > 0.08
+
+
+def test_a_machine_that_does_not_change_is_not_said_to(found):
+    assert not any(result.posterior.layout.softening for result in found.axes.values())
+
+
+def test_a_cut_that_contradicts_the_others_is_named_and_counts_less(shop, campaign):
+    """One of twenty was made with another cutter: its lines are a third too large and turned."""
+    bad = [replace(c, axes={Dof.X: c.axes[Dof.X]}) for c in campaign[2][::2]]
+    lines = bad[7].axes[Dof.X]
+    bad[7] = replace(bad[7], axes={Dof.X: replace(lines, cut=(1.3 + 0.4j) * lines.cut)})
+    without = SMALL.run(shop.prepare([*bad[:7], *bad[8:]]), 102)
+    spoilt = SMALL.run(shop.prepare(bad), 102)
+    assert spoilt.status is Status.CONVERGED, spoilt.reasons
+    named = [note for note in spoilt.notes if "contradict" in note]
+    assert len(named) == 1
+    assert [c.cut_id for c in bad if f" {c.cut_id} (" in named[0]] == [bad[7].cut_id]
+    # the others are believed as if it were not there
+    assert spoilt.axes[Dof.X].model_error < 1.5 * without.axes[Dof.X].model_error
+    assert tip_errors(shop, spoilt)[Dof.X] < 0.03
+
+
+def test_one_tooling_is_not_enough(shop):
+    cuts, _ = shop.measurements(np.random.default_rng(0), names=list(shop.truth)[:1], axes=(Dof.X,))
+    found = TINY.run(shop.prepare(cuts), 1)
+    assert found.status is Status.SUSPECT
+    assert any("one tooling" in reason for reason in found.reasons)
+    assert list(found.axes) == [Dof.X]
+
+
+def test_few_cuts_are_named(shop, campaign):
+    cuts = [replace(c, axes={Dof.X: c.axes[Dof.X]}) for c in (*campaign[2][:8], *campaign[2][20:25])]
+    found = TINY.run(shop.prepare(cuts), 1)
+    assert not any("few cuts: 8" in reason for reason in found.reasons)
+    assert any("few cuts: 5" in reason for reason in found.reasons)
+
+
+def test_a_sensor_of_the_wrong_sign(shop):
+    cuts, _ = shop.measurements(np.random.default_rng(0), change=lambda values, force, axis: -values if axis is Dof.X else values)
+    found = TINY.run(shop.prepare(cuts[::4]), 1)
+    assert found.status is Status.SUSPECT
+    assert found.axes[Dof.X].model_error > 0.05
+    assert any(reason.startswith("X:") and "unexplained" in reason for reason in found.reasons)
+
+
+def test_forces_that_are_not_those_of_the_cut(shop):
+    rng = np.random.default_rng(1)
+
+    def wrong(values, force, axis):
+        share = rng.standard_normal((values.shape[0], 1)) + 1j * rng.standard_normal((values.shape[0], 1))
+        return values * (1.0 + 0.15 * share)
+
+    found = TINY.run(shop.prepare(shop.measurements(np.random.default_rng(0), axes=(Dof.X,), change=wrong)[0][::2]), 1)
+    assert found.status is Status.SUSPECT
+    assert any("unexplained" in reason for reason in found.reasons)
+
+
+def test_noise_alone_is_not_a_machine(shop):
+    cuts, _ = shop.measurements(np.random.default_rng(0), change=lambda values, force, axis: 0.0 * values)
+    found = TINY.run(shop.prepare(cuts[::2]), 1)
+    assert found.status is Status.SUSPECT
+    assert any("noise" in reason for reason in found.reasons)
+
+
+ODD = {
+    "an axis that a cut did not see": lambda cuts: [
+        replace(c, axes={a: v for a, v in c.axes.items() if (a is Dof.X) == (i % 2 == 0)}) for i, c in enumerate(cuts)
+    ],
+    "a fixture that one cut did not see": lambda cuts: [
+        replace(cuts[0], axes={Dof.X: cuts[0].axes[Dof.X], Dof.Y: cuts[0].axes[Dof.Y].summed()}),
+        *cuts[1:],
+    ],
+    "a cut without lines": lambda cuts: [replace(cuts[0], axes={}), *cuts[1:]],
+    "a cut with a single line": lambda cuts: [trimmed(trimmed(cuts[0], Dof.X, 1), Dof.Y, 0), *cuts[1:]],
+    "one line in all": lambda cuts: [replace(trimmed(cuts[0], Dof.X, 1), axes={Dof.X: trimmed(cuts[0], Dof.X, 1).axes[Dof.X]})],
+    "one cut": lambda cuts: cuts[:1],
+    "lines of nothing": lambda cuts: [
+        replace(c, axes={a: replace(v, cut=0.0 * v.cut, air=0.0 * v.air, variance=0.0 * v.variance) for a, v in c.axes.items()})
+        for c in cuts
+    ],
+    "a million times too large": lambda cuts: [replace(c, axes={a: replace(v, cut=1e6 * v.cut) for a, v in c.axes.items()}) for c in cuts],
+    "a million times too small": lambda cuts: [
+        replace(c, axes={a: replace(v, cut=1e-6 * v.cut, variance=1e-12 * v.variance) for a, v in c.axes.items()}) for c in cuts
+    ],
+    "a trigger on one cut": lambda cuts: [replace(cuts[0], delay=1e-3, delay_std=1e-6), *cuts[1:]],
+    "an edge of unknown tooth angle on one cut": lambda cuts: [
+        replace(cuts[0], delay=1e-3, delay_std=1e-6, tooth_angle_known=False),
+        *cuts[1:],
+    ],
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_odd_data_end_in_a_status(shop, campaign, name):
+    data = shop.prepare(ODD[name](campaign[2][::8]), spread=(0.05, 0.05, 0.0, 0.0))
+    found = TINY.run(data, 3)
+    assert found.status is Status.SUSPECT
+    assert found.reasons
+    assert np.all(np.isfinite(found.delay_std))
+    for result in found.axes.values():
+        assert np.all(np.isfinite(result.posterior.covariance))
+        assert np.isfinite(result.chi2_per_point)
+    assert all(np.isfinite(value) and np.isfinite(std) for value, std in found.coefficients.values())

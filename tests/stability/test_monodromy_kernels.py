@@ -1,0 +1,171 @@
+"""The map of a period against quadrature, dense matrices and matrix exponentials; these tests run again without the compiler."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
+from rcsa_ident.stability import _cut_kernels
+from rcsa_ident.stability import _monodromy_kernels as kernels
+from rcsa_ident.stability.monodromy import MonodromyOperator, lobatto
+from tests.oracles import naive
+from tests.stability.mills import ONE, RPM, SKEWED, Table, mill, plan_of, tip
+
+NODE, SHARE = np.polynomial.legendre.leggauss(40)
+NODE, SHARE = 0.5 * (NODE + 1.0), 0.5 * SHARE
+
+
+@pytest.mark.parametrize("z", [0.0, 1e-9, -1e-3 + 2e-3j, -0.3 + 1.5j, -2.0 + 6.9j, -2.0 + 7.2j, -30.0 + 4.0j, -0.1 + 25.0j])
+def test_moments(z):
+    moments = np.empty(7, dtype=complex)
+    assert kernels._exponential_moments(complex(z), moments) == pytest.approx(np.exp(z), rel=1e-13)
+    expected = [np.sum(SHARE * np.exp(z * (1.0 - NODE)) * NODE**k) for k in range(7)]
+    np.testing.assert_allclose(moments, expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 6])
+def test_responses(degree):
+    """A step's motion under a force that is a polynomial, against an integral over its past."""
+    rng = np.random.default_rng(3)
+    pole = np.array([-90.0 + 5000.0j, -400.0 + 0.0j, -2000.0 + 21000.0j])
+    outputs, inputs = (rng.standard_normal(s) + 1j * rng.standard_normal(s) for s in ((2, 3), (3, 2)))
+    table, h = lobatto(degree), 3e-4
+    q, m, r = table.shape[1] - 1, pole.size, outputs.shape[0]
+    decay, drive, seen = (np.empty(shape, dtype=complex) for shape in ((q + 1, m), (q + 1, m, r), (2, q, r, m)))
+    echo = np.zeros((2, q, q + 1, r, r))
+    kernels.responses(h, pole, outputs, inputs, table, decay, drive, seen, echo)
+    start, force = rng.standard_normal(3) + 1j * rng.standard_normal(3), rng.standard_normal((degree + 1, 2))
+    for j in range(1, degree + 1):
+        x = table[0, j]
+        powers = (x * NODE)[:, None] ** np.arange(degree + 1)
+        along = powers @ table[2:].T @ force
+        state = np.exp(pole * h * x) * start
+        state = state + h * x * np.sum(SHARE[:, None] * np.exp(pole * h * x * (1.0 - NODE[:, None])) * (along @ inputs.T), axis=0)
+        y = np.real(seen[0, j - 1] @ start) + np.einsum("iab,ib->a", echo[0, j - 1], force)
+        v = np.real(seen[1, j - 1] @ start) + np.einsum("iab,ib->a", echo[1, j - 1], force)
+        np.testing.assert_allclose(y, 2.0 * np.real(outputs @ state), rtol=1e-9)
+        np.testing.assert_allclose(v, 2.0 * np.real(outputs @ (pole * state + inputs @ force[j])), rtol=1e-9)
+    np.testing.assert_allclose(decay[degree] * start + np.einsum("ikb,ib->k", drive, force), state, rtol=1e-9)
+
+
+def test_solve():
+    rng = np.random.default_rng(4)
+    for n in (1, 2, 7):
+        matrix, right = rng.standard_normal((n, n)), rng.standard_normal((n, 3))
+        if n > 1:
+            # a pivot that is zero
+            matrix[0, 0] = 0.0
+        expected = np.linalg.solve(matrix, right)
+        kernels._solve(matrix.copy(), right)
+        np.testing.assert_allclose(right, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_largest_of_hessenberg(seed):
+    rng = np.random.default_rng(seed)
+    n = (1, 2, 3, 5, 8, 13, 21, 30)[seed % 8]
+    matrix = np.triu(rng.standard_normal((n, n)), -1)
+    if seed in (4, 9):
+        # split in two, and with alike eigenvalues
+        matrix[n // 2, n // 2 - 1] = 0.0
+    if seed == 10:
+        matrix = np.diag(np.ones(n)) + np.diag(1e-3 * np.ones(n - 1), 1)
+    value, vector = kernels.largest_of_hessenberg(matrix)
+    values = np.linalg.eigvals(matrix)
+    assert abs(value) == pytest.approx(np.abs(values).max(), rel=1e-9)
+    assert np.min(np.abs(values - value)) < 1e-6 * np.abs(value)
+    np.testing.assert_allclose(matrix @ vector, value * vector, rtol=0, atol=1e-7 * abs(value))
+    assert np.linalg.norm(vector) == pytest.approx(1.0)
+
+
+def test_largest_of_a_rotation():
+    """Eigenvalues of one magnitude all round the circle."""
+    matrix = np.zeros((6, 6))
+    matrix[np.arange(1, 6), np.arange(5)] = 1.0
+    matrix[0, 5] = 1.0
+    value, vector = kernels.largest_of_hessenberg(matrix)
+    assert abs(value) == pytest.approx(1.0)
+    np.testing.assert_allclose(matrix @ vector, value * vector, atol=1e-9)
+
+
+def test_elements_of_nearly_equal_steps_share_what_was_computed():
+    """Also where the first and the last of them differ by more than neighbours do."""
+    cut = MonodromyOperator(tip(ONE), mill(2, 0.5), 2, False)
+    m, r, h, shape = cut.pole.size, cut.outputs.shape[0], 3e-4, (9, cut.outputs.shape[0], cut.outputs.shape[0])
+    places = np.array([[0.0, h * (1.0 + 0.7e-12 * k), 1.0, 3.0 * k, 0.0] for k in range(3)])
+    system = cut.pole, cut.outputs, cut.inputs
+    decay, drive, seen, echo, same, *_ = kernels.prepare(
+        *system, cut.constant, np.zeros((9, 1, r, r)), np.zeros(shape), places, False, cut.table
+    )
+    wanted = np.empty((3, m), dtype=complex), np.empty((3, m, r), dtype=complex), np.empty((2, 2, r, m), dtype=complex)
+    kernels.responses(h, *system, cut.table, *wanted, np.zeros((2, 2, 3, r, r)))
+    for e in same:
+        for found, each in zip((decay, drive, seen), wanted, strict=True):
+            np.testing.assert_allclose(found[e], each, rtol=1e-9)
+        assert np.any(echo[e])
+
+
+def dense(cut: MonodromyOperator, speed: float, depth: float, step: float) -> np.ndarray:
+    """The map of a period written down, column by column."""
+    layout = _cut_kernels.lay_out(*cut._rows(speed, depth), plan_of(cut, speed, depth, step), cut.table)
+    places, stiffness, damping, where, weight, _ = layout
+    prepared = kernels.prepare(cut.pole, cut.outputs, cut.inputs, cut.constant, stiffness, damping, places, cut.frozen, cut.table)
+    m, (r, points) = cut.pole.size, (cut.outputs.shape[0], damping.shape[0])
+    system = cut.pole, cut.outputs, cut.constant
+    laid = stiffness, damping, places, cut.frozen, cut.table, where, weight, prepared
+    columns = []
+    for unit in np.eye(2 * m + points * r):
+        state, motion, force = unit[:m] + 1j * unit[m : 2 * m], np.zeros((2 * points, r)), np.zeros((points, r))
+        motion[:points] = unit[2 * m :].reshape(points, r)
+        kernels.march(state, motion, force, *system, *laid)
+        columns.append(np.concatenate([state.real, state.imag, motion[points:].ravel()]))
+    return np.array(columns).T
+
+
+SMALL = {
+    "half": (ONE, mill(2, 0.5), False),
+    "constant in each step": (ONE, mill(2, 0.5), True),
+    "unequal pitch": (SKEWED[:2], mill(2, 0.3, pitch=np.radians([165.0, 195.0])), False),
+    "rubbing, speed": (ONE, mill(2, 0.3, damping=ProcessDamping(2e13, 5e-5), speed_variation=SpeedVariation(0.2, 1.0)), False),
+}
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_arnoldi_against_all_eigenvalues(name):
+    modes, process, frozen = SMALL[name]
+    cut, speed, depth, step = MonodromyOperator(tip(modes), process, 3, frozen), 15000.0 * RPM, 1e-3, 4e-4
+    values = np.linalg.eigvals(dense(cut, speed, depth, step))
+    largest = values[np.argmax(np.abs(values))]
+    found = cut.multiplier(speed, depth, step, residual=1e-9)
+    assert abs(found.value - complex(largest.real, abs(largest.imag))) < 1e-8
+    assert found.residual < 1e-9
+
+
+def windows(process):
+    """(angle, start, end, delay) of each tooth, equal or not, without run-out."""
+    angles, pitch = process.cutter.tooth_angle, process.cutter.pitch
+    return [(angles[j], process.engagement.entry, process.engagement.exit, pitch[j]) for j in range(process.cutter.teeth)]
+
+
+FROZEN: dict[str, tuple[Table, object, float, float]] = {
+    "half": (ONE, mill(2, 0.5), 0.5 * np.pi, 1e-6),
+    "three teeth, rotated feed": (SKEWED, mill(3, 0.75, "up", feed_angle=0.4), np.pi / 3.0, 1e-6),
+    "rubbing": (SKEWED, mill(2, 0.5, damping=ProcessDamping(2e13, 5e-5)), 0.5 * np.pi, 1e-6),
+}
+
+
+@pytest.mark.parametrize("name", FROZEN)
+def test_semi_discretisation_with_matrix_exponentials(name):
+    """The same steps, with dense matrices: what is left is the polynomials' error within a step."""
+    modes, process, part, tolerance = FROZEN[name]
+    speed, depth, count = 12000.0 * RPM, 0.8e-3, 14
+    pitch = process.cutter.pitch[0]
+    cut = MonodromyOperator(tip(modes), process, 3, frozen=True)
+    found = cut.multiplier(speed, depth, part / count / speed * (1.0 + 1e-9), residual=1e-9).value
+    d, strength = process.damping, 0.0 if process.damping is None else process.damping.strength
+    rub = depth * strength / (speed * 0.006) * np.array([0.0 if d is None else d.friction, 1.0])
+    kt, kr = depth * process.coefficients.tangential, depth * process.coefficients.tangential * process.coefficients.radial_ratio
+    edges = np.linspace(0.0, pitch, round(pitch / part) * count + 1)
+    slow = naive.milling_multiplier(modes, windows(process), (kt, kr), edges, lambda a: a / speed, process.feed_angle, rub=tuple(rub))
+    assert abs(found - complex(slow.real, abs(slow.imag))) < tolerance * abs(slow)

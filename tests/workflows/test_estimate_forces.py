@@ -1,0 +1,161 @@
+"""Forces of a recording: what is found out on the way (speed, noise, bands), what is said, what is refused; figures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.observer import relative_error, virtual_cut
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.posterior import MachineAxis
+from rcsa_ident.observer.tuning import PaperWalk, Resonators
+from rcsa_ident.report.forces import force_history, observer_frf
+from rcsa_ident.signals.measurement import NO_AIR
+from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+from rcsa_ident.workflows.estimate_forces import observe, trigger_speed, wear_of
+from rcsa_ident.workflows.speeds import MachineOverSpeed
+from tests.observer.flange_machine import BAND, flange_machine, paper_cut
+
+RPM = np.pi / 30.0
+
+
+def watch(cut, air=None, teeth=2, machine=None, band=BAND, speed=12000.0 * RPM, **options):
+    return observe(machine or flange_machine(), paper_cut().tooling.assembly, teeth, cut, air, band, speed, **options)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return watch(paper_cut().cut, paper_cut().air)
+
+
+def with_trigger(cut, speed, pulses=1):
+    turn = np.arange(cut.samples.shape[0]) / cut.rate * speed * pulses
+    signal = (np.mod(turn, 2.0 * np.pi) < 0.4).astype(float)
+    sensor = Sensor("trigger", Quantity.TRIGGER, pulses_per_revolution=pulses)
+    return Recording(cut.rate, np.column_stack([cut.samples, signal]), (*cut.sensors, sensor))
+
+
+def test_speed_and_noise_come_from_the_record(found):
+    assert found.spindle_speed == pytest.approx(paper_cut().spindle_speed, rel=1e-6)
+    for noise in found.noise.values():
+        assert noise == pytest.approx(2e-9, rel=0.2)
+
+
+def test_the_fundamental_below_the_identified_band_is_said(found):
+    assert found.band[0] < 2.0 * np.pi * 400.0 < BAND[0]
+    assert any("400 Hz, lies below the identified band" in note for note in found.notes)
+    higher = watch(paper_cut().cut, paper_cut().air, band=(2.0 * np.pi * 700.0, BAND[1]))
+    assert any("harmonics below 490 Hz are left out" in note for note in higher.notes)
+    assert higher.band[0] > 2.0 * np.pi * 400.0
+
+
+def test_a_missing_air_cut_is_said():
+    assert NO_AIR in watch(paper_cut().cut).notes
+
+
+def test_one_axis_alone_is_watched(found):
+    whole = flange_machine()
+    only = watch(paper_cut().cut, paper_cut().air, machine=MachineOverSpeed({Dof.Y: whole.whole[Dof.Y]}))
+    assert only.estimate.axes == (Dof.Y,)
+    # speed and angle to the air cut come from fewer channels
+    np.testing.assert_allclose(
+        only.estimate.force[4000:, 0], found.estimate.force[4000:, 1], atol=0.03 * np.abs(found.estimate.force).max()
+    )
+
+
+def test_sensors_that_lag_and_lose_are_undone():
+    """The same cut seen through slower sensors: the forces stay, without their delay."""
+    slow = virtual_cut(gap_delay=60e-6, gap_bandwidth=7000.0, acceleration_delay=20e-6)
+    estimate = watch(slow.cut, slow.air).estimate
+    assert np.all(relative_error(estimate.force, slow.force, slow.cut.rate) < 0.045)
+    wrong = replace(slow.cut, sensors=tuple(replace(s, delay=0.0, bandwidth=None) for s in slow.cut.sensors))
+    worse = watch(wrong, replace(slow.air, sensors=wrong.sensors)).estimate
+    assert np.all(relative_error(worse.force, slow.force, slow.cut.rate) > 0.3)
+
+
+def test_a_narrow_bandwidth_keeps_few_harmonics():
+    narrow = watch(paper_cut().cut, paper_cut().air, bandwidth=2.0 * np.pi * 1000.0)
+    spectrum = np.abs(np.fft.rfft(narrow.estimate.force[4096:8192] * np.hanning(4096)[:, None], axis=0))
+    frequency = np.fft.rfftfreq(4096, 1.0 / 25600.0)
+    assert spectrum[frequency > 2500.0].max() < 0.05 * spectrum[frequency < 1100.0].max()
+
+
+def test_a_trigger_tells_the_speed(found):
+    speed = paper_cut().spindle_speed
+    for pulses in (1, 3):
+        assert trigger_speed(with_trigger(paper_cut().cut, speed, pulses)) == pytest.approx(speed, rel=0.01)
+    by_trigger = watch(with_trigger(paper_cut().cut, speed), paper_cut().air, speed=None, method=PaperWalk())
+    assert by_trigger.spindle_speed == pytest.approx(speed, rel=1e-6)
+    with pytest.raises(InputError, match="speed-rpm"):
+        watch(paper_cut().cut, speed=None)
+    still = with_trigger(paper_cut().cut, 0.0)
+    with pytest.raises(InputError, match="trigger"):
+        watch(still, speed=None)
+
+
+def test_the_posterior_widens_the_bands(found):
+    """Of a machine whose C31 is uncertain by a known share: the force is, too."""
+    from tests.workflows.test_tip import posterior_of
+
+    machine = {}
+    for axis, shift in ((Dof.X, 1.0), (Dof.Y, 0.95)):
+        posterior = posterior_of(shift, softening=False)
+        machine[axis] = MachineAxis(None, None, posterior)  # type: ignore[arg-type]
+    certain = {
+        axis: MachineAxis(None, None, replace(part.posterior, covariance=0.0 * part.posterior.covariance)) for axis, part in machine.items()
+    }
+    one, two = (watch(paper_cut().cut, paper_cut().air, machine=MachineOverSpeed(m), method=PaperWalk()) for m in (machine, certain))
+    for i, axis in enumerate(one.estimate.axes):
+        assert one.model_error[axis] > 0.0
+        assert two.model_error[axis] == 0.0
+        own, bare = one.estimate.standard_deviation[:, i], two.estimate.standard_deviation[:, i]
+        np.testing.assert_allclose(own**2, bare**2 + one.model_error[axis] ** 2, rtol=1e-6)
+
+
+def test_wear_of_the_paper_case(found):
+    """Through machine, sensors and observer: K_tc and K_rc of the virtual workpiece (902 MPa, 0.26), no edges."""
+    made = paper_cut()
+    from benchmarks.observer import CASE
+
+    worn = wear_of(found, Cutter(2, 0.012, made.tooling.cutter.helix), CASE)
+    assert worn.separable
+    assert worn.misfit < 0.05
+    np.testing.assert_allclose(worn.coefficient[:, :2].mean(axis=0), [902e6, 0.26 * 902e6], rtol=0.04)
+    assert np.all(np.abs(worn.coefficient[:, 2:].mean(axis=0)) < 2e3)
+    assert np.mod(worn.angle - made.angle + 0.1, np.pi) == pytest.approx(0.1, abs=0.02)
+
+
+def test_bad_records_are_refused_in_a_sentence():
+    cut = paper_cut().cut
+    lost = np.array(cut.samples)
+    lost[100, 0] = np.nan
+    with pytest.raises(InputError, match="drop-outs"):
+        watch(replace(cut, samples=lost))
+    with pytest.raises(InputError, match="too short"):
+        watch(replace(cut, samples=cut.samples[:600]))
+    with pytest.raises(InputError, match="no displacement"):
+        watch(replace(cut, samples=cut.samples[:, 2:], sensors=cut.sensors[2:]))
+    with pytest.raises(InputError, match="band"):
+        watch(cut, band=(2.0 * np.pi * 20000.0, 2.0 * np.pi * 30000.0))
+
+
+def test_figures_have_units_and_bands(found):
+    history = force_history(found.estimate, found.spindle_speed)
+    assert [ax.get_ylabel() for ax in history.axes] == ["force X [N]", "force Y [N]"]
+    assert history.axes[-1].get_xlabel() == "time [ms]"
+    low, high = history.axes[0].get_xlim()
+    assert high - low > 3.0 * 5.0
+    responses = observer_frf(found.response, found.band)
+    assert "dB" in responses.axes[0].get_ylabel()
+    assert responses.axes[-1].get_xlabel() == "frequency [Hz]"
+    with_truth = force_history(found.estimate, found.spindle_speed, true=paper_cut().force - paper_cut().force.mean(axis=0))
+    assert len(with_truth.axes[0].lines) == len(history.axes[0].lines) + 1
+
+
+def test_methods_are_objects():
+    assert Resonators().colours_noise
+    assert not PaperWalk().colours_noise
