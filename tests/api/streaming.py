@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from fastapi.testclient import TestClient
 from starlette.testclient import WebSocketTestSession
-from tests.workflows.test_live import RATE, SECOND, streamed
 
 from api.main import create_app
 from api.settings import Settings
@@ -22,6 +21,7 @@ from benchmarks.observer import DATA
 from rcsa_ident.io.results import plain, spindle_to_json
 from tests.api.conftest import URL, Here, Near, embedded
 from tests.observer.flange_machine import BAND, flange_machine
+from tests.workflows.test_stream_forces import RATE, SECOND, streamed
 
 STREAM = "ws://localhost/v1/forces/stream"
 CHANNELS = ["gap_x", "gap_y", "fix_x", "fix_y"]

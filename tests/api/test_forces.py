@@ -8,7 +8,6 @@ import json
 import h5py
 import numpy as np
 import pytest
-from tests.workflows.test_live import RATE, streamed
 
 from api.client import Client, ServiceError
 from benchmarks.observer import relative_error
@@ -18,6 +17,7 @@ from tests.api.conftest import example
 from tests.api.recordings import declared
 from tests.api.streaming import CHANNELS, SENSORS, STREAM, closed, result, send, signals, streaming, until
 from tests.api.test_streams import joined
+from tests.workflows.test_stream_forces import RATE, streamed
 
 #: Of the recordings below [s].
 AIR, CUT = (0.2, 0.7), (2.0, 2.5)

@@ -9,13 +9,13 @@ import time
 import httpx2
 import numpy as np
 import pytest
-from tests.workflows.test_live import RATE, streamed
 
 from api.stream_client import Event, Forces, ForceStream, StreamRefused
 from benchmarks.observer import relative_error
 from benchmarks.streaming import processes
 from tests.api.streaming import hello, result, signals, tooling
 from tests.api.test_serve import command, free_port
+from tests.workflows.test_stream_forces import RATE, streamed
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ import time
 
 import numpy as np
 import pytest
-from tests.workflows.test_live import RATE, streamed
 
 from api.streams.engine import FAILED, Message
 from api.streams.frames import unpacked
@@ -21,6 +20,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from tests.api.conftest import Near
 from tests.api.streaming import CHANNELS, SENSITIVITY, STREAM, closed, hello, result, send, signals, streaming, tooling, until
+from tests.workflows.test_stream_forces import RATE, streamed
 
 SETTLE = round(0.2 * RATE)
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.stability.test_period_kernels import dense
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
@@ -21,6 +20,7 @@ from rcsa_ident.stability.tip_modes import TipModes
 from tests.oracles import naive
 from tests.oracles.literature import MULTIPLIER_DEPTH_MM, MULTIPLIER_RPM, MULTIPLIERS
 from tests.stability.mills import COEFFICIENTS, HALF, ONE, RPM, SKEWED, TWO, Table, mill, tip
+from tests.stability.test_monodromy_kernels import dense
 
 #: The mill of the published multipliers: polynomials' degree, constant coefficients, steps per tooth period. What is good to 1e-5 takes
 #: very many steps of a low order.
