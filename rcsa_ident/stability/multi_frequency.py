@@ -76,7 +76,7 @@ class MultiFrequency:
             doubts.append(f"at {lost} of {speeds.size} speeds the limit is not converged: it may be percents off")
         # a flip vibrates at an odd multiple of half the tooth-passing frequency, and nothing else does to the last digit
         flip = np.abs(chatter / (cutter.teeth * speeds) % 1.0 - 0.5) < 1e-9
-        return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), "multi-frequency", tuple(doubts), flip)
+        return StabilityLobes(speeds, limit, chatter, lobe, max_depth, "multi-frequency", warnings=tuple(doubts), flip=flip)
 
 
 def _doubts(tip: TipMotion, chatter: FloatArray) -> list[str]:

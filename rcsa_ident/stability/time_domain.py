@@ -104,7 +104,7 @@ class TimeDomain:
             limit[i] = depth
             chatter[i], flip[i] = cut.vibration(depth, self.periods)
             lobe[i] = int(chatter[i] / (speed * process.cutter.teeth))
-        return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), "time-domain", (), flip)
+        return StabilityLobes(speeds, limit, chatter, lobe, max_depth, "time-domain", flip=flip)
 
 
 def milling_history(
