@@ -29,6 +29,7 @@ from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
 from rcsa_ident.signals.verdict import raw_faults, speed_faults
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.units import to_rpm
 from rcsa_ident.workflows.speeds import MachineOverSpeed
 from rcsa_ident.workflows.tip import tooltip, turned_plane
 
@@ -135,8 +136,8 @@ def observe(
     run_out = _run_out(steady, air, axes, programmed, top, teeth, notes)
     known = machine.speed_range
     if known is not None and not known[0] * (1.0 - 1e-9) <= speed <= known[1] * (1.0 + 1e-9):
-        low, high = (each * 30.0 / np.pi for each in known)
-        notes.append(f"the machine was identified from {low:.0f} to {high:.0f} rev/min, the record has {speed * 30.0 / np.pi:.0f}")
+        low, high = (to_rpm(each) for each in known)
+        notes.append(f"the machine was identified from {low:.0f} to {high:.0f} rev/min, the record has {to_rpm(speed):.0f}")
     omega = 2.0 * np.pi * np.arange(max(0.25 * band[0] / (2.0 * np.pi), STEP_HZ), 1.3 * band[1] / (2.0 * np.pi), STEP_HZ)
     coupled = tooltip(machine.at(speed), assembly, omega, bands=False, speed=speed).coupled
     tuning = {axis: Tuning(_noise(steady, i), bandwidth or band[1], _response_time(method, speed)) for i, axis in enumerate(axes)}
@@ -195,7 +196,7 @@ def _periodic(steady: SteadyRecord, programmed: float, notes: list[str]) -> None
     signals = steady.displacement - steady.displacement.mean(axis=0)
     share = 1.0 - float(np.sum(steady.lines.rest[:, : signals.shape[1]] ** 2) / max(np.sum(signals**2), 1e-300))
     if share < UNRELATED:
-        found = f"{programmed * 30.0 / np.pi:.0f} rev/min, whose orders make {100.0 * share:.0f} % of the vibration"
+        found = f"{to_rpm(programmed):.0f} rev/min, whose orders make {100.0 * share:.0f} % of the vibration"
         raise InputError("--speed-rpm", found, "the speed of the spindle to 1 % [rev/min], in a cut without chatter")
     if share < PERIODIC:
         notes.append(f"{100.0 * (1.0 - share):.0f} % of the vibration does not follow the spindle: chatter, or not a steady cut")
