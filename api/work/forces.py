@@ -20,8 +20,6 @@ from rcsa_ident.units import from_hz, to_hz, to_rpm
 
 #: Buckets of an answer's picture, and samples that one answer may take.
 BUCKETS, MOST_SAMPLES = 2000, 8_000_000
-#: The commands' options are other fields here.
-_FIELDS = {"--speed-rpm": "spindle_speed_rpm", "speed": "spindle_speed_rpm", "--idle-percent": "idle_percent", "idle share": "idle_percent"}
 
 ReadPair = Callable[[], tuple[Recording, Recording | None]]
 
@@ -129,7 +127,7 @@ def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, 
 
 
 def observed(known: Known, tool: Any, cut: Recording, air: Recording | None, speed: float | None, method: str, smooth: bool = False) -> Any:
-    """Return a `MonitoredCut`; errors name fields of the query."""
+    """Return a `MonitoredCut`."""
     from rcsa_ident.observer.tuning import PaperWalk, Resonators
     from rcsa_ident.workflows.estimate_forces import observe
 
@@ -140,11 +138,7 @@ def observed(known: Known, tool: Any, cut: Recording, air: Recording | None, spe
     weigh(tool.assembly, 1.3 * high)
     band = from_hz(low), from_hz(high)
     how = PaperWalk() if method == "paper" else Resonators()
-    try:
-        return observe(known.machine, tool.assembly, tool.cutter.teeth, cut, air, band, speed, how, None, smooth)
-    except InputError as error:
-        allowed = error.allowed.replace(" with --speed-rpm", "")
-        raise InputError(_FIELDS.get(error.field, error.field), error.found, allowed, error.where) from None
+    return observe(known.machine, tool.assembly, tool.cutter.teeth, cut, air, band, speed, how, None, smooth)
 
 
 def _harmonics(force: Any, rate: float, speed: float, band: tuple[float, float]) -> list[dict[str, Any]]:

@@ -174,12 +174,13 @@ def trigger_speed(recording: Recording) -> float:
     """
     found = recording.channel(Quantity.TRIGGER)
     if found is None:
-        raise InputError("--speed-rpm", "none, and no trigger in the recording", "the programmed spindle speed [rev/min]")
+        raise InputError("spindle_speed", "none, and no trigger in the recording", "the programmed spindle speed [rev/min]")
     sensor, signal = found
     high = signal > 0.5 * (np.nanmin(signal) + np.nanmax(signal))
     edges = np.flatnonzero(high[1:] & ~high[:-1])
     if edges.size < 3:
-        raise InputError("trigger", f"{edges.size} rising edges", "three or more, or the programmed spindle speed with --speed-rpm")
+        found_edges = f"none, and {edges.size} rising edges of the trigger"
+        raise InputError("spindle_speed", found_edges, "the programmed spindle speed [rev/min], or three rising edges or more")
     # the median shrugs off a stray or a lost edge
     return float(2.0 * np.pi * recording.rate / np.median(np.diff(edges)) / sensor.pulses_per_revolution)
 
@@ -197,7 +198,7 @@ def _periodic(steady: SteadyRecord, programmed: float, notes: list[str]) -> None
     share = 1.0 - float(np.sum(steady.lines.rest[:, : signals.shape[1]] ** 2) / max(np.sum(signals**2), 1e-300))
     if share < UNRELATED:
         found = f"{to_rpm(programmed):.0f} rev/min, whose orders make {100.0 * share:.0f} % of the vibration"
-        raise InputError("--speed-rpm", found, "the speed of the spindle to 1 % [rev/min], in a cut without chatter")
+        raise InputError("spindle_speed", found, "the spindle speed to within 1 % [rev/min], in a cut without chatter")
     if share < PERIODIC:
         notes.append(f"{100.0 * (1.0 - share):.0f} % of the vibration does not follow the spindle: chatter, or not a steady cut")
 

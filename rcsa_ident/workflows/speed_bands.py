@@ -73,7 +73,7 @@ def divided(judged: Sequence[JudgedCut], count: int) -> list[tuple[tuple[float, 
             number = sum(j.cut.tooling == name for j in cuts)
             if number < FEWEST_CUTS:
                 raise InputError(
-                    "--speed-bands",
+                    "speed_bands",
                     f"{number} cuts with {name} from {to_rpm(low):.0f} to {to_rpm(high):.0f} rev/min",
                     f"at least {FEWEST_CUTS} cuts with each tooling in each of {count} bands: fewer bands, or more cuts",
                 )
