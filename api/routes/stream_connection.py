@@ -31,7 +31,7 @@ log = logging.getLogger("rcsa_ident.service")
 #: Time for what waits for a reader at the end, and for a steady part that an observer can be made from [s].
 LINGER, SETTLING = 5.0, 120.0
 #: Fields of errors that the next part of a stream may not have, and what lies between two attempts [s].
-UNSTEADY, PAUSE = ("recording", "recording length", "spindle_speed_rpm", "trigger"), 0.5
+UNSTEADY, PAUSE = ("recording", "recording length", "spindle_speed", "trigger"), 0.5
 #: Between two looks at the key [s].
 LOOK = 20.0
 #: An index further ahead is a fault of its sender, not a gap [s].

@@ -90,7 +90,7 @@ def test_a_trigger_tells_the_speed(found):
         assert trigger_speed(with_trigger(paper_cut().cut, speed, pulses)) == pytest.approx(speed, rel=0.01)
     by_trigger = watch(with_trigger(paper_cut().cut, speed), paper_cut().air, speed=None, method=PaperWalk())
     assert by_trigger.spindle_speed == pytest.approx(speed, rel=1e-6)
-    with pytest.raises(InputError, match="speed-rpm"):
+    with pytest.raises(InputError, match="spindle_speed"):
         watch(paper_cut().cut, speed=None)
     still = with_trigger(paper_cut().cut, 0.0)
     with pytest.raises(InputError, match="trigger"):
