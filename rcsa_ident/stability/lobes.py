@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
@@ -11,19 +9,12 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
 
 _ZERO_ORDER = ZeroOrder()
-
-
-class StabilityMethod(Protocol):
-    """A published way to the stability limit."""
-
-    def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
-        """Return the limit at each speed; the arguments have been checked."""
-        ...
 
 
 def stability_lobes(
