@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_fit import fitted_modes
 from rcsa_ident.stability.tip_modes import TIP, TipModes
@@ -22,17 +22,6 @@ _ZERO_ORDER = ZeroOrder()
 DRAWS = 60
 #: How much deeper than asked for the zero-order method looks, for proportions.
 _DEEPER = 5.0
-
-
-class StabilityMethod(Protocol):
-    """A published way to the stability limit."""
-
-    name: ClassVar[str]
-    needs: ClassVar[str]
-
-    def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
-        """Return the limit at each speed; the arguments have been checked."""
-        ...
 
 
 def stability_lobes(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability._kernels import envelope, envelopes, largest_real_part, pitch_envelope
+from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import TipModes, receptance_of
 
@@ -30,6 +32,11 @@ class ZeroOrder:
     1 - e^{-i w tau} by its mean over the teeth (Altintas, Engin & Budak, J. Manuf. Sci. Eng. 121 (1999) 173) and costs
     speeds times frequencies.
     """
+
+    name: ClassVar[str] = MethodName.ZERO_ORDER.value
+    needs: ClassVar[Literal["receptance", "modes"]] = "receptance"
+    seconds_per_speed: ClassVar[float] = 2e-5
+    gives_maps: ClassVar[bool] = False
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the lower envelope of all lobes in the range of `speeds`."""
@@ -57,7 +64,7 @@ class ZeroOrder:
             chatter,
             lobe,
             max_depth,
-            "zero-order",
+            self.name,
             absolute_limit=1.0 / (2.0 * coefficients.tangential * strongest) if exists else float("inf"),
             absolute_frequency=place if exists else None,
             warnings=tuple(_doubts(process, receptance, place if exists else None)),

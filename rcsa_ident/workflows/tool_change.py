@@ -19,18 +19,17 @@ from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
 from rcsa_ident.machine.speed_dependence import tips_over_speed
 from rcsa_ident.machining_setup import CutSpec, Tooling
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
-from rcsa_ident.stability.lobes import DRAWS, StabilityMethod, both_directions, stability_lobes
-from rcsa_ident.stability.methods import METHODS
+from rcsa_ident.stability.lobes import DRAWS, both_directions, stability_lobes
+from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.pockets import pad_speeds
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, StabilityLobes
-from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.stability_map import StabilityMap, stability_map
 from rcsa_ident.stability.surface_error import SurfaceError, surface_location_error
 from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, tally
 from rcsa_ident.stability.tip_fit import fitted_modes
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
-from rcsa_ident.units import hz_from_rad_s, rpm_from_rad_s
+from rcsa_ident.units import to_hz, to_rpm
 from rcsa_ident.workflows.advice import (
     OperatingPoint,
     PlannedCut,
@@ -96,7 +95,7 @@ def tooltip(
         tip = UncertainReceptance(known.omega, known.values, known.rows, known.cols)
     remarks = [*machine.remarks, *([] if speed is None else _outside(machine, np.array([speed])))]
     if machine.band is not None and tip.omega.max() > 1.001 * machine.band[1]:
-        top = hz_from_rad_s(machine.band[1])
+        top = to_hz(machine.band[1])
         remarks.append(f"the machine is known up to {top:.0f} Hz; above that the receptance is extrapolated")
     return TipAnswer(tooling, tip, tuple(remarks))
 
@@ -146,7 +145,7 @@ class ToolChange:
         zero_order = isinstance(self.method, ZeroOrder)
         each = self.method.seconds_per_speed + (_BAND_SECONDS if self.draws else 0.0)
         # lobes come closer as a spindle turns slower
-        found = each * float(np.sum(4000.0 / rpm_from_rad_s(self.speeds)))
+        found = each * float(np.sum(4000.0 / to_rpm(self.speeds)))
         if zero_order and np.ptp(self.process.cutter.pitch) > 1e-9:
             found *= _PITCH_FACTOR
         if not (zero_order and self.machine.prepared):
@@ -271,7 +270,7 @@ def map_of(change: ToolChange, depths: int = 100, full: bool = False) -> Stabili
     full : bool
         Compute every point.
     """
-    method = change.method if isinstance(change.method, FullDiscretisation | SemiDiscretisation) else FullDiscretisation()
+    method = change.method if change.method.gives_maps else FullDiscretisation()
     speeds, depth = np.unique(change.speeds), change.max_depth * np.arange(1, depths + 1) / depths
     parts = []
     for places, tip in tips_over_speed(change.machine, change.tooling, change.machine.lines(BEYOND), speeds, spread=False):
@@ -293,23 +292,10 @@ def surface_of(change: ToolChange, depth: float) -> SurfaceError:
     return SurfaceError(speeds, parts[0].height, error, parts[0].wall, warnings)
 
 
-def method_named(name: str) -> StabilityMethod:
-    """Return a stability method, with its usual settings, by name.
-
-    Raises
-    ------
-    InputError
-        There is no such method.
-    """
-    if name not in METHODS:
-        raise InputError("method", name, f"one of {', '.join(METHODS)}")
-    return METHODS[name]()
-
-
 def _outside_band(lobes: StabilityLobes, band: tuple[float, float]) -> str | None:
     """A sentence where the limiting vibration lies outside the band in which the machine is known, else None."""
-    low, high = (hz_from_rad_s(w) for w in band)
-    frequency = hz_from_rad_s(lobes.chatter_frequency[np.isfinite(lobes.chatter_frequency)])
+    low, high = (to_hz(w) for w in band)
+    frequency = to_hz(lobes.chatter_frequency[np.isfinite(lobes.chatter_frequency)])
     outside = (frequency < low) | (frequency > high)
     if not outside.any():
         return None
@@ -326,5 +312,5 @@ def _outside(machine: TipSource, speeds: FloatArray) -> list[str]:
     # the last digit of a speed that was written in rev/min is nobody's wish
     if known is None or (speeds.min() >= known[0] * (1.0 - 1e-9) and speeds.max() <= known[1] * (1.0 + 1e-9)):
         return []
-    low, high = (rpm_from_rad_s(speed) for speed in known)
+    low, high = (to_rpm(speed) for speed in known)
     return [f"the machine was identified from {low:.0f} to {high:.0f} rev/min; outside it stays what it is at the nearest of them"]
