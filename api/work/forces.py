@@ -144,7 +144,7 @@ def observed(known: Known, tool: Any, cut: Recording, air: Recording | None, spe
         return observe(known.machine, tool.assembly, tool.cutter.teeth, cut, air, band, speed, how, None, smooth)
     except InputError as error:
         allowed = error.allowed.replace(" with --speed-rpm", "")
-        raise InputError(_FIELDS.get(error.field, error.field), error.found, allowed, error.where) from None
+        raise type(error)(_FIELDS.get(error.field, error.field), error.found, allowed, error.where) from None
 
 
 def _harmonics(force: Any, rate: float, speed: float, band: tuple[float, float]) -> list[dict[str, Any]]:
