@@ -1,4 +1,4 @@
-"""Decoupling: a known tool-holder taken out of a measured assembly leaves the spindle's flange."""
+"""Decoupling [park2003]: a known tool-holder taken out of a measured assembly leaves the spindle's flange."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def decouple(measured: Receptance, tool_holder: Receptance, joint: LumpedJoint |
     """Return the spindle's flange from an assembly whose receptances are known with rotations, exactly.
 
     With D = A22 + K^-1: B33 = A21 (A11 - C11)^-1 A12 - D where the tip was measured, else B33 = (C33^-1 - D^-1)^-1 at the
-    spindle's end of the joint, or B33 = (I - G)^-1 G D with G = C31 A21^-1 across: eq. 10 of the paper turned round.
+    spindle's end of the joint, or B33 = (I - G)^-1 G D with G = C31 A21^-1 across: [inprocess], eq. 10, turned round.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from rcsa_ident.errors import non_negative, positive
 
 @dataclass(frozen=True, slots=True)
 class LumpedJoint:
-    """Springs and dampers in translation and rotation (the paper's eq. 11).
+    """Springs and dampers in translation and rotation ([inprocess], eq. 11).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Receptance coupling of a tool-holder and a spindle through a lumped joint (the paper's eqs. 10 and 12)."""
+"""Receptance coupling [schmitz2000] of a tool-holder and a spindle through a lumped joint ([inprocess], eqs. 10 and 12)."""
 
 from __future__ import annotations
 

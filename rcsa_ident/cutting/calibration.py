@@ -1,4 +1,4 @@
-"""Cutting coefficients from measured mean forces, with intervals."""
+"""Cutting coefficients from measured mean forces [altintas2012], with intervals."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rcsa_ident.errors import InputError
 #: Coefficients in the order of `ForceCalibration.value`; the last two of three belong to a dynamometer that measures along the axis.
 NAMES = ("K_tc", "K_rc", "K_te", "K_re", "K_ac", "K_ae")
 UNITS = {"K_tc": "N/m^2", "K_rc": "N/m^2", "K_ac": "N/m^2", "K_te": "N/m", "K_re": "N/m", "K_ae": "N/m"}
-#: ShortestPlan cuts from which a scatter between cuts can be told.
+#: Fewest cuts from which a scatter between cuts can be told.
 LEAST_CUTS = 3
 _NORMAL_95 = 1.959964
 #: Condition number of the scaled regression from which on coefficients cannot be told apart.

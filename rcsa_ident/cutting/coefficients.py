@@ -9,7 +9,7 @@ from rcsa_ident.errors import InputError, non_negative, positive
 
 @dataclass(frozen=True, slots=True)
 class CuttingCoefficients:
-    """Linear force model: F = K_c h b + K_e b for each direction, b the width of cut.
+    """Linear force model [altintas2012]: F = K_c h b + K_e b for each direction, b the width of cut.
 
     Parameters
     ----------

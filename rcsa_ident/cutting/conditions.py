@@ -13,7 +13,7 @@ from rcsa_ident.errors import InputError, non_negative, positive
 class Engagement:
     """Between which immersion angles the teeth cut.
 
-    Angles are measured clockwise from the normal direction Y (the feed is X), as the paper does: half-immersion
+    Angles are measured clockwise from the normal direction Y (the feed is X), as in [inprocess]: half-immersion
     down-milling is pi/2 to pi, slotting 0 to pi.
 
     Parameters

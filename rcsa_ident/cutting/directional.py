@@ -10,7 +10,7 @@ from rcsa_ident.cutting.conditions import Engagement
 
 
 def mean_directional_matrix(teeth: int, engagement: Engagement, coefficients: CuttingCoefficients, feed_angle: float = 0.0) -> FloatArray:
-    """Return the mean over a revolution of the directional matrix [alpha] (the paper's eq. 3), in machine axes.
+    """Return the mean over a revolution of the directional matrix [alpha] ([inprocess], eq. 3), in machine axes.
 
     F = a K_tc [alpha] {X(t) - X(t - tau)}; closed form, exact.
 

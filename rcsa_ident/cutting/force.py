@@ -1,4 +1,4 @@
-"""Milling force in a stable cut: Fourier lines and time histories (the paper's eqs. 2-4, with edges and helix)."""
+"""Milling force in a stable cut: Fourier lines and time histories ([inprocess], eqs. 2-4, with edges and helix)."""
 
 from __future__ import annotations
 

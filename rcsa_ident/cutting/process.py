@@ -14,7 +14,7 @@ from rcsa_ident.errors import InputError, non_negative, positive
 
 @dataclass(frozen=True, slots=True)
 class ProcessDamping:
-    """The flank rubs on the wave that it leaves: a viscous force, the indentation model for small waves (Ahmadi & Ismail 2012).
+    """The flank rubs on the wave that it leaves: a viscous force, the indentation model for small waves [ahmadi2012].
 
     A width b of edge that moves into the workpiece with the velocity u feels F_r = K_sp w^2 b u / (4 v), v its cutting speed, and
     the friction mu F_r against the cut.

@@ -59,7 +59,7 @@ class PoleModel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalModel:
-    """Complex modes and a residual compliance (the paper's eq. 13, plus the modes above the band).
+    """Complex modes and a residual compliance ([inprocess], eq. 13, plus the modes above the band).
 
     h_pq = sum_n phi_pn phi_qn / (i omega - lambda_n) + conj(phi_pn phi_qn) / (i omega - conj(lambda_n)) + R_pq,
     lambda_n = -zeta_n omega_n + i omega_n sqrt(1 - zeta_n^2).
@@ -138,7 +138,7 @@ def damped_modes(
     """Return the complex modes of real modes coupled by a full damping matrix.
 
     Solves q'' + D q' + diag(omega_n^2) q = psi f, w = psi^T q, exactly; a real pole becomes a mode with zeta = 1 and
-    half its residue, so that the pair of eq. 13 sums to it.
+    half its residue, so that the pair of poles sums to it.
 
     Parameters
     ----------

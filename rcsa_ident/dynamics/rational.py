@@ -181,8 +181,8 @@ def rational_fit(
     Notes
     -----
     With sigma(s) = sum_k c~_k phi_k(s) + d~ and the poles of the last step, sigma h = sum_k c_k phi_k + d is solved by linear
-    least squares; zeros of sigma are the next poles (Gustavsen and Semlyen 1999; relaxed: Gustavsen 2006; each entry
-    condensed by its own QR: Deschrijver et al. 2008). An unstable pole is mirrored. The next higher order starts from the poles
+    least squares; zeros of sigma are the next poles ([gustavsen1999]; relaxed: [gustavsen2006]; each entry
+    condensed by its own QR: [deschrijver2008]). An unstable pole is mirrored. The next higher order starts from the poles
     of the last and a pair where the misfit is largest, and from evenly spaced poles.
     """
     problem = Problem.of(omega, values, tolerance, noise, weight, constant)

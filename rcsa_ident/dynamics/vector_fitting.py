@@ -1,4 +1,4 @@
-"""Vector fitting: poles of a rational function that several responses share, by relocation."""
+"""Vector fitting [gustavsen1999]: poles of a rational function that several responses share, by relocation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many modes: as many as the data pay for, by Laplace's approximation of the evidence."""
+"""How many modes: as many as the data pay for, by Laplace's approximation of the evidence [mackay1992]."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def drop_modes(solution: Solution, misfit: Misfit, report: Report | None = None,
     solution : Solution
         Polished.
     smallest : int
-        ShortestPlan modes of an axis.
+        Fewest modes of an axis.
     """
     best, best_evidence = solution, evidence(solution, misfit)
     here = solution

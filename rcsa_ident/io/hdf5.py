@@ -85,7 +85,7 @@ def read_vectors(path: Path, names: Sequence[str], wished: Sequence[str], kinds:
     Parameters
     ----------
     kinds : sequence of str
-        CutConstraints values of the attribute ``MATLAB_class``; without it the type of the samples decides.
+        Allowed values of the attribute ``MATLAB_class``; without it the type of the samples decides.
     """
     where = str(path)
     size = existing_file(path, "recording", LARGEST_FILE).stat().st_size

@@ -1,8 +1,8 @@
 """Timoshenko beam elements: two nodes, deflection w and section rotation r = dw/dz + shear each.
 
-Consistent matrices from shape functions that satisfy the static equations exactly (Friedman & Kosmatka, Computers &
-Structures 47 (1993) 473), so a uniform beam under end loads is exact with one element. Order of freedoms: w1, r1, w2, r2;
-z runs from the tip to the spindle, a positive rotation lifts w with z.
+Consistent matrices from shape functions that satisfy the static equations exactly [friedman1993], so a uniform beam under
+end loads is exact with one element. Order of freedoms: w1, r1, w2, r2; z runs from the tip to the spindle, a positive rotation
+lifts w with z.
 
 These shapes leave out how inertia and contact, which load a beam along its length, bend it inside an element: in stubby parts
 the error of a natural frequency falls with the second power of the length only. Two more freedoms inside, the static answers
@@ -24,7 +24,7 @@ ShearCoefficient = Callable[[float, float], float]
 
 
 def cowper(poisson: float, ratio: float) -> float:
-    """Shear coefficient of a hollow circular section (Cowper, J. Appl. Mech. 33 (1966) 335).
+    """Shear coefficient of a hollow circular section [cowper1966].
 
     kappa = 6 (1 + nu) (1 + m^2)^2 / ((7 + 6 nu) (1 + m^2)^2 + (20 + 12 nu) m^2), m = inner / outer diameter.
     """
@@ -33,10 +33,10 @@ def cowper(poisson: float, ratio: float) -> float:
 
 
 def hutchinson(poisson: float, ratio: float) -> float:
-    """Shear coefficient of a hollow circular section (Hutchinson, J. Appl. Mech. 68 (2001) 87).
+    """Shear coefficient of a hollow circular section [hutchinson2001].
 
-    kappa = 6 (1 + nu)^2 (1 + m^2)^2 / ((7 + 12 nu + 4 nu^2) (1 + m^2)^2 + 4 (5 + 6 nu + 2 nu^2) m^2); with it the
-    solid section's frequencies are those of tables/stability_benchmarks.toml.
+    kappa = 6 (1 + nu)^2 (1 + m^2)^2 / ((7 + 12 nu + 4 nu^2) (1 + m^2)^2 + 4 (5 + 6 nu + 2 nu^2) m^2); the tests'
+    reference frequencies of solid sections were computed with it.
     """
     square = (1.0 + ratio**2) ** 2
     nu = poisson

@@ -23,7 +23,7 @@ from rcsa_ident.signals.verdict import chatter
 
 #: Highest line of the full-signal fit [Hz]: below the resonance of most dynamometers.
 MAX_FREQUENCY = 2000.0
-#: ShortestPlan revolutions of a usable record, and most blocks that it is divided into.
+#: Fewest revolutions of a usable record, and most blocks that it is divided into.
 LEAST_REVOLUTIONS, MOST_BLOCKS = 16.0, 24
 #: Largest share of lost samples; they are bridged by straight lines.
 LOST_SHARE = 1e-3
