@@ -56,7 +56,17 @@ def decouple(measured: Receptance, tool_holder: Receptance, joint: LumpedJoint |
 
 
 def interface_receptance(tool_holder: Receptance, directions: tuple[Dof, ...], joint: LumpedJoint | None) -> ComplexArray:
-    """Return A22 + K^-1, shape (n, d, d)."""
+    """Return A22 + K^-1, shape (n, d, d): what the spindle's flange is coupled to.
+
+    Parameters
+    ----------
+    tool_holder : Receptance
+        Point ``flange`` among its points.
+    directions : tuple of Dof, length d
+        Of the flange, in the tool-holder's order.
+    joint : LumpedJoint or None
+        None is a rigid connection.
+    """
     interface = np.array(tool_holder["flange", "flange"])
     if joint is not None:
         i = np.arange(len(directions))
@@ -73,7 +83,7 @@ def with_slope(translations: ComplexArray, positions: FloatArray) -> ComplexArra
     Parameters
     ----------
     translations : complex array, shape (n, k, k) [m/N]
-        Between all pairs of points, two at least.
+        Receptances between all pairs of points, two at least.
     positions : array, shape (k,) [m]
         Along z from the tip towards the spindle.
 
