@@ -19,6 +19,12 @@ class Engagement:
     Parameters
     ----------
     entry, exit : float [rad], 0 <= entry < exit <= pi
+
+    Examples
+    --------
+    >>> half = Engagement.from_immersion(0.5, "down")
+    >>> [round(float(np.degrees(angle)), 6) for angle in (half.entry, half.exit)]
+    [90.0, 180.0]
     """
 
     entry: float

@@ -14,6 +14,15 @@ def mean_directional_matrix(teeth: int, engagement: Engagement, coefficients: Cu
 
     F = a K_tc [alpha] {X(t) - X(t - tau)}; closed form, exact.
 
+    Parameters
+    ----------
+    teeth : int
+    engagement : Engagement
+    coefficients : CuttingCoefficients
+        Only the radial ratio counts.
+    feed_angle : float [rad]
+        Direction of the feed in the machine's X-Y plane, from +X towards +Y.
+
     Returns
     -------
     array, shape (2, 2) [-]

@@ -26,7 +26,7 @@ class ProcessDamping:
     wear_land : float [m]
         w, width of the flat behind the edge.
     friction : float [-]
-        mu.
+        mu, coefficient of friction between flank and workpiece.
     """
 
     indentation: float
@@ -82,6 +82,15 @@ class MillingProcess:
         Matters to stability only with run-out: it decides which teeth cut, and what they regenerate.
     damping : ProcessDamping or None
     speed_variation : SpeedVariation or None
+
+    Examples
+    --------
+    A two-tooth end mill of 12 mm in EN AW-6082, half-immersion down-milling:
+
+    >>> cutter, coefficients = Cutter(2, 0.012), CuttingCoefficients(902e6, 0.26)
+    >>> process = MillingProcess(cutter, coefficients, Engagement.from_immersion(0.5, "down"), feed_per_tooth=0.1e-3)
+    >>> process.conditions(speed=1000.0, depth=0.002).axial_depth
+    0.002
     """
 
     cutter: Cutter

@@ -19,7 +19,7 @@ def cluster_covariance(design: FloatArray, residual: FloatArray, cluster: np.nda
     design : array, shape (n, p)
         Full rank; whitened where the fit was.
     residual : array, shape (n,)
-        Of the least-squares fit.
+        What the least-squares fit leaves.
     cluster : array of int, shape (n,)
         Rows of one cluster may be correlated in any way and have any variance; clusters are independent.
 
