@@ -1,4 +1,4 @@
-"""Where and in which direction something moves."""
+"""Coordinates: where and in which direction something moves."""
 
 from __future__ import annotations
 

@@ -21,14 +21,20 @@ class Receptance:
     ----------
     omega : array, shape (n,) [rad/s]
     values : complex array, shape (n, r, c) [m/N, rad/N, m/(N m), rad/(N m)]
-        Time dependence e^{+i omega t}.
+        The time dependence is e^{+i omega t}.
     rows, cols : tuple of Coordinate, lengths r and c
+        Where and in which direction motion is seen, and where a force (for a slope, a moment) acts.
 
     Examples
     --------
-    >>> h = Receptance([1.0], [[[2.0]]], (Coordinate.parse("tip.x"),), (Coordinate.parse("tip.x"),))
-    >>> h["tip", "tip"].shape
-    (1, 1, 1)
+    Two frequencies between tip and flange, a force at the tip:
+
+    >>> tip, flange = Coordinate.parse("tip.x"), Coordinate.parse("flange.x")
+    >>> h = Receptance([100.0, 200.0], [[[2e-6], [1e-6]], [[3e-6], [1e-6]]], rows=(tip, flange), cols=(tip,))
+    >>> h["flange", "tip"].shape
+    (2, 1, 1)
+    >>> abs(h.between("tip.x", "tip.x")).tolist()
+    [2e-06, 3e-06]
     """
 
     omega: FloatArray
@@ -118,6 +124,12 @@ def dissipation(omega: FloatArray, values: ComplexArray) -> FloatArray:
 
     A structure without an inner source of energy has none below zero: the mean power that a harmonic force f feeds
     in is f^H (Y + Y^H) f / 4 with the mobility Y = i omega H.
+
+    Parameters
+    ----------
+    omega : array, shape (n,) [rad/s]
+    values : complex array, shape (n, d, d)
+        A square receptance, rows as columns.
     """
     mobility = 1j * omega[:, None, None] * values
     hermitian = 0.5 * (mobility + np.conj(np.swapaxes(mobility, 1, 2)))

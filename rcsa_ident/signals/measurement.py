@@ -144,7 +144,7 @@ def measure_cut(
         As programmed; forces are simulated at the speed found in the record.
     max_frequency : float [Hz]
     estimator : Estimator
-        `LineEstimator`, or `AirCorrectedSpectra` for the paper's.
+        `LineEstimator`, or `AirCorrectedSpectra` for that of [inprocess].
 
     Raises
     ------

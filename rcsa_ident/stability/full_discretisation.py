@@ -18,7 +18,7 @@ from rcsa_ident.stability.tip_modes import TipModes, modes_of
 
 @dataclass(frozen=True, slots=True)
 class FullDiscretisation:
-    """Full discretisation of the periodic delay equation (Ding, Zhu, Zhang & Ding, Int. J. Mach. Tools Manuf. 50 (2010) 502).
+    """Full discretisation of the periodic delay equation [ding2010].
 
     p' = pole p + inputs F moves exactly, F = K(t) (y - y(t - T)) + C(t) y' is a polynomial within each step: a straight line in the
     published method (degree 1), through Gauss-Lobatto nodes here. Steps begin and end where teeth enter and leave, so the error falls

@@ -22,7 +22,7 @@ _LEFT = 0.2
 
 @dataclass(frozen=True, slots=True)
 class MultiFrequency:
-    """Truncated Hill determinant of the periodic delay equation (Merdol & Altintas, J. Manuf. Sci. Eng. 126 (2004) 459).
+    """Truncated Hill determinant of the periodic delay equation [merdol2004].
 
     With [alpha(t)] = sum_r [alpha_r] e^{i r w_T t}, w_T the tooth-passing frequency, a force with the harmonics
     F_k e^{i (w + k w_T) t} repeats itself for

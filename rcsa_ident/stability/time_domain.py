@@ -62,7 +62,7 @@ class MillingHistory:
 
 @dataclass(frozen=True, slots=True)
 class TimeDomain:
-    """Regenerative time-domain simulation with a Poincare test, the method that decides disputes.
+    """Regenerative time-domain simulation [tlusty1981] with a Poincare test, the method that decides disputes.
 
     Two cuts run side by side, one of them a little pushed, and are looked at once per period (a tooth's, a revolution's where teeth
     differ, a swing's of a varying speed): what their states differ by grows or dies away. The limit is where it does neither. Teeth

@@ -24,12 +24,12 @@ FEWEST_TEETH_IN_CUT = 1.0
 
 @dataclass(frozen=True, slots=True)
 class ZeroOrder:
-    """Altintas & Budak's closed form (CIRP Annals 44 (1995) 357), with cross receptances.
+    """The closed form of Altintas and Budak [altintas1995], with cross receptances.
 
     F = a K_tc [alpha0] (1 - e^{-i w tau}) G(w) F with the mean directional matrix [alpha0]: at each frequency the two
     eigenvalues mu of [alpha0] G give the boundary a = 1 / (2 K_tc Re mu) at w tau = pi + 2 arg mu + 2 pi l. Between the
     given frequencies trace and determinant of [alpha0] G are interpolated by quintics. Unequal pitch replaces
-    1 - e^{-i w tau} by its mean over the teeth (Altintas, Engin & Budak, J. Manuf. Sci. Eng. 121 (1999) 173) and costs
+    1 - e^{-i w tau} by its mean over the teeth [altintas1999] and costs
     speeds times frequencies.
     """
 

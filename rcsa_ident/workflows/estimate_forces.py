@@ -350,7 +350,7 @@ def _model_error(
 
 
 def _above(force: FloatArray, low: float, step: float) -> FloatArray:
-    """Forces without what lies below the band: the paper's walk puts the sensors' drift and integrated noise there."""
+    """Forces without what lies below the band: the walk of [inprocess] puts the sensors' drift and integrated noise there."""
     from scipy.signal import butter, sosfiltfilt
 
     sections = butter(4, 0.5 * low / (2.0 * np.pi), "highpass", fs=1.0 / step, output="sos")

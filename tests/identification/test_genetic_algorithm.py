@@ -155,7 +155,7 @@ def test_modes_that_feed_energy_in_are_named(found):
 
 
 def test_two_outputs_are_taken_as_their_sum(rich):
-    """The paper knows the flange's motion only."""
+    """The published method knows the flange's motion only."""
     low, high = _Problem(PaperGeneticAlgorithm(), rich.only(Dof.X)).bounds()
     x = low + np.random.default_rng(1).uniform(size=(3, low.size)) * (high - low)
     for cost in (LiteralCost(), NoiseWeightedCost()):
