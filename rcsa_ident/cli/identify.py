@@ -164,14 +164,10 @@ def read_start(path: Path) -> Mapping[Dof, Posterior]:
     from rcsa_ident.io.identifications import machine_from_json
     from rcsa_ident.io.results import read_result
 
-    data = read_result(path)
-    machine = machine_from_json(data, str(path))
-    found = {axis: part.posterior for axis, part in machine.items() if part.posterior is not None}
-    if len(found) < len(machine):
-        missing = next(axis.upper() for axis in machine if axis not in found)
-        allowed = "a result of the default method, with unknowns and covariance of each axis"
-        raise InputError(f"axes.{missing}", f"no covariance (method {data['method']})", allowed, str(path))
-    return found
+    try:
+        return machine_from_json(read_result(path), str(path)).posteriors()
+    except InputError as error:
+        raise error if error.where else error.at(str(path)) from None
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,8 +19,8 @@ from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.result import AxisResult, Identification
-from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.search import SearchSettings, explore
+from rcsa_ident.identification.status import Status
 
 #: Told of axis, stage, cost, unknowns and their layout.
 Progress = Callable[[str, str, float, FloatArray, Layout], None]

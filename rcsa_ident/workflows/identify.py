@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Protocol
 
@@ -84,7 +84,8 @@ def identify(campaign: Campaign, judged: Sequence[JudgedCut], method: Method, se
     InputError
         If no cut is usable.
     """
-    return method.run(data_of(campaign, judged), seed, map)
+    found = method.run(data_of(campaign, judged), seed, map)
+    return replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors)
 
 
 def mode_deviations(found: Identification) -> dict[Dof, tuple[FloatArray, FloatArray]]:
