@@ -27,9 +27,8 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import read_cut
 from rcsa_ident.io.setups import read_campaign
 from tests.api import identifying
-from tests.api.conftest import URL, embedded, service
 from tests.api.identifying import Steps, carried, declared, uploaded
-from tests.api.test_machines import refused
+from tests.api.in_process import URL, embedded, refused, service
 
 KINDS = {"progress", "trace", "fit", "end"}
 

@@ -14,10 +14,9 @@ from api.files import NORMALISED, UPLOADS
 from api.reading.samples import read_normalised
 from rcsa_ident.io.recordings import read_recording, write_hdf5
 from rcsa_ident.signals.recording import Quantity, Sensor
-from tests.api.conftest import service
+from tests.api.in_process import refused, service
 from tests.api.recordings import RATE, RPM, channels, content, declared, pair
-from tests.api.test_machines import refused
-from tests.io.formats import FORMATS
+from tests.fixtures.recording_formats import FORMATS
 
 BINARY = {"Content-Type": "application/octet-stream"}
 

@@ -14,7 +14,7 @@ from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.workflows.tip import tooltip
-from tests.identification.conftest import AXES, TIP_OMEGA, open_shop
+from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, open_shop
 
 SMALL = EvidenceSelection(search=SearchSettings(modes=8, population=4, generations=2, steps=6), candidates=2)
 #: For what must not crash, whatever comes out.

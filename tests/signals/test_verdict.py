@@ -9,7 +9,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.signals.measurement import judge_air
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.signals.verdict import implausible, raw_faults, tooth_count_fault
-from tests.signals.synthetic import RATE, RPM, changed, conditions, drift, pair, profile, wave
+from tests.fixtures.synthetic import RATE, RPM, changed, conditions, drift, pair, profile, wave
 
 
 @pytest.fixture(scope="module")

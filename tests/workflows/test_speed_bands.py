@@ -15,7 +15,7 @@ from rcsa_ident.signals.measurement import AxisLines, CutMeasurement, Reading
 from rcsa_ident.signals.verdict import Verdict
 from rcsa_ident.workflows.identify import JudgedCut
 from rcsa_ident.workflows.speed_bands import divided, speed_bands
-from tests.cli import by_hand
+from tests.fixtures import by_hand
 
 
 def judged_cut(folder, number, speed, tooling="T1", usable=True):
