@@ -12,7 +12,8 @@ from rcsa_ident.cutting.force import SLOPES
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.signals.measurement import AxisLines, CutMeasurement
+from rcsa_ident.signals.frf import AxisLines
+from rcsa_ident.signals.measurement import CutMeasurement
 
 #: Slopes are multiplied and moments divided by it, so that all receptances have one unit and size [m].
 LEVER = 0.1

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
@@ -15,7 +14,7 @@ from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
 from rcsa_ident.signals.alignment import angle_to_air, trigger_delay
-from rcsa_ident.signals.frf import Estimator, LineEstimator, turned_air
+from rcsa_ident.signals.frf import AxisLines, Estimator, LineEstimator, turned_air
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
 from rcsa_ident.signals.verdict import Verdict, chatter, implausible, raw_faults, silence, speed_faults, tooth_count_fault
@@ -29,53 +28,6 @@ _AIR_BEYOND = 1.02
 DEFAULT_ESTIMATOR = LineEstimator()
 #: Note on a cut without an air cut.
 NO_AIR = "no air cut: run-out and roundness of the flange are left in the lines that the teeth share with them"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class AxisLines:
-    """Lines of one axis at the tooth-passing harmonics of one cut.
-
-    Parameters
-    ----------
-    order : array of int, shape (n,)
-        Multiples of the spindle frequency.
-    omega : array, shape (n,) [rad/s]
-    cut, air : complex arrays, shape (n, o) [m/N]
-        Displacement over the simulated force with tooth 1 at immersion 0 at the record's start; the air cut's line is turned
-        by the best estimate of the angle between both records. Outputs are gap and fixture, whose sum is the flange's absolute
-        motion, or that alone.
-    variance : array, shape (n, o) [m^2/N^2]
-        Of the real and of the imaginary part of cut - air each.
-    coherence : array, shape (n,) [-]
-        Of the flange's motion.
-    force : complex array, shape (n,) [N]
-    force_slope : complex array, shape (n, 5) [-]
-        Change of the force's logarithm with `cutting.force.SLOPES`.
-    """
-
-    order: np.ndarray
-    omega: FloatArray
-    cut: ComplexArray
-    air: ComplexArray
-    variance: FloatArray
-    coherence: FloatArray
-    force: ComplexArray
-    force_slope: ComplexArray
-
-    @property
-    def outputs(self) -> int:
-        """1 or 2."""
-        return self.cut.shape[1]
-
-    @property
-    def receptance(self) -> ComplexArray:
-        """Flange displacement per tip force, up to the cut's delay, shape (n,): true value times e^{-i omega delay}."""
-        return np.sum(self.cut - self.air, axis=1)
-
-    def summed(self) -> AxisLines:
-        """Return the lines with the flange's motion as the only output."""
-        cut, air, variance = (np.sum(each, axis=1, keepdims=True) for each in (self.cut, self.air, self.variance))
-        return replace(self, cut=cut, air=air, variance=variance)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -184,21 +136,13 @@ def measure_cut(
         return Reading(Verdict(reasons, notes), None, *found)
     speed = steady.spindle_speed
     force, slope = force_and_slope(cutter, replace(conditions, spindle_speed=speed), coefficients, harmonic)
-    strong = WEAKEST_FORCE * np.abs(force).max()
-    seen = [0 if axis is Dof.X else 1 for axis in axes]
-    keep = np.abs(force[:, seen]) > strong
-    points = estimator.points(steady, still, angle, harmonic, np.where(keep, force[:, seen], max(strong, 1e-300)))
-    result = {}
-    for i, (axis, k) in enumerate(zip(axes, keep.T, strict=True)):
-        # an axis without the fixture's acceleration has the gap alone
-        outputs = slice(None) if steady.has_fixture(axis) else slice(0, 1)
-        if k.any():
-            cut_points, air_points, variance = (each[k, i, outputs] for each in (points.cut, points.air, points.variance))
-            force_k, slope_k = force[k, seen[i]], slope[k, seen[i]]
-            result[axis] = AxisLines(
-                harmonic[k], harmonic[k] * speed, cut_points, air_points, variance, points.coherence[k, i], force_k, slope_k
-            )
-    measurement = CutMeasurement(cut_id, tooling, speed, result, alignment_std, *trigger_delay(cut, speed, cutter.teeth))
+    weakest = WEAKEST_FORCE * np.abs(force).max()
+    measured = [0 if axis is Dof.X else 1 for axis in axes]
+    force, slope = force[:, measured], slope[:, measured]
+    strong = np.abs(force) > weakest
+    lines = estimator.lines(steady, still, angle, harmonic, np.where(strong, force, max(weakest, 1e-300)), slope)
+    kept = {axis: lines[axis].of(k) for axis, k in zip(axes, strong.T, strict=True) if k.any()}
+    measurement = CutMeasurement(cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth))
     return Reading(Verdict((), notes if air is not None else (*notes, NO_AIR)), measurement, *found)
 
 

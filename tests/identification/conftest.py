@@ -15,7 +15,8 @@ from rcsa_ident.identification.parameters import DAMPING_UNIT, JOINT, plain
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.signals.measurement import AxisLines, CutMeasurement
+from rcsa_ident.signals.frf import AxisLines
+from rcsa_ident.signals.measurement import CutMeasurement
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 

@@ -21,7 +21,8 @@ from rcsa_ident.machining_setup import Campaign, Cut, Tooling, Workpiece
 from rcsa_ident.report.figures import svg, tooltip_frf
 from rcsa_ident.report.html import ToolingPage, report_html
 from rcsa_ident.report.summaries import coefficient_rows, mode_rows, recording_rows, two_digits
-from rcsa_ident.signals.measurement import AxisLines, CutMeasurement, Reading
+from rcsa_ident.signals.frf import AxisLines
+from rcsa_ident.signals.measurement import CutMeasurement, Reading
 from rcsa_ident.signals.verdict import Verdict
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly

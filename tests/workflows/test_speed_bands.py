@@ -11,7 +11,8 @@ from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.machining_setup import Cut
-from rcsa_ident.signals.measurement import AxisLines, CutMeasurement, Reading
+from rcsa_ident.signals.frf import AxisLines
+from rcsa_ident.signals.measurement import CutMeasurement, Reading
 from rcsa_ident.signals.verdict import Verdict
 from rcsa_ident.workflows.identify import JudgedCut
 from rcsa_ident.workflows.speed_bands import divided, speed_bands
