@@ -10,7 +10,6 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.force import REFERENCE_RUNOUT, SLOPES
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.measurement import Reading
 
 _RPM = 30.0 / np.pi
@@ -40,12 +39,12 @@ class RecordingRow:
     signal_to_noise_db: dict[str, float] = field(default_factory=dict)
 
 
-def recording_rows(readings: Iterable[tuple[Cut, Reading]]) -> list[RecordingRow]:
-    """Return a row for each recording, in the campaign's order."""
+def recording_rows(readings: Iterable[Reading]) -> list[RecordingRow]:
+    """Return a row for each reading, in their order."""
     rows = []
-    for cut, reading in readings:
+    for reading in readings:
         verdict, found = reading.verdict, reading.measurement
-        common = (cut.id, cut.tooling, verdict.usable, verdict.reasons, verdict.notes, cut.conditions.spindle_speed * _RPM)
+        common = (reading.cut_id, reading.tooling, verdict.usable, verdict.reasons, verdict.notes, reading.programmed_speed * _RPM)
         if found is None:
             rows.append(RecordingRow(*common))
             continue

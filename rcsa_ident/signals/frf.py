@@ -116,8 +116,9 @@ class LineEstimator:
         found = {}
         for i, axis in enumerate(cut.axes):
             # an axis without the fixture's acceleration has the gap alone
-            own = [each[:, i] if cut.has_fixture(axis) else each[:, i, :1] for each in points]
-            found[axis] = AxisLines(order, order * cut.spindle_speed, *own, coherence[:, i], force[:, i], force_slope[:, i])
+            moved, unmoved, spread = (each[:, i] if cut.has_fixture(axis) else each[:, i, :1] for each in points)
+            omega = order * cut.spindle_speed
+            found[axis] = AxisLines(order, omega, moved, unmoved, spread, coherence[:, i], force[:, i], force_slope[:, i])
         return found
 
 
@@ -156,13 +157,12 @@ class AirCorrectedSpectra:
         spread = (self.segments - 1) / self.segments * np.sum(np.abs(left - left.mean(axis=0)) ** 2, axis=0)
         variance = 0.5 * spread * _overlap_factor(self.segments)
         shared = coherence(displacement - still.mean(axis=0), same)
-        points = values[:, :, None], np.zeros_like(values)[:, :, None], variance[:, :, None]
-        return {
-            axis: AxisLines(
-                order, order * cut.spindle_speed, *(each[:, i] for each in points), shared[:, i], force[:, i], force_slope[:, i]
-            )
-            for i, axis in enumerate(cut.axes)
-        }
+        found = {}
+        for i, axis in enumerate(cut.axes):
+            value, omega = values[:, i, None], order * cut.spindle_speed
+            nothing, spread = np.zeros_like(value), variance[:, i, None]
+            found[axis] = AxisLines(order, omega, value, nothing, spread, shared[:, i], force[:, i], force_slope[:, i])
+        return found
 
 
 def turned_air(air: SteadyRecord, angle: float, highest: int) -> tuple[ComplexArray, FloatArray]:

@@ -59,16 +59,23 @@ class CutMeasurement:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """A record's verdict and, where it is usable, its measurement.
+    """A cut whose recordings were read: their verdict and, where they are usable, the measurement.
 
     Parameters
     ----------
+    cut_id, tooling : str
+    programmed_speed : float [rad/s]
+    verdict : Verdict
+    measurement : CutMeasurement or None
     spindle_speed : float or None [rad/s]
         From the record, also of one that is not usable, unless nothing can be told of it.
     harmonics : mapping of Dof to int
         Multiples of the tooth-passing frequency, of an air cut of the spindle's, that stand above the noise beside them.
     """
 
+    cut_id: str
+    tooling: str
+    programmed_speed: float
     verdict: Verdict
     measurement: CutMeasurement | None = None
     spindle_speed: float | None = None
@@ -107,33 +114,37 @@ def measure_cut(
     if not axes:
         raise InputError("sensors", "no displacement", "a displacement sensor for X or Y", cut_id)
     programmed, notes = conditions.spindle_speed, implausible(cut)
+
+    def left_out(reasons: tuple[str, ...], speed: float | None = None, harmonics: Mapping[Dof, int] | None = None) -> Reading:
+        return Reading(cut_id, tooling, programmed, Verdict(reasons, notes), None, speed, harmonics or {})
+
     faults = raw_faults(cut) + tuple(f"air cut: {fault}" for fault in (raw_faults(air) if air is not None else ()))
     if faults:
-        return Reading(Verdict(faults, notes))
+        return left_out(faults)
     try:
         steady = steady_record(cut, axes, programmed, max_frequency, cutter.teeth)
     except Unsteady as error:
-        return Reading(Verdict((str(error.found),), notes))
+        return left_out((str(error.found),))
     found = steady.spindle_speed, _harmonics(steady)
     faults = _speed_faults(steady, programmed)
     if faults:
-        return Reading(Verdict(faults, notes), None, *found)
+        return left_out(faults, *found)
     try:
         still = None if air is None else steady_record(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
         faults = () if still is None else _speed_faults(still, programmed)
     except Unsteady as error:
         faults = (str(error.found),)
     if faults:
-        return Reading(Verdict((f"air cut: {faults[0]}",), notes), None, *found)
+        return left_out((f"air cut: {faults[0]}",), *found)
     harmonic = np.arange(cutter.teeth, steady.highest_order + 1, cutter.teeth)
     if harmonic.size == 0:
-        return Reading(Verdict((f"no tooth-passing line below {max_frequency:.0f} Hz",), notes), None, *found)
+        return left_out((f"no tooth-passing line below {max_frequency:.0f} Hz",), *found)
     angle, alignment_std = 0.0, 0.0
     if still is not None:
         angle, alignment_std = angle_to_air(steady, still, cutter.teeth)
     reasons = _cut_faults(steady, still, angle, harmonic, cutter, max_frequency)
     if reasons:
-        return Reading(Verdict(reasons, notes), None, *found)
+        return left_out(reasons, *found)
     speed = steady.spindle_speed
     force, slope = force_and_slope(cutter, replace(conditions, spindle_speed=speed), coefficients, harmonic)
     weakest = WEAKEST_FORCE * np.abs(force).max()
@@ -143,10 +154,11 @@ def measure_cut(
     lines = estimator.lines(steady, still, angle, harmonic, np.where(strong, force, max(weakest, 1e-300)), slope)
     kept = {axis: lines[axis].of(k) for axis, k in zip(axes, strong.T, strict=True) if k.any()}
     measurement = CutMeasurement(cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth))
-    return Reading(Verdict((), notes if air is not None else (*notes, NO_AIR)), measurement, *found)
+    verdict = Verdict((), notes if air is not None else (*notes, NO_AIR))
+    return Reading(cut_id, tooling, programmed, verdict, measurement, *found)
 
 
-def judge_air(air: Recording, conditions: CuttingConditions, max_frequency: float = MAX_FREQUENCY) -> Reading:
+def judge_air(cut_id: str, tooling: str, air: Recording, conditions: CuttingConditions, max_frequency: float = MAX_FREQUENCY) -> Reading:
     """Return the verdict on an air cut alone, as `measure_cut` judges it beside a cut.
 
     Raises
@@ -154,17 +166,18 @@ def judge_air(air: Recording, conditions: CuttingConditions, max_frequency: floa
     InputError
         If no displacement channel is there.
     """
-    axes, notes = measured_axes(air), implausible(air)
+    axes, notes, programmed = measured_axes(air), implausible(air), conditions.spindle_speed
     if not axes:
         raise InputError("sensors", "no displacement", "a displacement sensor for X or Y")
     faults = raw_faults(air)
     if faults:
-        return Reading(Verdict(faults, notes))
+        return Reading(cut_id, tooling, programmed, Verdict(faults, notes))
     try:
-        still = steady_record(air, axes, conditions.spindle_speed, _AIR_BEYOND * max_frequency, 1)
+        still = steady_record(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
     except Unsteady as error:
-        return Reading(Verdict((str(error.found),), notes))
-    return Reading(Verdict(_speed_faults(still, conditions.spindle_speed), notes), None, still.spindle_speed, _harmonics(still))
+        return Reading(cut_id, tooling, programmed, Verdict((str(error.found),), notes))
+    verdict = Verdict(_speed_faults(still, programmed), notes)
+    return Reading(cut_id, tooling, programmed, verdict, None, still.spindle_speed, _harmonics(still))
 
 
 def _speed_faults(steady: SteadyRecord, programmed: float) -> tuple[str, ...]:
