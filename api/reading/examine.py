@@ -94,15 +94,16 @@ def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | 
     try:
         with np.errstate(all="ignore"):
             if role == "air":
-                reading = judge_air(recording, cut.conditions)
+                reading = judge_air(cut.id, cut.tooling, recording, cut.conditions)
             else:
                 coefficients = campaign.workpiece.coefficients
                 reading = measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, coefficients)
     except InputError as error:
-        reading = Reading(Verdict((str(error),)))
+        reading = Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((str(error),)))
     except (ArithmeticError, np.linalg.LinAlgError):
-        reading = Reading(Verdict(("numbers of these samples have no finite answer",)))
-    (row,) = recording_rows([(cut, reading)])
+        reasons = ("numbers of these samples have no finite answer",)
+        reading = Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict(reasons))
+    (row,) = recording_rows([reading])
     verdict = {
         "usable": row.usable,
         "reasons": list(row.reasons),

@@ -55,11 +55,11 @@ def demo(
     stages = Stages(quiet=json_)
     _folder(out)
     with workers(processes) as pool:
-        campaign, judged = read_and_judge(data, pool, stages)
+        campaign, readings = read_and_judge(data, pool, stages)
         extra = _further_toolings(campaign, data, tooling)
-        found = search(campaign, judged, Method.default, seed, pool, stages)
+        found = search(campaign, readings, Method.default, seed, pool, stages)
         deviations = mode_deviations(found)
-        result = result_of(found, campaign, judged, deviations)
+        result = result_of(found, campaign, readings, deviations)
         write_result(out / "RESULT.json", result)
         pages: list[ToolingPage] = []
         if found.axes:
@@ -71,7 +71,7 @@ def demo(
                     pages.append(page)
                     progress(len(pages), len(wanted))
     with stages.stage("report"):
-        text = report_html(found, campaign, [(j.cut, j.reading) for j in judged], pages, stages.seconds, deviations)
+        text = report_html(found, campaign, readings, pages, stages.seconds, deviations)
         write_text(out / "report.html", text)
     if json_:
         emit(_summary(found, pages, stages, out))

@@ -23,7 +23,8 @@ from rcsa_ident.identification._kernels import cross_frf
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, chain, lower_triangle, residual_turn, scaled_joint, unpack
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.signals.measurement import MAX_FREQUENCY, WEAKEST_FORCE, AxisLines, CutMeasurement
+from rcsa_ident.signals.frf import AxisLines
+from rcsa_ident.signals.measurement import MAX_FREQUENCY, WEAKEST_FORCE, CutMeasurement
 
 #: Share of a line that the force model leaves unexplained at best.
 LEAST_MODEL_ERROR = 5e-4

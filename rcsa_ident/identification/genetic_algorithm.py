@@ -154,7 +154,7 @@ class PaperGeneticAlgorithm:
             axes=axes,
             cut_ids=data.cut_ids,
             delay=delays,
-            delay_std=data.cut_prior[:, 3] / GRID,
+            delay_std=data.cut_prior.tooth_period / GRID,
             spindle_speed=data.spindle_speed,
             trace=tuple(trace),
         )
@@ -168,7 +168,7 @@ class _Problem:
         axis = self.axis
         self.start = np.searchsorted(axis.cut, np.arange(len(data.cut_ids) + 1))
         self.weight = method.cost.weights(axis)
-        period = data.cut_prior[axis.cut, 3]
+        period = data.cut_prior.tooth_period[axis.cut]
         delay = np.arange(GRID)[:, None] / GRID * period[None, :]
         turned = axis.measured * np.exp(1j * axis.omega * delay)
         self.table = np.ascontiguousarray(np.stack([turned.real, turned.imag], axis=1))
@@ -252,7 +252,7 @@ class _Problem:
         for cut in range(best.size):
             first, last = self.start[cut], self.start[cut + 1]
             if last > first:
-                best[cut] = np.argmax(overlap[:, first:last].sum(axis=1)) / GRID * self.data.cut_prior[cut, 3]
+                best[cut] = np.argmax(overlap[:, first:last].sum(axis=1)) / GRID * self.data.cut_prior.tooth_period[cut]
         return best
 
 

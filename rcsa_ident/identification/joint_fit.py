@@ -179,7 +179,7 @@ def _start(data: IdentificationData, found: Solution, softening: bool) -> tuple[
 def _tooth_angles(data: IdentificationData, nuisance: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return each clamping's tooth angle from delays fitted without it, and the delays in the tooth-passing period that it means."""
     angles, nuisance = np.zeros(data.clampings), nuisance.copy()
-    period = data.cut_prior[:, 3]
+    period = data.cut_prior.tooth_period
     for c in range(data.clampings):
         of = data.clamping == c
         turned = (nuisance[of, 0] - data.edge[of, 0]) / period[of]

@@ -8,7 +8,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification._kernels import cross_frf, fit_cuts, mix_cuts, whiten
-from rcsa_ident.identification.data import AxisData, IdentificationData
+from rcsa_ident.identification.data import AxisData, CutPrior, IdentificationData
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, AxisParameters, Layout, chain, residual_turn, scaled_joint, unpack
 from rcsa_ident.identification.priors import Priors, prior_rows
 
@@ -264,7 +264,8 @@ class Misfit:
         models, gradients, axes = self._models(theta, layout, normal)
         nuisance = nuisance.copy()
         prior = self._cut_prior(theta, layout)
-        fit_cuts(self._lines, self._weights, np.concatenate([m.ravel() for m in models])[self._order], self._start, prior, nuisance, grid)
+        at_lines = np.concatenate([m.ravel() for m in models])[self._order]
+        fit_cuts(self._lines, self._weights, at_lines, self._start, prior.rows, nuisance, grid)
         residual = self._residual(theta, layout, models, nuisance, prior)
         linear = self._linearise(theta, layout, axes, models, gradients, residual, nuisance, prior) if normal else None
         return Evaluation(residual.cost, nuisance, tuple(models), residual, linear)
@@ -306,22 +307,23 @@ class Misfit:
             gradients.append(gradient)
         return models, gradients, axes
 
-    def _cut_prior(self, theta: FloatArray, layout: Layout) -> FloatArray:
-        """What is known of each cut, with the triggers of unknown tooth angle where that is an unknown of the layout, shape (k, 4)."""
+    def _cut_prior(self, theta: FloatArray, layout: Layout) -> CutPrior:
+        """What is known of each cut, with the triggers of unknown tooth angle where that is an unknown of the layout."""
+        prior = self.data.cut_prior
         if not layout.clampings:
-            return self.data.cut_prior
-        prior = self.data.cut_prior.copy()
+            return prior
+        delay, weight = prior.delay.copy(), prior.delay_weight.copy()
         known = self.data.clamping >= 0
         angle = theta[layout.clamping][self.data.clamping[known]]
-        prior[known, 0] = self.data.edge[known, 0] + angle / self.data.spindle_speed[known]
-        prior[known, 1] = self.data.edge[known, 1]
-        return prior
+        delay[known] = self.data.edge[known, 0] + angle / self.data.spindle_speed[known]
+        weight[known] = self.data.edge[known, 1]
+        return replace(prior, delay=delay, delay_weight=weight)
 
-    def _residual(self, theta: FloatArray, layout: Layout, models: list[ComplexArray], nuisance: FloatArray, prior: FloatArray) -> Residual:
+    def _residual(self, theta: FloatArray, layout: Layout, models: list[ComplexArray], nuisance: FloatArray, prior: CutPrior) -> Residual:
         lines = tuple(axis.rest(model, nuisance) for axis, model in zip(self._axes, models, strict=True))
         own = prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients]).residual(theta)
-        cuts = np.sqrt(prior[:, 1:3]) * nuisance
-        cuts[:, 0] -= np.sqrt(prior[:, 1]) * prior[:, 0]
+        cuts = np.sqrt(prior.weights) * nuisance
+        cuts[:, 0] -= np.sqrt(prior.delay_weight) * prior.delay
         return Residual(lines, own, cuts)
 
     def _linearise(
@@ -333,13 +335,13 @@ class Misfit:
         gradients: list[ComplexArray],
         residual: Residual,
         nuisance: FloatArray,
-        prior: FloatArray,
+        prior: CutPrior,
     ) -> Linearisation:
         """Gauss-Newton matrices of the parameters after eliminating two unknowns per cut (Schur complement)."""
         size, cuts = layout.size, len(self.data.cut_ids)
         own = prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients]).jacobian
         hessian = own.T @ own
-        cut_prior = np.sqrt(prior[:, 1:3]) * np.array([DELAY_UNIT, 1.0])
+        cut_prior = np.sqrt(prior.weights) * np.array([DELAY_UNIT, 1.0])
         mixed = np.zeros((cuts, 2, size))
         inner = np.zeros((cuts, 2, 2))
         inner[:, 0, 0], inner[:, 1, 1] = cut_prior[:, 0] ** 2, cut_prior[:, 1] ** 2
@@ -361,7 +363,7 @@ class Misfit:
         if layout.clampings:
             np.add.at(hessian, (clamping[0], clamping[0]), clamping[1] ** 2)
             mixed[np.arange(cuts), 0, clamping[0]] += cut_prior[:, 0] * clamping[1]
-        _without_information(inner, prior[:, 3])
+        _without_information(inner, prior.tooth_period)
         # inner = L L^T, cut by cut: hessian - mixed^T inner^-1 mixed = hessian - half^T half
         first = np.sqrt(inner[:, 0, 0])
         low = inner[:, 1, 0] / first
@@ -386,14 +388,14 @@ class Misfit:
         )
         return replace(linear, gradient=linear.pull(residual))
 
-    def _clamping(self, layout: Layout, prior: FloatArray) -> tuple[np.ndarray, FloatArray]:
+    def _clamping(self, layout: Layout, prior: CutPrior) -> tuple[np.ndarray, FloatArray]:
         """Place of the tooth angle that each cut's prior depends on, and the prior's change with it."""
         cuts = len(self.data.cut_ids)
         if not layout.clampings:
             return np.zeros(cuts, dtype=np.intp), np.zeros(cuts)
-        told = self.data.clamping >= 0
+        known = self.data.clamping >= 0
         place = layout.clamping.start + np.maximum(self.data.clamping, 0)
-        return place, np.where(told, -np.sqrt(prior[:, 1]) / self.data.spindle_speed, 0.0)
+        return place, np.where(known, -np.sqrt(prior.delay_weight) / self.data.spindle_speed, 0.0)
 
 
 class _AxisLines:

@@ -14,7 +14,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.parameters import JOINT
 from rcsa_ident.identification.result import AxisResult, Identification
-from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.machining_setup import Campaign
 from rcsa_ident.report import figures
 from rcsa_ident.report.lobes import stability_figure
 from rcsa_ident.report.summaries import coefficient_rows, lobes_summary, mode_rows, peak_row, recording_rows, two_digits
@@ -71,7 +71,7 @@ class ToolingPage:
 def report_html(
     found: Identification,
     campaign: Campaign,
-    readings: Iterable[tuple[Cut, Reading]],
+    readings: Iterable[Reading],
     toolings: Sequence[ToolingPage] = (),
     seconds: Mapping[str, float] | None = None,
     deviations: Mapping[Dof, tuple[FloatArray, FloatArray]] | None = None,
@@ -82,8 +82,8 @@ def report_html(
     ----------
     found : Identification
     campaign : Campaign
-    readings : iterable of (Cut, Reading)
-        The verdict on every recording.
+    readings : iterable of Reading
+        Of every cut of the campaign.
     toolings : sequence of ToolingPage
     seconds : mapping of stage to float
         How long each took.

@@ -13,7 +13,6 @@ from rcsa_ident.cutting.force import REFERENCE_RUNOUT, SLOPES
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.advice import Advice, OperatingPoint, PlannedCut
 from rcsa_ident.stability.result import StabilityLobes
@@ -45,12 +44,12 @@ class RecordingRow:
     signal_to_noise_db: dict[str, float] = field(default_factory=dict)
 
 
-def recording_rows(readings: Iterable[tuple[Cut, Reading]]) -> list[RecordingRow]:
-    """Return a row for each recording, in the campaign's order."""
+def recording_rows(readings: Iterable[Reading]) -> list[RecordingRow]:
+    """Return a row for each reading, in their order."""
     rows = []
-    for cut, reading in readings:
+    for reading in readings:
         verdict, found = reading.verdict, reading.measurement
-        common = (cut.id, cut.tooling, verdict.usable, verdict.reasons, verdict.notes, to_rpm(cut.conditions.spindle_speed))
+        common = (reading.cut_id, reading.tooling, verdict.usable, verdict.reasons, verdict.notes, to_rpm(reading.programmed_speed))
         if found is None:
             rows.append(RecordingRow(*common))
             continue

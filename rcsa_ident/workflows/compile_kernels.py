@@ -26,7 +26,8 @@ from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.observer.force_model import RandomWalk, augmented
 from rcsa_ident.observer.kalman import kalman_filter
 from rcsa_ident.observer.transfer_function import SampledModes
-from rcsa_ident.signals.measurement import AxisLines, CutMeasurement, measure_cut
+from rcsa_ident.signals.frf import AxisLines
+from rcsa_ident.signals.measurement import CutMeasurement, measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes

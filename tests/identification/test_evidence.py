@@ -32,7 +32,7 @@ def tip_errors(shop, found, speed=None, told=None):
 
 def off(found, data, delays):
     """Errors of the delays, in the tooth-passing period that is nearest [s]."""
-    period = data.cut_prior[:, 3]
+    period = data.cut_prior.tooth_period
     miss = found.delay - delays
     return miss - period * np.round(miss / period)
 
