@@ -6,29 +6,28 @@ import hashlib
 import json
 from collections.abc import Iterator
 from pathlib import Path as FilePath
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 from api.components import Components, ThisService
+from api.conventions import BODY, After, CampaignId, Limit, MachineId, Repeat, guard, page, problems, utf8
 from api.files import UPLOADS
+from api.lookups import known_campaign, machine_of
 from api.problems import Problem
 from api.reading.campaign_text import LARGEST, declare, toml_text
-from api.routes.archives import zipped
-from api.routes.common import BODY, After, Limit, MachineId, found_or_404, guard, page, problems, utf8
-from api.routes.machines import Repeat
 from api.schemas.campaigns import EXAMPLE, CampaignAnswer, CampaignSummary, CutAnswer, FileState, NewCampaign, VerdictAnswer
-from api.schemas.common import ID_PATTERN, Page, body_of
+from api.schemas.common import Page, body_of
 from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.campaigns import Campaign, Counts, Recording
 from api.stores.entities import Taken
+from api.transfer.archives import zipped
 from api.work.toolings import parsed, toml_of
 
 router = APIRouter(tags=["campaigns"], route_class=Guarded)
 TOML, JSON, ZIP = "application/toml", "application/json", "application/zip"
-CampaignId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a campaign.")]
 _EXAMPLE_TOML = toml_of({key: value for key, value in EXAMPLE.items() if key != "cuts"}) + "".join(
     f"[[cuts]]\n{toml_of(cut)}" for cut in EXAMPLE["cuts"]
 )
@@ -59,7 +58,7 @@ async def make(
     is_toml = request.headers["content-type"].split(";")[0].strip().lower() == TOML
 
     def keep() -> Campaign:
-        found_or_404(parts.store.machines.get(caller.group, id), "machine")
+        machine_of(parts, caller.group, id)
         data = parsed(utf8(raw)) if is_toml else body_of(NewCampaign, raw).model_dump(exclude_unset=True, exclude_none=True)
         name, text, cuts = declare(data, lambda name: _tooling(parts, caller.group, name))
         campaign = Campaign(new_id(), caller.group, id, name, text, cuts, now())
@@ -84,7 +83,7 @@ def _tooling(parts: Components, group: str, name: str) -> str | None:
 
 @router.get("/machines/{id}/campaigns", summary="List campaigns of a machine", openapi_extra=guard("read"), responses=problems(404, 422))
 def list_campaigns(id: MachineId, parts: ThisService, caller: WhoAsks, after: After = "", limit: Limit = 50) -> Page[CampaignSummary]:
-    found_or_404(parts.store.machines.get(caller.group, id), "machine")
+    machine_of(parts, caller.group, id)
     rows, following = page(parts.store.campaigns.list(caller.group, id, after, limit + 1), limit, lambda row: row.id)
     counts = parts.store.campaigns.counts(caller.group, [row.id for row in rows])
     items = []
@@ -144,11 +143,6 @@ def forget(id: CampaignId, parts: ThisService, caller: WhoAsks) -> Response:
     if not parts.uploads.forget_campaign(known_campaign(parts, caller.group, id)):
         raise Problem(404, "there is no such campaign")
     return Response(status_code=204)
-
-
-def known_campaign(parts: Components, group: str, id: str) -> Campaign:
-    """Return a campaign that is there."""
-    return found_or_404(parts.store.campaigns.get(group, id), "campaign")
 
 
 def _answer(parts: Components, campaign: Campaign) -> CampaignAnswer:

@@ -10,11 +10,11 @@ from fastapi import APIRouter, Path, Response
 from fastapi.responses import FileResponse, StreamingResponse
 
 from api.components import Components, ThisService
+from api.conventions import guard, problems
 from api.problems import Problem
-from api.routes.archives import zipped, zipped_bytes
-from api.routes.common import guard, problems
 from api.schemas.libraries import Example, Examples
 from api.security import Guarded
+from api.transfer.archives import zipped, zipped_bytes
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_campaign
 

@@ -13,18 +13,17 @@ from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
 from api.components import Components, ThisService
+from api.conventions import BODY, guard, problems
+from api.lookups import known_machine, pair_reader, tooling_text, uploaded
 from api.problems import Problem
+from api.reading import reader_tasks
 from api.reading.campaign_text import FORMATS, Upload
-from api.reading.plain import read_plain
 from api.reading.uploads import Received
-from api.routes.common import BODY, guard, problems
-from api.routes.machines import known_machine
-from api.routes.multipart import FORM, form
-from api.routes.stream_opening import given_sensors, reader, uploaded
-from api.routes.tool_change import tooling_text
+from api.schemas.campaigns import given_sensors
 from api.schemas.common import body_of
 from api.schemas.forces import ForceAnswer, ForceQuery, ForceUpload
 from api.security import Guarded, WhoAsks
+from api.transfer.multipart import FORM, form
 from api.work.forces import ForceQuestion, ReadPair, forces, sensors_of
 from api.work.requests import MachineText, ToolingText
 from rcsa_ident.errors import InputError
@@ -80,7 +79,7 @@ async def estimate(request: Request, parts: ThisService, caller: WhoAsks) -> Any
 def _of_campaign(parts: Components, group: str, query: ForceQuery) -> tuple[MachineText, ToolingText, ForceQuestion, ReadPair]:
     found = uploaded(parts, group, query.campaign, query.recording)
     tooling = found.tooling if query.tooling is None else tooling_text(parts, group, query.tooling)
-    return known_machine(parts, group, query.machine), tooling, query.question(found.speed), reader(found.cut, found.air)
+    return known_machine(parts, group, query.machine), tooling, query.question(found.speed), pair_reader(found.cut, found.air)
 
 
 def _of_upload(parts: Components, group: str, upload: ForceUpload) -> tuple[MachineText, ToolingText, ForceQuestion, tuple[Sensor, ...]]:
@@ -100,8 +99,8 @@ async def _read(
             if not file.lower().endswith(FORMATS):
                 raise InputError(name, file[-80:], f"a file that ends in one of {', '.join(FORMATS)}")
             targets[name] = await run_in_threadpool(parts.files.spare, group)
-            await parts.reader.run(read_plain, Upload(received.path, file, targets[name]), sensors, rate)
-        yield reader(targets["recording"], targets.get("air"))
+            await parts.reader.run(reader_tasks.read_alone, Upload(received.path, file, targets[name]), sensors, rate)
+        yield pair_reader(targets["recording"], targets.get("air"))
     finally:
         for path in targets.values():
             path.unlink(missing_ok=True)

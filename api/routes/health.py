@@ -8,8 +8,8 @@ from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
 from api.components import ThisService
+from api.conventions import problems
 from api.problems import Problem
-from api.routes.common import problems
 from api.schemas.common import Answer
 
 router = APIRouter(tags=["health"])

@@ -10,10 +10,10 @@ from fastapi import APIRouter, Query, Response
 from fastapi.responses import StreamingResponse
 
 from api.components import ThisService
-from api.routes import jobs
-from api.routes.common import BODY, After, Limit, found_or_404, guard, page, problems
-from api.routes.jobs import ACCEPTED, RETRY, STREAM, JobId, Prefer, Seen
-from api.routes.machines import Repeat
+from api.conventions import BODY, After, Limit, Repeat, guard, page, problems
+from api.live import jobs
+from api.live.jobs import ACCEPTED, RETRY, STREAM, JobId, Prefer, Seen
+from api.lookups import known_campaign
 from api.schemas.common import ID_PATTERN, Page
 from api.schemas.jobs import FittedLines, JobAnswer, JobState, NewIdentification
 from api.schemas.machines import Identification, Modes
@@ -40,7 +40,7 @@ _Of = Annotated[str | None, Query(pattern=ID_PATTERN)]
     responses={202: ACCEPTED, **problems(404, 409, *BODY)},
 )
 def identify(body: NewIdentification, parts: ThisService, caller: WhoAsks, repeat: Repeat = None) -> Any:
-    campaign = found_or_404(parts.store.campaigns.get(caller.group, body.campaign), "campaign")
+    campaign = known_campaign(parts, caller.group, body.campaign)
     counts = parts.store.campaigns.counts(caller.group, [campaign.id]).get(campaign.id)
     if counts is None or counts.uploaded == 0:
         raise InputError("campaign", f"no recording of its {campaign.cuts} cuts", "a campaign with recordings")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from fastapi import APIRouter, Response
 
 from api.components import ThisService
+from api.conventions import BODY, After, KeyId, Limit, guard, page, problems
 from api.problems import Problem
-from api.routes.common import BODY, After, KeyId, Limit, guard, page, problems
 from api.schemas.common import Page
 from api.schemas.keys import KeyAnswer, MadeKey, NewKey
 from api.security import Guarded, WhoAsks, make_key

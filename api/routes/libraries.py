@@ -9,8 +9,8 @@ from fastapi import APIRouter, Query, Request
 from fastapi.concurrency import run_in_threadpool
 
 from api.components import ThisService
+from api.conventions import BODY, found_or_404, guard, problems
 from api.problems import Problem
-from api.routes.common import BODY, found_or_404, guard, problems
 from api.routes.toolings import summary
 from api.schemas.common import NAME_PATTERN
 from api.schemas.libraries import ImportAnswer, ImportedTool

@@ -6,26 +6,21 @@ import hashlib
 import json
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from api.components import Components, ThisService
+from api.conventions import BODY, After, Limit, MachineId, Repeat, expected, guard, page, problems, tagged, unchanged, utf8
+from api.lookups import identification_of, known_machine, machine_of
 from api.problems import Problem
-from api.routes.common import BODY, After, Limit, MachineId, expected, found_or_404, guard, page, problems, tagged, unchanged, utf8
 from api.schemas.common import Page
 from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes, NewMachine
 from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.entities import Document, Machine, Stale, Taken, digest_of
 from api.work import tasks
-from api.work.requests import MachineText
-from rcsa_ident.errors import InputError
 
 router = APIRouter(prefix="/machines", tags=["machines"], route_class=Guarded)
 _RESULT = {"content": {"application/json": {"schema": {"$ref": "#/components/schemas/Identification"}}}, "required": True}
-Repeat = Annotated[
-    str | None,
-    Header(alias="Idempotency-Key", pattern=r"^[\x21-\x7e]{1,128}$", description="The same again answers as the first time, for a day."),
-]
 
 
 @router.post("", status_code=201, summary="Make a machine", openapi_extra=guard("upload"), responses=problems(409, *BODY))
@@ -50,7 +45,7 @@ def list_machines(parts: ThisService, caller: WhoAsks, after: After = "", limit:
 
 @router.get("/{id}", summary="A machine", openapi_extra=guard("read"), responses=problems(404, 422))
 def get(id: MachineId, parts: ThisService, caller: WhoAsks) -> MachineAnswer:
-    return _answer(parts, found_or_404(parts.store.machines.get(caller.group, id), "machine"))
+    return _answer(parts, machine_of(parts, caller.group, id))
 
 
 @router.delete(
@@ -74,7 +69,7 @@ def forget(id: MachineId, parts: ThisService, caller: WhoAsks) -> Response:
     responses={201: {"model": IdentificationSummary, "description": "There was none before."}, **problems(404, 412, *BODY)},
 )
 async def identify(id: MachineId, request: Request, response: Response, parts: ThisService, caller: WhoAsks) -> IdentificationSummary:
-    await run_in_threadpool(_machine, parts, caller.group, id)
+    await run_in_threadpool(machine_of, parts, caller.group, id)
     text = utf8(await request.body())
     summary = await parts.work.run(tasks.check, text)
     document = Document(caller.group, id, text, json.dumps(summary), digest_of(text), now())
@@ -103,7 +98,7 @@ async def identify(id: MachineId, request: Request, response: Response, parts: T
     },
 )
 def result(id: MachineId, request: Request, parts: ThisService, caller: WhoAsks) -> Response:
-    document = _document(parts, caller.group, id)
+    document = identification_of(parts, caller.group, id)
     if unchanged(request, document.digest):
         return Response(status_code=304, headers=tagged(document.digest))
     return Response(document.text.encode(), media_type="application/json", headers=tagged(document.digest))
@@ -113,7 +108,7 @@ def result(id: MachineId, request: Request, parts: ThisService, caller: WhoAsks)
     "/{id}/identification/modes", summary="Modes with their uncertainties", openapi_extra=guard("read"), responses=problems(404, 422)
 )
 def modes(id: MachineId, parts: ThisService, caller: WhoAsks) -> Modes:
-    return Modes.model_validate(tasks.modes(json.loads(_document(parts, caller.group, id).text)))
+    return Modes.model_validate(tasks.modes(json.loads(identification_of(parts, caller.group, id).text)))
 
 
 @router.get(
@@ -132,23 +127,6 @@ async def frf(
 ) -> Frf:
     machine = await run_in_threadpool(known_machine, parts, caller.group, id)
     return Frf.model_validate(await parts.work.run(tasks.flange_frf, machine, (from_hz, to_hz, step_hz), parts.settings.work_seconds))
-
-
-def known_machine(parts: Components, group: str, id: str) -> MachineText:
-    """Return the identification of a machine that one can compute with."""
-    document = _document(parts, group, id)
-    if not json.loads(document.summary)["axes"]:
-        raise InputError("machine", "an identification that has failed", "a machine with an identification of axis X, Y or both")
-    return MachineText(document.digest, document.text)
-
-
-def _machine(parts: Components, group: str, id: str) -> Machine:
-    return found_or_404(parts.store.machines.get(group, id), "machine")
-
-
-def _document(parts: Components, group: str, id: str) -> Document:
-    _machine(parts, group, id)
-    return found_or_404(parts.store.identifications.get(group, id), "identification of the machine")
 
 
 def _digest(document: Document | None) -> str | None:

@@ -6,18 +6,18 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 
 from api.components import Components, ThisService
+from api.conventions import BODY, CampaignId, guard, problems
 from api.files import Part
+from api.lookups import known_campaign
 from api.problems import Problem, of_input
 from api.reading.campaign_text import files_of
-from api.routes.body_stream import complete, plain, room, told_length, write
-from api.routes.campaigns import CampaignId, known_campaign
-from api.routes.common import BODY, guard, problems
-from api.routes.multipart import FORM, Head, events
 from api.routes.recordings import answer, take
 from api.schemas.campaigns import ItemProblem, UploadAnswer, UploadItem
 from api.schemas.common import Fault
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign
+from api.transfer.body_stream import complete, plain, room, told_length, write
+from api.transfer.multipart import FORM, Head, events
 from api.work.pool import Busy
 from rcsa_ident.errors import InputError
 

@@ -13,19 +13,19 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 from api.components import Components, ThisService
+from api.conventions import BODY, CampaignId, Limit, found_or_404, guard, page, problems, tagged, unchanged
 from api.files import NORMALISED, UPLOADS
+from api.lookups import known_campaign
 from api.problems import Problem
 from api.reading import reader_tasks
 from api.reading.campaign_text import File, files_of
 from api.reading.uploads import Received
-from api.routes.body_stream import append, arriving, check_digest, complete, plain, room, told_digest, told_length
-from api.routes.campaigns import CampaignId, known_campaign
-from api.routes.common import BODY, Limit, found_or_404, guard, page, problems, tagged, unchanged
 from api.schemas.campaigns import RecordingAnswer, SignalAnswer, SpectrumAnswer
 from api.schemas.common import Page
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign, Recording
 from api.stores.entities import Taken
+from api.transfer.body_stream import append, arriving, check_digest, complete, plain, room, told_digest, told_length
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
 BINARY = "application/octet-stream"

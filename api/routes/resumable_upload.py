@@ -11,16 +11,15 @@ from fastapi.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 
 from api.components import Components, ThisService
+from api.conventions import BODY, CampaignId, guard, problems, tagged
 from api.files import Part, Partial
 from api.problems import Problem
 from api.reading.uploads import partial_name
-from api.routes.body_stream import LOOK, blocks, check_digest, complete, plain, room, spacious, told_digest, write
-from api.routes.campaigns import CampaignId
-from api.routes.common import BODY, guard, problems, tagged
 from api.routes.recordings import BINARY, RecordingName, Replace, answer, named, take
 from api.schemas.campaigns import RecordingAnswer
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign
+from api.transfer.body_stream import LOOK, blocks, check_digest, complete, plain, room, spacious, told_digest, write
 from rcsa_ident.errors import InputError
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from fastapi import APIRouter, Request, Response
 
+from api.conventions import tagged, unchanged
 from api.problems import Problem
-from api.routes.common import tagged, unchanged
 
 router = APIRouter(include_in_schema=False)
 FOLDER = Path(__file__).resolve().parents[1] / "web"

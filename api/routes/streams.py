@@ -17,11 +17,11 @@ from starlette.websockets import WebSocketDisconnect, WebSocketState
 
 from api import problems
 from api.components import Components, ThisService
+from api.conventions import guard
+from api.conventions import problems as documented
+from api.live.stream_connection import LINGER, UNEXPECTED, ended, owned, watched
+from api.live.stream_opening import logger, replayed
 from api.problems import Problem
-from api.routes.common import guard
-from api.routes.common import problems as documented
-from api.routes.stream_connection import LINGER, UNEXPECTED, ended, owned, watched
-from api.routes.stream_opening import logger, replayed
 from api.schemas.common import body_of
 from api.schemas.forces import Hello, ReplayHello, StreamHello, StreamsAnswer, StreamSummary, WatchHello
 from api.security import HEADER, Caller, Guarded, WhoAsks, caller_of, new_id

@@ -14,7 +14,7 @@ import pytest
 
 from api.reading.campaign_text import FORMATS, campaign_of_text, declare, files_of, recording_name, toml_text
 from api.reading.campaigns import load_campaign
-from api.routes.archives import zipped
+from api.transfer.archives import zipped
 from api.work.toolings import toml_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import READERS, read_cut
@@ -271,7 +271,7 @@ def test_an_archive_of_nothing(client, machine):
 
 def test_an_archive_is_never_whole_in_memory(tmp_path, monkeypatch):
     (tmp_path / "long").write_bytes(bytes(range(256)) * 40)
-    monkeypatch.setattr("api.routes.archives._BLOCK", 1000)
+    monkeypatch.setattr("api.transfer.archives._BLOCK", 1000)
     pieces = list(zipped([("a/short", b"x"), ("b/long", tmp_path / "long")]))
     assert max(map(len, pieces)) < 1300
     archive = zipfile.ZipFile(io.BytesIO(b"".join(pieces)))

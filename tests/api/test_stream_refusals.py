@@ -212,7 +212,7 @@ def test_keys_scopes_and_groups(keyed):
 
 
 def test_a_key_that_is_withdrawn_ends_its_stream(keyed, monkeypatch):
-    monkeypatch.setattr("api.routes.stream_connection.LOOK", 0.1)
+    monkeypatch.setattr("api.live.stream_connection.LOOK", 0.1)
     http, id, keys = keyed
     with http.websocket_connect(STREAM) as socket, http.websocket_connect(STREAM) as viewer:
         socket.send_json(hello(id, key=keys["run"]))

@@ -13,9 +13,9 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse, StreamingResponse
 
 from api.components import Components
+from api.conventions import found_or_404
 from api.jobs.event_feed import Crowded
 from api.problems import Problem
-from api.routes.common import found_or_404
 from api.schemas.common import ID_PATTERN
 from api.schemas.jobs import JobAnswer
 from api.security import now

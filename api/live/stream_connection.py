@@ -15,8 +15,8 @@ from starlette.websockets import WebSocketDisconnect
 
 from api import problems
 from api.components import Components
+from api.live.stream_opening import Opening
 from api.problems import Problem
-from api.routes.stream_opening import Opening
 from api.schemas.forces import Hello
 from api.security import LOCAL_KEY, Caller
 from api.stores.entities import Unavailable

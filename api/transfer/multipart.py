@@ -15,7 +15,7 @@ from api.files import Part
 from api.problems import Problem
 from api.reading.campaign_text import recording_name
 from api.reading.uploads import Received
-from api.routes.body_stream import arriving, blocks, complete, write
+from api.transfer.body_stream import arriving, blocks, complete, write
 
 FORM = "multipart/form-data"
 MOST_PARTS, LARGEST_TEXT = 1000, 1_000_000
