@@ -12,10 +12,11 @@ from fastapi.openapi.utils import get_openapi
 
 from api import problems
 from api.access import AccessMonitor
-from api.components import Components, JobCounts, Metrics, Rates
+from api.components import Components, Rates
 from api.files import Files
 from api.jobs.event_feed import EventFeeds
 from api.jobs.supervisor import Supervisor
+from api.metrics import JobCounts, Metrics
 from api.reading.reader import Limits, Reader
 from api.reading.uploads import Uploads
 from api.routes import (
