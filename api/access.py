@@ -31,8 +31,8 @@ BODY_SECONDS, BYTE_SECONDS, HEAD_SECONDS, HEAD_BYTES = 60.0, 1e-4, 20.0, 262_144
 class AccessMonitor:
     """The outermost layer of the service."""
 
-    def __init__(self, app: ASGIApp, parts: Components) -> None:
-        self.app, self.parts = app, parts
+    def __init__(self, app: ASGIApp, components: Components) -> None:
+        self.app, self.components = app, components
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -44,7 +44,7 @@ class AccessMonitor:
         request.state.request_id = id
         status, start = 0, time.perf_counter()
         # routes that stream to the disk let more in
-        request.state.body = body = _Body(request, receive, self.parts.settings.max_body_bytes)
+        request.state.body = body = _Body(request, receive, self.components.settings.max_body_bytes)
 
         async def observed(message: Message) -> None:
             nonlocal status
@@ -71,8 +71,8 @@ class AccessMonitor:
         # the pattern, not the path: ids would make a counter each
         route = getattr(scope.get("route"), "path", "unknown")
         method = scope["method"] if scope["method"] in ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS") else "other"
-        self.parts.metrics.requests.labels(method, route, str(status)).inc()
-        self.parts.metrics.seconds.labels(method, route).observe(seconds)
+        self.components.metrics.requests.labels(method, route, str(status)).inc()
+        self.components.metrics.seconds.labels(method, route).observe(seconds)
         caller = scope.get("state", {}).get("caller")
         fields = {"request_id": id, "method": method, "route": route, "status": status, "seconds": round(seconds, 6)}
         log.info("request", extra={"fields": fields | ({} if caller is None else {"key": caller.id, "group": caller.group})})

@@ -67,10 +67,10 @@ class Components:
     crew: Supervisor | None = field(repr=False)
 
 
-def parts_of(request: Request) -> Components:
-    """Return the parts of the service that a request came to."""
-    parts: Components = request.app.state.parts
-    return parts
+def components_of(request: Request) -> Components:
+    """Return the components of the service that a request came to."""
+    components: Components = request.app.state.components
+    return components
 
 
-ThisService = Annotated[Components, Depends(parts_of)]
+ThisService = Annotated[Components, Depends(components_of)]

@@ -83,7 +83,7 @@ def create_app(
     rates, metrics = Rates(settings.requests_per_minute, settings.burst), Metrics(lambda: float(workers.waiting))
     hub = Hub(StreamProcess() if host is None else host, _stream_limits(settings), metrics)
     metrics.streams.set_function(lambda: float(len(hub.sessions)))
-    parts = Components(
+    components = Components(
         settings, kept, workers, files, readers, uploads, rates, metrics, hub, EventFeeds(kept.jobs, settings.watchers), crew
     )
     metrics.registry.register(JobCounts(kept.jobs))
@@ -114,14 +114,14 @@ def create_app(
         docs_url=None,
         redoc_url=None,
     )
-    app.state.parts = parts
+    app.state.components = components
     problems.install(app)
     app.include_router(health.router)
     app.include_router(static_files.router)
     about = (keys, machines, toolings, libraries, materials, examples)
     for each in (*about, campaigns, recordings, resumable_upload, multi_upload, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
-    app.add_middleware(AccessMonitor, parts=parts)
+    app.add_middleware(AccessMonitor, components=components)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
     return app
 

@@ -40,29 +40,29 @@ UNEXPECTED = End(1011, 500, "something unexpected happened; the log has it under
 _WORDS = {1009: 413, 1003: 415}
 
 
-async def owned(websocket: WebSocket, parts: Components, caller: Caller, session: Session, opening: Opening, hello: Hello) -> End:
+async def owned(websocket: WebSocket, components: Components, caller: Caller, session: Session, opening: Opening, hello: Hello) -> End:
     """Serve the client that a session belongs to."""
-    hub, listener = parts.streams, Listener(len(session.about.axes), hello.format == "json", hello.envelope)
+    hub, listener = components.streams, Listener(len(session.about.axes), hello.format == "json", hello.envelope)
     hub.listen(session, listener)
     about = session.about
     listener.tell("opened", session=about.id, axes=list(about.axes), sampling_rate_hz=about.rate, settle_samples=opening.settle)
     tasks = [
         _told(hub, session, _received(websocket, hub, session, hello.format == "json", opening.source is None)),
-        _told(hub, session, _prepared(parts, session, opening)),
-        _told(hub, session, _allowed(parts, caller)),
+        _told(hub, session, _prepared(components, session, opening)),
+        _told(hub, session, _allowed(components, caller)),
     ]
     return await _until_over(websocket, session, listener, tasks)
 
 
-async def watched(websocket: WebSocket, parts: Components, caller: Caller, session: Session, hello: Hello) -> End:
+async def watched(websocket: WebSocket, components: Components, caller: Caller, session: Session, hello: Hello) -> End:
     """Serve a viewer; a session does not end with it."""
     listener, about = Listener(len(session.about.axes), hello.format == "json", hello.envelope), session.about
-    parts.streams.listen(session, listener)
+    components.streams.listen(session, listener)
     listener.tell("watching", session=about.id, name=about.name, axes=list(about.axes), sampling_rate_hz=about.rate)
     if session.stage is Stage.LIVE:
         listener.tell("ready", **session.ready)
     try:
-        tasks = [asyncio.create_task(_silent(websocket)), asyncio.create_task(_allowed(parts, caller))]
+        tasks = [asyncio.create_task(_silent(websocket)), asyncio.create_task(_allowed(components, caller))]
         return await _until_over(websocket, session, listener, tasks)
     finally:
         session.listeners.remove(listener)
@@ -75,11 +75,11 @@ async def _silent(websocket: WebSocket) -> None:
     raise WebSocketDisconnect
 
 
-async def _allowed(parts: Components, caller: Caller) -> None:
+async def _allowed(components: Components, caller: Caller) -> None:
     """Look now and then whether the key is still one."""
     while True:
         await asyncio.sleep(LOOK)
-        if caller.id != LOCAL_KEY and await run_in_threadpool(parts.store.keys.get, caller.id) is None:
+        if caller.id != LOCAL_KEY and await run_in_threadpool(components.store.keys.get, caller.id) is None:
             raise Problem(401, "the key has been withdrawn")
 
 
@@ -174,9 +174,9 @@ async def finished(hub: Hub, session: Session) -> None:
     hub.close(session, End())
 
 
-async def _prepared(parts: Components, session: Session, opening: Opening) -> None:
+async def _prepared(components: Components, session: Session, opening: Opening) -> None:
     """Have the observer made, then stream; of a replay also feed it."""
-    hub, loop = parts.streams, asyncio.get_running_loop()
+    hub, loop = components.streams, asyncio.get_running_loop()
     limit, refused = loop.time() + SETTLING, None
     while session.stage is not Stage.LIVE:
         window = (0, None) if opening.source is not None else session.window(opening.settle)
@@ -192,7 +192,7 @@ async def _prepared(parts: Components, session: Session, opening: Opening) -> No
             continue
         session.stage = Stage.DESIGNING
         try:
-            plan, ready = await _patiently(functools.partial(opening.design, parts.work, *window))
+            plan, ready = await _patiently(functools.partial(opening.design, components.work, *window))
         except InputError as error:
             if opening.source is not None or error.field not in UNSTEADY or loop.time() > limit:
                 raise refused or error from None
@@ -201,7 +201,7 @@ async def _prepared(parts: Components, session: Session, opening: Opening) -> No
             for listener in session.listeners:
                 listener.tell("settling", detail=detail.detail, errors=detail.errors)
             session.stage = Stage.SETTLING if session.stage is Stage.DESIGNING else session.stage
-            parts.metrics.missed(0, session.skip(window[0] + opening.settle))
+            components.metrics.missed(0, session.skip(window[0] + opening.settle))
             await asyncio.sleep(PAUSE)
             continue
         hub.begin(session, plan, window[0], {"session": session.about.id, **ready})

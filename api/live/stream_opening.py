@@ -101,12 +101,12 @@ class Opening:
                 hub.offer(session, start + first, samples)
 
 
-async def logger(parts: Components, group: str, hello: StreamHello) -> Opening:
+async def logger(components: Components, group: str, hello: StreamHello) -> Opening:
     """Return the opening of a data logger's stream."""
 
     def look() -> Opening:
-        known = known_machine(parts, group, hello.machine)
-        tooling = tooling_text(parts, group, hello.tooling)
+        known = known_machine(components, group, hello.machine)
+        tooling = tooling_text(components, group, hello.tooling)
         channels = channels_of(hello.channels, given_sensors(hello.sensors) or sensors_of(known.text))
         speed = None if hello.spindle_speed_rpm is None else hello.spindle_speed_rpm * _RPM
         if speed is None and not any(sensor.quantity is Quantity.TRIGGER for sensor in channels):
@@ -115,28 +115,28 @@ async def logger(parts: Components, group: str, hello: StreamHello) -> Opening:
         if len(set(axes)) < len(axes):
             raise InputError("axes", list(axes), "each axis once")
         seconds = max(hello.settle_s, 0.0 if speed is None else REVOLUTIONS * 2.0 * math.pi / speed)
-        if seconds > 0.5 * parts.settings.stream_buffer_seconds:
+        if seconds > 0.5 * components.settings.stream_buffer_seconds:
             raise InputError("spindle_speed_rpm", hello.spindle_speed_rpm, f"a speed of which {REVOLUTIONS} revolutions can wait")
         settle = math.ceil(seconds * hello.sampling_rate_hz)
         air = None
         if hello.air is not None:
             if hello.begins == "air":
                 raise InputError("air", "a recording, and a stream that begins in air", "one of them")
-            air = air_cut(parts, group, hello.air.campaign, hello.air.recording)
+            air = air_cut(components, group, hello.air.campaign, hello.air.recording)
         question = StreamQuestion(hello.sampling_rate_hz, speed, channels, axes, hello.begins, hello.method)
         return Opening(known, tooling, hello.machine, hello.name, question, settle, air)
 
     return await run_in_threadpool(look)
 
 
-async def replayed(parts: Components, group: str, hello: ReplayHello) -> Opening:
+async def replayed(components: Components, group: str, hello: ReplayHello) -> Opening:
     """Return the opening of a recording that is played."""
 
     def look() -> Opening:
-        found = uploaded(parts, group, hello.replay.campaign, hello.replay.recording)
+        found = uploaded(components, group, hello.replay.campaign, hello.replay.recording)
         machine_id = hello.machine or found.machine
-        known = known_machine(parts, group, machine_id)
-        tooling = found.tooling if hello.tooling is None else tooling_text(parts, group, hello.tooling)
+        known = known_machine(components, group, machine_id)
+        tooling = found.tooling if hello.tooling is None else tooling_text(components, group, hello.tooling)
         axes = displacement_axes(found.sensors)
         question = StreamQuestion(found.rate, found.speed, found.sensors, axes, "cut", hello.method)
         source = Source(found.cut, found.air, hello.replay.rate)

@@ -43,8 +43,8 @@ MOST_HELLO = 300_000
     openapi_extra=guard("read"),
     responses=documented(),
 )
-async def streams(parts: ThisService, caller: WhoAsks) -> StreamsAnswer:
-    return StreamsAnswer(items=[_summary(session) for session in parts.streams.list(caller.group)])
+async def streams(components: ThisService, caller: WhoAsks) -> StreamsAnswer:
+    return StreamsAnswer(items=[_summary(session) for session in components.streams.list(caller.group)])
 
 
 def _summary(session: Session) -> StreamSummary:
@@ -66,10 +66,10 @@ def _summary(session: Session) -> StreamSummary:
 
 @router.websocket("/forces/stream")
 async def stream(websocket: WebSocket) -> None:
-    parts: Components = websocket.app.state.parts
+    components: Components = websocket.app.state.components
     id = new_id()
     try:
-        caller = await _admitted(websocket, parts)
+        caller = await _admitted(websocket, components)
     except Problem as problem:
         document = JSONResponse(problems.told(problem, id), problem.status, problem.headers, problems.MEDIA_TYPE)
         await websocket.send_denial_response(document)
@@ -77,7 +77,7 @@ async def stream(websocket: WebSocket) -> None:
     await websocket.accept()
     end = UNEXPECTED
     try:
-        end = await _served(websocket, parts, caller, id)
+        end = await _served(websocket, components, caller, id)
     except WebSocketDisconnect:
         return
     except Exception as error:
@@ -89,52 +89,52 @@ async def stream(websocket: WebSocket) -> None:
             await _farewell(websocket, end, id)
 
 
-async def _admitted(websocket: HTTPConnection, parts: Components) -> Caller | None:
+async def _admitted(websocket: HTTPConnection, components: Components) -> Caller | None:
     """Return who asks, None where the first message is to tell; a page from elsewhere is not let in, whatever the browser would send."""
     origin, host = websocket.headers.get("origin"), websocket.headers.get("host", "")
     if origin is not None and (urlsplit(origin).scheme not in ("http", "https") or urlsplit(origin).netloc.lower() != host.lower()):
         raise Problem(403, "a page of another origin can not open a stream")
     where = websocket.client.host if websocket.client is not None else "nobody"
-    _paced(parts, f"open {where}")
-    if parts.settings.asks_for_keys and not websocket.headers.get(HEADER):
+    _paced(components, f"open {where}")
+    if components.settings.asks_for_keys and not websocket.headers.get(HEADER):
         return None
-    return await run_in_threadpool(caller_of, websocket, parts)
+    return await run_in_threadpool(caller_of, websocket, components)
 
 
-def _paced(parts: Components, who: str) -> None:
-    seconds = parts.rates.wait(who)
+def _paced(components: Components, who: str) -> None:
+    seconds = components.rates.wait(who)
     if seconds > 0.0:
         raise Problem(429, "too many streams are opened", headers={"Retry-After": str(math.ceil(seconds))})
 
 
-async def _served(websocket: WebSocket, parts: Components, caller: Caller | None, id: str) -> End:
+async def _served(websocket: WebSocket, components: Components, caller: Caller | None, id: str) -> End:
     """Read the first message, do what it says, and return how it ended."""
     raw = await _hello(websocket)
     data = object_of(raw)
     kind: type[Hello] = WatchHello if "watch" in data else ReplayHello if "replay" in data else StreamHello
     hello = body_of(kind, raw.encode("utf-8", "replace"))
     if caller is None:
-        caller = await run_in_threadpool(caller_of, websocket, parts, hello.key)
-    _paced(parts, caller.id)
+        caller = await run_in_threadpool(caller_of, websocket, components, hello.key)
+    _paced(components, caller.id)
     scope = "read" if isinstance(hello, WatchHello) and not caller.may("run") else "run"
     if not caller.may(scope):
         raise Problem(403, f"the key has not the scope {scope}")
     log.info("stream", extra={"fields": {"request_id": id, "kind": kind.__name__, "key": caller.id, "group": caller.group}})
-    hub = parts.streams
+    hub = components.streams
     if isinstance(hello, WatchHello):
         session = hub.get(caller.group, hello.watch)
         if session is None:
             raise Problem(404, "there is no such stream")
-        return await watched(websocket, parts, caller, session, hello)
+        return await watched(websocket, components, caller, session, hello)
     if isinstance(hello, ReplayHello):
-        opening = await replayed(parts, caller.group, hello)
+        opening = await replayed(components, caller.group, hello)
     else:
         assert isinstance(hello, StreamHello)
-        opening = await logger(parts, caller.group, hello)
-    about = opening.about(id, caller.group, parts.settings.stream_buffer_seconds)
+        opening = await logger(components, caller.group, hello)
+    about = opening.about(id, caller.group, components.settings.stream_buffer_seconds)
     session = hub.open(about)
     try:
-        return await owned(websocket, parts, caller, session, opening, hello)
+        return await owned(websocket, components, caller, session, opening, hello)
     except WebSocketDisconnect:
         hub.close(session, End())
         raise

@@ -25,7 +25,7 @@ BLOCK, LOOK = 1 << 20, 64 << 20
 _DIGEST = re.compile(r"(?:^|,)\s*sha-256=:([A-Za-z0-9+/=]*):")
 
 
-async def blocks(request: Request, parts: Components) -> AsyncIterator[bytearray]:
+async def blocks(request: Request, components: Components) -> AsyncIterator[bytearray]:
     """Yield the body in blocks; what arrives too slowly, or not at all, ends it.
 
     Raises
@@ -35,7 +35,7 @@ async def blocks(request: Request, parts: Components) -> AsyncIterator[bytearray
     HTTPException
         413 where the body is larger than an upload may be.
     """
-    settings, waited, seen, buffer = parts.settings, 0.0, 0, bytearray()
+    settings, waited, seen, buffer = components.settings, 0.0, 0, bytearray()
     request.state.body.most = settings.max_upload_bytes
     stream = request.stream()
     while True:
@@ -63,28 +63,28 @@ async def blocks(request: Request, parts: Components) -> AsyncIterator[bytearray
         yield buffer
 
 
-async def append(request: Request, parts: Components, group: str, part: Part) -> None:
+async def append(request: Request, components: Components, group: str, part: Part) -> None:
     """Write a body behind a part; the disk keeps what it has to keep."""
     seen = 0
-    async for block in blocks(request, parts):
+    async for block in blocks(request, components):
         seen += len(block)
-        await write(parts, group, part, block, seen)
+        await write(components, group, part, block, seen)
 
 
-async def write(parts: Components, group: str, part: Part, block: bytes | bytearray, seen: int) -> None:
+async def write(components: Components, group: str, part: Part, block: bytes | bytearray, seen: int) -> None:
     """Write a block, `seen` being the bytes of this request so far."""
     with spacious():
         if seen // LOOK != (seen - len(block)) // LOOK:
-            await run_in_threadpool(parts.files.check_space, group)
+            await run_in_threadpool(components.files.check_space, group)
         await run_in_threadpool(part.write, block)
 
 
-async def room(parts: Components, group: str, told: int) -> None:
+async def room(components: Components, group: str, told: int) -> None:
     """Refuse an upload of so many bytes that has no place."""
-    if told > parts.settings.max_upload_bytes:
-        raise Problem(413, f"the body is too large: at most {parts.settings.max_upload_bytes} bytes")
+    if told > components.settings.max_upload_bytes:
+        raise Problem(413, f"the body is too large: at most {components.settings.max_upload_bytes} bytes")
     with spacious():
-        await run_in_threadpool(parts.files.check_space, group, told)
+        await run_in_threadpool(components.files.check_space, group, told)
 
 
 @contextmanager
@@ -103,10 +103,10 @@ def spacious() -> Iterator[None]:
 
 
 @asynccontextmanager
-async def arriving(parts: Components, group: str) -> AsyncIterator[Part]:
+async def arriving(components: Components, group: str) -> AsyncIterator[Part]:
     """A new part, which is gone afterwards unless it has become something else."""
     with spacious():
-        part = await run_in_threadpool(parts.files.part, group)
+        part = await run_in_threadpool(components.files.part, group)
     try:
         yield part
     finally:
