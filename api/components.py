@@ -64,7 +64,7 @@ class Components:
     metrics: Metrics = field(repr=False)
     streams: Hub = field(repr=False)
     feeds: EventFeeds = field(repr=False)
-    crew: Supervisor | None = field(repr=False)
+    supervisor: Supervisor | None = field(repr=False)
 
 
 def components_of(request: Request) -> Components:

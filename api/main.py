@@ -60,7 +60,7 @@ def create_app(
     work: Work | None = None,
     reader: Work | None = None,
     host: Host | None = None,
-    crew: Supervisor | None = None,
+    supervisor: Supervisor | None = None,
 ) -> FastAPI:
     """Return the service.
 
@@ -84,7 +84,7 @@ def create_app(
     hub = Hub(StreamProcess() if host is None else host, _stream_limits(settings), metrics)
     metrics.streams.set_function(lambda: float(len(hub.sessions)))
     components = Components(
-        settings, kept, workers, files, readers, uploads, rates, metrics, hub, EventFeeds(kept.jobs, settings.watchers), crew
+        settings, kept, workers, files, readers, uploads, rates, metrics, hub, EventFeeds(kept.jobs, settings.watchers), supervisor
     )
     metrics.registry.register(JobCounts(kept.jobs))
 
@@ -93,15 +93,15 @@ def create_app(
         workers.start()
         readers.start()
         await hub.start()
-        if crew is not None:
-            crew.start()
-        attending = asyncio.create_task(uploads.attend())
+        if supervisor is not None:
+            supervisor.start()
+        maintenance = asyncio.create_task(uploads.maintain())
         yield
         await hub.stop()
-        attending.cancel()
-        await asyncio.gather(attending, return_exceptions=True)
-        if crew is not None:
-            await asyncio.to_thread(crew.stop)
+        maintenance.cancel()
+        await asyncio.gather(maintenance, return_exceptions=True)
+        if supervisor is not None:
+            await asyncio.to_thread(supervisor.stop)
         readers.stop()
         workers.stop()
         kept.close()

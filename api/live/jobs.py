@@ -59,9 +59,9 @@ STREAM: dict[str, Any] = {
 def answer(job: Job) -> JobAnswer:
     """Return a job as clients see it."""
     names = ("id", "kind", "machine", "campaign", "state", "created", "started", "finished", "status")
-    told = {name: getattr(job, name) for name in names}
+    columns = {name: getattr(job, name) for name in names}
     texts = {name: None if text is None else json.loads(text) for name, text in (("progress", job.progress), ("problem", job.problem))}
-    return JobAnswer.model_validate(told | texts)
+    return JobAnswer.model_validate(columns | texts)
 
 
 def place(job: Job) -> str:
@@ -133,7 +133,7 @@ async def events(components: Components, group: str, id: str, kind: str, seen: s
 
     async def stream() -> AsyncIterator[str]:
         try:
-            async for part in _told(components, job, int(seen or 0)):
+            async for part in _events(components, job, int(seen or 0)):
                 yield part
         finally:
             watching.__exit__(None, None, None)
@@ -141,7 +141,7 @@ async def events(components: Components, group: str, id: str, kind: str, seen: s
     return StreamingResponse(stream(), media_type=EVENTS, headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"})
 
 
-async def _told(components: Components, job: Job, after: int) -> AsyncIterator[str]:
+async def _events(components: Components, job: Job, after: int) -> AsyncIterator[str]:
     end = time.monotonic() + components.settings.watch_seconds
     # what is known at once; without a number, so that it is no event that could be missed
     yield f"retry: 2000\n{_event(None, 'progress', answer(job).model_dump_json())}"

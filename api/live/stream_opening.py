@@ -101,7 +101,7 @@ class Opening:
                 hub.offer(session, start + first, samples)
 
 
-async def logger(components: Components, group: str, hello: StreamHello) -> Opening:
+async def open_logger(components: Components, group: str, hello: StreamHello) -> Opening:
     """Return the opening of a data logger's stream."""
 
     def look() -> Opening:
@@ -129,7 +129,7 @@ async def logger(components: Components, group: str, hello: StreamHello) -> Open
     return await run_in_threadpool(look)
 
 
-async def replayed(components: Components, group: str, hello: ReplayHello) -> Opening:
+async def open_replay(components: Components, group: str, hello: ReplayHello) -> Opening:
     """Return the opening of a recording that is played."""
 
     def look() -> Opening:

@@ -27,7 +27,7 @@ def read_alone(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) 
     """Write the samples of an upload that comes without a campaign, and return its rate, duration and channels."""
     from api.reading import examine
 
-    return examine.told(examine.read_upload(upload, sensors, rate))
+    return examine.described(examine.read_upload(upload, sensors, rate))
 
 
 def recording_and_air(cut: Path, air: Path | None) -> tuple[Any, Any]:

@@ -33,7 +33,7 @@ def ready(components: ThisService) -> State:
         raise Problem(503, "workers are starting", headers={"Retry-After": "2"})
     if not components.streams.host.ready:
         raise Problem(503, "the process of the streams is starting", headers={"Retry-After": "2"})
-    if components.crew is not None and not components.crew.ready:
+    if components.supervisor is not None and not components.supervisor.ready:
         raise Problem(503, "no worker for jobs is alive: those that are accepted wait", headers={"Retry-After": "5"})
     return State(status="ok")
 

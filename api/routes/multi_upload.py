@@ -16,7 +16,7 @@ from api.schemas.campaigns import ItemProblem, UploadAnswer, UploadItem
 from api.schemas.common import Fault
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign
-from api.transfer.body_stream import complete, plain, room, told_length, write
+from api.transfer.body_stream import announced_length, check_room, complete, refuse_encoded, write
 from api.transfer.multipart import FORM, Head, events
 from api.work.pool import Busy
 from rcsa_ident.errors import InputError
@@ -45,10 +45,10 @@ _FORM = {
 )
 async def post(id: CampaignId, request: Request, components: ThisService, caller: WhoAsks, replace: bool = False) -> UploadAnswer:
     campaign = await run_in_threadpool(known_campaign, components, caller.group, id)
-    plain(request)
+    refuse_encoded(request)
     known = files_of(campaign.text)
     with components.uploads.admitted():
-        await room(components, caller.group, told_length(request))
+        await check_room(components, caller.group, announced_length(request))
         items: list[UploadItem] = []
         name, part, seen = "", None, 0
         try:

@@ -25,7 +25,16 @@ from api.schemas.common import Page
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign, Recording
 from api.stores.entities import Taken
-from api.transfer.body_stream import append, arriving, check_digest, complete, plain, room, told_digest, told_length
+from api.transfer.body_stream import (
+    announced_digest,
+    announced_length,
+    append,
+    check_digest,
+    check_room,
+    complete,
+    new_part,
+    refuse_encoded,
+)
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
 BINARY = "application/octet-stream"
@@ -60,11 +69,11 @@ async def put(
     replace: Replace = False,
 ) -> RecordingAnswer:
     campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
-    digest = told_digest(request, "Repr-Digest", "Content-Digest")
-    plain(request)
+    digest = announced_digest(request, "Repr-Digest", "Content-Digest")
+    refuse_encoded(request)
     with components.uploads.admitted():
-        await room(components, caller.group, told_length(request))
-        async with arriving(components, caller.group) as part:
+        await check_room(components, caller.group, announced_length(request))
+        async with new_part(components, caller.group) as part:
             await append(request, components, caller.group, part)
             received = await complete(part)
             check_digest(digest, received.sha256)

@@ -19,7 +19,17 @@ from api.routes.recordings import BINARY, RecordingName, Replace, answer, named,
 from api.schemas.campaigns import RecordingAnswer
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign
-from api.transfer.body_stream import LOOK, blocks, check_digest, complete, plain, room, spacious, told_digest, write
+from api.transfer.body_stream import (
+    LOOK,
+    announced_digest,
+    blocks,
+    check_digest,
+    check_room,
+    complete,
+    refuse_encoded,
+    storage_problems,
+    write,
+)
 from rcsa_ident.errors import InputError
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
@@ -76,8 +86,8 @@ async def patch(
     replace: Replace = False,
 ) -> Any:
     campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
-    whole, content = told_digest(request, "Repr-Digest"), told_digest(request, "Content-Digest")
-    plain(request)
+    whole, content = announced_digest(request, "Repr-Digest"), announced_digest(request, "Content-Digest")
+    refuse_encoded(request)
     key = (campaign.id, name)
     if key in components.uploads.writing:
         # perhaps the same client's, whose connection is not yet known to be lost
@@ -121,7 +131,7 @@ async def _go_on(components: Components, campaign: Campaign, name: str, offset: 
     if offset == 0 and (state is None or (length is not None and length != state.length)):
         if length is None:
             raise InputError("Upload-Length", "nothing", "the length of the whole file, with its first part")
-        await room(components, campaign.group, length)
+        await check_room(components, campaign.group, length)
         state = Partial(0, length)
         await run_in_threadpool(components.files.forget, path)
         return state
@@ -141,7 +151,7 @@ async def _append(request: Request, components: Components, group: str, path: Pa
         async for block in blocks(request, components):
             if part.size + len(block) > state.length:
                 raise InputError("body", "more than Upload-Length", f"at most {state.length - state.offset} bytes from {state.offset}")
-            with spacious():
+            with storage_problems():
                 await write(components, group, part, block, part.size - state.offset + len(block))
             digest.update(block)
             if content is None and (part.size - state.offset) // LOOK > noted:
@@ -159,6 +169,6 @@ async def _append(request: Request, components: Components, group: str, path: Pa
 
 
 def _note(components: Components, part: Part, offset: int, length: int) -> None:
-    with spacious():
+    with storage_problems():
         part.sync()
         components.files.note(part.path, Partial(offset, length))

@@ -109,7 +109,7 @@ def _planned(
     plan = Plan(live_observer(found, recording, follow), gap, shaken, len(kinds), first, order)
     deviation = found.estimate.standard_deviation
     delay = max(found.response[axis].delay_at_lines for axis in found.response) * recording.rate
-    told = {
+    ready = {
         "axes": list(question.axes),
         "sampling_rate_hz": recording.rate,
         "spindle_speed_rpm": found.spindle_speed * _RPM,
@@ -119,4 +119,4 @@ def _planned(
         "first": first,
         "notes": list(found.notes),
     }
-    return pickle.dumps(plan), told
+    return pickle.dumps(plan), ready

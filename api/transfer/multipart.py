@@ -15,7 +15,7 @@ from api.files import Part
 from api.problems import Problem
 from api.reading.campaign_text import recording_name
 from api.reading.uploads import Received
-from api.transfer.body_stream import arriving, blocks, complete, write
+from api.transfer.body_stream import blocks, complete, new_part, write
 
 FORM = "multipart/form-data"
 MOST_PARTS, LARGEST_TEXT = 1000, 1_000_000
@@ -44,7 +44,7 @@ async def events(request: Request, components: Components) -> AsyncIterator[Head
     Problem
         400 for a body that is no form, 408 and 413 as `blocks`.
     """
-    told = parse_options_header(request.headers.get("content-type", ""))[1]
+    options = parse_options_header(request.headers.get("content-type", ""))[1]
     found: list[Head | bytes | None] = []
     heads: dict[bytes, bytes] = {}
     name, value, count, whole = bytearray(), bytearray(), 0, False
@@ -67,7 +67,7 @@ async def events(request: Request, components: Components) -> AsyncIterator[Head
 
     try:
         parser = MultipartParser(
-            told.get(b"boundary", b""),
+            options.get(b"boundary", b""),
             {
                 "on_part_begin": begin,
                 "on_header_field": lambda data, start, end: name.extend(data[start:end]),
@@ -79,7 +79,7 @@ async def events(request: Request, components: Components) -> AsyncIterator[Head
                 "on_end": end,
             },
         )
-        if not told.get(b"boundary"):
+        if not options.get(b"boundary"):
             raise FormParserError
         async for block in blocks(request, components):
             parser.write(bytes(block))
@@ -124,7 +124,7 @@ async def form(
                     fault = {"field": head.field[:80] or "part", "found": "such a part", "allowed": allowed}
                     raise Problem(422, f"a part of the form: found {head.field[:80]!r}, allowed is {allowed}", [fault])
                 if head.field in files:
-                    part = await stack.enter_async_context(arriving(components, group))
+                    part = await stack.enter_async_context(new_part(components, group))
             elif event is None:
                 if isinstance(part, Part):
                     received[head.field] = (head.name or "", await complete(part))
