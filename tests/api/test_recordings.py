@@ -153,7 +153,7 @@ def test_every_format_tells_the_same(client, tmp_path, kind):
     assert (found.sampling_rate_hz, found.duration_s) == (RATE, pytest.approx(0.28))
     assert found.spindle_speed_rpm == pytest.approx(pair().speed * 30.0 / np.pi, rel=1e-5)
     assert found.harmonics_above_noise["X"] >= 6
-    parts = client.http.app.state.parts
+    parts = client.http.app.state.components
     row = parts.store.recordings.get("local", id, path.name)
     assert parts.files.path("local", UPLOADS, row.sha256).read_bytes() == path.read_bytes()
     sensors = tuple(Sensor(name, Quantity.TRIGGER) for name in volts)

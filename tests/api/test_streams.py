@@ -32,7 +32,7 @@ def shop(tmp_path):
 
 
 def hub_of(http):
-    return http.app.state.parts.streams
+    return http.app.state.components.streams
 
 
 def batch(raw: np.ndarray) -> np.ndarray:

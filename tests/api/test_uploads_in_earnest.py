@@ -311,7 +311,7 @@ for folder, *step in json.loads(sys.argv[1]):
 def whole(folder: Path, group: str = "local") -> dict[str, str]:
     """Names and hashes of recordings, each of which is there to the last byte."""
     with service(open_store(f"sqlite:///{folder / 'store.db'}"), folder) as http:
-        parts = http.app.state.parts
+        parts = http.app.state.components
         (machine,) = parts.store.machines.list(group, "", 9)
         (campaign,) = parts.store.campaigns.list(group, machine.id, "", 9)
         found = {}
@@ -354,7 +354,7 @@ def test_a_kill_at_every_step_loses_nothing_and_leaves_nothing(tmp_path, replaci
         # the next start sweeps, and judges what is owed
         with service(open_store(f"sqlite:///{copy / 'store.db'}"), copy) as http:
             until(lambda copy=copy, there=there: len(files_in(copy)) == 2 * len(there))
-            store = http.app.state.parts.store
+            store = http.app.state.components.store
             until(lambda store=store: store.campaigns.unsettled() == [])
             again = http.put(f"/v1/campaigns/{id}/recordings/c0_cut.h5?replace=true", content=new, headers=BINARY)
             assert again.status_code == (200 if kept else 201)
