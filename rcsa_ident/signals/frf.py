@@ -21,7 +21,7 @@ class HarmonicPoints:
         The receptance is cut - air; the air cut's line is turned by the angle between both records. Outputs are gap and
         fixture, whose sum is the flange's motion, or that alone.
     variance : array, shape (n, axes, o) [m^2/N^2]
-        Of the real and of the imaginary part of cut - air each.
+        Variance of the real and of the imaginary part of cut - air each.
     coherence : array, shape (n, axes) [-]
     """
 
@@ -39,11 +39,14 @@ class Estimator(Protocol):
 
         Parameters
         ----------
+        cut : SteadyRecord
+        air : SteadyRecord or None
+            The air cut, where there is one.
         angle : float [rad]
-            By which the air cut must be turned to lie under the cut.
+            Angle by which the air cut must be turned to lie under the cut.
         order : array of int, shape (n,)
         force : complex array, shape (n, axes) [N]
-            Without zeros.
+            Simulated force at those orders, none of them 0.
         """
         ...
 
@@ -53,7 +56,7 @@ class LineEstimator:
     """Least-squares lines over the whole record, the air cut's subtracted as complex numbers."""
 
     def points(self, cut: SteadyRecord, air: SteadyRecord | None, angle: float, order: np.ndarray, force: ComplexArray) -> HarmonicPoints:
-        """Return the points; the variance is that of both lines, from the noise beside them and their scatter."""
+        """Return the points (see `Estimator`); the variance is that of both lines, from the noise beside them and their scatter."""
         amplitude, noise = cut.outputs[order], cut.output_variance[order]
         still = np.zeros_like(amplitude)
         if air is not None:
@@ -82,7 +85,7 @@ class AirCorrectedSpectra:
     segments: int = 8
 
     def points(self, cut: SteadyRecord, air: SteadyRecord | None, angle: float, order: np.ndarray, force: ComplexArray) -> HarmonicPoints:
-        """Return the points, nothing left to subtract; the variance is the jackknife's over the segments."""
+        """Return the points (see `Estimator`), nothing left to subtract; the variance is the jackknife's over the segments."""
         displacement = cut.segments(order, self.segments)
         still = np.zeros_like(displacement)
         if air is not None:
@@ -97,12 +100,21 @@ class AirCorrectedSpectra:
 
 
 def turned_air(air: SteadyRecord, angle: float, highest: int) -> tuple[ComplexArray, FloatArray]:
-    """Return an air cut's lines turned by an angle and their variance, orders 0..highest; 0 where the record has no such order."""
+    """Return an air cut's lines turned by an angle [rad] and their variance, orders 0..highest; 0 where there is no such order."""
     return turned(air.flange, air.variance, angle, highest)
 
 
 def turned(lines: ComplexArray, noise: FloatArray, angle: float, highest: int) -> tuple[ComplexArray, FloatArray]:
-    """Return lines (orders, ...) turned by an angle, and their variance, orders 0..highest; 0 where there is no such order."""
+    """Return lines turned by an angle, and their variance, orders 0..highest; 0 where there is no such order.
+
+    Parameters
+    ----------
+    lines : complex array, shape (orders, ...)
+    noise : array of the same shape
+        Their variance.
+    angle : float [rad]
+    highest : int
+    """
     rest = [(0, 0)] * (lines.ndim - 1)
     missing = max(highest + 1 - lines.shape[0], 0)
     amplitude = np.pad(lines, [(0, missing), *rest])[: highest + 1]
@@ -138,6 +150,11 @@ def air_corrected(displacement: ComplexArray, force: ComplexArray, air: ComplexA
 
     Spectra are subtracted, not lines: what the air cut shares with the cut is only taken out in the mean, which is
     exact where both are uncorrelated.
+
+    Parameters
+    ----------
+    displacement, force, air : complex arrays, shape (segments, ...) [m], [N], [m]
+        Spectra of the segments of a cut, of its force and of its air cut.
     """
     return (_mean(displacement, displacement) - _mean(air, air)) / (_mean(force, displacement) - _mean(force, air))
 

@@ -45,10 +45,11 @@ class AxisLines:
         by the best estimate of the angle between both records. Outputs are gap and fixture, whose sum is the flange's absolute
         motion, or that alone.
     variance : array, shape (n, o) [m^2/N^2]
-        Of the real and of the imaginary part of cut - air each.
+        Variance of the real and of the imaginary part of cut - air each.
     coherence : array, shape (n,) [-]
-        Of the flange's motion.
+        Coherence of the flange's motion with the force.
     force : complex array, shape (n,) [N]
+        The simulated force.
     force_slope : complex array, shape (n, 5) [-]
         Change of the force's logarithm with `cutting.force.SLOPES`.
     """
@@ -64,7 +65,7 @@ class AxisLines:
 
     @property
     def outputs(self) -> int:
-        """1 or 2."""
+        """Number of outputs: 2 for gap and fixture, 1 for the flange's motion alone."""
         return self.cut.shape[1]
 
     @property
@@ -85,8 +86,9 @@ class CutMeasurement:
     Parameters
     ----------
     cut_id, tooling : str
+        Name of the cut and of its tooling.
     spindle_speed : float [rad/s]
-        From the record.
+        As found in the record.
     axes : mapping of Dof to AxisLines
     alignment_std : float [rad]
         Standard deviation of the angle between cut and air cut; 0 without an air cut.
@@ -111,8 +113,11 @@ class Reading:
 
     Parameters
     ----------
+    verdict : Verdict
+    measurement : CutMeasurement or None
+        None where the record is not usable.
     spindle_speed : float or None [rad/s]
-        From the record, also of one that is not usable, unless nothing can be told of it.
+        As found in the record, also in one that is not usable, unless nothing can be told of it.
     harmonics : mapping of Dof to int
         Multiples of the tooth-passing frequency, of an air cut of the spindle's, that stand above the noise beside them.
     """
@@ -138,11 +143,18 @@ def measure_cut(
 
     Parameters
     ----------
-    cut, air : Recording
+    cut_id, tooling : str
+        Name of the cut and of its tooling, for the result and for messages.
+    cut : Recording
         Displacement channels for X and/or Y, accelerometers of the fixture where there are some.
+    air : Recording or None
+        The same in the air, where it was recorded.
+    cutter : Cutter
     conditions : CuttingConditions
-        As programmed; forces are simulated at the speed found in the record.
+        The cut as programmed; forces are simulated at the speed found in the record.
+    coefficients : CuttingCoefficients
     max_frequency : float [Hz]
+        Highest line.
     estimator : Estimator
         `LineEstimator`, or `AirCorrectedSpectra` for that of [inprocess].
 
@@ -202,6 +214,14 @@ def measure_cut(
 
 def judge_air(air: Recording, conditions: CuttingConditions, max_frequency: float = MAX_FREQUENCY) -> Reading:
     """Return the verdict on an air cut alone, as `measure_cut` judges it beside a cut.
+
+    Parameters
+    ----------
+    air : Recording
+    conditions : CuttingConditions
+        The cut as programmed: its speed counts.
+    max_frequency : float [Hz]
+        Highest line.
 
     Raises
     ------
