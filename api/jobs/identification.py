@@ -31,6 +31,7 @@ from rcsa_ident.io.results import check_result, layout, plain
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.recording import Recording
+from rcsa_ident.units import to_hz
 from rcsa_ident.workflows import identify as workflow
 from rcsa_ident.workflows.identify import JudgedCut, Method, ReadCut, judge_cut, mode_deviations
 
@@ -189,7 +190,7 @@ class _Story:
         order = np.argsort(part.omega, kind="stable")
         order = order[np.linspace(0, order.size - 1, min(order.size, POINTS)).round().astype(int)]
         curves = {
-            "frequency_hz": part.omega / (2.0 * np.pi),
+            "frequency_hz": to_hz(part.omega),
             "measured_abs": np.abs(part.measured),
             "model_abs": np.abs(np.sum(found.models[i], axis=1)),
         }
@@ -216,7 +217,7 @@ def _lines(found: Identification, campaign: Campaign) -> dict[str, Any]:
         order = np.argsort(lines["omega"], kind="stable")
         value, model = (np.asarray(lines[name], dtype=complex)[order] for name in ("value", "model"))
         axes[axis.upper()] = {
-            "frequency_hz": (lines["omega"][order] / (2.0 * np.pi)).tolist(),
+            "frequency_hz": to_hz(lines["omega"][order]).tolist(),
             "measured_re": value.real.tolist(),
             "measured_im": value.imag.tolist(),
             "model_re": model.real.tolist(),

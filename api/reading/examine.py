@@ -17,8 +17,7 @@ from rcsa_ident.signals.measurement import Reading, judge_air, measure_cut
 from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.signals.steady import measured_axes
 from rcsa_ident.signals.verdict import Verdict
-
-_RPM = 30.0 / np.pi
+from rcsa_ident.units import to_rpm
 
 
 def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) -> Recording:
@@ -68,7 +67,7 @@ def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) ->
     speed = reading.spindle_speed
     return told(recording) | {
         "verdict": verdict,
-        "spindle_speed_rpm": speed * _RPM if speed is not None and np.isfinite(speed) else None,
+        "spindle_speed_rpm": to_rpm(speed) if speed is not None and np.isfinite(speed) else None,
         "harmonics_above_noise": {axis.upper(): reading.harmonics.get(axis, 0) for axis in measured_axes(recording)},
     }
 

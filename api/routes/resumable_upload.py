@@ -56,7 +56,7 @@ def head(id: CampaignId, name: RecordingName, parts: ThisService, caller: WhoAsk
     "/{name}",
     summary="Upload a part of a recording",
     response_model=RecordingAnswer,
-    description="Components follow each other; HEAD tells where to go on. What has come is kept when the connection breaks, and through "
+    description="Parts follow each other; HEAD tells where to go on. What has come is kept when the connection breaks, and through "
     "restarts, for a day. The last part answers as an upload at once does.",
     openapi_extra=guard("upload", requestBody=_PART, parameters=_DIGESTS, **{"x-content-types": (BINARY,)}),
     responses={

@@ -34,8 +34,8 @@ from api.work.requests import MachineText, ToolingText
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Quantity, Sensor
+from rcsa_ident.units import from_rpm
 
-_RPM = math.pi / 30.0
 #: That an observer is made from, at least.
 REVOLUTIONS = 12
 #: Of a replay [s]: what is read at once, and what comes at once.
@@ -117,7 +117,7 @@ async def logger(parts: Components, group: str, hello: StreamHello) -> Opening:
         known = known_machine(parts, group, hello.machine)
         tooling = tooling_text(parts, group, hello.tooling)
         channels = channels_of(hello.channels, given_sensors(hello.sensors) or sensors_of(known.text))
-        speed = None if hello.spindle_speed_rpm is None else hello.spindle_speed_rpm * _RPM
+        speed = None if hello.spindle_speed_rpm is None else from_rpm(hello.spindle_speed_rpm)
         if speed is None and not any(sensor.quantity is Quantity.TRIGGER for sensor in channels):
             raise InputError("spindle_speed_rpm", "nothing, and no channel of a trigger", "the programmed speed [rev/min]")
         axes = tuple(hello.axes) if hello.axes is not None else displacement_axes(channels)

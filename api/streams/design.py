@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import pickle
 from dataclasses import dataclass
 from typing import Any
@@ -16,8 +15,7 @@ from api.work.requests import MachineText, ToolingText
 from api.work.toolings import tooling_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
-
-_RPM = 30.0 / math.pi
+from rcsa_ident.units import to_hz, to_rpm
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +110,8 @@ def _planned(
     told = {
         "axes": list(question.axes),
         "sampling_rate_hz": recording.rate,
-        "spindle_speed_rpm": found.spindle_speed * _RPM,
-        "band_hz": [w / (2.0 * math.pi) for w in found.band],
+        "spindle_speed_rpm": to_rpm(found.spindle_speed),
+        "band_hz": [to_hz(w) for w in found.band],
         "delay_samples": round(float(delay), 3),
         "std_n": {axis: float(deviation[-1, axes.index(axis)]) for axis in question.axes},
         "first": first,

@@ -16,12 +16,10 @@ from api.work.toolings import tooling_of, weigh
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Recording, Sensor
+from rcsa_ident.units import from_hz, to_hz, to_rpm
 
-_RPM = 30.0 / math.pi
 #: Buckets of an answer's picture, and samples that one answer may take.
 BUCKETS, MOST_SAMPLES = 2000, 8_000_000
-#: The commands' options are other fields here.
-_FIELDS = {"--speed-rpm": "spindle_speed_rpm", "speed": "spindle_speed_rpm", "--idle-percent": "idle_percent", "idle share": "idle_percent"}
 
 ReadPair = Callable[[], tuple[Recording, Recording | None]]
 
@@ -115,9 +113,9 @@ def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, 
         }
         lines[axis.upper()] = _harmonics(force, cut.rate, found.spindle_speed, found.band)
     answer = {
-        "spindle_speed_rpm": found.spindle_speed * _RPM,
+        "spindle_speed_rpm": to_rpm(found.spindle_speed),
         "sampling_rate_hz": cut.rate,
-        "band_hz": [w / (2.0 * math.pi) for w in found.band],
+        "band_hz": [to_hz(w) for w in found.band],
         "notes": [*_doubts(known), *found.notes],
         "axes": axes,
         "time_s": (begin * estimate.step).tolist(),
@@ -129,7 +127,7 @@ def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, 
 
 
 def observed(known: Known, tool: Any, cut: Recording, air: Recording | None, speed: float | None, method: str, smooth: bool = False) -> Any:
-    """Return a `MonitoredCut`; errors name fields of the query."""
+    """Return a `MonitoredCut`."""
     from rcsa_ident.observer.tuning import PaperWalk, Resonators
     from rcsa_ident.workflows.estimate_forces import observe
 
@@ -138,13 +136,9 @@ def observed(known: Known, tool: Any, cut: Recording, air: Recording | None, spe
         raise InputError("recording", f"{samples} samples", f"at most {MOST_SAMPLES} in one answer, the air cut's among them")
     low, high = known.data["band_hz"]
     weigh(tool.assembly, 1.3 * high)
-    band = 2.0 * math.pi * low, 2.0 * math.pi * high
+    band = from_hz(low), from_hz(high)
     how = PaperWalk() if method == "paper" else Resonators()
-    try:
-        return observe(known.machine, tool.assembly, tool.cutter.teeth, cut, air, band, speed, how, None, smooth)
-    except InputError as error:
-        allowed = error.allowed.replace(" with --speed-rpm", "")
-        raise InputError(_FIELDS.get(error.field, error.field), error.found, allowed, error.where) from None
+    return observe(known.machine, tool.assembly, tool.cutter.teeth, cut, air, band, speed, how, None, smooth)
 
 
 def _harmonics(force: Any, rate: float, speed: float, band: tuple[float, float]) -> list[dict[str, Any]]:
@@ -153,10 +147,10 @@ def _harmonics(force: Any, rate: float, speed: float, band: tuple[float, float])
 
     if force.size < 4.0 * 2.0 * np.pi / speed * rate:
         return []
-    amplitude = np.abs(line_spectrum(force[:, None], rate, speed, band[1] / (2.0 * np.pi)).amplitude[:, 0])
+    amplitude = np.abs(line_spectrum(force[:, None], rate, speed, to_hz(band[1])).amplitude[:, 0])
     order = np.arange(amplitude.size)
     inside = order[(order * speed >= band[0]) & (order * speed <= band[1])]
-    return [{"order": int(m), "frequency_hz": float(m * speed / (2.0 * np.pi)), "amplitude_n": float(amplitude[m])} for m in inside]
+    return [{"order": int(m), "frequency_hz": float(to_hz(m * speed)), "amplitude_n": float(amplitude[m])} for m in inside]
 
 
 def _wear(found: Any, tool: Any, question: WornQuestion) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import typer
 
 from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.errors import InputError
+from rcsa_ident.units import from_hz, to_hz
 
 if TYPE_CHECKING:
     from rcsa_ident.coupling.flange_fit import DecoupledFlange
@@ -64,7 +65,7 @@ def decouple(
     omega = next(iter(found.values())).receptance.omega
     if any(not np.array_equal(f.receptance.omega, omega) for f in found.values()):
         raise InputError("frequencies", "other ones for X than for Y", "the same for both axes")
-    write_flange_csv(out, omega / (2.0 * np.pi), {a: f.receptance.values for a, f in found.items()}, {a: f.std for a, f in found.items()})
+    write_flange_csv(out, to_hz(omega), {a: f.receptance.values for a, f in found.items()}, {a: f.std for a, f in found.items()})
     if plot is not None:
         _draw(found, machine, plot)
     if json_:
@@ -107,7 +108,7 @@ def _taps(texts: list[str], low: float, high: float) -> dict[Dof, list[FlangeTap
             assemblies[tooling] = read_tooling(tooling).assembly
         for axis, (frequency, values) in read_hammer(path).values.items():
             kept = (np.asarray(frequency) >= low) & (np.asarray(frequency) <= high)
-            own = FlangeTap(Path(path).name, assemblies[tooling], Place(place), 2.0 * np.pi * frequency[kept], values[kept])
+            own = FlangeTap(Path(path).name, assemblies[tooling], Place(place), from_hz(frequency[kept]), values[kept])
             found.setdefault(Dof(axis.lower()), []).append(own)
     complete = {axis: own for axis, own in found.items() if len(own) == len(texts)}
     if not complete:
@@ -139,4 +140,4 @@ def _draw(found: dict[Dof, DecoupledFlange], machine: dict[Dof, MachineAxis], pa
     if axis in machine:
         curves["identified in process"] = machine[axis].spindle.receptance(first.receptance.omega).values
     title = f"spindle flange, {axis.upper()}"
-    save(flange_comparison(FlangePair(title, first.receptance.omega / (2.0 * math.pi), curves)), path)
+    save(flange_comparison(FlangePair(title, to_hz(first.receptance.omega), curves)), path)

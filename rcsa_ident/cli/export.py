@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rcsa_ident import units
 from rcsa_ident.cli.common import Json, answers, emit, inclusive, say, warn, writable
 from rcsa_ident.cli.lobes import ResultFile
 from rcsa_ident.cli.results import read_machine_over_speed
@@ -62,8 +63,6 @@ def export(
     json_: Json = False,
 ) -> None:
     """Write tip FRFs, flange FRFs or modes for other programs."""
-    import numpy as np
-
     from rcsa_ident.errors import positive
     from rcsa_ident.io import exports
     from rcsa_ident.io.setups import read_tooling
@@ -75,7 +74,7 @@ def export(
         raise InputError("--tooling", "nothing" if tooling is None else str(tooling), "a TOOLING.toml with --what tip, and only there")
     if what is Part.modes and to not in (Format.csv, Format.json):
         raise InputError("--to", str(to), "csv or json for modes")
-    omega = None if speed is None else positive("--speed", speed, "rev/min") * math.pi / 30.0
+    omega = None if speed is None else units.from_rpm(positive("--speed", speed, "rev/min"))
     machine, data = read_machine_over_speed(result)
     axes = machine.at(omega)
     if what is Part.modes:
@@ -87,7 +86,7 @@ def export(
         frequency = inclusive(low, high, step_hz, ("--from-hz", "--to-hz", "--step-hz"), "Hz")
         if frequency[-1] > 1.001 * band[1] or frequency[0] < 0.999 * band[0]:
             warn(f"the machine was identified from {band[0]:.0f} to {band[1]:.0f} Hz; outside the FRF is extrapolated")
-        grid = 2.0 * np.pi * frequency
+        grid = units.from_hz(frequency)
         if tooling is not None:
             setup = read_tooling(tooling)
             title = f"{data['campaign']['name']}, {setup.name}"

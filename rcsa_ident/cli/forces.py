@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -13,13 +12,12 @@ import typer
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import Strategy
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.units import from_hz, from_rpm, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from rcsa_ident.machining_setup import Tooling
     from rcsa_ident.observer.wear import WearIndicators
     from rcsa_ident.workflows.estimate_forces import MonitoredCut
-
-_RPM = 30.0 / math.pi
 
 
 class ObserverName(StrEnum):
@@ -86,8 +84,8 @@ def forces(
         raise InputError("--plot", f"suffix '{plot.suffix}'", "one of .png, .svg, .pdf", str(plot))
     if wear is not None and (axial_depth_mm is None or feed_mm is None):
         raise InputError("--wear", "no depth or no feed", "--axial-depth-mm and --feed-mm beside it")
-    programmed = None if speed_rpm is None else positive("--speed-rpm", speed_rpm, "rev/min") / _RPM
-    bandwidth = None if bandwidth_hz is None else 2.0 * math.pi * positive("--bandwidth-hz", bandwidth_hz, "Hz")
+    programmed = None if speed_rpm is None else from_rpm(positive("--speed-rpm", speed_rpm, "rev/min"))
+    bandwidth = None if bandwidth_hz is None else from_hz(positive("--bandwidth-hz", bandwidth_hz, "Hz"))
     rate = None if sampling_rate_hz is None else positive("--sampling-rate-hz", sampling_rate_hz, "Hz")
     machine, data = read_machine_over_speed(result)
     setup, sensors = read_tooling(tooling), sensors_of_result(data, str(result))
@@ -97,7 +95,7 @@ def forces(
         still = None if air is None else read_recording(air, sensors, rate)
     method = Resonators() if observer is ObserverName.resonators else PaperWalk()
     with stages.stage("forces"):
-        low, high = (2.0 * math.pi * f for f in data["band_hz"])
+        low, high = (from_hz(f) for f in data["band_hz"])
         try:
             found = observe(machine, setup.assembly, setup.cutter.teeth, cut, still, (low, high), programmed, method, bandwidth, smooth)
         except InputError as error:
@@ -155,8 +153,8 @@ def _summary(found: MonitoredCut, observer: str, smooth: bool) -> dict[str, Any]
     settled = slice(min(estimate.force.shape[0] // 4, 4096), None)
     for i, axis in enumerate(estimate.axes):
         force, response = estimate.force[settled, i], found.response[axis]
-        hz = [float(w) / (2.0 * math.pi) if w == w else None for w in response.usable(float(response.line[0]), at_lines=True)]
-        anywhere = [float(w) / (2.0 * math.pi) if w == w else None for w in response.usable(1.3 * found.band[0])]
+        hz = [to_hz(float(w)) if w == w else None for w in response.usable(float(response.line[0]), at_lines=True)]
+        anywhere = [to_hz(float(w)) if w == w else None for w in response.usable(1.3 * found.band[0])]
         axes[axis.upper()] = {
             "rms_n": float(np.std(force)),
             "lowest_n": float(force.min()),
@@ -174,8 +172,8 @@ def _summary(found: MonitoredCut, observer: str, smooth: bool) -> dict[str, Any]
         "observer": observer,
         "smoothed": smooth,
         "mean_force": "removed: the sensors do not show it",
-        "spindle_speed_rpm": found.spindle_speed * _RPM,
-        "band_hz": [w / (2.0 * math.pi) for w in found.band],
+        "spindle_speed_rpm": to_rpm(found.spindle_speed),
+        "band_hz": [to_hz(w) for w in found.band],
         "samples": int(estimate.force.shape[0]),
         "axes": axes,
         "warnings": list(found.notes),

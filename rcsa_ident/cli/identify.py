@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from functools import partial
@@ -25,6 +24,7 @@ from rcsa_ident.cli.common import (
 )
 from rcsa_ident.cli.processes import Dask, Processes, Workers, tell, workers_or_cluster
 from rcsa_ident.errors import InputError
+from rcsa_ident.units import to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -132,7 +132,7 @@ def identify(
 
         show_identification(found, deviations)
         for band in bands:
-            low, high = (speed * 30.0 / math.pi for speed in band.speeds)
+            low, high = (to_rpm(speed) for speed in band.speeds)
             say(f"{low:.0f} to {high:.0f} rev/min: {band.found.status}, {len(band.found.cut_ids)} cuts")
         warn_left_out(data)
         say(", ".join(f"{name} {seconds:.1f} s" for name, seconds in stages.seconds.items()))

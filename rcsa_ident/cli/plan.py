@@ -14,6 +14,7 @@ import typer
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import Strategy, engagement, feed_angle
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.units import from_rpm, to_rpm
 
 if TYPE_CHECKING:
     from rcsa_ident.cutting.coefficients import CuttingCoefficients
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from rcsa_ident.identification.posterior import MachineAxis
     from rcsa_ident.workflows.plan import PlannedCut, PlannedCuts
 
-_RPM = 30.0 / math.pi
 #: Recordings of a campaign that its noise is learned from.
 MOST_READ = 8
 
@@ -123,7 +123,7 @@ def plan_text(planned: PlannedCuts) -> str:
             "[[cuts]]",
             f"id = {_quoted(name)}",
             f"tooling = {_quoted(cut.tooling)}",
-            f"spindle_speed_rpm = {float(f'{c.spindle_speed * _RPM:.9g}')}",
+            f"spindle_speed_rpm = {float(f'{to_rpm(c.spindle_speed):.9g}')}",
             f"axial_depth_mm = {float(f'{c.axial_depth * 1e3:.9g}')}",
             f"feed_per_tooth_mm = {float(f'{c.feed_per_tooth * 1e3:.9g}')}",
             f"entry_angle_deg = {float(f'{math.degrees(c.engagement.entry):.9g}')}",
@@ -168,9 +168,9 @@ def _speeds(machine: dict[Dof, MachineAxis], lowest: float | None, highest: floa
     for name, given, known in (("--speed-from", lowest, middle - half), ("--speed-to", highest, middle + half)):
         if given is None and known <= 0.0:
             raise InputError(name, "nothing", "a spindle speed [rev/min]: the result does not say which ones were cut")
-        found.append(known if given is None else positive(name, given, "rev/min") / _RPM)
+        found.append(known if given is None else from_rpm(positive(name, given, "rev/min")))
     if found[1] < found[0]:
-        raise InputError("--speed-to", found[1] * _RPM, f"--speed-from ({found[0] * _RPM:g}) or more [rev/min]")
+        raise InputError("--speed-to", to_rpm(found[1]), f"--speed-from ({to_rpm(found[0]):g}) or more [rev/min]")
     return found[0], found[1]
 
 
@@ -222,7 +222,7 @@ def _row(name: str, cut: PlannedCut) -> dict[str, Any]:
     return {
         "id": name,
         "tooling": cut.tooling,
-        "spindle_speed_rpm": float(f"{c.spindle_speed * _RPM:.9g}"),
+        "spindle_speed_rpm": float(f"{to_rpm(c.spindle_speed):.9g}"),
         "axial_depth_mm": float(f"{c.axial_depth * 1e3:.9g}"),
         "limit_depth_mm": cut.limit_depth * 1e3,
     }
@@ -259,7 +259,7 @@ def _show(planned: PlannedCuts) -> None:
     table.add_row("", "before", "", "", "", *(f"{100.0 * v:.3f}" for v in planned.band[0]))
     for i, (cut, after) in enumerate(zip(planned.cuts, planned.band[1:], strict=True), start=1):
         c, limit = cut.conditions, f"{cut.limit_depth * 1e3:.2f}" if math.isfinite(cut.limit_depth) else "more"
-        numbers = (f"{c.spindle_speed * _RPM:.0f}", f"{c.axial_depth * 1e3:g}", limit, *(f"{100.0 * v:.3f}" for v in after))
+        numbers = (f"{to_rpm(c.spindle_speed):.0f}", f"{c.axial_depth * 1e3:g}", limit, *(f"{100.0 * v:.3f}" for v in after))
         table.add_row(str(i), escape(cut.tooling), *numbers)
     out = Console(highlight=False)
     out.print(table)

@@ -14,9 +14,9 @@ from rcsa_ident.identification.result import Identification
 from rcsa_ident.report.summaries import RecordingRow, coefficient_rows, mode_rows, two_digits
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally
+from rcsa_ident.units import to_cm3_per_min, to_rpm
 from rcsa_ident.workflows.advice import OperatingPoint, PlannedCut, SpeedWindow
 
-_RPM = 9.549296585513721
 _COLOURS = {"converged": "green", "suspect": "yellow", "failed": "red"}
 
 
@@ -96,7 +96,7 @@ def show_lobes(lobes: StabilityLobes, best: Sequence[tuple[float, float]], max_d
     for column in table.columns:
         column.justify = "right"
     for speed, depth in best:
-        table.add_row(f"{speed * _RPM:.0f}", f"{1e3 * depth:.2f}" if depth < float("inf") else f"more than {1e3 * max_depth:g}")
+        table.add_row(f"{to_rpm(speed):.0f}", f"{1e3 * depth:.2f}" if depth < float("inf") else f"more than {1e3 * max_depth:g}")
     out.print(table)
 
 
@@ -143,7 +143,12 @@ def show_points(points: Sequence[OperatingPoint]) -> None:
     heads = ("spindle speed\nrev/min", "depth\nmm", "removal\ncm³/min", "power\nkW", "torque\nN m", "more is\nended by")
     table = _table(*heads, title="highest removal rate")
     for p in points:
-        numbers = (f"{p.spindle_speed * _RPM:.0f}", f"{1e3 * p.depth:.2f}", f"{6e7 * p.removal_rate:.0f}", f"{1e-3 * p.power:.2f}")
+        numbers = (
+            f"{to_rpm(p.spindle_speed):.0f}",
+            f"{1e3 * p.depth:.2f}",
+            f"{to_cm3_per_min(p.removal_rate):.0f}",
+            f"{1e-3 * p.power:.2f}",
+        )
         table.add_row(*numbers, f"{p.torque:.1f}", str(p.bound))
     console().print(table)
 
@@ -158,7 +163,7 @@ def show_windows(windows: Sequence[SpeedWindow], depth_mm: float, name: str) -> 
     heads = ("best at\nrev/min", "from\nrev/min", "to\nrev/min", "allowed there\nmm")
     table = _table(*heads, title=f"{about}speeds for a depth of {depth_mm:g} mm")
     for w in windows[:8]:
-        table.add_row(*(f"{speed * _RPM:.0f}" for speed in (w.best, w.low, w.high)), f"{1e3 * w.allowed:.2f}")
+        table.add_row(*(f"{to_rpm(speed):.0f}" for speed in (w.best, w.low, w.high)), f"{1e3 * w.allowed:.2f}")
     out.print(table)
 
 
@@ -169,11 +174,11 @@ def show_planned(cuts: Sequence[PlannedCut], name: str) -> None:
         about = f"{escape(name)}: " if name else ""
         verdict = "[green]stable[/]" if cut.stable else "[red]chatter[/]"
         limit = f"limit {1e3 * cut.limit:.2f} mm, margin {100.0 * cut.margin:+.0f} %" if cut.limit < float("inf") else "no limit in reach"
-        words = [f"{about}{cut.spindle_speed * _RPM:.0f} rev/min, {1e3 * cut.depth:.2f} mm: {verdict}, {limit}"]
+        words = [f"{about}{to_rpm(cut.spindle_speed):.0f} rev/min, {1e3 * cut.depth:.2f} mm: {verdict}, {limit}"]
         if cut.probability is not None:
             words.append(f"stable with a probability of {100.0 * cut.probability:.0f} %")
         words.append(f"{1e3 * cut.robust_limit:.2f} mm with tolerance and probability")
-        near = [f"{speed * _RPM:.0f} rev/min" for speed in (cut.slower, cut.faster) if speed is not None]
+        near = [f"{to_rpm(speed):.0f} rev/min" for speed in (cut.slower, cut.faster) if speed is not None]
         if near:
             words.append(f"{'chatter begins at' if cut.stable else 'the nearest stable speeds are'} {' and '.join(near)}")
         words.append(
@@ -191,7 +196,7 @@ def show_comparison(rows: Sequence[tuple[str, float, Sequence[OperatingPoint]]])
         cells = ["", "", "", ""]
         if points:
             p = points[0]
-            cells = [f"{p.spindle_speed * _RPM:.0f}", f"{1e3 * p.depth:.2f}", f"{6e7 * p.removal_rate:.0f}", str(p.bound)]
+            cells = [f"{to_rpm(p.spindle_speed):.0f}", f"{1e3 * p.depth:.2f}", f"{to_cm3_per_min(p.removal_rate):.0f}", str(p.bound)]
         table.add_row(escape(name), f"{1e3 * lowest:.3f}", *cells)
     console().print(table)
 

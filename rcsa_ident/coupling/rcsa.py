@@ -12,7 +12,7 @@ from rcsa_ident.errors import InputError
 SPINDLE = "spindle"
 
 
-def couple(tool_holder: Receptance, spindle: Receptance, joint: LumpedJoint) -> Receptance:
+def couple(tool_holder: Receptance, spindle: Receptance, joint: LumpedJoint | None) -> Receptance:
     """Return the receptances of the coupled machine at the tip (point 1) and at the spindle's flange (point 3).
 
     C11 = A11 - A12 Z A21,  C31 = B33 Z A21,  C33 = B33 - B33 Z B33,  Z = [A22 + K^-1 + B33]^-1.
@@ -23,8 +23,8 @@ def couple(tool_holder: Receptance, spindle: Receptance, joint: LumpedJoint) -> 
         Points ``tip`` and ``flange``; per point translation and slope of one bending plane, or of both (4 x 4 blocks).
     spindle : Receptance
         Point ``flange`` with the same directions in the same order, at the same frequencies.
-    joint : LumpedJoint
-        Between the tool-holder's flange and the spindle's, in every direction that both have.
+    joint : LumpedJoint or None
+        None is a rigid connection, or one whose compliance the spindle's receptance holds already.
 
     Returns
     -------
@@ -56,8 +56,9 @@ def couple(tool_holder: Receptance, spindle: Receptance, joint: LumpedJoint) -> 
                 f"directions at the flange ({name})", " ".join(found), f"the tool-holder's, {' '.join(directions)}, in that order"
             )
     interface = a22 + b33
-    i = np.arange(len(directions))
-    interface[:, i, i] += joint.compliance_along(tool_holder.omega, directions)
+    if joint is not None:
+        i = np.arange(len(directions))
+        interface[:, i, i] += joint.compliance_along(tool_holder.omega, directions)
     tips = a21.shape[2]
     carried = np.linalg.solve(interface, np.concatenate([a21, b33], axis=2))
     from_tip, from_spindle = carried[:, :, :tips], carried[:, :, tips:]

@@ -26,6 +26,11 @@ class Dof(StrEnum):
         """True for a rotation."""
         return self in (Dof.SLOPE_X, Dof.SLOPE_Y)
 
+    @property
+    def plane(self) -> Dof:
+        """The translation of the bending plane that it belongs to; a direction without one stands for itself."""
+        return {Dof.SLOPE_X: Dof.X, Dof.SLOPE_Y: Dof.Y}.get(self, self)
+
 
 @dataclass(frozen=True, slots=True)
 class Coordinate:

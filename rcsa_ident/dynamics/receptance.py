@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -64,6 +65,38 @@ class Receptance:
             known = ", ".join(str(c) for c in (*self.rows, *self.cols))
             raise InputError("coordinate", f"{row} or {col}", f"one of {known}") from None
         return self.values[:, i, j]
+
+    def block(self, coordinates: Sequence[Coordinate]) -> Receptance:
+        """Return the receptance between some of its coordinates, which are rows as well as columns."""
+        rows, cols = ([side.index(c) for c in coordinates] for side in (self.rows, self.cols))
+        return Receptance(self.omega, self.values[:, rows][:, :, cols], tuple(coordinates), tuple(coordinates))
+
+    @classmethod
+    def block_diagonal(cls, parts: Sequence[Receptance]) -> Receptance:
+        """Return the receptance of parts that do not feel each other, with zeros between them.
+
+        Raises
+        ------
+        InputError
+            If the parts' frequencies differ, or there is no part.
+        """
+        if not parts:
+            raise InputError("receptances", "none", "at least one")
+        omega = parts[0].omega
+        if any(not np.array_equal(part.omega, omega) for part in parts[1:]):
+            raise InputError("receptances", "frequencies that differ", f"the {omega.size} frequencies of the first")
+        rows, cols = tuple(c for p in parts for c in p.rows), tuple(c for p in parts for c in p.cols)
+        values = np.zeros((omega.size, len(rows), len(cols)), dtype=complex)
+        row = col = 0
+        for part in parts:
+            values[:, row : row + len(part.rows), col : col + len(part.cols)] = part.values
+            row, col = row + len(part.rows), col + len(part.cols)
+        return cls(omega, values, rows, cols)
+
+    def __repr__(self) -> str:
+        low, high = (w / (2.0 * np.pi) for w in (self.omega.min(initial=np.inf), self.omega.max(initial=-np.inf)))
+        between = ", ".join(str(c) for c in self.rows) + ("" if self.rows == self.cols else " over " + ", ".join(str(c) for c in self.cols))
+        return f"<{type(self).__name__} {between}: {self.omega.size} frequencies, {low:.0f} to {high:.0f} Hz>"
 
 
 def _at(coordinates: tuple[Coordinate, ...], point: str) -> np.ndarray:

@@ -19,7 +19,8 @@ from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification._kernels import best_grid_misfit, modal_cross_frf
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
-from rcsa_ident.identification.result import AxisResult, Identification, Status
+from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.status import Status
 
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 GRID = 64

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel
@@ -17,6 +15,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import write_frf_csv
 from rcsa_ident.io.files import replacing, write_text
 from rcsa_ident.io.uff import DISPLACEMENT, EXCITATION_FORCE, FRF, UffAxis, UffFunction, write_uff
+from rcsa_ident.units import to_hz
 
 #: Directions as universal files number them; a slope dy/dz is a rotation about -X.
 _DIRECTIONS = {Dof.X: 1, Dof.Y: 2, Dof.Z: 3, Dof.SLOPE_X: 5, Dof.SLOPE_Y: -4}
@@ -38,7 +37,7 @@ def write_receptances_uff(path: str | Path, receptances: Mapping[str, Receptance
     functions = [
         UffFunction(
             FRF,
-            receptance.omega / (2.0 * np.pi),
+            to_hz(receptance.omega),
             receptance.values[:, i, j],
             _place(row),
             _place(col),
@@ -71,7 +70,7 @@ def named_entries(receptances: Mapping[str, Receptance]) -> dict[str, ComplexArr
 def write_receptances_csv(path: str | Path, receptances: Mapping[str, Receptance], further: Mapping[str, FloatArray] | None = None) -> None:
     """Write FRF.csv with all entries: motion per force first, as every reader of FRF.csv wants it."""
     entries = named_entries(receptances)
-    frequency = next(iter(receptances.values())).omega / (2.0 * np.pi)
+    frequency = to_hz(next(iter(receptances.values())).omega)
     rest = {name: values for name, values in entries.items() if name not in receptances}
     columns = {
         f"{name}_{part}": getattr(values, which) for name, values in rest.items() for part, which in (("re", "real"), ("im", "imag"))
@@ -81,7 +80,7 @@ def write_receptances_csv(path: str | Path, receptances: Mapping[str, Receptance
 
 def write_receptances_json(path: str | Path, receptances: Mapping[str, Receptance], title: str) -> None:
     """Write every entry as lists of real and imaginary parts."""
-    frequency = next(iter(receptances.values())).omega / (2.0 * np.pi)
+    frequency = to_hz(next(iter(receptances.values())).omega)
     entries = {name: {"re": v.real.tolist(), "im": v.imag.tolist()} for name, v in named_entries(receptances).items()}
     data = {"title": title, "units": _UNITS, "frequency_hz": frequency.tolist(), "receptances": entries}
     write_text(path, json.dumps(data, ensure_ascii=False, allow_nan=False) + "\n")
@@ -97,7 +96,7 @@ def write_receptances_hdf5(path: str | Path, receptances: Mapping[str, Receptanc
     with replacing(path) as part, h5py.File(part, "w") as file:
         file.attrs["title"] = title
         file.attrs["units"] = json.dumps(_UNITS)
-        file["frequency_hz"] = next(iter(receptances.values())).omega / (2.0 * np.pi)
+        file["frequency_hz"] = to_hz(next(iter(receptances.values())).omega)
         for name, values in named_entries(receptances).items():
             file[name] = values
 
@@ -107,7 +106,7 @@ def mode_records(axes: Mapping[str, ModalModel]) -> list[dict[str, Any]]:
     return [
         {
             "axis": axis,
-            "natural_frequency_hz": float(omega) / (2.0 * np.pi),
+            "natural_frequency_hz": to_hz(float(omega)),
             "damping_ratio": float(zeta),
             **{
                 f"phi_{_KIND[c.dof.is_slope]}_{part}": float(getattr(value, which))

@@ -14,6 +14,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import read_table
 from rcsa_ident.machine.measured import MeasuredFlange
+from rcsa_ident.units import from_hz
 
 #: Entries of [[tF, tM], [rF, rM]]; a flange is reciprocal, so rF is tM.
 _ENTRIES = {"tF": (0, 0), "tM": (0, 1), "rM": (1, 1)}
@@ -66,7 +67,7 @@ def read_flange_csv(path: str | Path) -> dict[Dof, MeasuredFlange]:
             block[:, i, j] = block[:, j, i] = parts[2 * k] + 1j * parts[2 * k + 1]
         rows = plane("flange", axis)
         try:
-            flanges[axis] = MeasuredFlange(Receptance(2.0 * np.pi * frequency, block, rows, rows))
+            flanges[axis] = MeasuredFlange(Receptance(from_hz(frequency), block, rows, rows))
         except InputError as error:
             raise error.at(str(path)) from None
     if not flanges:

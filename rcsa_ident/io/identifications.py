@@ -21,8 +21,8 @@ from rcsa_ident.io.workpieces import workpiece_keys, workpiece_of
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machining_setup import Campaign, Workpiece
 from rcsa_ident.signals.recording import Quantity, Sensor
+from rcsa_ident.units import from_hz, to_hz, to_rpm
 
-_RPM = 30.0 / math.pi
 _MOST_MODES = 200
 #: Standard deviations of natural frequencies [rad/s] and damping ratios, per axis.
 ModeDeviations = Mapping[Dof, tuple[FloatArray, FloatArray]]
@@ -54,7 +54,7 @@ def identification_to_json(
     and the mean pitch of the teeth; which of the teeth it is, cuts of equal teeth do not tell.
     """
     omega = [axis.measured["omega"] for axis in identification.axes.values() if "omega" in axis.measured]
-    band = [float(min(w.min() for w in omega)), float(max(w.max() for w in omega))] if omega else [0.0, 2.0 * np.pi * max_frequency_hz]
+    band = [float(min(w.min() for w in omega)), float(max(w.max() for w in omega))] if omega else [0.0, from_hz(max_frequency_hz)]
     return {
         "schema_version": SCHEMA_VERSION,
         "status": str(identification.status),
@@ -71,7 +71,7 @@ def identification_to_json(
         "sensors": {sensor.name: _sensor_to_json(sensor) for sensor in campaign.sensors},
         "workpiece": workpiece_keys(campaign.workpiece, all_spreads=True),
         "coefficients": {name: _coefficient(name, *found) for name, found in identification.coefficients.items()},
-        "band_hz": [w / (2.0 * np.pi) for w in band],
+        "band_hz": [to_hz(w) for w in band],
         "axes": _axes_to_json(identification, deviations or {}),
         "delays": _delays(identification, campaign),
     }
@@ -82,7 +82,7 @@ def speed_band_to_json(
 ) -> dict[str, Any]:
     """Return one entry of ``speed_bands``: what the cuts of a range of spindle speeds [rad/s] say for themselves."""
     return {
-        "speed_range_rpm": [speed * _RPM for speed in speeds],
+        "speed_range_rpm": [to_rpm(speed) for speed in speeds],
         "cuts_used": len(identification.cut_ids),
         "status": str(identification.status),
         "reasons": list(identification.reasons),
@@ -99,12 +99,12 @@ def _axis_to_json(axis: AxisResult, deviation: tuple[FloatArray, FloatArray] | N
     data = spindle_to_json(axis.modes, axis.joint)
     if deviation is not None:
         for mode, omega_n, zeta in zip(data["modes"], *(d.tolist() for d in deviation), strict=True):
-            mode |= {"natural_frequency_std_hz": omega_n / (2.0 * math.pi), "damping_ratio_std": zeta}
+            mode |= {"natural_frequency_std_hz": to_hz(omega_n), "damping_ratio_std": zeta}
     posterior = axis.posterior
     if posterior is not None:
         middle, half = posterior.speed_range
         data["layout"] = {"modes": posterior.layout.modes, "softening": posterior.layout.softening}
-        data["speed_range_rpm"] = [(middle - half) * _RPM, (middle + half) * _RPM]
+        data["speed_range_rpm"] = [to_rpm(middle - half), to_rpm(middle + half)]
         data["unknowns"] = posterior.theta.tolist()
         data["rivals"] = [rival.tolist() for rival in posterior.rivals]
         data["covariance"] = {"parameters": list(axis.parameters), "matrix": posterior.covariance.tolist()}
@@ -173,7 +173,7 @@ def speed_bands_from_json(data: Mapping[str, Any], where: str) -> list[tuple[tup
     for table in tables:
         low, high = table.numbers("speed_range_rpm", 2, "rev/min")
         if table.table("axes").data:
-            found.append(((low / _RPM, high / _RPM), _machine(table)))
+            found.append(((low / to_rpm(1.0), high / to_rpm(1.0)), _machine(table)))
     return found
 
 
@@ -200,7 +200,7 @@ def _posterior(axis: Table) -> Posterior | None:
     low, high = axis.numbers("speed_range_rpm", 2, "rev/min") if "speed_range_rpm" in axis else (0.0, 0.0)
     if not 0.0 <= low <= high:
         axis.refuse("speed_range_rpm", f"{[low, high]}", "lowest and highest speed, 0 <= lowest <= highest [rev/min]")
-    speed_range = 0.5 * (low + high) / _RPM, 0.5 * (high - low) / _RPM
+    speed_range = 0.5 * (low + high) / to_rpm(1.0), 0.5 * (high - low) / to_rpm(1.0)
     return Posterior(np.array(unknowns), matrix, layout, speed_range, tuple(_rivals(axis, layout)))
 
 

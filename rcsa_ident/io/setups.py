@@ -20,11 +20,11 @@ from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Campaign, Cut, Tooling
 from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, clamped
+from rcsa_ident.units import from_rpm
 
 CAMPAIGN_FILE = "campaign.toml"
 LARGEST_SETUP = 4 * MEGABYTE
 FEED_DIRECTIONS = {"+X": 0.0, "-X": np.pi, "+Y": 0.5 * np.pi, "-Y": -0.5 * np.pi}
-RPM = np.pi / 30.0
 
 _TOOLING = ("name", "cutter", "tool", "holder", "contact", "materials")
 _CUTTER = ("teeth", "diameter_mm", "helix_deg", "pitch_deg")
@@ -243,7 +243,7 @@ def _cut(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Table,
     if exit_ <= entry:
         table.refuse("exit_angle_deg", f"{exit_:g}", f"above entry_angle_deg, {entry:g}, and at most 180 [deg]")
     conditions = CuttingConditions(
-        table.number("spindle_speed_rpm", "rev/min", above=0.0, most=500000.0) * RPM,
+        from_rpm(table.number("spindle_speed_rpm", "rev/min", above=0.0, most=500000.0)),
         table.number("axial_depth_mm", "mm", above=0.0, most=500.0) * 1e-3,
         table.number("feed_per_tooth_mm", "mm", above=0.0, most=10.0) * 1e-3,
         Engagement(float(np.radians(entry)), float(np.radians(exit_))),

@@ -280,7 +280,7 @@ def restore_mean_force(estimate: ForceEstimate, idle: float, first: int = 0) -> 
         with its sign turned.
     """
     if not 0.0 < idle < 1.0:
-        raise InputError("idle share", idle, "above 0 and below 1: some time in which no tooth cuts")
+        raise InputError("idle share", f"{100.0 * idle:g} %", "more than 0 % and less than 100 %: the time in which no tooth cuts")
     levels = []
     for values in np.sort(estimate.force[first:], axis=0).T:
         held = max(int(0.5 * idle * values.size), 2)

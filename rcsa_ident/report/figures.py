@@ -19,6 +19,7 @@ from matplotlib.ticker import MaxNLocator
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.units import to_hz
 
 #: Distinct for colour-blind readers, too (Okabe & Ito), and dark enough on white.
 COLOURS = {"X": "#0072B2", "Y": "#C8501A"}
@@ -109,7 +110,7 @@ def cross_frf(axis: AxisResult, tooling: Sequence[str], name: str) -> Figure:
         for column, each in enumerate(names):
             order = np.flatnonzero(of == each)
             order = order[np.argsort(omega[order])]
-            frequency = omega[order] / (2.0 * np.pi)
+            frequency = to_hz(omega[order])
             top, bottom = grid[:, column]
             for ax, curve in ((top, lambda h: 1e6 * np.abs(h)), (bottom, lambda h: np.degrees(np.angle(h)))):
                 ax.plot(frequency, curve(value[order]), "o", ms=3.4, mfc="none", mec=COLOURS[name], mew=1.0, zorder=3, label="measured")

@@ -20,8 +20,8 @@ from rcsa_ident.report.lobes import stability_figure
 from rcsa_ident.report.summaries import coefficient_rows, mode_rows, peak_row, recording_rows, two_digits
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.units import to_hz, to_rpm
 
-_RPM = 30.0 / np.pi
 #: A logarithm that the data leave open by more than this is not told by them.
 UNTOLD = 0.5
 
@@ -141,7 +141,7 @@ def _axis(name: str, part: AxisResult, tooling: Sequence[str], deviation: tuple[
         "part": part,
         "modes": mode_rows(part.modes, deviation),
         "residual": part.modes.residual.tolist(),
-        "band": (float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))) if omega.size else None,
+        "band": (float(to_hz(omega.min())), float(to_hz(omega.max()))) if omega.size else None,
         "points": omega.size,
         "figure": figures.svg(figures.cross_frf(part, tooling, name), f"cross{name}") if omega.size else "",
     }
@@ -178,7 +178,7 @@ def _tooling(number: int, page: ToolingPage) -> dict[str, Any]:
         "lobes": ""
         if lobes is None
         else figures.svg(stability_figure(lobes, page.max_depth, page.band, page.best, page.true_limit), f"lobes{number}"),
-        "best": [{"rpm": s * _RPM, "mm": d * 1e3 if np.isfinite(d) else None} for s, d in page.best],
+        "best": [{"rpm": to_rpm(s), "mm": d * 1e3 if np.isfinite(d) else None} for s, d in page.best],
         "anywhere": None if lobes is None or not np.isfinite(lobes.absolute_limit) else lobes.absolute_limit * 1e3,
-        "critical": None if lobes is None or not np.isfinite(lobes.absolute_frequency) else lobes.absolute_frequency / (2.0 * np.pi),
+        "critical": None if lobes is None or not np.isfinite(lobes.absolute_frequency) else to_hz(lobes.absolute_frequency),
     }

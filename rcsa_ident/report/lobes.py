@@ -17,8 +17,8 @@ from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.stability_map import StabilityMap
 from rcsa_ident.stability.surface_error import SurfaceError
 from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, Verdict
+from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
 
-_RPM = 30.0 / np.pi
 _GREY, _GREEN, _RED = "#52606d", "#00704f", "#a33f12"
 #: Marker, colour and filling of a tested cut.
 _VERDICTS = {Verdict.STABLE: ("o", _GREEN, "none"), Verdict.CHATTER: ("X", _RED, _RED), Verdict.MARGINAL: ("D", "#b8860b", "none")}
@@ -91,13 +91,13 @@ def stability_figure(
         _draw_limit(top, lobes, max_depth, ceiling, band, chart)
         if true_limit is not None:
             top.plot(
-                lobes.spindle_speed * _RPM, 1e3 * np.minimum(true_limit, max_depth), "--", color=_TRUTH, lw=1.1, label="from the true FRF"
+                to_rpm(lobes.spindle_speed), 1e3 * np.minimum(true_limit, max_depth), "--", color=_TRUTH, lw=1.1, label="from the true FRF"
             )
         if np.isfinite(lobes.absolute_limit) and lobes.absolute_limit < max_depth:
             label = f"stable at any speed: {1e3 * lobes.absolute_limit:.2f} mm"
             top.axhline(1e3 * lobes.absolute_limit, color=_GREY, ls=":", lw=1.2, label=label)
         for i, (best_speed, depth) in enumerate(best):
-            x, y = best_speed * _RPM, 1e3 * min(depth, max_depth)
+            x, y = to_rpm(best_speed), 1e3 * min(depth, max_depth)
             top.plot(x, y, "v", color=_GREEN, ms=8.0, label="best speeds" if i == 0 else None)
             text = f"{x:.0f} rev/min\n{y:.2f} mm" if depth <= max_depth else f"{x:.0f} rev/min"
             top.annotate(text, (x, y), xytext=(0, 7), textcoords="offset points", ha="center", fontsize=8.5, color=_GREEN)
@@ -111,7 +111,7 @@ def stability_figure(
         if surface is not None:
             _draw_surface(grid[2, 0], surface)
         bottom.set_xlabel("spindle speed [rev/min]")
-        speed = lobes.spindle_speed * _RPM
+        speed = to_rpm(lobes.spindle_speed)
         bottom.set_xlim(np.min(speed), np.max(speed))
     return figure
 
@@ -130,7 +130,7 @@ def _draw_limit(
     band: tuple[FloatArray, FloatArray] | None = None,
     chart: StabilityMap | None = None,
 ) -> None:
-    speed, limit = lobes.spindle_speed * _RPM, 1e3 * np.minimum(lobes.limit_depth, max_depth)
+    speed, limit = to_rpm(lobes.spindle_speed), 1e3 * np.minimum(lobes.limit_depth, max_depth)
     if chart is None:
         ax.fill_between(speed, 0.0, limit, color="#009E73", alpha=0.13, lw=0)
         ax.fill_between(speed, limit, ceiling, color="#C8501A", alpha=0.10, lw=0)
@@ -138,8 +138,8 @@ def _draw_limit(
         # a cut of no depth is stable
         depth = 1e3 * np.concatenate([[0.0], chart.depth])
         growth = np.concatenate([np.minimum(chart.growth[:, :1], -0.1), chart.growth], axis=1).T
-        ax.contourf(chart.spindle_speed * _RPM, depth, growth, [-np.inf, 0.0, np.inf], colors=["#009E73", "#C8501A"], alpha=0.13)
-        ax.contour(chart.spindle_speed * _RPM, depth, growth, [0.0], colors=[_GREY], linewidths=0.9)
+        ax.contourf(to_rpm(chart.spindle_speed), depth, growth, [-np.inf, 0.0, np.inf], colors=["#009E73", "#C8501A"], alpha=0.13)
+        ax.contour(to_rpm(chart.spindle_speed), depth, growth, [0.0], colors=[_GREY], linewidths=0.9)
     if band is not None:
         low, high = (1e3 * np.minimum(edge, max_depth) for edge in band)
         ax.fill_between(speed, low, high, color=COLOURS["X"], alpha=0.35, lw=0, label="95 % of what the records leave open")
@@ -151,7 +151,7 @@ def _draw_limit(
 
 
 def _draw_tested(ax: Axes, tested: Judged) -> None:
-    speed, depth = tested.cuts.spindle_speed * _RPM, 1e3 * tested.cuts.axial_depth
+    speed, depth = to_rpm(tested.cuts.spindle_speed), 1e3 * tested.cuts.axial_depth
     for verdict, (marker, colour, filling) in _VERDICTS.items():
         seen = tested.cuts.seen(verdict)
         if seen.any():
@@ -173,7 +173,7 @@ def _told(tally: Tally) -> str:
 
 def _draw_chatter(ax: Axes, lobes: StabilityLobes) -> None:
     order = np.argsort(lobes.spindle_speed)
-    speed, chatter = lobes.spindle_speed[order] * _RPM, lobes.chatter_frequency[order] / (2.0 * np.pi)
+    speed, chatter = to_rpm(lobes.spindle_speed[order]), to_hz(lobes.chatter_frequency[order])
     # another lobe or another mode: no line between them
     jumps = np.abs(np.diff(chatter, prepend=chatter[0])) > 0.03 * chatter
     chatter[jumps] = np.nan
@@ -182,7 +182,7 @@ def _draw_chatter(ax: Axes, lobes: StabilityLobes) -> None:
 
 
 def _draw_surface(ax: Axes, surface: SurfaceError) -> None:
-    speed, error = surface.spindle_speed * _RPM, 1e6 * surface.error
+    speed, error = to_rpm(surface.spindle_speed), 1e6 * surface.error
     ax.fill_between(speed, error.min(axis=1), error.max(axis=1), color="#CC79A7", alpha=0.35, lw=0, label="over the depth")
     ax.plot(speed, error.mean(axis=1), color="#CC79A7", label="mean")
     ax.axhline(0.0, color=_GREY, lw=0.8)
@@ -204,7 +204,7 @@ def cases_figure(panels: Sequence[Panel]) -> Figure:
         for ax, panel in zip(grid.ravel(), panels, strict=False):
             ceiling = _ceiling(panel.lobes, panel.max_depth, panel.tested)
             _draw_limit(ax, panel.lobes, panel.max_depth, ceiling)
-            speed = panel.lobes.spindle_speed * _RPM
+            speed = to_rpm(panel.lobes.spindle_speed)
             for (name, limit), colour in zip(panel.others.items(), (_TRUTH, *_CURVES[2:]), strict=False):
                 ax.plot(speed, 1e3 * np.minimum(limit, panel.max_depth), "--", color=colour, lw=1.1, label=name)
             title = panel.title
@@ -261,7 +261,7 @@ def usable_figure(depths: Depths, marks: Sequence[Mark] = (), planned: Sequence[
     """
     figure, grid = _grid(2, 1, 5.2, (2.0, 1.0), sharey="none")
     top, bottom = grid[:, 0]
-    speed = depths.spindle_speed * _RPM
+    speed = to_rpm(depths.spindle_speed)
     limit, depth = 1e3 * depths.limit, 1e3 * depths.depth
     ceiling = 1.18 * float(max(limit.max(), *(1e3 * mark.depth for mark in planned), 1e-6))
     with mpl.rc_context(_STYLE):
@@ -279,14 +279,14 @@ def usable_figure(depths: Depths, marks: Sequence[Mark] = (), planned: Sequence[
         top.plot(speed, limit, color=COLOURS["X"], label="stability limit")
         for group, marker, colour, name in ((marks, "v", _GREEN, "highest removal"), (planned, "s", _RED, "planned")):
             for i, mark in enumerate(group):
-                x, y = mark.spindle_speed * _RPM, 1e3 * mark.depth
+                x, y = to_rpm(mark.spindle_speed), 1e3 * mark.depth
                 top.plot(x, y, marker, color=colour, ms=7.0, zorder=5, label=name if i == 0 else None)
-                bottom.plot(x, 6e7 * mark.removal_rate, marker, color=colour, ms=6.0, zorder=5)
+                bottom.plot(x, to_cm3_per_min(mark.removal_rate), marker, color=colour, ms=6.0, zorder=5)
                 _beside(top, x, y, mark.text, colour, speed)
         top.set_ylim(0.0, ceiling)
         top.set_ylabel("axial depth [mm]")
         figure.legend(*top.get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=9.0, frameon=False)
-        bottom.plot(speed, 6e7 * depths.removal_rate, color=_GREEN)
+        bottom.plot(speed, to_cm3_per_min(depths.removal_rate), color=_GREEN)
         bottom.set_ylim(bottom=0.0)
         bottom.set_ylabel("removal [cm³/min]")
         bottom.set_xlabel("spindle speed [rev/min]")
@@ -322,15 +322,15 @@ def comparison_figure(curves: Mapping[str, Depths], marks: Mapping[str, Mark]) -
     with mpl.rc_context(_STYLE):
         for i, (name, depths) in enumerate(curves.items()):
             colour, dashes = _CURVES[i % len(_CURVES)], ("-", "--", ":")[i // len(_CURVES) % 3]
-            speed = depths.spindle_speed * _RPM
+            speed = to_rpm(depths.spindle_speed)
             top.plot(speed, 1e3 * depths.limit, dashes, color=colour, lw=0.8, alpha=0.6)
             top.plot(speed, 1e3 * depths.depth, dashes, color=colour, label=name.replace("$", r"\$"))
-            bottom.plot(speed, 6e7 * depths.removal_rate, dashes, color=colour)
+            bottom.plot(speed, to_cm3_per_min(depths.removal_rate), dashes, color=colour)
             if name in marks:
                 mark = marks[name]
-                top.plot(mark.spindle_speed * _RPM, 1e3 * mark.depth, "v", color=colour, ms=7.0, zorder=5)
-                bottom.plot(mark.spindle_speed * _RPM, 6e7 * mark.removal_rate, "v", color=colour, ms=7.0, zorder=5)
-                _beside(bottom, mark.spindle_speed * _RPM, 6e7 * mark.removal_rate, mark.text, colour, speed)
+                top.plot(to_rpm(mark.spindle_speed), 1e3 * mark.depth, "v", color=colour, ms=7.0, zorder=5)
+                bottom.plot(to_rpm(mark.spindle_speed), to_cm3_per_min(mark.removal_rate), "v", color=colour, ms=7.0, zorder=5)
+                _beside(bottom, to_rpm(mark.spindle_speed), to_cm3_per_min(mark.removal_rate), mark.text, colour, speed)
             bottom.set_xlim(speed.min(), speed.max())
         top.set_ylim(bottom=0.0)
         top.set_ylabel("usable depth [mm]\n(thin: stability alone)")

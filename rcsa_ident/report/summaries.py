@@ -12,8 +12,7 @@ from rcsa_ident.cutting.force import REFERENCE_RUNOUT, SLOPES
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.measurement import Reading
-
-_RPM = 30.0 / np.pi
+from rcsa_ident.units import to_hz, to_rpm
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +44,7 @@ def recording_rows(readings: Iterable[tuple[Cut, Reading]]) -> list[RecordingRow
     rows = []
     for cut, reading in readings:
         verdict, found = reading.verdict, reading.measurement
-        common = (cut.id, cut.tooling, verdict.usable, verdict.reasons, verdict.notes, cut.conditions.spindle_speed * _RPM)
+        common = (cut.id, cut.tooling, verdict.usable, verdict.reasons, verdict.notes, to_rpm(cut.conditions.spindle_speed))
         if found is None:
             rows.append(RecordingRow(*common))
             continue
@@ -55,7 +54,7 @@ def recording_rows(readings: Iterable[tuple[Cut, Reading]]) -> list[RecordingRow
             if lines.omega.size
         }
         count = sum(lines.omega.size for lines in found.axes.values())
-        rows.append(RecordingRow(*common, found.spindle_speed * _RPM, count, ratios))
+        rows.append(RecordingRow(*common, to_rpm(found.spindle_speed), count, ratios))
     return rows
 
 
@@ -88,12 +87,10 @@ def mode_rows(modes: ModalModel, deviation: tuple[FloatArray, FloatArray] | None
         Standard deviations of natural frequencies [rad/s] and damping ratios, in the modes' order.
     """
     order = np.argsort(modes.omega_n)
-    deviations = (
-        [(None, None)] * order.size if deviation is None else [(d / (2.0 * np.pi), 100.0 * z) for d, z in zip(*deviation, strict=True)]
-    )
+    deviations = [(None, None)] * order.size if deviation is None else [(to_hz(d), 100.0 * z) for d, z in zip(*deviation, strict=True)]
     return [
         ModeRow(
-            float(modes.omega_n[n] / (2.0 * np.pi)),
+            float(to_hz(modes.omega_n[n])),
             float(100.0 * modes.zeta[n]),
             complex(modes.phi[n, 0]),
             complex(modes.phi[n, 1]),

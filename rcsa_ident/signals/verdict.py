@@ -10,6 +10,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, follow_speed, line_spectrum, refine_speed
 from rcsa_ident.signals.steady_part import hann
+from rcsa_ident.units import to_rpm
 
 #: Equal samples in a row that a live analogue channel does not produce.
 FROZEN_SAMPLES = 12
@@ -138,7 +139,7 @@ def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) ->
     programmed : float [rad/s]
         The spindle speed that was set.
     """
-    speed, rate, rpm = lines.spindle_speed, lines.rate, 30.0 / np.pi
+    speed, rate = lines.spindle_speed, lines.rate
     order = np.arange(1, lines.amplitude.shape[0])[:, None]
     power = np.abs(lines.amplitude[1:, : samples.shape[1]]) ** 2
     information = power / np.maximum(lines.variance[1:, : samples.shape[1]], 1e-300)
@@ -151,7 +152,7 @@ def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) ->
         # an air cut of a round flange tells no speed
         return ()
     if abs(speed / programmed - 1.0) > 0.0095:
-        return (f"speed: the record repeats at {speed * rpm:.1f} rev/min, the programmed speed is {programmed * rpm:.0f} rev/min",)
+        return (f"speed: the record repeats at {to_rpm(speed):.1f} rev/min, the programmed speed is {to_rpm(programmed):.0f} rev/min",)
     duration = samples.shape[0] / rate
     half = samples.shape[0] // 2
     if half < 4.0 * rate * 2.0 * np.pi / speed:
@@ -164,7 +165,7 @@ def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) ->
     std = 4.0 / np.sqrt(np.sum(order**2 * information) * duration**2 / 12.0)
     if phase > DRIFT_PHASE and abs(second - first) > 5.0 * std:
         return (
-            f"speed drifts from {first * rpm:.1f} to {second * rpm:.1f} rev/min: "
+            f"speed drifts from {to_rpm(first):.1f} to {to_rpm(second):.1f} rev/min: "
             f"the highest line's phase bends by {phase:.2g} rad (at most {DRIFT_PHASE})",
         )
     return ()

@@ -14,7 +14,7 @@ from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.errors import InputError
+from rcsa_ident.errors import InputError, Unsteady
 from rcsa_ident.identification.posterior import MachineAxis, spread
 from rcsa_ident.observer.force import AxisObserver, ForceEstimate, ForceObserver, RunOut, axis_observer, force_observer
 from rcsa_ident.observer.response import ObserverFRF, observer_response
@@ -29,6 +29,7 @@ from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
 from rcsa_ident.signals.verdict import raw_faults, speed_faults
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.units import to_rpm
 from rcsa_ident.workflows.speeds import MachineOverSpeed
 from rcsa_ident.workflows.tip import tooltip, turned_plane
 
@@ -117,17 +118,19 @@ def observe(
     Raises
     ------
     InputError
-        If the recording has lost samples, no displacement, no speed or no steady part.
+        If the recording has no displacement or no speed.
+    Unsteady
+        If it has lost samples, no steady part, or a vibration that does not follow the speed.
     """
     faults = (*raw_faults(cut), *(f"air cut: {fault}" for fault in (raw_faults(air) if air is not None else ())))
     if faults:
-        raise InputError("recording", "; ".join(faults), "a record without lost, frozen or clipped samples")
+        raise Unsteady("recording", "; ".join(faults), "a record without lost, frozen or clipped samples")
     axes = tuple(axis for axis in measured_axes(cut) if axis in machine.whole)
     if not axes:
         raise InputError("sensors", "no displacement along an identified axis", "a displacement sensor for X or Y")
     programmed = trigger_speed(cut) if programmed is None else programmed
     top = min(identified[1], HIGHEST * 2.0 * np.pi * cut.rate)
-    steady = _steady(cut, axes, programmed, top, teeth)
+    steady = steady_record(cut, axes, programmed, top / (2.0 * np.pi), teeth)
     speed = steady.spindle_speed
     notes = list(speed_faults(steady.displacement, steady.lines, programmed))
     _periodic(steady, programmed, notes)
@@ -135,8 +138,8 @@ def observe(
     run_out = _run_out(steady, air, axes, programmed, top, teeth, notes)
     known = machine.speed_range
     if known is not None and not known[0] * (1.0 - 1e-9) <= speed <= known[1] * (1.0 + 1e-9):
-        low, high = (each * 30.0 / np.pi for each in known)
-        notes.append(f"the machine was identified from {low:.0f} to {high:.0f} rev/min, the record has {speed * 30.0 / np.pi:.0f}")
+        low, high = (to_rpm(each) for each in known)
+        notes.append(f"the machine was identified from {low:.0f} to {high:.0f} rev/min, the record has {to_rpm(speed):.0f}")
     omega = 2.0 * np.pi * np.arange(max(0.25 * band[0] / (2.0 * np.pi), STEP_HZ), 1.3 * band[1] / (2.0 * np.pi), STEP_HZ)
     coupled = tooltip(machine.at(speed), assembly, omega, bands=False, speed=speed).coupled
     tuning = {axis: Tuning(_noise(steady, i), bandwidth or band[1], _response_time(method, speed)) for i, axis in enumerate(axes)}
@@ -173,21 +176,15 @@ def trigger_speed(recording: Recording) -> float:
     """
     found = recording.channel(Quantity.TRIGGER)
     if found is None:
-        raise InputError("--speed-rpm", "none, and no trigger in the recording", "the programmed spindle speed [rev/min]")
+        raise InputError("spindle_speed", "none, and no trigger in the recording", "the programmed spindle speed [rev/min]")
     sensor, signal = found
     high = signal > 0.5 * (np.nanmin(signal) + np.nanmax(signal))
     edges = np.flatnonzero(high[1:] & ~high[:-1])
     if edges.size < 3:
-        raise InputError("trigger", f"{edges.size} rising edges", "three or more, or the programmed spindle speed with --speed-rpm")
+        found_edges = f"none, and {edges.size} rising edges of the trigger"
+        raise Unsteady("spindle_speed", found_edges, "the programmed spindle speed [rev/min], or three rising edges or more")
     # the median shrugs off a stray or a lost edge
     return float(2.0 * np.pi * recording.rate / np.median(np.diff(edges)) / sensor.pulses_per_revolution)
-
-
-def _steady(recording: Recording, axes: tuple[Dof, ...], programmed: float, top: float, teeth: int) -> SteadyRecord:
-    steady = steady_record(recording, axes, programmed, top / (2.0 * np.pi), teeth)
-    if isinstance(steady, str):
-        raise InputError("recording", steady, "a steady record of the programmed speed")
-    return steady
 
 
 def _periodic(steady: SteadyRecord, programmed: float, notes: list[str]) -> None:
@@ -195,8 +192,8 @@ def _periodic(steady: SteadyRecord, programmed: float, notes: list[str]) -> None
     signals = steady.displacement - steady.displacement.mean(axis=0)
     share = 1.0 - float(np.sum(steady.lines.rest[:, : signals.shape[1]] ** 2) / max(np.sum(signals**2), 1e-300))
     if share < UNRELATED:
-        found = f"{programmed * 30.0 / np.pi:.0f} rev/min, whose orders make {100.0 * share:.0f} % of the vibration"
-        raise InputError("--speed-rpm", found, "the speed of the spindle to 1 % [rev/min], in a cut without chatter")
+        found = f"{to_rpm(programmed):.0f} rev/min, whose orders make {100.0 * share:.0f} % of the vibration"
+        raise Unsteady("spindle_speed", found, "the spindle speed to within 1 % [rev/min], in a cut without chatter")
     if share < PERIODIC:
         notes.append(f"{100.0 * (1.0 - share):.0f} % of the vibration does not follow the spindle: chatter, or not a steady cut")
 
@@ -226,7 +223,7 @@ def _run_out(
     if air is None:
         notes.append(NO_AIR)
         return None
-    still = _steady(air, axes, programmed, 1.02 * top, 1)
+    still = steady_record(air, axes, programmed, 1.02 * top / (2.0 * np.pi), 1)
     angle, std = angle_to_air(cut, still, teeth)
     if std > LOOSE_ANGLE:
         notes.append(f"the angle between cut and air cut is known to {np.degrees(std):.0f}° only: run-out is left in")

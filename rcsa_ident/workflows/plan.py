@@ -38,6 +38,7 @@ from rcsa_ident.stability.lobes import StabilityMethod
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.tool_holder.geometry import stiffened
 from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.units import from_rpm, to_rpm
 from rcsa_ident.workflows.lobes import LobeConditions, tooling_lobes
 from rcsa_ident.workflows.tip import STIFFNESS_SPREAD, tooltip
 
@@ -91,10 +92,10 @@ class CutConstraints:
     def speeds(self) -> FloatArray:
         """Whole rev/min, a little more than `SPACING` apart, shape (n,) [rad/s]."""
         count = int(np.log(self.highest / self.lowest) / (1.02 * SPACING)) + 1
-        rpm = np.geomspace(self.lowest, self.highest, count) * (30.0 / np.pi)
+        rpm = to_rpm(np.geomspace(self.lowest, self.highest, count))
         # rounding does not lead out of what is allowed
         inside = np.clip(np.round(rpm), np.ceil(rpm[0] - 1e-6), max(np.floor(rpm[-1] + 1e-6), np.ceil(rpm[0] - 1e-6)))
-        return np.unique(inside) * (np.pi / 30.0)
+        return from_rpm(np.unique(inside))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,9 +12,8 @@ from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.diagnostics import FEWEST_CUTS
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.machining_setup import Campaign
+from rcsa_ident.units import to_rpm
 from rcsa_ident.workflows.identify import JudgedCut, Map, Method, data_of
-
-_RPM = 30.0 / np.pi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,8 +73,8 @@ def divided(judged: Sequence[JudgedCut], count: int) -> list[tuple[tuple[float, 
             number = sum(j.cut.tooling == name for j in cuts)
             if number < FEWEST_CUTS:
                 raise InputError(
-                    "--speed-bands",
-                    f"{number} cuts with {name} from {low * _RPM:.0f} to {high * _RPM:.0f} rev/min",
+                    "speed_bands",
+                    f"{number} cuts with {name} from {to_rpm(low):.0f} to {to_rpm(high):.0f} rev/min",
                     f"at least {FEWEST_CUTS} cuts with each tooling in each of {count} bands: fewer bands, or more cuts",
                 )
         found.append(((low, high), cuts))

@@ -111,7 +111,7 @@ def test_the_mean_where_the_cut_is_interrupted(folder):
         (("--bandwidth-hz", "0"), "--bandwidth-hz"),
         (("--bandwidth-hz", "100"), "harmonics in the band"),
         (("--plot", "F.gif"), "--plot"),
-        (("--idle-percent", "120"), "idle share"),
+        (("--idle-percent", "120"), "--idle-percent: found 120 %"),
         (("--wear", "W.csv"), "--axial-depth-mm"),
         (("--out", "no/such/F.csv"), "--out"),
         (("--air", "nowhere.h5"), "nowhere.h5"),

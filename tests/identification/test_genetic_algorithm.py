@@ -11,7 +11,7 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.data import LEVER
 from rcsa_ident.identification.genetic_algorithm import WIDE, LiteralCost, NoiseWeightedCost, PaperGeneticAlgorithm, SearchSpace, _Problem
-from rcsa_ident.identification.result import Status
+from rcsa_ident.identification.status import Status
 from rcsa_ident.tool_holder.geometry import BeamSegment, Material, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from tests.oracles.literature import NOMINAL_MATERIALS, NOMINAL_TOOLINGS, PUBLISHED_JOINT, PUBLISHED_MODES
