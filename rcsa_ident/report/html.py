@@ -49,9 +49,9 @@ class ToolingPage:
     best : sequence of (speed [rad/s], depth [m])
     true_limit : array, shape (n,) [m], or None
     band_hz : (low, high) [Hz], or None
-        That was identified.
+        Band that was identified.
     conditions : str
-        Of the lobes, in words.
+        What the lobes hold for, in words.
     warnings : sequence of str
     """
 

@@ -69,11 +69,11 @@ def stability_figure(
     ----------
     lobes : StabilityLobes
     max_depth : float [m]
-        That was asked for; the cut is stable up to it where the limit is infinite.
+        Largest depth that was looked at; the cut is stable up to it where the limit is infinite.
     band : (low, high) [m]
     best : sequence of (speed [rad/s], depth [m])
     true_limit : array, shape (n,) [m]
-        Where it is known.
+        The true limit, where it is known.
     tested : Judged, optional
         Drawn over the lobes.
     surface : SurfaceError, optional

@@ -100,7 +100,15 @@ class AirCorrectedSpectra:
 
 
 def turned_air(air: SteadyRecord, angle: float, highest: int) -> tuple[ComplexArray, FloatArray]:
-    """Return an air cut's lines turned by an angle [rad] and their variance, orders 0..highest; 0 where there is no such order."""
+    """Return an air cut's lines turned by an angle and their variance, orders 0..highest; 0 where there is no such order.
+
+    Parameters
+    ----------
+    air : SteadyRecord
+    angle : float [rad]
+    highest : int
+        Highest order that is returned.
+    """
     return turned(air.flange, air.variance, angle, highest)
 
 

@@ -179,6 +179,8 @@ def segment_lines(samples: FloatArray, rate: float, omega: FloatArray, segments:
     samples : array, shape (n, c)
     rate : float [Hz]
     omega : array, shape (m,) [rad/s]
+    segments : int
+        Number of segments.
 
     Returns
     -------
