@@ -121,7 +121,8 @@ def multiplier(
     of the tool's path obeys F = a K_tc [alpha(t)] {d(t) - d(t - T)} as long as it is small against the feed: no tooth
     leaves the material. It is marched from tooth to tooth as `mill_cut` marches the cut (force linear within a step,
     poles exact), with the directional matrix averaged over depth and step in closed form, and the delay a whole number
-    of steps. The largest eigenvalue of the march over one tooth period is found by Arnoldi's method.
+    of steps. The largest eigenvalue of the march over one tooth period is found by Arnoldi's method
+    [arnoldi1951].
 
     Parameters
     ----------
