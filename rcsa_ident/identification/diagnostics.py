@@ -35,7 +35,20 @@ _JOINT = ("translational stiffness", "rotational stiffness", "translational damp
 def diagnose(
     data: IdentificationData, searched: list[AxisSearch], solution: Solution, misfit: Misfit, posteriors: Sequence[Posterior]
 ) -> list[str]:
-    """Return the reasons for `suspect`; `posteriors` are those of the axes."""
+    """Return the reasons for `suspect`.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    searched : list of AxisSearch
+        One for each axis.
+    solution : Solution
+        All axes together.
+    misfit : Misfit
+        The one whose minimum it is.
+    posteriors : sequence of Posterior
+        One for each axis.
+    """
     reasons = []
     if not solution.converged:
         reasons.append(f"not converged: the polish still gained after {solution.steps} steps")
@@ -78,7 +91,16 @@ def diagnose(
 
 
 def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covariance: FloatArray) -> list[str]:
-    """Return what the data cannot tell, and what was done about single cuts."""
+    """Return what the data cannot tell, and what was done about single cuts.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    solution : Solution
+    misfit : Misfit
+    covariance : array, shape (p, p)
+        Covariance of all unknowns.
+    """
     words = []
     layout, priors = solution.layout, misfit.priors
     deviation = np.sqrt(np.diag(covariance))

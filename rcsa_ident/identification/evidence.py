@@ -59,7 +59,7 @@ class EvidenceSelection:
 
     @property
     def name(self) -> str:
-        """As in a result file."""
+        """Name of the method in a result file."""
         return "default"
 
     def run(self, data: IdentificationData, seed: int, map: Map = map, progress: Progress | None = None) -> Identification:
@@ -73,7 +73,7 @@ class EvidenceSelection:
         map : callable
             The builtin, or a pool's: axes are searched side by side.
         progress : callable of (axis, stage, cost, theta, layout), optional
-            Told of every step; with a pool's map it has to be picklable.
+            Called at every step; with a pool's map it has to be picklable.
         """
         sequence = np.random.SeedSequence(seed)
         summed = data.summed()

@@ -27,9 +27,10 @@ class Posterior:
     Parameters
     ----------
     theta : array, shape (p,)
+        The most probable unknowns.
     covariance : array, shape (p, p)
     layout : AxisLayout
-        Without fixture.
+        Which unknown stands where; without fixture.
     speed_range : (float, float) [rad/s]
         Middle of the campaign's spindle speeds and half their range; only a layout with softening asks for it.
     rivals : tuple of array
@@ -55,6 +56,14 @@ class Posterior:
         """Return modes and joint at `theta`, by default at the optimum, and at a spindle speed [rad/s], by default the middle one.
 
         Outside the campaign's speeds the machine of the nearest of them answers.
+
+        Parameters
+        ----------
+        axis : Dof
+            Bending plane of the answer.
+        theta : array, shape (p,), optional
+            Unknowns, of this model or of a rival; by default the optimum's.
+        speed : float, optional [rad/s]
         """
         vector = self.theta if theta is None else theta
         layout = self.layout if vector.size == self.theta.size else self.layout_of(vector.size - JOINT)

@@ -28,17 +28,18 @@ class AxisResult:
     Parameters
     ----------
     modes : ModalModel
-        At the flange: translation and slope.
+        Modes of machine and spindle at the flange: translation and slope.
     joint : LumpedJoint
     chi2_per_point : float [-]
         Mean squared residual in standard deviations of noise and model error.
     per_tooling : mapping of str to float
+        The same for each tooling by itself.
     model_error : float [-]
         Share of each line that neither the model nor the records' noise explains, learned from the residuals.
     parameters : tuple of str
         Names of the unknowns of flange and joint, in the posterior's order.
     posterior : Posterior or None
-        Where the method gives one.
+        None where the method gives no covariance.
     measured : mapping with arrays omega, value, model, cut (index), coherence
         Lines without delay beside the model's: what a plot shows.
     """
@@ -80,7 +81,7 @@ class Identification:
         Tooth 1 stands at immersion 0 that much after the record's start.
     spindle_speed : array, shape (k,) [rad/s]
     trace : tuple of (axis, stage, cost)
-        The search in order.
+        The steps of the search in their order.
     campaign : str
         Its name.
     workpiece : Workpiece or None

@@ -28,6 +28,8 @@ def write_flange_csv(
 
     Parameters
     ----------
+    path : path
+    frequency_hz : array, shape (n,)
     values : mapping of Dof to complex array, shape (n, 2, 2)
     std : mapping of Dof to array, shape (n, 2, 2), optional
         Columns ``X_tF_std`` and so on: of the real and of the imaginary part each.

@@ -78,7 +78,17 @@ def identification_to_json(
 def speed_band_to_json(
     speeds: tuple[float, float], identification: Identification, deviations: ModeDeviations | None = None
 ) -> dict[str, Any]:
-    """Return one entry of ``speed_bands``: what the cuts of a range of spindle speeds [rad/s] say for themselves."""
+    """Return one entry of ``speed_bands``: what the cuts of a range of spindle speeds [rad/s] say for themselves.
+
+    Parameters
+    ----------
+    speeds : (float, float) [rad/s]
+        Lowest and highest speed.
+    identification : Identification
+        Of the cuts between them.
+    deviations : mapping
+        Standard deviations of its modes, as in `identification_to_json`.
+    """
     return {
         "speed_range_rpm": [to_rpm(speed) for speed in speeds],
         "cuts_used": len(identification.cut_ids),
@@ -151,7 +161,7 @@ def machine_from_json(data: Mapping[str, Any], where: str) -> IdentifiedMachine:
     Parameters
     ----------
     data : mapping
-        As `read_result` returns it.
+        The result as `read_result` returns it.
     where : str
         The file, for the messages.
 

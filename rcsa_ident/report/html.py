@@ -47,9 +47,9 @@ class ToolingPage:
         Stability limits, and what is recommended within them.
     true_limit : array, shape (n,) [m], or None
     band_hz : (low, high) [Hz], or None
-        That was identified.
+        Band that was identified.
     conditions : str
-        Of the lobes, in words.
+        What the lobes hold for, in words.
     warnings : sequence of str
     """
 

@@ -68,7 +68,7 @@ def stability_figure(
     recommended : sequence of OperatingPoint
         Their depth is the limit less what a recommendation holds back.
     true_limit : array, shape (n,) [m]
-        Where it is known.
+        The true limit, where it is known.
     tested : Judged, optional
         Drawn over the lobes.
     surface : SurfaceError, optional

@@ -37,8 +37,9 @@ class CutMeasurement:
     Parameters
     ----------
     cut_id, tooling : str
+        Name of the cut and of its tooling.
     spindle_speed : float [rad/s]
-        From the record.
+        As found in the record.
     axes : mapping of Dof to AxisLines
     alignment_std : float [rad]
         Standard deviation of the angle between cut and air cut; 0 without an air cut.
@@ -68,7 +69,7 @@ class Reading:
     verdict : Verdict
     measurement : CutMeasurement or None
     spindle_speed : float or None [rad/s]
-        From the record, also of one that is not usable, unless nothing can be told of it.
+        As found in the record, also in one that is not usable, unless nothing can be told of it.
     harmonics : mapping of Dof to int
         Multiples of the tooth-passing frequency, of an air cut of the spindle's, that stand above the noise beside them.
     """
@@ -97,11 +98,18 @@ def measure_cut(
 
     Parameters
     ----------
-    cut, air : Recording
+    cut_id, tooling : str
+        Name of the cut and of its tooling, for the result and for messages.
+    cut : Recording
         Displacement channels for X and/or Y, accelerometers of the fixture where there are some.
+    air : Recording or None
+        The same in the air, where it was recorded.
+    cutter : Cutter
     conditions : CuttingConditions
-        As programmed; forces are simulated at the speed found in the record.
+        The cut as programmed; forces are simulated at the speed found in the record.
+    coefficients : CuttingCoefficients
     max_frequency : float [Hz]
+        Highest line.
     estimator : Estimator
         `LineEstimator`, or `AirCorrectedSpectra` for that of [inprocess].
 
@@ -160,6 +168,14 @@ def measure_cut(
 
 def judge_air(cut_id: str, tooling: str, air: Recording, conditions: CuttingConditions, max_frequency: float = MAX_FREQUENCY) -> Reading:
     """Return the verdict on an air cut alone, as `measure_cut` judges it beside a cut.
+
+    Parameters
+    ----------
+    air : Recording
+    conditions : CuttingConditions
+        The cut as programmed: its speed counts.
+    max_frequency : float [Hz]
+        Highest line.
 
     Raises
     ------
