@@ -16,7 +16,6 @@ from prometheus_client.metrics_core import GaugeMetricFamily, Metric, SummaryMet
 from api.files import Files
 from api.jobs.event_feed import EventFeeds
 from api.jobs.supervisor import Supervisor
-from api.reading.reader import Reading
 from api.reading.uploads import Uploads
 from api.settings import Settings
 from api.stores.entities import Store, Unavailable
@@ -112,7 +111,7 @@ class Components:
     store: Store
     work: Work
     files: Files
-    reader: Reading
+    reader: Work
     uploads: Uploads
     rates: Rates = field(repr=False)
     metrics: Metrics = field(repr=False)

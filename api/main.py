@@ -16,7 +16,7 @@ from api.components import Components, JobCounts, Metrics, Rates
 from api.files import Files
 from api.jobs.event_feed import EventFeeds
 from api.jobs.supervisor import Supervisor
-from api.reading.reader import Limits, Reader, Reading
+from api.reading.reader import Limits, Reader
 from api.reading.uploads import Uploads
 from api.routes import (
     campaigns,
@@ -57,7 +57,7 @@ def create_app(
     settings: Settings,
     store: Store | None = None,
     work: Work | None = None,
-    reader: Reading | None = None,
+    reader: Work | None = None,
     host: Host | None = None,
     crew: Supervisor | None = None,
 ) -> FastAPI:

@@ -1,4 +1,4 @@
-"""The study of the identification: drawn machines, with trigger, without, and at three times the noise, beside the paper's method.
+"""The study of the identification: drawn machines, with trigger, without, and at three times the noise, beside [inprocess].
 
 ``python -m benchmarks study``. Everything goes through files: a machine file is drawn, its cuts are simulated, written, read, judged
 and identified, the result is written and read; its tooltip FRFs are compared with the virtual machine's own full equations.
@@ -206,7 +206,7 @@ def perform(scratch: Path, run: Run) -> dict[str, Any]:
 
 
 def planned(machines: Sequence[str], conditions: Sequence[str], methods: Sequence[str], seeds: Sequence[int]) -> list[Run]:
-    """Return the default method's runs under all conditions, the paper's on campaigns without trigger and on the `INSIDE` machine."""
+    """Return the default method's runs under all conditions, the published one's on those without trigger and on the `INSIDE` machine."""
     runs = []
     for machine in machines:
         for condition in conditions if machine != INSIDE else ["no-trigger"]:

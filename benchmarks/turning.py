@@ -86,7 +86,7 @@ class TurningCut:
 
 
 def turning_cut(rate: float = 51200.0, noise: tuple[float, float] = (2e-9, 0.05)) -> TurningCut:
-    """Return the tables of the sample machine in the paper's cut; `rate` makes whole samples of a revolution's 5 ms."""
+    """Return the tables of the sample machine in the cut of [inprocess]; `rate` makes whole samples of a revolution's 5 ms."""
     made = virtual_cut(duration=0.3, rate=rate, speed_error=0.0, gap_noise=0.0, gap_drift=0.0, acceleration_noise=0.0)
     air = _table(made.air.samples, made.air_angle, rate)
     cut = _table(np.column_stack([made.cut.samples, made.force]), made.angle, rate)

@@ -17,10 +17,9 @@ from typing import Any
 from api.files import NORMALISED, UPLOADS, Files
 from api.reading import reader_tasks
 from api.reading.campaign_text import Upload, files_of
-from api.reading.reader import Reading
 from api.stores.campaigns import Campaign, FileKey, Recording
 from api.stores.entities import Store, Taken, Unavailable
-from api.work.pool import Busy
+from api.work.pool import Busy, Work
 from rcsa_ident.errors import InputError
 
 log = logging.getLogger("rcsa_ident.reading")
@@ -46,12 +45,12 @@ class Uploads:
     ----------
     store : Store
     files : Files
-    reader : Reading
+    reader : Work
     most : int
         Uploads at once.
     """
 
-    def __init__(self, store: Store, files: Files, reader: Reading, most: int) -> None:
+    def __init__(self, store: Store, files: Files, reader: Work, most: int) -> None:
         self.store, self.files, self.reader, self.most = store, files, reader, most
         self.running = 0
         self.writing: set[tuple[str, str]] = set()

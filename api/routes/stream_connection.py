@@ -25,13 +25,13 @@ from api.streams.hub import Full, Hub
 from api.streams.listener import Listener
 from api.streams.session import End, Session, Stage
 from api.work.pool import Busy
-from rcsa_ident.errors import InputError
+from rcsa_ident.errors import InputError, Unsteady
 
 log = logging.getLogger("rcsa_ident.service")
 #: Time for what waits for a reader at the end, and for a steady part that an observer can be made from [s].
 LINGER, SETTLING = 5.0, 120.0
-#: Fields of errors that the next part of a stream may not have, and what lies between two attempts [s].
-UNSTEADY, PAUSE = ("recording", "recording length", "spindle_speed", "trigger"), 0.5
+#: Between two attempts to make an observer [s].
+PAUSE = 0.5
 #: Between two looks at the key [s].
 LOOK = 20.0
 #: An index further ahead is a fault of its sender, not a gap [s].
@@ -194,7 +194,7 @@ async def _prepared(parts: Components, session: Session, opening: Opening) -> No
         try:
             plan, ready = await _patiently(functools.partial(opening.design, parts.work, *window))
         except InputError as error:
-            if opening.source is not None or error.field not in UNSTEADY or loop.time() > limit:
+            if opening.source is not None or not isinstance(error, Unsteady) or loop.time() > limit:
                 raise refused or error from None
             # perhaps the spindle has still come up to speed, or the tool has entered: the next second may do
             refused, detail = error, problems.of_input(error)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-import multiprocessing
-import os
-import threading
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Protocol, TypeVar
+
+from api.processes import follow_parent, spawn_context
 
 T = TypeVar("T")
 
@@ -19,24 +18,24 @@ class Busy(Exception):
 
 
 class Work(Protocol):
-    """Where questions are computed."""
+    """What answers calls in processes of its own."""
 
     async def run(self, call: Callable[..., T], *arguments: Any) -> T:
-        """Return what a call answers; raises `Busy` where too many wait."""
+        """Return what a call answers; raises `Busy` where too many wait, `InputError` where the input is at fault."""
 
     @property
     def waiting(self) -> int:
-        """Questions that have no answer yet."""
+        """Calls that have no answer yet."""
 
     @property
     def ready(self) -> bool:
-        """Whether workers are there."""
+        """Whether there is a process that answers."""
 
     def start(self) -> None:
-        """Start workers."""
+        """Start the processes."""
 
     def stop(self) -> None:
-        """End workers."""
+        """End the processes."""
 
 
 class Pool:
@@ -62,11 +61,7 @@ class Pool:
         return self.warm > 0
 
     def start(self) -> None:
-        # each worker computes on one core; read by the libraries when they are first imported there
-        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-            os.environ.setdefault(name, "1")
-        context = multiprocessing.get_context("spawn")
-        self.executor = ProcessPoolExecutor(self.workers, context, initializer=_begin, initargs=(self.machines,))
+        self.executor = ProcessPoolExecutor(self.workers, spawn_context(), initializer=_begin, initargs=(self.machines,))
         self.warm = 0
         for _ in range(self.workers):
             self.executor.submit(warm).add_done_callback(self._warmed)
@@ -102,15 +97,8 @@ class Pool:
 
 
 def _begin(machines: int) -> None:
-    """In a new worker: import what answers, and end with the service, however that ends."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def follow() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=follow, daemon=True).start()
+    """In a new worker: import what answers."""
+    follow_parent()
     from api.work import tasks
 
     tasks.keep(machines)

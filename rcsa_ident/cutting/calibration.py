@@ -1,4 +1,4 @@
-"""Cutting coefficients from measured mean forces, with intervals."""
+"""Cutting coefficients from measured mean forces [altintas2012], with intervals."""
 
 from __future__ import annotations
 
@@ -32,12 +32,13 @@ class ForceCalibration:
     Parameters
     ----------
     method : str
+        ``mean`` or ``signal``.
     names : tuple of str, length p
-        Of `NAMES`.
+        The coefficients that were fitted, out of `NAMES`.
     value : array, shape (p,) [N/m^2 or N/m]
     covariance : array, shape (p, p)
     half_width : array, shape (p,)
-        Of the 95 % intervals, by a t-distribution.
+        Half widths of the 95 % intervals, by a t-distribution.
     misfit : float [-]
         Root mean square of what is left over that of the forces.
     reasons, notes : tuples of str
@@ -184,7 +185,15 @@ def _runout_effect(cutter: Cutter, conditions: CuttingConditions, solution: Floa
 
 
 def plausible(names: Sequence[str], value: FloatArray, half_width: FloatArray) -> tuple[str, ...]:
-    """Return what speaks against a set of coefficients."""
+    """Return what speaks against a set of coefficients, in words.
+
+    Parameters
+    ----------
+    names : sequence of str, length p
+        Out of `NAMES`.
+    value, half_width : arrays, shape (p,) [N/m^2 or N/m]
+        Coefficients and half widths of their 95 % intervals.
+    """
     known = dict(zip(names, zip(value.tolist(), half_width.tolist(), strict=True), strict=True))
     reasons = []
     tangential, width = known["K_tc"]

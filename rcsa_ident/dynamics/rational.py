@@ -54,7 +54,7 @@ class RankOneModes:
             object.__setattr__(self, name, frozen(getattr(self, name), dtype))
 
     def response(self, omega: FloatArray) -> ComplexArray:
-        """Return the receptances, shape (n, r, c)."""
+        """Return the receptances at frequencies omega, shape (n,) [rad/s]; shape (n, r, c)."""
         residues = np.einsum("rm,mc->mrc", self.outputs, self.inputs)
         return _pair_sum(np.asarray(omega, dtype=float), self.pole, residues) + self.constant
 
@@ -85,7 +85,7 @@ class RationalFit:
     pole : complex array, shape (m,) [rad/s]
         Imaginary parts not negative, real parts negative.
     residue : complex array, shape (m, r, c)
-        Of H(s) = sum_k residue[k] / (s - pole[k]) + conj(residue[k]) / (s - conj(pole[k])) + constant; a real pole's is half.
+        In H(s) = sum_k residue[k] / (s - pole[k]) + conj(residue[k]) / (s - conj(pole[k])) + constant; a real pole's is half.
     constant : array, shape (r, c)
         Residual compliance; 0 where the fit is strictly proper.
     error : float [-]
@@ -110,7 +110,7 @@ class RationalFit:
             object.__setattr__(self, name, frozen(getattr(self, name), dtype))
 
     def response(self, omega: FloatArray) -> ComplexArray:
-        """Return the function over frequency, shape (n, r, c)."""
+        """Return the function at frequencies omega, shape (n,) [rad/s]; shape (n, r, c)."""
         return _pair_sum(np.asarray(omega, dtype=float), self.pole, self.residue) + self.constant
 
     def modes(self, rank: float = _RANK) -> RankOneModes:
@@ -169,7 +169,7 @@ def rational_fit(
     weight : array of the values' shape (or broadcast to it), optional
         Further factor on each misfit.
     constant : bool
-        With a real constant (the modes above the band), else strictly proper.
+        Whether a real constant (the modes above the band) is fitted too; without it the function is strictly proper.
     highest_order : int
         Where the search ends. If no order is good enough, Bayes's information criterion chooses, and the status says so.
 
@@ -181,8 +181,8 @@ def rational_fit(
     Notes
     -----
     With sigma(s) = sum_k c~_k phi_k(s) + d~ and the poles of the last step, sigma h = sum_k c_k phi_k + d is solved by linear
-    least squares; zeros of sigma are the next poles (Gustavsen and Semlyen 1999; relaxed: Gustavsen 2006; each entry
-    condensed by its own QR: Deschrijver et al. 2008). An unstable pole is mirrored. The next higher order starts from the poles
+    least squares; zeros of sigma are the next poles ([gustavsen1999]; relaxed: [gustavsen2006]; each entry
+    condensed by its own QR: [deschrijver2008]). An unstable pole is mirrored. The next higher order starts from the poles
     of the last and a pair where the misfit is largest, and from evenly spaced poles.
     """
     problem = Problem.of(omega, values, tolerance, noise, weight, constant)
@@ -212,7 +212,7 @@ def tip_modes(receptance: Receptance, **options: float | int | bool | None) -> R
     receptance : Receptance
         Square; where all entries off the diagonal are 0, each diagonal entry is fitted for itself.
     options
-        Of `rational_fit`.
+        Keyword arguments of `rational_fit`.
     """
     values = receptance.values
     r, c = values.shape[1:]

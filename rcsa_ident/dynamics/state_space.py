@@ -23,7 +23,7 @@ class StateSpace:
     C : array, shape (o, n)
     D : array, shape (o, i)
     step : float [s]
-        Of the samples; 0 in continuous time.
+        Time between samples; 0 in continuous time.
 
     Examples
     --------
@@ -78,6 +78,7 @@ class StateSpace:
         Parameters
         ----------
         step : float [s]
+            Time between samples.
         hold : str
             ``zero-order``: the input keeps its last sample. ``first-order``: it runs straight from one sample to the next; the
             state is then x[k] less the part that the sample u[k] itself has caused, and D is not 0 even where the system's is.

@@ -18,7 +18,8 @@ from rcsa_ident.identification.model_order import GIVE_UP_SOON, Report, cut_weig
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, parameter_names, unpack
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.priors import Priors
-from rcsa_ident.identification.result import AxisResult, Identification, Status
+from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.search import SearchSettings, explore
 
 #: Told of axis, stage, cost, unknowns and their layout.

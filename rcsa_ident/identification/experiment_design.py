@@ -1,4 +1,4 @@
-"""What cuts that were not made yet would tell, and those that tell most.
+"""What cuts that were not made yet would tell, and those that tell most: optimal experiment design [fedorov1972].
 
 Unknowns are whitened: z = S^-1 (theta - theta_0) with S S^T the posterior's covariance, so that C = 1 before any further cut. A
 cut whose lines change by J z, in standard deviations and with its own delay taken out (J = J' - c c^T J' / c^T c, the Schur

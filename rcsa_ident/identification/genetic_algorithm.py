@@ -1,6 +1,6 @@
-"""The main paper's method: a genetic algorithm over boxes, with its printed search space and cost (Table 2, eq. 14).
+"""The published identification: a genetic algorithm over boxes, with its printed search space and cost ([inprocess], Table 2, eq. 14).
 
-64 variables a direction: ten complex modes (p1..p6) and the joint (p7..p10). What the paper does not say is how the simulated
+64 variables a direction: ten complex modes (p1..p6) and the joint (p7..p10). What [inprocess] does not say is how the simulated
 force's phase is tied to the record; here each cut is granted its best delay on a grid, for every candidate.
 """
 
@@ -19,7 +19,8 @@ from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification._kernels import best_grid_misfit, modal_cross_frf
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
-from rcsa_ident.identification.result import AxisResult, Identification, Status
+from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.status import Status
 
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 GRID = 64
@@ -29,7 +30,7 @@ WORST_MISFIT = 4.0
 
 @dataclass(frozen=True, slots=True)
 class SearchSpace:
-    """Boxes of the variables; the defaults are the paper's Table 2.
+    """Boxes of the variables; the defaults are those of [inprocess], Table 2.
 
     Parameters
     ----------
@@ -57,13 +58,13 @@ class SearchSpace:
     c_r: float = 100.0
 
 
-#: Boxes that hold spindles with low, lightly damped modes and real joints, which Table 2 leaves out.
+#: Boxes that hold spindles with low, lightly damped modes and real joints, which Table 2 of [inprocess] leaves out.
 WIDE = SearchSpace((50.0, 5000.0), (0.003, 0.30), 0.02, 1.0, (0.0, 40.0), (8.0, 12.0), (5.0, 9.0), 1e5, 1e3)
 
 
 @dataclass(frozen=True, slots=True)
 class LiteralCost:
-    """kappa sum_j ||E_j|| + nu sum_n |p3,n|, E_j in m/N over the lines of tooling j: the paper's, with its constants."""
+    """kappa sum_j ||E_j|| + nu sum_n |p3,n|, E_j in m/N over the lines of tooling j, with the constants of [inprocess], eq. 14."""
 
     kappa: float = 1.0e6
     nu: float = 700.0
@@ -103,7 +104,7 @@ class NoiseWeightedCost:
 
 @dataclass(frozen=True, slots=True)
 class PaperGeneticAlgorithm:
-    """pymoo's genetic algorithm as the paper sets it: population 20, 5000 iterations, each direction for itself.
+    """pymoo's genetic algorithm [blank2020] as [inprocess] sets it: population 20, 5000 iterations, each direction for itself.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Damped Gauss-Newton steps down to the nearest minimum (Levenberg-Marquardt with Marquardt's scaling)."""
+"""Damped Gauss-Newton steps down to the nearest minimum (Levenberg-Marquardt with Marquardt's scaling, [marquardt1963])."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def refine(
 
 
 def _step(misfit: Misfit, theta: FloatArray, layout: Layout, here: Evaluation, damping: float) -> FloatArray | None:
-    """Damped step with geodesic acceleration (Transtrum & Sethna, 2012): it bends along the valley, not into its wall."""
+    """Damped step with geodesic acceleration [transtrum2012]: it bends along the valley, not into its wall."""
     linear = here.linear
     assert linear is not None
     scale = np.sqrt(np.maximum(np.diag(linear.hessian), 1e-12))

@@ -1,4 +1,4 @@
-"""How many modes: as many as the data pay for, by Laplace's approximation of the evidence."""
+"""How many modes: as many as the data pay for, by Laplace's approximation of the evidence [mackay1992]."""
 
 from __future__ import annotations
 

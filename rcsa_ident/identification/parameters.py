@@ -307,7 +307,7 @@ def joint_of(logs: FloatArray) -> LumpedJoint:
 
 
 def modes_of(axis: AxisParameters, dof: Dof) -> ModalModel:
-    """Return the axis as complex modes at the flange (the paper's form), in SI, sorted by frequency."""
+    """Return the axis as complex modes at the flange ([inprocess], eq. 13), in SI, sorted by frequency."""
     lever = np.array([1.0, 1.0 / LEVER])
     residual = axis.residual @ axis.residual.T * np.outer(lever, lever)
     return damped_modes(axis.omega_n, axis.factor @ axis.factor.T, axis.psi * lever, residual, plane("flange", dof))

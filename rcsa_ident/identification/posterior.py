@@ -1,19 +1,23 @@
-"""What the posterior says about a derived quantity: linear propagation of the unknowns' covariance."""
+"""What is known of an axis' unknowns after all cuts, and which machines that allows: linear propagation of their covariance."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, joint_of, modes_of, unpack
+from rcsa_ident.machine.flange_part import Candidate, Doubt, FlangePart, Step
 from rcsa_ident.machine.spindle import Spindle
+
+#: Longest step along a direction of the covariance from which a change is told: logarithms, or of order one.
+LONGEST_STEP = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,6 +70,23 @@ class Posterior:
             raise InputError("rivals", size, "a size that belongs to a whole number of modes")
         return found
 
+    def doubt(self, axis: Dof, speed: float | None = None) -> Doubt:
+        """Return the machines one step to both sides along each of the covariance's own axes, and the rivals, at a spindle speed [rad/s]."""
+        values, vectors = np.linalg.eigh(self.covariance)
+        steps = []
+        for size, direction in zip(np.sqrt(np.maximum(values, 0.0)), vectors.T, strict=True):
+            # stiff directions take a full deviation, loose ones a step that stays linear
+            step = min(size, LONGEST_STEP)
+            if step > 0.0:
+                ends = (self.candidate(axis, self.theta + sign * step * direction, speed) for sign in (1.0, -1.0))
+                steps.append(Step(*ends, weight=size / (2.0 * step)))
+        return Doubt(tuple(steps), tuple(self.candidate(axis, rival, speed) for rival in self.rivals))
+
+    def candidate(self, axis: Dof, theta: FloatArray | None = None, speed: float | None = None) -> Candidate:
+        """Return `machine` as what stands behind the flange."""
+        modes, joint = self.machine(axis, theta, speed)
+        return Candidate(modes, joint)
+
 
 @dataclass(frozen=True, slots=True)
 class MachineAxis:
@@ -87,30 +108,16 @@ class MachineAxis:
         """Return modes and joint at a spindle speed [rad/s], by default the campaign's middle one."""
         return (self.spindle.modes, self.joint) if self.posterior is None else self.posterior.machine(axis, speed=speed)
 
+    def part(self, axis: Dof, speed: float | None) -> FlangePart:
+        """Return this axis as a part of the flange, with what the posterior leaves open, at a spindle speed [rad/s]."""
+        modes, joint = self.at(axis, speed)
+        doubt = None if self.posterior is None else cache(partial(self.posterior.doubt, axis, speed))
+        return FlangePart(modes.coordinates, Candidate(modes, joint), doubt)
 
-def spread(
-    posterior: Posterior, axis: Dof, response: Callable[[ModalModel, LumpedJoint], ComplexArray], speed: float | None = None
-) -> ComplexArray:
-    """Return the response's change per standard deviation along each of the covariance's own axes and to each rival, shape (p, n).
-
-    Sums of its rows with independent standard normal weights are draws of the linearised response.
-
-    Parameters
-    ----------
-    response : callable
-        Modes and joint to a complex array, shape (n,).
-    speed : float or None [rad/s]
-    """
-    values, vectors = np.linalg.eigh(posterior.covariance)
-    slopes = []
-    for size, direction in zip(np.sqrt(np.maximum(values, 0.0)), vectors.T, strict=True):
-        # stiff directions take a full deviation, loose ones a step that stays linear
-        step = min(size, 0.05)
-        if step == 0.0:
-            continue
-        ahead = response(*posterior.machine(axis, posterior.theta + step * direction, speed))
-        behind = response(*posterior.machine(axis, posterior.theta - step * direction, speed))
-        slopes.append((ahead - behind) / (2.0 * step) * size)
-    here = response(*posterior.machine(axis, speed=speed))
-    slopes += [response(*posterior.machine(axis, rival, speed)) - here for rival in posterior.rivals]
-    return np.array(slopes) if slopes else np.zeros((1, here.size), dtype=complex)
+    @property
+    def softening_range(self) -> tuple[float, float] | None:
+        """Lowest and highest spindle speed [rad/s] between which it changes; None where it does not change."""
+        if self.posterior is None or not self.posterior.layout.softening:
+            return None
+        middle, half = self.posterior.speed_range
+        return middle - half, middle + half

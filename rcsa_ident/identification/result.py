@@ -4,21 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.identification.posterior import Posterior
-
-
-class Status(StrEnum):
-    """May the answer be used?"""
-
-    CONVERGED = "converged"
-    SUSPECT = "suspect"
-    FAILED = "failed"
+from rcsa_ident.identification.posterior import MachineAxis, Posterior
+from rcsa_ident.identification.status import Status
+from rcsa_ident.machine.spindle import Spindle
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,6 +44,11 @@ class AxisResult:
     parameters: tuple[str, ...]
     posterior: Posterior | None
     measured: Mapping[str, FloatArray]
+
+    @property
+    def machine(self) -> MachineAxis:
+        """This axis as a tip feels it."""
+        return MachineAxis(Spindle(self.modes), self.joint, self.posterior)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""Exploration: pymoo's genetic algorithm over starts, each of which takes a few damped Gauss-Newton steps."""
+"""Exploration: pymoo's genetic algorithm [blank2020] over starts, each of which takes a few damped Gauss-Newton steps."""
 
 from __future__ import annotations
 

@@ -302,7 +302,7 @@ def axis_observer(
     noise : float [m]
         Standard deviation of a displacement sample.
     acceleration_noise : float [m/s^2]
-        Standard deviation of an acceleration sample; 0: as if the integrated acceleration were without noise (the paper's).
+        Standard deviation of an acceleration sample; 0: as if the integrated acceleration were without noise, as in [inprocess].
     accelerometer : bool
         Whether the fixture's acceleration is measured.
     sensor_ratio : (omega, ratio), optional

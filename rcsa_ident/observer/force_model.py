@@ -1,4 +1,4 @@
-"""What the observer knows of the force between samples, and the augmented state {q, f} (the paper's eq. 17)."""
+"""What the observer knows of the force between samples, and the augmented state {q, f} ([inprocess], eq. 17)."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class ForceModel(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class RandomWalk:
-    """f[k+1] = f[k] + eta (the paper's), which may slowly forget: behind a high-pass the mean cannot be seen.
+    """f[k+1] = f[k] + eta ([inprocess], eq. 17), which may slowly forget: behind a high-pass the mean cannot be seen.
 
     Parameters
     ----------
     intensity : float [N/sqrt(s)]
     leak : float [rad/s]
-        0 is the paper's.
+        Rate at which it forgets; 0 is the walk of [inprocess].
     """
 
     intensity: float
@@ -170,9 +170,9 @@ def augmented(
         Tip force to measured displacement [m/N].
     force : ForceModel
     noise : float [m]
-        Standard deviation of a displacement sample: the measurement noise of eq. 17.
+        Standard deviation of a displacement sample: the measurement noise of [inprocess], eq. 17.
     unmodelled : float [N]
-        Process noise of eq. 17: standard deviation of a force sample that the force model cannot follow.
+        Process noise of [inprocess], eq. 17: standard deviation of a force sample that the force model cannot follow.
     acceleration : SampledModes, optional
         Filter from the fixture's acceleration to displacement: it colours the accelerometer's noise.
     acceleration_noise : float [m/s^2]

@@ -1,4 +1,4 @@
-"""Kalman filter of the augmented state {q, f}: settling and steady gains, streaming, fixed lag, smoothing (the paper's eq. 17)."""
+"""Kalman filter [kalman1960] of the augmented state {q, f} ([inprocess], eq. 17): settling, steady, streaming, fixed lag, smoothing."""
 
 from __future__ import annotations
 
@@ -101,8 +101,8 @@ class KalmanFilter:
     def smooth(self, result: FloatArray) -> FloatArray:
         """Return the force given the whole record, shape (n,) [N]; `result` is that of `run` from the first sample on.
 
-        The fixed-interval smoother of Rauch, Tung and Striebel in the form of Bryson and Frazier, which needs no inverse of a
-        covariance and costs as little as the filter.
+        The fixed-interval smoother of Rauch, Tung and Striebel [rauch1965] in the form of Bryson and Frazier [bryson1963], which needs no
+        inverse of a covariance and costs as little as the filter.
         """
         force, innovation = (np.ascontiguousarray(result[:, c]) for c in (0, 2))
         return smoothed_force(*self._arrays(), self.gain, self.variance, self.row, innovation, force)
@@ -219,7 +219,7 @@ def kalman_filter(model: AugmentedModel, longest_settling: int = LONGEST_SETTLIN
 def riccati(a: FloatArray, seen: FloatArray, q: FloatArray) -> FloatArray:
     """Return the steady covariance before the correction, for one measurement of unit noise, by structure-preserving doubling.
 
-    Each step covers twice the samples of the last (Chu, Fan, Lin and Wang 2004). Oscillators without damping have poles on the unit
+    Each step covers twice the samples of the last [chu2004]. Oscillators without damping have poles on the unit
     circle, where the ordered Schur form of the usual solution loses its order.
 
     Parameters

@@ -61,7 +61,7 @@ class SampledModes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TransferFunction:
-    """Rational function of the bilinear frequency 2 / step tan(omega step / 2), stable and strictly proper (the paper's eq. 18).
+    """Rational function of the bilinear frequency 2 / step tan(omega step / 2), stable and strictly proper ([inprocess], eq. 18).
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class TransferFunction:
 
     @property
     def order(self) -> int:
-        """n of eq. 18."""
+        """Degree n of the denominator ([inprocess], eq. 18)."""
         return self.fit.order
 
     def response(self, omega: FloatArray) -> ComplexArray:

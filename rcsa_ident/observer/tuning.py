@@ -17,7 +17,7 @@ from rcsa_ident.observer.transfer_function import TransferFunction
 MARGIN = 1.0 / (10.0**0.005 - 1.0)
 #: Time in which an oscillator follows a change, in revolutions.
 RESPONSE_TURNS = 0.5
-#: The paper's walk does not forget; behind a high-pass it must, and this share of the band's lower end is nearly never.
+#: The walk of [inprocess] does not forget; behind a high-pass it must, and this share of the band's lower end is nearly never.
 BASELINE_LEAK = 0.1
 #: Intensity of the walk beside oscillators over that of a walk that has to follow everything.
 BESIDE = 0.1
@@ -53,7 +53,7 @@ class Tuning:
         ----------
         transfer : TransferFunction
         leak : float [rad/s], optional
-            By default nearly none, as in the paper.
+            By default nearly none, as in [inprocess].
 
         Notes
         -----
@@ -153,7 +153,7 @@ class Resonators:
 
 @dataclass(frozen=True, slots=True)
 class PaperWalk:
-    """The paper's random walk and white measurement noise: lags by the machine's own delay."""
+    """The random walk and white measurement noise of [inprocess], eq. 17: lags by the machine's own delay."""
 
     colours_noise: ClassVar[bool] = False
     response_turns: ClassVar[float] = RESPONSE_TURNS

@@ -1,4 +1,4 @@
-"""Cross FRF estimators: tip force to flange displacement."""
+"""Cross FRF estimators: tip force to flange displacement. H1, H2 and coherence are those of [bendat2010]."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class LineEstimator:
 
 @dataclass(frozen=True, slots=True)
 class AirCorrectedSpectra:
-    """The paper's estimator: spectra averaged over segments, those of the air cut subtracted (eqs. 8 and 16).
+    """Spectra averaged over segments [welch1967], those of the air cut subtracted ([inprocess], eqs. 8 and 16).
 
     What cut and air cut share at an order goes only as far as it is uncorrelated with what the force does there; at the
     few harmonics where the flange's roundness reaches them this leaves a bias that `LineEstimator` does not have.
@@ -134,7 +134,7 @@ def hv(displacement: ComplexArray, force: ComplexArray) -> ComplexArray:
 
 
 def air_corrected(displacement: ComplexArray, force: ComplexArray, air: ComplexArray) -> ComplexArray:
-    """Return (S_dd - S_aa) / (S_fd - S_fa), the paper's eqs. 8 and 16, with S_fd = E[F D*].
+    """Return (S_dd - S_aa) / (S_fd - S_fa) with S_fd = E[F D*] ([inprocess], eqs. 8 and 16).
 
     Spectra are subtracted, not lines: what the air cut shares with the cut is only taken out in the mean, which is
     exact where both are uncorrelated.

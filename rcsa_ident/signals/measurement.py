@@ -13,7 +13,7 @@ from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.errors import InputError
+from rcsa_ident.errors import InputError, Unsteady
 from rcsa_ident.signals.alignment import angle_to_air, trigger_delay
 from rcsa_ident.signals.frf import Estimator, LineEstimator, turned_air
 from rcsa_ident.signals.recording import Recording
@@ -144,7 +144,7 @@ def measure_cut(
         As programmed; forces are simulated at the speed found in the record.
     max_frequency : float [Hz]
     estimator : Estimator
-        `LineEstimator`, or `AirCorrectedSpectra` for the paper's.
+        `LineEstimator`, or `AirCorrectedSpectra` for that of [inprocess].
 
     Raises
     ------
@@ -158,19 +158,21 @@ def measure_cut(
     faults = raw_faults(cut) + tuple(f"air cut: {fault}" for fault in (raw_faults(air) if air is not None else ()))
     if faults:
         return Reading(Verdict(faults, notes))
-    steady = steady_record(cut, axes, programmed, max_frequency, cutter.teeth)
-    if isinstance(steady, str):
-        return Reading(Verdict((steady,), notes))
+    try:
+        steady = steady_record(cut, axes, programmed, max_frequency, cutter.teeth)
+    except Unsteady as error:
+        return Reading(Verdict((str(error.found),), notes))
     found = steady.spindle_speed, _harmonics(steady)
     faults = _speed_faults(steady, programmed)
     if faults:
         return Reading(Verdict(faults, notes), None, *found)
-    still = None if air is None else steady_record(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
-    if still is not None:
-        faults = (still,) if isinstance(still, str) else _speed_faults(still, programmed)
-        if faults:
-            return Reading(Verdict((f"air cut: {faults[0]}",), notes), None, *found)
-    assert not isinstance(still, str)
+    try:
+        still = None if air is None else steady_record(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
+        faults = () if still is None else _speed_faults(still, programmed)
+    except Unsteady as error:
+        faults = (str(error.found),)
+    if faults:
+        return Reading(Verdict((f"air cut: {faults[0]}",), notes), None, *found)
     harmonic = np.arange(cutter.teeth, steady.highest_order + 1, cutter.teeth)
     if harmonic.size == 0:
         return Reading(Verdict((f"no tooth-passing line below {max_frequency:.0f} Hz",), notes), None, *found)
@@ -214,9 +216,10 @@ def judge_air(air: Recording, conditions: CuttingConditions, max_frequency: floa
     faults = raw_faults(air)
     if faults:
         return Reading(Verdict(faults, notes))
-    still = steady_record(air, axes, conditions.spindle_speed, _AIR_BEYOND * max_frequency, 1)
-    if isinstance(still, str):
-        return Reading(Verdict((still,), notes))
+    try:
+        still = steady_record(air, axes, conditions.spindle_speed, _AIR_BEYOND * max_frequency, 1)
+    except Unsteady as error:
+        return Reading(Verdict((str(error.found),), notes))
     return Reading(Verdict(_speed_faults(still, conditions.spindle_speed), notes), None, still.spindle_speed, _harmonics(still))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 import scipy.optimize
@@ -79,11 +79,13 @@ class StabilityMap:
         return np.where(self.growth[:, 0] >= 0.0, self.depth[0], limit)
 
 
-class MarchingMethod(Protocol):
-    """A method that gives a cut's map of a period."""
+class MonodromyMethod(Protocol):
+    """A method that finds the limit from Floquet multipliers: it also knows them at every other depth."""
 
-    def cut(self, tip: TipModes, process: MillingProcess) -> MonodromyOperator:
-        """Return it."""
+    name: ClassVar[str]
+
+    def monodromy(self, tip: TipModes, process: MillingProcess) -> MonodromyOperator:
+        """Return the cut's monodromy operator."""
         ...
 
 
@@ -92,7 +94,7 @@ def stability_map(
     process: MillingProcess,
     speeds: FloatArray,
     depths: FloatArray,
-    method: MarchingMethod | None = None,
+    method: MonodromyMethod | None = None,
     full: bool = False,
     tolerance: float = 5e-3,
 ) -> StabilityMap:
@@ -111,8 +113,8 @@ def stability_map(
         Of the crossings' depths, relative.
     """
     speeds, depths = (_ascending(name, values) for name, values in (("speeds", speeds), ("depths", depths)))
-    chosen = FullDiscretisation() if method is None else method
-    cut = chosen.cut(tip, process)
+    chosen: MonodromyMethod = FullDiscretisation() if method is None else method
+    cut = chosen.monodromy(tip, process)
     step = longest_step(cut)
     known = np.full((speeds.size, depths.size), np.nan)
     columns = [Growth(cut, float(speed), step, ROUGH) for speed in speeds]
@@ -171,7 +173,7 @@ def stability_map(
         np.array([depth for _, depth, _ in crossings]),
         sum(column.calls for column in (*columns, *exact, *probes)),
         error,
-        "semi-discretisation" if cut.frozen else "full-discretisation",
+        chosen.name,
     )
 
 

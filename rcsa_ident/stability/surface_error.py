@@ -87,7 +87,7 @@ def surface_location_error(
     -----
     A stable cut of equal teeth repeats itself from tooth to tooth, so that what one leaves is what the next would have left:
     regeneration drops out and the tip moves as x(t) = Re sum_m G(i m Omega) F_m e^{i m Omega t} with the force lines F_m of a
-    rigid tool (Schmitz & Ziegert, Precision Engineering 23 (1999) 51; Mann, Young, Schmitz & Dilley, J. Manuf. Sci. Eng. 127 (2005) 446). A
+    rigid tool [schmitz1999], [mann2005]. A
     point of the wall is made by the edge that stands there, at immersion 0 (entry) or pi (exit): at height z that is at
     Omega t = phi_wall - psi_j + 2 z tan(helix) / D. Of unequal teeth the one that cuts deepest leaves the wall.
     """

@@ -14,7 +14,7 @@ from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.errors import InputError
+from rcsa_ident.errors import InputError, Unsteady
 from rcsa_ident.identification.posterior import MachineAxis, spread
 from rcsa_ident.observer.force import AxisObserver, ForceEstimate, ForceObserver, RunOut, axis_observer, force_observer
 from rcsa_ident.observer.response import ObserverFRF, observer_response
@@ -118,17 +118,19 @@ def observe(
     Raises
     ------
     InputError
-        If the recording has lost samples, no displacement, no speed or no steady part.
+        If the recording has no displacement or no speed.
+    Unsteady
+        If it has lost samples, no steady part, or a vibration that does not follow the speed.
     """
     faults = (*raw_faults(cut), *(f"air cut: {fault}" for fault in (raw_faults(air) if air is not None else ())))
     if faults:
-        raise InputError("recording", "; ".join(faults), "a record without lost, frozen or clipped samples")
+        raise Unsteady("recording", "; ".join(faults), "a record without lost, frozen or clipped samples")
     axes = tuple(axis for axis in measured_axes(cut) if axis in machine.whole)
     if not axes:
         raise InputError("sensors", "no displacement along an identified axis", "a displacement sensor for X or Y")
     programmed = trigger_speed(cut) if programmed is None else programmed
     top = min(identified[1], HIGHEST * 2.0 * np.pi * cut.rate)
-    steady = _steady(cut, axes, programmed, top, teeth)
+    steady = steady_record(cut, axes, programmed, top / (2.0 * np.pi), teeth)
     speed = steady.spindle_speed
     notes = list(speed_faults(steady.displacement, steady.lines, programmed))
     _periodic(steady, programmed, notes)
@@ -182,16 +184,9 @@ def trigger_speed(recording: Recording) -> float:
     edges = np.flatnonzero(high[1:] & ~high[:-1])
     if edges.size < 3:
         found_edges = f"none, and {edges.size} rising edges of the trigger"
-        raise InputError("spindle_speed", found_edges, "the programmed spindle speed [rev/min], or three rising edges or more")
+        raise Unsteady("spindle_speed", found_edges, "the programmed spindle speed [rev/min], or three rising edges or more")
     # the median shrugs off a stray or a lost edge
     return float(2.0 * np.pi * recording.rate / np.median(np.diff(edges)) / sensor.pulses_per_revolution)
-
-
-def _steady(recording: Recording, axes: tuple[Dof, ...], programmed: float, top: float, teeth: int) -> SteadyRecord:
-    steady = steady_record(recording, axes, programmed, top / (2.0 * np.pi), teeth)
-    if isinstance(steady, str):
-        raise InputError("recording", steady, "a steady record of the programmed speed")
-    return steady
 
 
 def _periodic(steady: SteadyRecord, programmed: float, notes: list[str]) -> None:
@@ -200,7 +195,7 @@ def _periodic(steady: SteadyRecord, programmed: float, notes: list[str]) -> None
     share = 1.0 - float(np.sum(steady.lines.rest[:, : signals.shape[1]] ** 2) / max(np.sum(signals**2), 1e-300))
     if share < UNRELATED:
         found = f"{to_rpm(programmed):.0f} rev/min, whose orders account for {100.0 * share:.0f} % of the vibration"
-        raise InputError("spindle_speed", found, "the spindle speed to within 1 % [rev/min], in a cut without chatter")
+        raise Unsteady("spindle_speed", found, "the spindle speed to within 1 % [rev/min], in a cut without chatter")
     if share < PERIODIC:
         notes.append(f"{100.0 * (1.0 - share):.0f} % of the vibration is not at orders of the spindle: chatter, or an unsteady cut")
 
@@ -232,7 +227,7 @@ def _run_out(
     if air is None:
         notes.append(NO_AIR)
         return None
-    still = _steady(air, axes, programmed, 1.02 * top, 1)
+    still = steady_record(air, axes, programmed, 1.02 * top / (2.0 * np.pi), 1)
     angle, std = angle_to_air(cut, still, teeth)
     if std > LOOSE_ANGLE:
         notes.append(f"the angle between cut and air cut is known only to {np.degrees(std):.0f}°: run-out is not subtracted")
@@ -359,7 +354,7 @@ def _model_error(
 
 
 def _above(force: FloatArray, low: float, step: float) -> FloatArray:
-    """Forces without what lies below the band: the paper's walk puts the sensors' drift and integrated noise there."""
+    """Forces without what lies below the band: the walk of [inprocess] puts the sensors' drift and integrated noise there."""
     from scipy.signal import butter, sosfiltfilt
 
     sections = butter(4, 0.5 * low / (2.0 * np.pi), "highpass", fs=1.0 / step, output="sos")

@@ -12,7 +12,8 @@ from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.parameters import AxisLayout, AxisParameters, pack, parameter_names, simple_axis
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.identification.result import AxisResult, Identification, Status
+from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.status import Status
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machining_setup import Campaign, Cut, Workpiece
 from rcsa_ident.signals.recording import Quantity, Sensor

@@ -10,7 +10,7 @@ from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.parameters import AxisLayout, parameter_names
 from rcsa_ident.identification.posterior import MachineAxis
-from rcsa_ident.identification.result import Status
+from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.workflows.tip import tooltip

@@ -16,7 +16,8 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.parameters import AxisLayout, parameter_names
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.identification.result import AxisResult, Identification, Status
+from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.status import Status
 from rcsa_ident.machining_setup import Campaign, Cut, Tooling, Workpiece
 from rcsa_ident.report.figures import svg, tooltip_frf
 from rcsa_ident.report.html import ToolingPage, report_html
