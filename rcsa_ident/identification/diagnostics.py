@@ -51,42 +51,45 @@ def diagnose(
     """
     reasons = []
     if not solution.converged:
-        reasons.append(f"not converged: the polish still gained after {solution.steps} steps")
+        reasons.append(f"not converged: the joint fit was still improving after {solution.steps} steps")
     for axis in data.axes:
         noise = np.sqrt(2.0 * axis.noise)
         signal = float(np.median(np.abs(axis.measured) / np.where(noise > 0.0, noise, 1e-300)))
         if signal < LEAST_SIGNAL:
-            reasons.append(f"{str(axis.axis).upper()}: half of the lines are below {signal:.2g} times their noise")
+            reasons.append(
+                f"{str(axis.axis).upper()}: the median signal-to-noise ratio of the lines is {signal:.2g} (at least {LEAST_SIGNAL:g})"
+            )
     for axis, share in zip(data.axes, misfit.model_error, strict=True):
         if share > WORST_MODEL_ERROR:
             reasons.append(
-                f"{str(axis.axis).upper()}: {100 * share:.1f} % of each line stay unexplained (at most {100 * WORST_MODEL_ERROR:g} %): "
-                "cutting coefficients, toolings, tooth count or sensor signs may be wrong, or the dynamics change with speed"
+                f"{str(axis.axis).upper()}: the model leaves {100 * share:.1f} % of each line unexplained "
+                f"(limit {100 * WORST_MODEL_ERROR:g} %): cutting coefficients, toolings, tooth count or sensor signs may be wrong, "
+                "or the dynamics change with speed"
             )
     bad = misfit.cut_weight < 1.0
     if np.mean(bad) > MOST_BAD_CUTS:
-        reasons.append(f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, {_named(data, bad, misfit)}")
+        reasons.append(f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, namely {_named(data, bad, misfit)}")
     for axis, found in zip(data.axes, searched, strict=True):
         if len(found.solutions) > 1 and found.evidences[1] - found.evidences[0] < EVIDENCE_TIE:
             difference, band = _difference(axis, *found.solutions[:2])
             if difference > max(LARGEST_DIFFERENCE, 3.0 * band):
                 reasons.append(
-                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.1f} % in what a tooltip "
-                    f"feels of the machine, more than their deviation of {100 * band:.1f} %"
+                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.1f} % in the machine's "
+                    f"contribution to the tooltip FRF, more than its standard deviation of {100 * band:.1f} % explains"
                 )
     for axis, posterior in zip(data.axes, posteriors, strict=True):
         band = _band(posterior, axis)
         if band > LARGEST_BAND:
             reasons.append(
-                f"{str(axis.axis).upper()}: what a tooltip feels of the machine is known to {100 * band:.1f} % only (at most "
-                f"{100 * LARGEST_BAND:g} %), and with tools that were never cut to several times that: more or quieter cuts are wanted"
+                f"{str(axis.axis).upper()}: the machine's contribution to the tooltip FRF has a standard deviation of {100 * band:.1f} % "
+                f"(limit {100 * LARGEST_BAND:g} %), several times that with tools that were never cut: more or quieter cuts are needed"
             )
     if len(data.toolings) < 2:
-        reasons.append("one tooling only: flange translation and slope can't be told apart; cut with a second, different holder")
+        reasons.append("only one tooling: translation and slope of the flange cannot be separated; cut with a second, different holder")
     for t, name in enumerate(data.toolings):
         count = int(np.sum(data.cut_tooling == t))
         if count < FEWEST_CUTS:
-            reasons.append(f"few cuts: {count} with {name}, at least {FEWEST_CUTS} are wanted")
+            reasons.append(f"too few cuts: {count} with {name}, at least {FEWEST_CUTS} are needed")
     return reasons
 
 
@@ -107,8 +110,8 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
     for name, std in zip(_JOINT, deviation[layout.joint], strict=True):
         if std > TOLD * priors.joint_spread:
             words.append(
-                f"joint: its {name} cannot be told from the flange's own compliance (known to a factor of {np.exp(std):.1f}); "
-                "both together are what the tooltip feels"
+                f"joint: the {name} cannot be separated from the flange's own compliance (known to within a factor of {np.exp(std):.1f}); "
+                "the tooltip FRF depends on both together"
             )
     for i, axis in enumerate(data.axes):
         natural = np.exp(solution.theta[layout.axis(i)][: layout.axes[i].modes]) / (2.0 * np.pi)
@@ -118,15 +121,17 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
             listed = ", ".join(f"{f:.0f}" for f in outside)
             words.append(
                 f"{str(axis.axis).upper()}: modes at {listed} Hz lie outside the excited band of {low:.0f} to {high:.0f} Hz: "
-                "they stand for all that the machine does there"
+                "they represent all dynamics of the machine outside it"
             )
     for c, name in enumerate(data.coefficient_names):
         std, before = deviation[layout.force][c], data.coefficient_spread[c]
         if std > TOLD * before and name.split(" of ")[0] != SLOPES[-1]:
-            words.append(f"{name}: the cuts say little about it; it is known to {100.0 * min(std, before):.1f} %, nearly as before")
+            words.append(
+                f"{name}: hardly determined by the cuts; its standard deviation is {100.0 * min(std, before):.1f} %, close to the prior's"
+            )
     bad = misfit.cut_weight < 1.0
     if 0.0 < np.mean(bad) <= MOST_BAD_CUTS:
-        words.append(f"cuts that contradict the others and count less: {_named(data, bad, misfit)}")
+        words.append(f"cuts that contradict the others and were given less weight: {_named(data, bad, misfit)}")
     return words
 
 

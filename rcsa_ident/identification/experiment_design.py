@@ -329,7 +329,7 @@ def _cross(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Cross FRF of an axis and a joint, shape (n,), and its change with the vector where asked for, shape (n, p)."""
     if layout.fixture:
-        raise InputError("layout", "one with fixture", "the flange's own motion: a posterior's layout")
+        raise InputError("layout", "a layout with the fixture's motion", "one of the flange's motion alone, as a posterior has")
     axis, joint = unpack(theta[:-JOINT], layout), scaled_joint(theta[-JOINT:])
     n = points.shape[0]
     values = np.empty((n, 1), dtype=complex)

@@ -158,12 +158,12 @@ class PaperGeneticAlgorithm:
             name, misfit = str(axis.axis).upper(), axes[axis.axis].chi2_per_point
             if misfit > WORST_MISFIT:
                 reasons.append(
-                    f"{name}: the modes miss the lines, chi2 per point {misfit:.0f} at 2 % of each line (at most {WORST_MISFIT:g})"
+                    f"{name}: the modes do not fit the lines, chi² per point is {misfit:.0f} at an error of 2 % (limit {WORST_MISFIT:g})"
                 )
             omega = np.linspace(axis.omega.min(), axis.omega.max(), 400)
             worst = float(dissipation(omega, axes[axis.axis].modes.receptance(omega).values).min())
             if worst < -1e-9:
-                reasons.append(f"{name}: the modes are not passive, they feed energy in (down to {worst:.2f} of the mobility)")
+                reasons.append(f"{name}: the modes are not passive, the real part of the mobility falls to {worst:.2f} of its magnitude")
         assert problem is not None
         delays = problem.delays(axes[data.axes[-1].axis])
         return Identification(

@@ -39,7 +39,7 @@ class RunOut:
     def __post_init__(self) -> None:
         object.__setattr__(self, "order", frozen(self.order))
         if np.any(self.order != np.rint(self.order)) or np.any(np.diff(self.order, prepend=0.0) <= 0.0):
-            raise InputError("run-out's orders", self.order.tolist(), "whole numbers from 1, rising")
+            raise InputError("run-out orders", self.order.tolist(), "whole numbers from 1, rising")
         for name in ("gap", "acceleration"):
             object.__setattr__(self, name, frozen(getattr(self, name), np.complex128))
 

@@ -40,8 +40,8 @@ class RandomWalk:
     leak: float = 0.0
 
     def __post_init__(self) -> None:
-        positive("random walk's intensity", self.intensity, "N/sqrt(s)")
-        non_negative("random walk's leak", self.leak, "rad/s")
+        positive("random-walk intensity", self.intensity, "N/sqrt(s)")
+        non_negative("random-walk leak", self.leak, "rad/s")
 
     def modes(self, step: float) -> tuple[ComplexArray, FloatArray]:
         """Return the only mode."""
@@ -195,7 +195,7 @@ def augmented(
         kinds.append((acceleration.decay, 2.0 * acceleration.gain, 0.0, acceleration_noise))
         direct = acceleration.through * acceleration_noise
     if len(disturbance):
-        spread = positive("disturbance's intensity", disturbance_intensity, "m/sqrt(s)") * np.sqrt(step)
+        spread = positive("disturbance intensity", disturbance_intensity, "m/sqrt(s)") * np.sqrt(step)
         kinds.append((np.exp(1j * np.asarray(disturbance) * step), 1.0, spread, 0.0))
     columns = [np.concatenate([np.broadcast_to(kind[c], kind[0].shape) for kind in kinds]) for c in range(4)]
     total = float(np.hypot(positive("measurement noise", noise, "m"), direct))

@@ -250,7 +250,7 @@ def riccati(a: FloatArray, seen: FloatArray, q: FloatArray) -> FloatArray:
             break
         if change <= 1e-14 * np.linalg.norm(covariance):
             return covariance / np.outer(size, size)
-    raise InputError("force model", "no steady Kalman gain", "modes that the displacement shows, each with noise")
+    raise InputError("force model", "no steady Kalman gain", "modes that are observable in the displacement, each driven by noise")
 
 
 def _corrected(predicted: FloatArray, seen: FloatArray) -> tuple[FloatArray, float, FloatArray]:

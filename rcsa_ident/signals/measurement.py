@@ -27,7 +27,7 @@ WEAKEST_FORCE = 1e-3
 _AIR_BEYOND = 1.02
 DEFAULT_ESTIMATOR = LineEstimator()
 #: Note on a cut without an air cut.
-NO_AIR = "no air cut: run-out and roundness of the flange are left in the lines that the teeth share with them"
+NO_AIR = "no air cut: run-out and roundness of the flange remain in the lines at the tooth-passing harmonics"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

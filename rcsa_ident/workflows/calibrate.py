@@ -213,7 +213,7 @@ def calibrate(
             progress(done, len(campaign.cuts))
     if not used:
         raise InputError("cuts", f"none of {len(campaign.cuts)} usable ({left_out[0][1]})", "recordings of the cutting force")
-    notes = [] if any(cut.air is not None for cut in campaign.cuts) else ["no air cuts: zero is taken from the sensors as it is"]
+    notes = [] if any(cut.air is not None for cut in campaign.cuts) else ["no air cuts: the sensors' own zero level is used"]
     if not signal:
         return Calibrated(_mean(used), None, tuple(used), tuple(left_out), tuple(notes))
     found = calibrate_signal([m.record for m in used], dynamometer, free_helix)

@@ -66,7 +66,7 @@ def flange_from_taps(
         Standard deviation of what the noise between neighbouring frequencies does not show, as a share of each receptance.
     """
     if not taps:
-        raise InputError("taps", "none", "hammer tests with three toolings at least")
+        raise InputError("taps", "none", "hammer tests with at least three toolings")
     omega = np.asarray(taps[0].omega, dtype=float)
     planes: dict[int, Receptance] = {}
     observations = []

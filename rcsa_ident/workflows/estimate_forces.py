@@ -133,7 +133,9 @@ def observe(
     known = machine.speed_range
     if known is not None and not known[0] * (1.0 - 1e-9) <= speed <= known[1] * (1.0 + 1e-9):
         low, high = (to_rpm(each) for each in known)
-        notes.append(f"the machine was identified from {low:.0f} to {high:.0f} rev/min, the record has {to_rpm(speed):.0f}")
+        notes.append(
+            f"the machine was identified from {low:.0f} to {high:.0f} rev/min, the recording was made at {to_rpm(speed):.0f} rev/min"
+        )
     omega = 2.0 * np.pi * np.arange(max(0.25 * band[0] / (2.0 * np.pi), STEP_HZ), 1.3 * band[1] / (2.0 * np.pi), STEP_HZ)
     here = machine.at(speed)
     coupled = here.coupled(assembly, omega, axes)
@@ -186,10 +188,10 @@ def _periodic(steady: SteadyRecord, programmed: float, notes: list[str]) -> None
     signals = steady.displacement - steady.displacement.mean(axis=0)
     share = 1.0 - float(np.sum(steady.lines.rest[:, : signals.shape[1]] ** 2) / max(np.sum(signals**2), 1e-300))
     if share < UNRELATED:
-        found = f"{to_rpm(programmed):.0f} rev/min, whose orders make {100.0 * share:.0f} % of the vibration"
+        found = f"{to_rpm(programmed):.0f} rev/min, whose orders account for {100.0 * share:.0f} % of the vibration"
         raise Unsteady("spindle_speed", found, "the spindle speed to within 1 % [rev/min], in a cut without chatter")
     if share < PERIODIC:
-        notes.append(f"{100.0 * (1.0 - share):.0f} % of the vibration does not follow the spindle: chatter, or not a steady cut")
+        notes.append(f"{100.0 * (1.0 - share):.0f} % of the vibration is not at orders of the spindle: chatter, or an unsteady cut")
 
 
 def _band(identified: tuple[float, float], top: float, speed: float, teeth: int, notes: list[str]) -> tuple[float, float]:
@@ -201,11 +203,13 @@ def _band(identified: tuple[float, float], top: float, speed: float, teeth: int,
     fundamental = speed * teeth
     if fundamental < low:
         share = f"harmonics below {low / hz:.0f} Hz are left out"
-        notes.append(f"the tooth-passing frequency, {fundamental / hz:.0f} Hz, lies below what the identified model is good for: {share}")
+        notes.append(
+            f"the tooth-passing frequency, {fundamental / hz:.0f} Hz, lies below the range in which the identified model is valid: {share}"
+        )
     elif fundamental < identified[0]:
         notes.append(
             f"the tooth-passing frequency, {fundamental / hz:.0f} Hz, lies below the identified band, which begins at "
-            f"{identified[0] / hz:.0f} Hz: its share of the force rests on the model beyond its data"
+            f"{identified[0] / hz:.0f} Hz: its part of the force is extrapolated"
         )
     return low, top
 
@@ -220,7 +224,7 @@ def _run_out(
     still = steady_record(air, axes, programmed, 1.02 * top / (2.0 * np.pi), 1)
     angle, std = angle_to_air(cut, still, teeth)
     if std > LOOSE_ANGLE:
-        notes.append(f"the angle between cut and air cut is known to {np.degrees(std):.0f}° only: run-out is left in")
+        notes.append(f"the angle between cut and air cut is known only to {np.degrees(std):.0f}°: run-out is not subtracted")
         return None
     count = min(cut.highest_order, still.highest_order)
     order = np.arange(1, count + 1)

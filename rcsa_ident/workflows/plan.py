@@ -231,13 +231,13 @@ def plan_cuts(
     order = greedy(prospects, count, goal)
     warnings = []
     if len(order) < count:
-        warnings.append(f"only {len(order)} of {count} cuts: no further speed is stable and {100 * SPACING:g} % away from the others")
+        warnings.append(f"only {len(order)} of {count} cuts: no further stable speed is {100 * SPACING:g} % away from the others")
     order = exchanged(prospects, order, goal) if wanted is None else _shortest(prospects, order, goal, positive("wanted band", wanted))
     even = _even(candidates, toolings, allowed, len(order))
     band = deviations(prospects, order)
     if wanted is not None and band[-1].max() > wanted:
         warnings.append(
-            f"the band of {100 * wanted:.3g} % is not reached: {len(order)} cuts come to {100 * band[-1].max():.3g} % "
+            f"a standard deviation of {100 * wanted:.3g} % is not reached: {len(order)} cuts give {100 * band[-1].max():.3g} % "
             f"({100 * band[0].max():.3g} % without them)"
         )
     return PlannedCuts(
