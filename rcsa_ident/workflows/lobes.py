@@ -18,10 +18,9 @@ from rcsa_ident.stability.lobes import StabilityMethod, stability_lobes, uncoupl
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.time_domain import TimeDomain
-from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.stability.tip_modes import TipModes, fitted_modes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.tip import TooltipResponse
-from rcsa_ident.workflows.tip_fit import fitted_modes
 
 #: Two peaks are one pocket unless the limit between them falls below this share of the lower one.
 POCKET = 0.85
@@ -215,7 +214,7 @@ def receptance_from_dc(modes: TipModes) -> Receptance:
     fine = modes.receptance().omega
     omega = np.arange(0.0, 2.0 * fine[-1], fine[1] - fine[0])
     tip = (Coordinate("tip", Dof.X), Coordinate("tip", Dof.Y))
-    return Receptance(omega, modes.at(omega), tip, tip)
+    return Receptance(omega, modes.response(omega), tip, tip)
 
 
 def measured_tip(

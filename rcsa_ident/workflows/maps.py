@@ -13,11 +13,10 @@ from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import uncoupled_planes
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.stability_map import StabilityMap, stability_map
-from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.stability.tip_modes import TipModes, fitted_modes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.workflows.lobes import LobeConditions
 from rcsa_ident.workflows.speeds import MachineOverSpeed, responses_over_speed
-from rcsa_ident.workflows.tip_fit import fitted_modes
 
 
 def tip_map(tip: Receptance | TipModes, conditions: LobeConditions, depths: int = 100, full: bool = False) -> StabilityMap:
