@@ -173,4 +173,4 @@ def _from_dc(modes: TipModes) -> Receptance:
     """The receptance of modes from 0 Hz to four times the highest, at frequencies that resolve the sharpest."""
     fine = modes.receptance().omega
     omega = np.arange(0.0, 2.0 * fine[-1], fine[1] - fine[0])
-    return Receptance(omega, modes.at(omega), TIP, TIP)
+    return Receptance(omega, modes.response(omega), TIP, TIP)

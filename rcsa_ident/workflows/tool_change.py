@@ -26,7 +26,7 @@ from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Stabili
 from rcsa_ident.stability.stability_map import MonodromyMethod, StabilityMap, stability_map
 from rcsa_ident.stability.surface_error import SurfaceError, surface_location_error
 from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, tally
-from rcsa_ident.stability.tip_fit import fitted_modes
+from rcsa_ident.stability.tip_modes import fitted_modes
 from rcsa_ident.stability.tip_modes import TIP, TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.units import to_hz, to_rpm
@@ -82,7 +82,7 @@ def tooltip(
     tip = machine.at(speed).tip(tooling, omega, spread, stiffness_spread)
     if isinstance(tip, TipModes):
         lines = tip.receptance().omega if omega is None else omega
-        tip = UncertainReceptance(lines, tip.at(lines), TIP, TIP)
+        tip = UncertainReceptance(lines, tip.response(lines), TIP, TIP)
     remarks = [*machine.remarks, *([] if speed is None else _outside(machine, np.array([speed])))]
     if machine.band is not None and tip.omega.max() > 1.001 * machine.band[1]:
         top = to_hz(machine.band[1])
