@@ -10,7 +10,6 @@ import typer
 
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn
 from rcsa_ident.cli.identify import Method, leave, read_and_judge, result_of, search, warn_left_out
-from rcsa_ident.cli.lobes import write_lobes
 from rcsa_ident.cli.processes import Processes, workers
 from rcsa_ident.errors import InputError
 from rcsa_ident.units import from_rpm, to_hz, to_rpm
@@ -113,6 +112,7 @@ def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out
 
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.io.curves import write_tip_csv
+    from rcsa_ident.io.lobes import write_lobes
     from rcsa_ident.machine.known_tip import measured_tip
     from rcsa_ident.machining_setup import CutSpec
     from rcsa_ident.report.html import ToolingPage

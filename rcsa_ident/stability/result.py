@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.errors import InputError
-from rcsa_ident.shown import Drawn, Saved, Shown
+from rcsa_ident.shown import Drawn, Shown
 from rcsa_ident.stability.pockets import least_within_tolerance, peaks
 from rcsa_ident.units import to_rpm
 
@@ -47,7 +47,7 @@ class Pocket(Shown):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class StabilityLobes(Drawn, Saved):
+class StabilityLobes(Drawn):
     """The smallest depth at which a cut loses stability, over spindle speed.
 
     Parameters
