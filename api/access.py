@@ -143,10 +143,10 @@ class TimedHeadProtocol(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
 
 def _problem(error: Exception) -> Problem:
     if isinstance(error, Unavailable):
-        return Problem(503, "the store does not answer now", headers=RETRY)
+        return Problem(503, "the database does not answer", headers=RETRY)
     if isinstance(error, Busy):
-        return Problem(503, "too many questions wait for an answer", headers=RETRY)
-    return Problem(500, "something unexpected happened; the log has it under this request's id")
+        return Problem(503, "too many queries are waiting for an answer", headers=RETRY)
+    return Problem(500, "an internal error occurred; it is logged under this request's id")
 
 
 class JsonLines(logging.Formatter):

@@ -24,18 +24,18 @@ Repeat = Annotated[
 ]
 
 _WHY = {
-    400: "The body can not be read.",
+    400: "The body cannot be read.",
     401: "No key, or not a valid one.",
     403: "The key has not the scope.",
     404: "Nothing is there, or it is another group's.",
-    408: "The body comes too slowly.",
+    408: "The body arrives too slowly.",
     409: "The name, or the idempotency key with another body, is in use.",
     412: "What is there is not what If-Match or If-None-Match expects.",
     413: "The body is too large.",
     415: "The body is of another type.",
     422: "Something in the query is not usable; the fields are named.",
     429: "Too many requests with this key.",
-    503: "Too much waits for an answer, or the store does not answer now.",
+    503: "Too much waits for an answer, or the database does not answer.",
 }
 _ALWAYS = (401, 403, 429, 503)
 #: What a body may meet.

@@ -110,10 +110,10 @@ def install(app: FastAPI) -> None:
         assert isinstance(error, HTTPException)
         words = {
             413: f"the body is too large: {error.detail}",
-            400: "the body can not be read",
-            408: "the body comes too slowly",
-            404: "nothing is there",
-            405: "the path does not take this method",
+            400: "the body cannot be read",
+            408: "the body arrives too slowly",
+            404: "there is nothing at this path",
+            405: "this path does not support the method",
         }
         detail = words.get(error.status_code, title(error.status_code))
         headers = dict(error.headers or {})

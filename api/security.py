@@ -85,7 +85,7 @@ def caller_of(request: HTTPConnection, components: Components, given: str | None
     if not text and not components.settings.asks_for_keys:
         # a page from elsewhere may reach loopback through a name of its own
         if not _LOCAL_NAME.fullmatch(request.headers.get("host", "")):
-            raise Problem(403, "without a key the service answers on localhost only")
+            raise Problem(403, "without an API key the service answers on localhost only")
         return Caller(LOCAL_KEY, LOCAL_GROUP, SCOPES)
     _, _, rest = text.partition("_")
     id, _, secret = rest.partition("_")
@@ -93,7 +93,7 @@ def caller_of(request: HTTPConnection, components: Components, given: str | None
     # an unknown id takes as long as a wrong secret
     kept = key.secret_hash if key is not None else hash_of("")
     if not hmac.compare_digest(hash_of(secret), kept) or key is None:
-        raise Problem(401, f"a valid key is needed in the header {HEADER}", headers={"WWW-Authenticate": "ApiKey"})
+        raise Problem(401, f"a valid API key is required in the header {HEADER}", headers={"WWW-Authenticate": "ApiKey"})
     return Caller(key.id, key.group, key.scopes)
 
 
@@ -111,10 +111,10 @@ class Guarded(APIRoute):
             caller = await run_in_threadpool(caller_of, request, components)
             request.state.caller = caller
             if not caller.may(scope):
-                raise Problem(403, f"the key has not the scope {scope}")
+                raise Problem(403, f"the API key does not have the scope {scope}")
             seconds = components.rates.wait(caller.id)
             if seconds > 0.0:
-                raise Problem(429, "too many requests with this key", headers={"Retry-After": str(math.ceil(seconds))})
+                raise Problem(429, "too many requests with this API key", headers={"Retry-After": str(math.ceil(seconds))})
             kind = request.headers.get("content-type", "").split(";")[0].strip().lower()
             if kinds and kind not in kinds:
                 raise Problem(415, f"found content type {kind[:80] or 'nothing'}, allowed is {' or '.join(kinds)}")

@@ -44,7 +44,7 @@ def serve(
 def create_key(
     context: typer.Context,
     group: Annotated[str, typer.Option(help="Whose machines and toolings it opens.")] = "default",
-    scopes: Annotated[str, typer.Option(help="Some of read, upload, run, admin, divided by commas.")] = "admin",
+    scopes: Annotated[str, typer.Option(help="Some of read, upload, run, admin, separated by commas.")] = "admin",
     label: Annotated[str, typer.Option(help="What it is for.")] = "",
 ) -> None:
     """Make a key and print it once; the first one of a group is made so."""
@@ -57,7 +57,7 @@ def create_key(
     try:
         wanted = tuple(dict.fromkeys(part.strip() for part in scopes.split(",")))
         if not set(wanted) <= set(SCOPES):
-            raise InputError("--scopes", scopes, f"some of {', '.join(SCOPES)}, divided by commas")
+            raise InputError("--scopes", scopes, f"some of {', '.join(SCOPES)}, separated by commas")
         if not re.fullmatch(NAME_PATTERN.strip("^$"), group):
             raise InputError("--group", group, "letters, digits, blanks and . _ + - ( ), at most 64")
         if not label.isprintable() or len(label) > 200:

@@ -141,7 +141,7 @@ class Settings:
         if self.dask and not ADDRESS.fullmatch(self.dask):
             raise InputError(f"{PREFIX}DASK", self.dask, "the address of a Dask scheduler, as tcp://host:8786")
         if self.keys is False and not self.loopback:
-            raise InputError(f"{PREFIX}KEYS", "off", f"on: the service listens on {self.host}, which others reach, too")
+            raise InputError(f"{PREFIX}KEYS", "off", f"on, since the service listens on {self.host}, which other machines reach")
 
     @property
     def loopback(self) -> bool:

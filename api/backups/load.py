@@ -30,7 +30,7 @@ def restore(source: Path, data: Path) -> Account:
         The folder is not empty, or the file is no whole backup that this release can read.
     """
     if data.is_symlink() or (data.exists() and not (data.is_dir() and not any(data.iterdir()))):
-        raise InputError("--data", f"{data.name} with something in it", "a folder that is empty, or not there yet")
+        raise InputError("--data", f"{data.name} which is not empty", "a folder that is empty or does not exist yet")
     with disk("--data"):
         data.absolute().parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(prefix=f".{data.name}.restoring-", dir=data.absolute().parent))
@@ -143,4 +143,4 @@ def _place(folder: Path, data: Path) -> None:
 
 
 def _no_backup(found: str) -> InputError:
-    return InputError("FILE.tar", found, "a whole backup of this service")
+    return InputError("FILE.tar", found, "a complete backup of this service")

@@ -44,14 +44,14 @@ def disk(field: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise InputError(field, error.strerror or "an error of the disk", "a disk with room that can be written to") from None
+        raise InputError(field, error.strerror or "a disk error", "a writable disk with enough free space") from None
 
 
 def copy(source: Any, target: Any, size: int, digest: Any) -> None:
     while size > 0:
         data = source.read(min(size, CHUNK))
         if not data:
-            raise InputError("FILE.tar", "a file that has become shorter", "files that stay, and a whole backup")
+            raise InputError("FILE.tar", "a file that has become shorter", "files that do not change, and a complete backup")
         digest.update(data)
         target.write(data)
         size -= len(data)

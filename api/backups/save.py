@@ -36,9 +36,9 @@ def backup(data: Path, target: Path) -> Account:
     if not (data / STORE).is_file():
         raise InputError("RCSA_IDENT_DATA", f"no {STORE}", "the data folder of a service")
     if target.exists() or target.is_symlink():
-        raise InputError("FILE.tar", f"{target.name} is there already", "a name that is free")
+        raise InputError("FILE.tar", f"{target.name}, which exists already", "the name of a new file")
     if not target.absolute().parent.is_dir():
-        raise InputError("FILE.tar", "no such folder", "a file in a folder that is there")
+        raise InputError("FILE.tar", "no such folder", "a file in an existing folder")
     part = target.with_name(f".{target.name}.{os.getpid()}.part")
     with disk("FILE.tar"), _alone(data) as staging:
         missing = _gather(data, staging)
@@ -60,7 +60,7 @@ def _name(part: Path, target: Path) -> None:
     try:
         os.link(part, target)
     except FileExistsError:
-        raise InputError("FILE.tar", f"{target.name} is there already", "a name that is free") from None
+        raise InputError("FILE.tar", f"{target.name}, which exists already", "the name of a new file") from None
     except OSError:
         # a disk without links
         os.rename(part, target)
@@ -73,7 +73,7 @@ def _alone(data: Path) -> Iterator[Path]:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise InputError("RCSA_IDENT_DATA", "another backup under way", "one at a time") from None
+            raise InputError("RCSA_IDENT_DATA", "another backup in progress", "one at a time") from None
         for old in data.glob(f"{_STAGING}*"):
             shutil.rmtree(old, ignore_errors=True)
         staging = Path(tempfile.mkdtemp(prefix=_STAGING, dir=data))

@@ -76,10 +76,10 @@ def _outcome(jobs: Jobs, carrier: Carrier, job: Job, token: str, remember: Remem
     except Unavailable:
         raise
     except Faulty:
-        return failed("something unexpected happened; the log has it under this job's id")
+        return failed("an internal error occurred; it is logged under this job's id")
     except Exception as error:
         log.error("unexpected", exc_info=error, extra={"fields": {"job": job.id}})
-        return failed("something unexpected happened; the log has it under this job's id")
+        return failed("an internal error occurred; it is logged under this job's id")
 
 
 def failed(detail: str, *errors: tuple[str, str, str]) -> Outcome:
@@ -89,7 +89,7 @@ def failed(detail: str, *errors: tuple[str, str, str]) -> Outcome:
 
 
 def _given_up(attempts: int) -> Outcome:
-    return failed(f"its process has died {attempts} times at the same step: perhaps it needs more memory than there is")
+    return failed(f"the worker process has died {attempts} times at the same step: perhaps it needs more memory than is available")
 
 
 class JobWorker:

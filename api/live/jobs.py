@@ -80,9 +80,9 @@ def submit(components: Components, job: Job, texts: Mapping[str, str], repeat: t
         return components.store.jobs.add(job, texts, components.settings.job_queue, repeat)
     except Taken as taken:
         entry = {"field": str(taken), "found": str(repeat and repeat[0]), "allowed": f"a {taken} of its own"}
-        raise Problem(409, f"the {taken} is in use", [entry]) from None
+        raise Problem(409, f"the {taken} is already in use", [entry]) from None
     except Full:
-        raise Problem(503, f"{components.settings.job_queue} jobs wait already", headers={"Retry-After": "60"}) from None
+        raise Problem(503, f"{components.settings.job_queue} jobs are waiting already", headers={"Retry-After": "60"}) from None
     except KeyError:
         raise Problem(404, "there is no such machine") from None
 
@@ -109,7 +109,7 @@ def cancel(components: Components, group: str, id: str, kind: str, response: Res
     job_of(components, group, id, kind)
     job, cancelled = found_or_404(components.store.jobs.cancel(group, id, now()), "job")
     if not cancelled:
-        raise Problem(409, f"the job has ended before: it is {job.state}")
+        raise Problem(409, f"the job has already ended: its state is {job.state}")
     response.headers["Location"] = place(job)
     return answer(job)
 
@@ -118,7 +118,7 @@ def finished(components: Components, group: str, id: str, kind: str, name: str) 
     """Return what a job has found."""
     job = job_of(components, group, id, kind)
     if job.state != "done":
-        raise Problem(409, f"the job has no result: it is {job.state}", headers={"Retry-After": AGAIN} if job.state in OPEN else {})
+        raise Problem(409, f"the job has no result: its state is {job.state}", headers={"Retry-After": AGAIN} if job.state in OPEN else {})
     return found_or_404(components.store.jobs.text(id, name), "result")
 
 
@@ -129,7 +129,7 @@ async def events(components: Components, group: str, id: str, kind: str, seen: s
         watching = components.feeds.stream()
         watching.__enter__()
     except Crowded:
-        raise Problem(503, "too many watch jobs", headers={"Retry-After": "30"}) from None
+        raise Problem(503, "too many event streams of jobs are open", headers={"Retry-After": "30"}) from None
 
     async def stream() -> AsyncIterator[str]:
         try:

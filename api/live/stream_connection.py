@@ -36,7 +36,7 @@ UNSTEADY, PAUSE = ("recording", "recording length", "spindle_speed_rpm", "trigge
 LOOK = 20.0
 #: An index further ahead is a fault of its sender, not a gap [s].
 MOST_AHEAD = 3600.0
-UNEXPECTED = End(1011, 500, "something unexpected happened; the log has it under this session")
+UNEXPECTED = End(1011, 500, "an internal error occurred; it is logged under this session's id")
 _WORDS = {1009: 413, 1003: 415}
 
 
@@ -82,7 +82,7 @@ async def _watch_key(components: Components, caller: Caller) -> None:
     while True:
         await asyncio.sleep(LOOK)
         if caller.id != LOCAL_KEY and await run_in_threadpool(components.store.keys.get, caller.id) is None:
-            raise Problem(401, "the key has been withdrawn")
+            raise Problem(401, "the API key has been revoked")
 
 
 def _session_task(hub: Hub, session: Session, doing: Awaitable[None]) -> asyncio.Task[None]:
@@ -155,7 +155,7 @@ async def _receive_frames(websocket: WebSocket, hub: Hub, session: Session, text
         if not feeds:
             raise WrongKind("message", "a frame", 'nothing but {"event": "end"}: the samples are those of the recording')
         if (words is not None) is not text:
-            raise WrongKind("frame", "bytes" if raw is not None else "text", "JSON" if text else "bytes, as the hello says")
+            raise WrongKind("frame", "bytes" if raw is not None else "text", "JSON" if text else "bytes, as declared in the first message")
         first, samples = samples_of_text(words, channels) if words is not None else samples_of(raw or b"", channels)
         ahead = first - session.counts.following
         if session.counts.following >= 0 and ahead > MOST_AHEAD * session.about.rate:
@@ -240,5 +240,5 @@ def end_of(error: Exception) -> End:
     if isinstance(error, Full):
         return End(1013, 503, str(error))
     if isinstance(error, Busy | Unavailable):
-        return End(1013, 503, "too much waits for an answer, or the store does not answer now")
+        return End(1013, 503, "too many queries are waiting for an answer, or the database does not answer")
     return UNEXPECTED

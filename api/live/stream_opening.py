@@ -110,18 +110,20 @@ async def open_logger(components: Components, group: str, hello: StreamHello) ->
         channels = channels_of(hello.channels, given_sensors(hello.sensors) or sensors_of(known.text))
         speed = None if hello.spindle_speed_rpm is None else hello.spindle_speed_rpm * _RPM
         if speed is None and not any(sensor.quantity is Quantity.TRIGGER for sensor in channels):
-            raise InputError("spindle_speed_rpm", "nothing, and no channel of a trigger", "the programmed speed [rev/min]")
+            raise InputError("spindle_speed_rpm", "nothing, and no trigger channel", "the programmed speed [rev/min]")
         axes = tuple(hello.axes) if hello.axes is not None else displacement_axes(channels)
         if len(set(axes)) < len(axes):
             raise InputError("axes", list(axes), "each axis once")
         seconds = max(hello.settle_s, 0.0 if speed is None else REVOLUTIONS * 2.0 * math.pi / speed)
         if seconds > 0.5 * components.settings.stream_buffer_seconds:
-            raise InputError("spindle_speed_rpm", hello.spindle_speed_rpm, f"a speed of which {REVOLUTIONS} revolutions can wait")
+            raise InputError(
+                "spindle_speed_rpm", hello.spindle_speed_rpm, f"a speed at which {REVOLUTIONS} revolutions fit into the buffer"
+            )
         settle = math.ceil(seconds * hello.sampling_rate_hz)
         air = None
         if hello.air is not None:
             if hello.begins == "air":
-                raise InputError("air", "a recording, and a stream that begins in air", "one of them")
+                raise InputError("air", "a recording, and a stream that begins in air", "one of the two")
             air = air_cut(components, group, hello.air.campaign, hello.air.recording)
         question = StreamQuestion(hello.sampling_rate_hz, speed, channels, axes, hello.begins, hello.method)
         return Opening(known, tooling, hello.machine, hello.name, question, settle, air)

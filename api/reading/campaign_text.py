@@ -114,7 +114,7 @@ def _cuts(top: Table) -> list[dict[str, Any]]:
                 continue
             cut[key] = name = _checked_name(f"cuts[{i}].{key}", text)
             if paths.setdefault(name, text) != text:
-                raise InputError(f"cuts[{i}].{key}", f'"{text}" beside "{paths[name]}"', "files that differ in the last part of their path")
+                raise InputError(f"cuts[{i}].{key}", f'"{text}" beside "{paths[name]}"', "file names (last parts of the paths) that differ")
     return cuts
 
 
@@ -125,7 +125,7 @@ def _checked_name(field: str, text: str) -> str:
     if odd or not 1 <= len(name) <= _LONGEST_NAME:
         raise InputError(field, repr(text[:80]), allowed)
     if PurePosixPath(name).suffix.lower() not in FORMATS:
-        raise InputError(field, repr(text[-80:]), f"a file that ends in one of {', '.join(FORMATS)}")
+        raise InputError(field, repr(text[-80:]), f"a file name that ends in one of {', '.join(FORMATS)}")
     return name
 
 
@@ -164,11 +164,11 @@ def _toolings(top: Table, cuts: list[dict[str, Any]], library: Library) -> dict[
         text = library(name) if TOOLING_NAME.fullmatch(name) else None
         if text is None:
             raise InputError(
-                field, f'"{name[:80]}", which the library has not', "a tooling of the library (PUT /v1/toolings/NAME writes one)"
+                field, f'"{name[:80]}", which is not in the library', "a tooling of the library (PUT /v1/toolings/NAME writes one)"
             )
         texts[key] = text
     if sum(map(len, texts.values())) > LARGEST_TOOLINGS:
-        raise InputError("toolings", "very long ones", f"at most {LARGEST_TOOLINGS // 1000} kB together")
+        raise InputError("toolings", "texts that are too long", f"at most {LARGEST_TOOLINGS // 1000} kB together")
     return texts
 
 

@@ -28,7 +28,7 @@ def load_campaign(store: Store, files: Files, group: str, campaign_id: str) -> t
 
     row = store.campaigns.get(group, campaign_id)
     if row is None:
-        raise InputError("campaign", f'"{campaign_id}"', "a campaign that is there")
+        raise InputError("campaign", f'"{campaign_id}"', "an existing campaign")
     keys = {each.name: each.normalised for each in store.recordings.list(group, campaign_id, "", 1_000_000)}
 
     def locate(name: str) -> Path:

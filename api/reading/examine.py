@@ -36,7 +36,7 @@ def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None)
     except InputError as error:
         raise _with_client_name(error, upload) from None
     except RecursionError:
-        raise InputError("recording", "one that cannot be read (nested without end)", "a complete file", upload.name) from None
+        raise InputError("recording", "a file nested too deeply to be read", "a complete file", upload.name) from None
 
 
 def _with_client_name(error: InputError, upload: Upload) -> InputError:

@@ -50,7 +50,7 @@ class Limits:
     def costly(self) -> InputError:
         """The refusal of an upload that costs more."""
         found = f"a file that costs more than {self.memory} MiB or {self.seconds:g} s to read"
-        return InputError("recording", found, "a recording that takes less: fewer samples, or a plainer format")
+        return InputError("recording", found, "a recording that is cheaper to read: fewer samples, or a simpler format")
 
 
 class Reader:
@@ -104,7 +104,7 @@ class Reader:
                 raise InputError(*answer)
             if kind == "failed":
                 log.error("a call of the reader has failed", extra={"fields": {"error": answer}})
-                raise InputError("recording", "one that cannot be read", "a complete file of its format")
+                raise InputError("recording", "a file that cannot be read", "a complete file of its format")
         raise Busy
 
     def _replace(self) -> None:

@@ -89,7 +89,7 @@ def _sensors(path: Path) -> tuple[Sensor, ...]:
         with h5py.File(path, "r", locking=False) as file:
             return tuple(_sensor(each) for each in json.loads(file.attrs[_SENSORS]))
     except (OSError, KeyError, ValueError):
-        raise InputError("recording", "samples that are gone or damaged", "a recording that is uploaded") from None
+        raise InputError("recording", "samples that are missing or damaged", "an uploaded recording") from None
 
 
 def _sensor(data: dict[str, Any]) -> Sensor:

@@ -69,7 +69,7 @@ async def make(
         campaign = await run_in_threadpool(keep)
     except Taken as taken:
         what, fault = str(taken), {"found": str(repeat), "allowed": f"an {taken} of its own"}
-        raise Problem(409, f"the {what} is in use", [{"field": what, **fault}]) from None
+        raise Problem(409, f"the {what} is already in use", [{"field": what, **fault}]) from None
     except KeyError:
         raise Problem(404, "there is no such machine") from None
     response.headers["Location"] = f"/v1/campaigns/{campaign.id}"
@@ -127,7 +127,7 @@ def archive(id: CampaignId, components: ThisService, caller: WhoAsks) -> Streami
     campaign = known_campaign(components, caller.group, id)
     rows = {row.name: row for row in components.store.recordings.list(caller.group, id, "", 1_000_000)}
     if not any(row.role == "cut" for row in rows.values()):
-        raise Problem(409, "no recording of a cut is uploaded yet")
+        raise Problem(409, "no recording of a cut has been uploaded yet")
     headers = {"Content-Disposition": f'attachment; filename="campaign-{campaign.id}.zip"'}
     return StreamingResponse(zipped(_members(components, campaign, rows)), media_type=ZIP, headers=headers)
 

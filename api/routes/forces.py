@@ -69,7 +69,9 @@ async def estimate(request: Request, components: ThisService, caller: WhoAsks) -
         async with form(request, components, caller.group, ("query",), ("recording", "air")) as (texts, files):
             missing = "query" if "query" not in texts else "recording" if "recording" not in files else ""
             if missing:
-                raise Problem(422, f"the form has no {missing}", [{"field": missing, "found": "nothing", "allowed": "a part of this name"}])
+                raise Problem(
+                    422, f"the form has no part named {missing}", [{"field": missing, "found": "nothing", "allowed": "a part of this name"}]
+                )
             upload = body_of(ForceUpload, texts["query"])
             machine, tooling, question, sensors = await run_in_threadpool(_of_upload, components, caller.group, upload)
             async with _read(components, caller.group, files, sensors, upload.sampling_rate_hz) as source:
@@ -99,7 +101,7 @@ async def _read(
     try:
         for name, (file, received) in files.items():
             if not file.lower().endswith(FORMATS):
-                raise InputError(name, file[-80:], f"a file that ends in one of {', '.join(FORMATS)}")
+                raise InputError(name, file[-80:], f"a file name that ends in one of {', '.join(FORMATS)}")
             targets[name] = await run_in_threadpool(components.files.spare, group)
             await components.reader.run(reader_tasks.read_alone, Upload(received.path, file, targets[name]), sensors, rate)
         yield pair_reader(targets["recording"], targets.get("air"))

@@ -30,11 +30,11 @@ async def health() -> State:
 def ready(components: ThisService) -> State:
     components.store.check()
     if not components.work.ready:
-        raise Problem(503, "workers are starting", headers={"Retry-After": "2"})
+        raise Problem(503, "the worker processes are starting", headers={"Retry-After": "2"})
     if not components.streams.host.ready:
-        raise Problem(503, "the process of the streams is starting", headers={"Retry-After": "2"})
+        raise Problem(503, "the process of the force streams is starting", headers={"Retry-After": "2"})
     if components.supervisor is not None and not components.supervisor.ready:
-        raise Problem(503, "no worker for jobs is alive: those that are accepted wait", headers={"Retry-After": "5"})
+        raise Problem(503, "no job worker is running: accepted jobs wait", headers={"Retry-After": "5"})
     return State(status="ok")
 
 

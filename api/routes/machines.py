@@ -32,7 +32,7 @@ def make(body: NewMachine, components: ThisService, caller: WhoAsks, response: R
     except Taken as taken:
         what = str(taken)
         found = body.name if what == "name" else str(repeat)
-        raise Problem(409, f"the {what} is in use", [{"field": what, "found": found, "allowed": f"a {what} of its own"}]) from None
+        raise Problem(409, f"the {what} is already in use", [{"field": what, "found": found, "allowed": f"a {what} of its own"}]) from None
     response.headers["Location"] = f"/v1/machines/{kept.id}"
     return _answer(components, kept)
 
@@ -81,7 +81,7 @@ async def identify(id: MachineId, request: Request, response: Response, componen
     try:
         response.status_code = 201 if await run_in_threadpool(write) else 200
     except Stale:
-        raise Problem(412, "the identification is not the one that the query expects") from None
+        raise Problem(412, "the stored identification does not match If-Match or If-None-Match") from None
     response.headers.update(tagged(document.digest))
     return _summary(document)
 

@@ -75,7 +75,7 @@ async def _item(components: Components, campaign: Campaign, name: str, part: Par
     """Keep one file, or say why not."""
     try:
         if part is None:
-            raise Problem(404, "the campaign names no such recording")
+            raise Problem(404, "the campaign does not name this recording")
         status, kept = await take(components, campaign, name, await complete(part), replacing)
         return UploadItem(name=name, status=status, recording=answer(campaign, kept), problem=None)
     except Problem as error:
@@ -83,6 +83,6 @@ async def _item(components: Components, campaign: Campaign, name: str, part: Par
     except InputError as error:
         problem = of_input(error)
     except Busy:
-        problem = Problem(503, "too many uploads wait to be read")
+        problem = Problem(503, "too many uploads are waiting to be read")
     faults = [Fault.model_validate(each) for each in problem.errors] or None
     return UploadItem(name=name[:200], status=problem.status, recording=None, problem=ItemProblem(detail=problem.detail, errors=faults))

@@ -88,7 +88,7 @@ async def take(components: Components, campaign: Campaign, name: str, received: 
         return await components.uploads.take(campaign, name, received, replacing)
     except Taken:
         fault = {"field": "name", "found": name[:120], "allowed": "the same content, or ?replace=true"}
-        raise Problem(409, "another content is there under this name", [fault]) from None
+        raise Problem(409, "a recording with other content exists under this name", [fault]) from None
     except KeyError:
         raise Problem(404, "there is no such campaign") from None
 
@@ -179,7 +179,7 @@ def named(components: Components, group: str, id: str, name: str) -> tuple[Campa
     campaign = known_campaign(components, group, id)
     found = files_of(campaign.text).get(_form(name))
     if found is None:
-        raise Problem(404, "the campaign names no such recording")
+        raise Problem(404, "the campaign does not name this recording")
     return campaign, _form(name), found
 
 

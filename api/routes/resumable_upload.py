@@ -55,7 +55,7 @@ def head(id: CampaignId, name: RecordingName, components: ThisService, caller: W
     campaign, name, _ = named(components, caller.group, id, name)
     state = _state(components, campaign, name)
     if state is None:
-        raise Problem(404, "nothing has come of it")
+        raise Problem(404, "no part of this recording has been uploaded")
     return Response(
         status_code=204, headers={"Upload-Offset": str(state.offset), "Upload-Length": str(state.length), "Cache-Control": "no-store"}
     )
@@ -65,7 +65,7 @@ def head(id: CampaignId, name: RecordingName, components: ThisService, caller: W
     "/{name}",
     summary="Upload a part of a recording",
     response_model=RecordingAnswer,
-    description="Components follow each other; HEAD tells where to go on. What has come is kept when the connection breaks, and through "
+    description="Parts follow each other; HEAD returns where to continue. What has come is kept when the connection breaks, and through "
     "restarts, for a day. The last part answers as an upload at once does.",
     openapi_extra=guard("upload", requestBody=_PART, parameters=_DIGESTS, **{"x-content-types": (BINARY,)}),
     responses={
@@ -91,7 +91,7 @@ async def patch(
     key = (campaign.id, name)
     if key in components.uploads.writing:
         # perhaps the same client's, whose connection is not yet known to be lost
-        raise Problem(503, "another query is writing this recording", headers={"Retry-After": "2"})
+        raise Problem(503, "another request is writing this recording", headers={"Retry-After": "2"})
     components.uploads.writing.add(key)
     try:
         with components.uploads.admitted():
@@ -139,7 +139,7 @@ async def _go_on(components: Components, campaign: Campaign, name: str, offset: 
         there = await run_in_threadpool(_state, components, campaign, name)
         found = 0 if there is None else there.offset
         fault = {"field": "Upload-Offset", "found": str(offset), "allowed": f"{found}, of {there.length if there else 'nothing'} bytes"}
-        raise Problem(409, f"the upload goes on at {found}", [fault], {"Upload-Offset": str(found)})
+        raise Problem(409, f"the upload continues at byte {found}", [fault], {"Upload-Offset": str(found)})
     return state
 
 
@@ -150,7 +150,9 @@ async def _append(request: Request, components: Components, group: str, path: Pa
     try:
         async for block in blocks(request, components):
             if part.size + len(block) > state.length:
-                raise InputError("body", "more than Upload-Length", f"at most {state.length - state.offset} bytes from {state.offset}")
+                raise InputError(
+                    "body", "more bytes than Upload-Length", f"at most {state.length - state.offset} bytes from {state.offset}"
+                )
             with storage_problems():
                 await write(components, group, part, block, part.size - state.offset + len(block))
             digest.update(block)

@@ -72,7 +72,7 @@ def samples_of_text(text: str, channels: int) -> tuple[int, FloatArray]:
         raise InputError("samples", rows, "a list of lists of numbers")
     _size(first, len(rows), max((len(row) for row in rows), default=channels), channels)
     if not all(len(row) == channels and all(type(v) in (int, float) for v in row) for row in rows):
-        raise InputError("samples", "rows of other lengths, or not of numbers", f"{channels} numbers in every row")
+        raise InputError("samples", "rows of unequal length, or entries that are not numbers", f"{channels} numbers in every row")
     try:
         values = np.array(rows, dtype=float).reshape(len(rows), channels)
     except OverflowError:
@@ -89,7 +89,7 @@ def object_of(text: str) -> dict[str, Any]:
     try:
         data = json.loads(text, parse_constant=no_number)
     except RecursionError:
-        raise InputError("message", "lists in lists without end", "a JSON object") from None
+        raise InputError("message", "lists nested too deeply", "a JSON object") from None
     except ValueError:
         raise InputError("message", "no JSON", "a JSON object") from None
     if not isinstance(data, dict):
@@ -99,7 +99,7 @@ def object_of(text: str) -> dict[str, Any]:
 
 def _size(first: int, count: int, width: int, channels: int) -> None:
     if width != channels:
-        raise InputError("channels", width, f"{channels}, as the hello says")
+        raise InputError("channels", width, f"{channels}, as declared in the first message")
     if count == 0:
         raise InputError("samples", 0, "one or more")
     if count > MOST_SAMPLES:
@@ -111,5 +111,5 @@ def _size(first: int, count: int, width: int, channels: int) -> None:
 def _finite(values: FloatArray) -> FloatArray:
     # beyond this squares overflow, and no sensor shows it
     if not np.all(np.abs(values) < 1e30):
-        raise InputError("samples", "a value that is not finite", "finite numbers; what was lost is left out, the index goes on")
+        raise InputError("samples", "a value that is not finite", "finite numbers; lost samples are omitted, and the index continues")
     return values

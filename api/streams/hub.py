@@ -23,7 +23,7 @@ from rcsa_ident.arrays import FloatArray
 log = logging.getLogger("rcsa_ident.service")
 #: Frames of a session in a second: each costs the service as much as hundreds of samples.
 MOST_FRAMES = 2000
-_UNEXPECTED = "something unexpected happened; the log has it under this session"
+_UNEXPECTED = "an internal error occurred; it is logged under this session's id"
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class Hub:
     async def stop(self) -> None:
         """End all sessions, and the process."""
         for session in list(self.sessions.values()):
-            self.close(session, End(1001, 503, "the service ends"))
+            self.close(session, End(1001, 503, "the service is shutting down"))
         if self.ticking is not None:
             self.ticking.cancel()
             with contextlib.suppress(asyncio.CancelledError):
@@ -95,9 +95,9 @@ class Hub:
     def open(self, about: About) -> Session:
         """Return a new session; raises `Full`."""
         if len(self.sessions) >= self.limits.sessions:
-            raise Full(f"{self.limits.sessions} streams are open, more are not served")
+            raise Full(f"{self.limits.sessions} streams are open, which is the limit of the service")
         if len(self.list(about.group)) >= self.limits.sessions_per_group:
-            raise Full(f"{self.limits.sessions_per_group} streams of this group are open, more are not served")
+            raise Full(f"{self.limits.sessions_per_group} streams of this group are open, which is its limit")
         session = Session(about, next(self.numbers))
         self.sessions[about.id] = self.by_number[session.number] = session
         return session
@@ -105,7 +105,7 @@ class Hub:
     def listen(self, session: Session, listener: Listener) -> None:
         """Let somebody hear a session; raises `Full`."""
         if len(session.listeners) > self.limits.listeners:
-            raise Full(f"{self.limits.listeners} listen to this stream, more are not served")
+            raise Full(f"{self.limits.listeners} clients watch this stream, which is its limit")
         session.listeners.append(listener)
 
     def close(self, session: Session, end: End) -> None:
@@ -166,7 +166,7 @@ class Hub:
                 self.metrics.missed(0, session.lost_process())
                 self.host.post(Message(OPEN, session.number, content=session.plan))
                 for listener in session.listeners:
-                    listener.tell("restarted", detail="the observer begins anew")
+                    listener.tell("restarted", detail="the observer starts again")
                 self._feed(session)
 
     async def _tick(self) -> None:
@@ -175,10 +175,10 @@ class Hub:
             await asyncio.sleep(1.0)
             for session in list(self.sessions.values()):
                 if time.monotonic() - session.touched > self.limits.idle and not session.finishing:
-                    self.close(session, End(1008, 408, f"no new sample in {self.limits.idle:g} s"))
+                    self.close(session, End(1008, 408, f"no new sample for {self.limits.idle:g} s"))
                     continue
                 if session.frames > MOST_FRAMES:
-                    detail = f"{session.frames} frames in a second, at most {MOST_FRAMES} are taken: put more samples into each"
+                    detail = f"{session.frames} frames in one second, at most {MOST_FRAMES} are accepted: send more samples per frame"
                     self.close(session, End(1008, 429, detail))
                     continue
                 session.frames = 0
@@ -189,9 +189,9 @@ class Hub:
         session.notes = [*session.ready.get("notes", ())]
         if abs(session.drift) > self.limits.drift:
             percent = f"{100.0 * session.drift:+.2f} %"
-            session.notes.append(f"the spindle's speed is {percent} from the one that the observer was made for: open a new stream")
+            session.notes.append(f"the spindle speed deviates by {percent} from the one the observer was designed for: open a new stream")
         if not session.known:
-            session.notes.append("the spindle's angle is not told by the signals now: run-out may be left in")
+            session.notes.append("the signals do not show the spindle's angle at present: run-out may remain in the forces")
         status = session.status()
         for listener in session.listeners:
             listener.tell(event, **status, unread=listener.unread)

@@ -44,17 +44,17 @@ async def blocks(request: Request, components: Components) -> AsyncIterator[byte
             async with asyncio.timeout(settings.upload_idle_seconds):
                 chunk = await anext(stream, b"")
         except TimeoutError:
-            raise Problem(408, f"nothing has come for {settings.upload_idle_seconds:g} s") from None
+            raise Problem(408, f"no data has arrived for {settings.upload_idle_seconds:g} s") from None
         except ClientDisconnect:
             if buffer:
                 yield buffer
-            raise Problem(400, "the client has gone") from None
+            raise Problem(400, "the client has disconnected") from None
         if not chunk:
             break
         # the time that writing takes is not the client's
         waited, seen = waited + time.monotonic() - start, seen + len(chunk)
         if waited > settings.upload_seconds or seen < (waited - settings.upload_idle_seconds) * settings.upload_bytes_per_second:
-            raise Problem(408, f"{seen} bytes have come in {waited:.0f} s, which is too slow")
+            raise Problem(408, f"the upload is too slow: {seen} bytes in {waited:.0f} s")
         buffer += chunk
         if len(buffer) >= BLOCK:
             yield buffer
@@ -95,7 +95,7 @@ def storage_problems() -> Iterator[None]:
     except TooLarge as error:
         raise Problem(413, str(error)) from None
     except Full:
-        raise Problem(503, "the disk has to keep the little space that it has left", headers={"Retry-After": "600"}) from None
+        raise Problem(503, "the disk has too little free space left", headers={"Retry-After": "600"}) from None
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
@@ -157,11 +157,11 @@ def announced_digest(request: Request, *headers: str) -> str | None:
 
 def _digest_fault(header: str, text: str) -> Problem:
     fault = {"field": header, "found": text[:120], "allowed": "sha-256=:BASE64:, of 32 bytes"}
-    return Problem(422, f"{header} is not understood", [fault])
+    return Problem(422, f"{header} cannot be parsed", [fault])
 
 
 def check_digest(announced: str | None, found: str, header: str = "Repr-Digest") -> None:
     """Refuse a content that is not the one that was told of."""
     if announced is not None and announced != found:
         fault = {"field": header, "found": f"content with the SHA-256 {found}", "allowed": announced}
-        raise Problem(422, "the content is not the one that the digest tells: it was damaged on its way", [fault])
+        raise Problem(422, "the content does not match the digest: it was damaged in transit", [fault])

@@ -165,7 +165,7 @@ def _wear(found: Any, tool: Any, question: WornQuestion) -> dict[str, Any]:
     from rcsa_ident.workflows.estimate_forces import wear_of
 
     if set(found.estimate.axes) != {Dof.X, Dof.Y}:
-        raise InputError("cut", f"forces of axis {', '.join(found.estimate.axes)} alone", "wear from forces of both axes, X and Y")
+        raise InputError("cut", f"forces of axis {', '.join(found.estimate.axes)} only", "forces of both axes, X and Y")
     cut = CuttingConditions(found.spindle_speed, question.axial_depth, question.feed_per_tooth, question.engagement, question.feed_angle)
     worn = wear_of(found, tool.cutter, cut)
     slope, slope_std = worn.trend()

@@ -73,7 +73,7 @@ def test_a_body_that_stops(port, body):
     answer = told(port, HEAD + body)
     assert answer.startswith(b"HTTP/1.1 408")
     assert b"application/problem+json" in answer
-    assert b"the body comes too slowly" in answer
+    assert b"the body arrives too slowly" in answer
 
 
 def test_a_body_that_trickles(port):

@@ -140,7 +140,7 @@ def test_a_length_that_is_a_lie(place, tmp_path):
         with socket.create_connection(("127.0.0.1", port), timeout=20) as link:
             link.sendall(head("PUT", path, f"Content-Length: {len(raw) + 1}") + raw)
             status, text = answer_of(link)
-        assert (status, b"nothing has come for 0.3 s" in text) == (408, True)
+        assert (status, b"no data has arrived for 0.3 s" in text) == (408, True)
         with socket.create_connection(("127.0.0.1", port), timeout=20) as link:
             link.sendall(head("PUT", path, f"Content-Length: {len(raw) - 1000}") + raw)
             assert answer_of(link)[0] == 422
