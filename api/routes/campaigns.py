@@ -1,4 +1,4 @@
-"""Campaigns of a machine: what was cut, with which toolings, measured by which sensors."""
+"""Campaigns of a machine: cuts, toolings and sensors."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ _BODY = {
 @router.post(
     "/machines/{id}/campaigns",
     status_code=201,
-    summary="Make a campaign: campaign.toml, or the same keys as JSON",
-    description="Toolings are copied: what happens to the library later does not change the campaign. "
-    "Recordings are named by the last part of their paths.",
+    summary="Make a campaign from campaign.toml, or from its keys as JSON",
+    description="Toolings are copied: later changes of the library do not affect the campaign. "
+    "Recordings are named by the last parts of their paths.",
     openapi_extra=guard("upload", requestBody=_BODY, **{"x-content-types": (JSON, TOML)}),
     responses=problems(404, 409, *BODY),
 )
@@ -96,7 +96,7 @@ def list_campaigns(id: MachineId, components: ThisService, caller: WhoAsks, afte
 
 @router.get(
     "/campaigns/{id}",
-    summary="A campaign, as JSON or as campaign.toml (Accept: application/toml)",
+    summary="A campaign as JSON, or as campaign.toml (Accept: application/toml)",
     openapi_extra=guard("read"),
     response_class=Response,
     responses={
@@ -114,12 +114,12 @@ def get(id: CampaignId, request: Request, components: ThisService, caller: WhoAs
 
 @router.get(
     "/campaigns/{id}/archive",
-    summary="What `rcsa-ident identify` takes: campaign.toml, toolings and the recordings as they came, ZIP",
-    description="Cuts whose recording is not there are left out.",
+    summary="ZIP archive for `rcsa-ident identify`: campaign.toml, toolings and the original recordings",
+    description="Cuts without a recording are omitted.",
     openapi_extra=guard("read"),
     response_class=StreamingResponse,
     responses={
-        200: {"description": "A folder.", "content": {ZIP: {"schema": {"type": "string", "format": "binary"}}}},
+        200: {"description": "The archive.", "content": {ZIP: {"schema": {"type": "string", "format": "binary"}}}},
         **problems(404, 409, 422),
     },
 )
@@ -135,7 +135,7 @@ def archive(id: CampaignId, components: ThisService, caller: WhoAsks) -> Streami
 @router.delete(
     "/campaigns/{id}",
     status_code=204,
-    summary="Forget a campaign and its recordings",
+    summary="Delete a campaign and its recordings",
     openapi_extra=guard("upload"),
     responses=problems(404, 422),
 )

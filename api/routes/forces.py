@@ -1,4 +1,4 @@
-"""Forces of a recording: one that comes with the query, or one of a campaign."""
+"""Forces of a recording, uploaded with the query or of a campaign."""
 
 from __future__ import annotations
 
@@ -41,8 +41,12 @@ _BODY = {
                 "required": ["query", "recording"],
                 "properties": {
                     "query": {"$ref": "#/components/schemas/ForceUpload"},
-                    "recording": {"type": "string", "format": "binary", "description": "Its file name's suffix says the format."},
-                    "air": {"type": "string", "format": "binary", "description": "Of an air cut with the same clamping and speed."},
+                    "recording": {"type": "string", "format": "binary", "description": "The suffix of its file name is the format."},
+                    "air": {
+                        "type": "string",
+                        "format": "binary",
+                        "description": "Recording of an air cut with the same clamping and speed.",
+                    },
                 },
                 "additionalProperties": False,
             },
@@ -55,7 +59,8 @@ _BODY = {
 @router.post(
     "/forces",
     summary="Forces of a recording; Accept: text/csv for FORCES.csv",
-    description="Either a form with the recording, or JSON that names one of a campaign. Without an air cut run-out stays in the forces.",
+    description="Either a form with the recording, or JSON that names a recording of a campaign. "
+    "Without an air cut run-out remains in the forces.",
     openapi_extra=guard("run", requestBody=_BODY, **{"x-content-types": (JSON, FORM)}),
     response_model=ForceAnswer,
     responses={200: {"description": "Forces.", "content": {CSV: {"schema": {"type": "string"}}}}, **problems(404, 408, *BODY)},
@@ -96,7 +101,7 @@ def _of_upload(
 async def _read(
     components: Components, group: str, files: Mapping[str, tuple[str, Received]], sensors: tuple[Sensor, ...], rate: float | None
 ) -> AsyncIterator[ReadPair]:
-    """What reads the samples of a form's files, which the reader process has taken from them; nothing is kept."""
+    """Function that reads the samples of a form's files, normalised by the reader process and deleted at the end of the context."""
     targets: dict[str, Path] = {}
     try:
         for name, (file, received) in files.items():

@@ -1,4 +1,4 @@
-"""For those who run the service: is it there, does it answer, what has it done."""
+"""Health checks and metrics, for operators."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ router = APIRouter(tags=["health"])
 
 
 class State(Answer):
-    """How it is."""
+    """State of the service."""
 
     status: Literal["ok"]
 
 
-@router.get("/health", summary="Whether the process is there")
+@router.get("/health", summary="Whether the service runs")
 async def health() -> State:
     return State(status="ok")
 
 
-@router.get("/ready", summary="Whether store and workers answer", responses=problems(503, always=()))
+@router.get("/ready", summary="Whether database and workers answer", responses=problems(503, always=()))
 def ready(components: ThisService) -> State:
     components.store.check()
     if not components.work.ready:
@@ -40,7 +40,7 @@ def ready(components: ThisService) -> State:
 
 @router.get(
     "/metrics",
-    summary="Prometheus",
+    summary="Metrics for Prometheus",
     response_class=Response,
     responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}, "description": "Counters since the start."}},
 )

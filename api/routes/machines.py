@@ -1,4 +1,4 @@
-"""Machines, and what is known of their dynamics."""
+"""Machines and their identifications."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def get(id: MachineId, components: ThisService, caller: WhoAsks) -> MachineAnswe
 @router.delete(
     "/{id}",
     status_code=204,
-    summary="Forget a machine, its identification and its campaigns",
+    summary="Delete a machine, its identification and its campaigns",
     openapi_extra=guard("upload"),
     responses=problems(404, 422),
 )
@@ -63,10 +63,10 @@ def forget(id: MachineId, components: ThisService, caller: WhoAsks) -> Response:
 
 @router.put(
     "/{id}/identification",
-    summary="Say how a machine vibrates: RESULT.json of `rcsa-ident identify`",
-    description="If-Match or If-None-Match: * keep what somebody else has written meanwhile.",
+    summary="Write the identification of a machine: RESULT.json of `rcsa-ident identify`",
+    description="If-Match or If-None-Match: * protect against overwriting concurrent changes.",
     openapi_extra=guard("upload", requestBody=_RESULT),
-    responses={201: {"model": IdentificationSummary, "description": "There was none before."}, **problems(404, 412, *BODY)},
+    responses={201: {"model": IdentificationSummary, "description": "The machine had none before."}, **problems(404, 412, *BODY)},
 )
 async def identify(id: MachineId, request: Request, response: Response, components: ThisService, caller: WhoAsks) -> IdentificationSummary:
     await run_in_threadpool(machine_of, components, caller.group, id)
@@ -88,12 +88,12 @@ async def identify(id: MachineId, request: Request, response: Response, componen
 
 @router.get(
     "/{id}/identification",
-    summary="RESULT.json as it was written",
+    summary="The identification of a machine: RESULT.json as written",
     openapi_extra=guard("read"),
     response_class=Response,
     responses={
-        200: {"model": Identification, "description": "To be used with the commands, too."},
-        304: {"description": "If-None-Match names it."},
+        200: {"model": Identification, "description": "For use with the commands, too."},
+        304: {"description": "The content matches If-None-Match."},
         **problems(404, 422),
     },
 )

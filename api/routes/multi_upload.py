@@ -1,4 +1,4 @@
-"""Several recordings in one body, as browsers send forms: each is kept, or refused, on its own."""
+"""Several recordings in one form: each is stored or refused on its own."""
 
 from __future__ import annotations
 
@@ -38,8 +38,7 @@ _FORM = {
 @router.post(
     "",
     summary="Upload several recordings",
-    description="Each file is a part, whose file name's last part is a name of the campaign. A file that is refused does not "
-    "hold up the others.",
+    description="Each file is a part of the form, whose file name is named by the campaign. A refused file does not affect the others.",
     openapi_extra=guard("upload", requestBody=_FORM, **{"x-content-types": (FORM,)}),
     responses=problems(404, 408, *BODY),
 )
@@ -72,7 +71,7 @@ async def post(id: CampaignId, request: Request, components: ThisService, caller
 
 
 async def _item(components: Components, campaign: Campaign, name: str, part: Part | None, replacing: bool) -> UploadItem:
-    """Keep one file, or say why not."""
+    """Store one file, or return the reason why not."""
     try:
         if part is None:
             raise Problem(404, "the campaign does not name this recording")

@@ -1,4 +1,4 @@
-"""Live forces over a WebSocket: samples in, forces out, and others who watch."""
+"""Live forces over a WebSocket: samples in, forces out, also to viewers."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ from api.streams.session import End, Session
 
 router = APIRouter(tags=["forces"], route_class=Guarded)
 log = logging.getLogger("rcsa_ident.service")
-#: Time for the first message [s].
+#: Time limit for the first message [s].
 HELLO = 10.0
-#: Bytes of a first message.
+#: Largest first message [characters].
 MOST_HELLO = 300_000
 
 
@@ -90,7 +90,7 @@ async def stream(websocket: WebSocket) -> None:
 
 
 async def _admit(websocket: HTTPConnection, components: Components) -> Caller | None:
-    """Return who asks, None where the first message is to tell; a page from elsewhere is not let in, whatever the browser would send."""
+    """Return the caller, None where the first message has the key; pages of other origins are refused, whatever the browser would send."""
     origin, host = websocket.headers.get("origin"), websocket.headers.get("host", "")
     if origin is not None and (urlsplit(origin).scheme not in ("http", "https") or urlsplit(origin).netloc.lower() != host.lower()):
         raise Problem(403, "a page of another origin cannot open a stream")
@@ -108,7 +108,7 @@ def _check_rate(components: Components, who: str) -> None:
 
 
 async def _serve(websocket: WebSocket, components: Components, caller: Caller | None, id: str) -> End:
-    """Read the first message, do what it says, and return how it ended."""
+    """Read the first message, serve the stream, and return its end."""
     raw = await _hello(websocket)
     data = object_of(raw)
     kind: type[Hello] = WatchHello if "watch" in data else ReplayHello if "replay" in data else StreamHello
@@ -159,7 +159,7 @@ async def _hello(websocket: WebSocket) -> str:
 
 
 async def _farewell(websocket: WebSocket, end: End, id: str) -> None:
-    """Tell why, and close."""
+    """Send the reason and close the WebSocket."""
     if websocket.client_state is WebSocketState.DISCONNECTED or websocket.application_state is WebSocketState.DISCONNECTED:
         return
     if end.status:

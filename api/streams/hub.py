@@ -1,4 +1,4 @@
-"""All sessions of the service: opened, fed, told about each second, and ended."""
+"""All sessions of the service: opened, fed, reported on each second, and ended."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from api.streams.session import About, End, Session, Stage
 from rcsa_ident.arrays import FloatArray
 
 log = logging.getLogger("rcsa_ident.service")
-#: Frames of a session in a second: each costs the service as much as hundreds of samples.
+#: Most frames of a session per second: each costs as much as hundreds of samples.
 MOST_FRAMES = 2000
 _UNEXPECTED = "an internal error occurred; it is logged under this session's id"
 
 
 @dataclass(frozen=True, slots=True)
 class StreamLimits:
-    """What is allowed.
+    """Limits of streams.
 
     Parameters
     ----------
     sessions, sessions_per_group, listeners : int
-        Of the service, of a group, of a session.
+        Most sessions of the service and of a group, most listeners of a session.
     idle : float [s]
-        Without a new sample, after which a session ends.
+        Time without a new sample after which a session ends.
     drift : float
-        Share of the speed beyond which forces are told to be less true.
+        Relative deviation of the spindle speed beyond which a note warns of less accurate forces.
     """
 
     sessions: int = 16
@@ -48,11 +48,11 @@ class StreamLimits:
 
 
 class Full(Exception):
-    """No more sessions, or listeners, are allowed."""
+    """The limit of sessions or listeners is reached."""
 
 
 class Hub:
-    """Sessions by id.
+    """Registry of sessions, between their connections and the stream process.
 
     Parameters
     ----------
@@ -69,12 +69,12 @@ class Hub:
         self.ticking: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
-        """Start the process."""
+        """Start the stream process."""
         await self.host.start(self._deliver, self._anew)
         self.ticking = asyncio.create_task(self._tick())
 
     async def stop(self) -> None:
-        """End all sessions, and the process."""
+        """End all sessions and the stream process."""
         for session in list(self.sessions.values()):
             self.close(session, End(1001, 503, "the service is shutting down"))
         if self.ticking is not None:
@@ -88,7 +88,7 @@ class Hub:
         return [session for session in self.sessions.values() if session.about.group == group]
 
     def get(self, group: str, id: str) -> Session | None:
-        """Return a session, where it is this group's."""
+        """Return a session of a group, or None."""
         found = self.sessions.get(id)
         return found if found is not None and found.about.group == group else None
 
@@ -103,13 +103,13 @@ class Hub:
         return session
 
     def listen(self, session: Session, listener: Listener) -> None:
-        """Let somebody hear a session; raises `Full`."""
+        """Add a listener to a session; raises `Full`."""
         if len(session.listeners) > self.limits.listeners:
             raise Full(f"{self.limits.listeners} clients watch this stream, which is its limit")
         session.listeners.append(listener)
 
     def close(self, session: Session, end: End) -> None:
-        """End a session and forget it."""
+        """End a session and remove it."""
         session.finish(end)
         if self.sessions.pop(session.about.id, None) is not None:
             self.by_number.pop(session.number, None)
@@ -117,7 +117,7 @@ class Hub:
             self.metrics.missed(0, session.held)
 
     def offer(self, session: Session, first: int, samples: FloatArray) -> None:
-        """Take a frame of a session's client."""
+        """Take a frame from a session's client."""
         session.frames += 1
         lost = session.counts.lost
         dropped = session.offer(first, samples, time.monotonic())
@@ -125,7 +125,7 @@ class Hub:
         self._feed(session)
 
     def begin(self, session: Session, plan: bytes, origin: int, ready: Mapping[str, Any]) -> None:
-        """Stream: an observer is there, and begins at a sample that waits."""
+        """Start the observer of a session at a waiting sample."""
         if session.stage is Stage.ENDED:
             return
         self.metrics.missed(0, session.skip(origin))
@@ -170,7 +170,7 @@ class Hub:
                 self._feed(session)
 
     async def _tick(self) -> None:
-        """Tell everybody each second; end what nobody feeds."""
+        """Send the status each second; end sessions without samples."""
         while True:
             await asyncio.sleep(1.0)
             for session in list(self.sessions.values()):
@@ -185,7 +185,7 @@ class Hub:
                 self.tell_status(session)
 
     def tell_status(self, session: Session, event: str = "status") -> None:
-        """Tell all who listen how a session stands."""
+        """Send the status of a session to its listeners."""
         session.notes = [*session.ready.get("notes", ())]
         if abs(session.drift) > self.limits.drift:
             percent = f"{100.0 * session.drift:+.2f} %"

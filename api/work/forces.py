@@ -1,4 +1,4 @@
-"""What a worker answers of forces: those of a recording, and the observer that a stream begins with."""
+"""Tasks about forces: those of a recording, and the observer of a stream."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Recording, Sensor
 
 _RPM = 30.0 / math.pi
-#: Buckets of an answer's picture, and samples that one answer may take.
+#: Buckets of an answer's envelope, and most samples of one answer.
 BUCKETS, MOST_SAMPLES = 2000, 8_000_000
-#: The commands' options are other fields here.
+#: Fields of the query for fields of errors from the library.
 _FIELDS = {"--speed-rpm": "spindle_speed_rpm", "speed": "spindle_speed_rpm", "--idle-percent": "idle_percent", "idle share": "idle_percent"}
 
 ReadPair = Callable[[], tuple[Recording, Recording | None]]
@@ -28,7 +28,7 @@ ReadPair = Callable[[], tuple[Recording, Recording | None]]
 
 @dataclass(frozen=True, slots=True)
 class WornQuestion:
-    """Of which cut the cutting coefficients are asked, revolution by revolution: depth and feed [m], angles [rad]."""
+    """Cut whose cutting coefficients are estimated revolution by revolution: depth and feed [m], angles [rad]."""
 
     axial_depth: float
     feed_per_tooth: float
@@ -38,7 +38,7 @@ class WornQuestion:
 
 @dataclass(frozen=True, slots=True)
 class ForceQuestion:
-    """Forces of a recording.
+    """Query for the forces of a recording.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class ForceQuestion:
         resonators or paper.
     smooth : bool
     idle : float or None
-        Share of the time in which no tooth cuts, at least.
+        Least share of the time in which no tooth cuts.
     wear : WornQuestion or None
     """
 
@@ -60,7 +60,7 @@ class ForceQuestion:
 
 
 def sensors_of(text: str) -> tuple[Sensor, ...]:
-    """Return the sensors that a RESULT.json remembers."""
+    """Return the sensors of a RESULT.json."""
     import json
 
     from rcsa_ident.io.forces import sensors_of_result
@@ -129,7 +129,7 @@ def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, 
 
 
 def observed(known: Known, tool: Any, cut: Recording, air: Recording | None, speed: float | None, method: str, smooth: bool = False) -> Any:
-    """Return a `MonitoredCut`; errors name fields of the query."""
+    """Return the estimated forces; errors name fields of the query."""
     from rcsa_ident.observer.tuning import PaperWalk, Resonators
     from rcsa_ident.workflows.estimate_forces import observe
 
@@ -148,7 +148,7 @@ def observed(known: Known, tool: Any, cut: Recording, air: Recording | None, spe
 
 
 def _harmonics(force: Any, rate: float, speed: float, band: tuple[float, float]) -> list[dict[str, Any]]:
-    """Amplitudes at the spindle's orders in the band."""
+    """Amplitudes at the harmonics of the spindle frequency in the band."""
     from rcsa_ident.signals.spectra import line_spectrum
 
     if force.size < 4.0 * 2.0 * np.pi / speed * rate:
