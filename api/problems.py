@@ -17,6 +17,8 @@ from rcsa_ident.io.validated_table import describe
 
 MEDIA_TYPE = "application/problem+json"
 _LONGEST = 200
+#: The library's fields as the bodies call them.
+_FIELDS = {"spindle_speed": "spindle_speed_rpm", "idle share": "idle_percent"}
 _TITLES = {413: "Content too large", 422: "Input not usable"}
 
 
@@ -59,7 +61,8 @@ def content_of(problem: Problem, request_id: str) -> dict[str, Any]:
 def of_input(error: InputError) -> Problem:
     """Return the problem of unusable input."""
     found = _short(error.found if isinstance(error.found, str) else describe(error.found))
-    return Problem(422, f"{error.field}: found {found}, allowed is {error.allowed}", [_entry(error.field, found, error.allowed)])
+    field = _FIELDS.get(error.field, error.field)
+    return Problem(422, f"{field}: found {found}, allowed is {error.allowed}", [_entry(field, found, error.allowed)])
 
 
 def of_validation(errors: Sequence[Any]) -> Problem:

@@ -1,7 +1,7 @@
 """Force streams against the service as its command starts it: a minute at its pace beside an identification, an hour as fast as it goes.
 
-The signals are those of the virtual machine in the paper's cut (`turning`), 51.2 kHz, gap and fixture's acceleration of two axes: half a
-second more than the first second in air, then the cut, under a spindle whose speed wanders. The service knows the machine as it was
+The signals are those of the virtual machine in the cut of [inprocess] (`turning`), 51.2 kHz, gap and fixture's acceleration of two axes:
+half a second more than the first second in air, then the cut, under a spindle whose speed wanders. The service knows the machine as it was
 identified from the sample runs. The client is this process, on the same cores.
 """
 
@@ -21,10 +21,11 @@ import numpy as np
 
 from api.client import Client
 from api.stream_client import Event, Forces, ForceStream
-from benchmarks.observer import DATA, relative_error
+from benchmarks.observer import DATA
 from benchmarks.service import serving
 from benchmarks.timing import row
-from benchmarks.turning import TurningCut, turning_cut
+from tests.fixtures.turning_cut import TurningCut, turning_cut
+from tests.fixtures.virtual_cut import relative_error
 
 #: Samples of a frame: 20 ms.
 FRAME = 1024

@@ -25,13 +25,13 @@ from api.streams.hub import Full, Hub
 from api.streams.listener import Listener
 from api.streams.session import End, Session, Stage
 from api.work.pool import Busy
-from rcsa_ident.errors import InputError
+from rcsa_ident.errors import InputError, Unsteady
 
 log = logging.getLogger("rcsa_ident.service")
 #: Time limits for sending what remains at the end, and for finding a steady part to design the observer from [s].
 LINGER, SETTLING = 5.0, 120.0
-#: Fields of errors that may vanish in the next part of a stream, and pause between two attempts [s].
-UNSTEADY, PAUSE = ("recording", "recording length", "spindle_speed_rpm", "trigger"), 0.5
+#: Pause between two attempts to design an observer [s].
+PAUSE = 0.5
 #: Interval between two checks of the API key [s].
 LOOK = 20.0
 #: A larger jump of the sample index is an error of the sender, not a gap [s].
@@ -196,7 +196,7 @@ async def _prepare(components: Components, session: Session, opening: Opening) -
         try:
             plan, ready = await _retried(functools.partial(opening.design, components.work, *window))
         except InputError as error:
-            if opening.source is not None or error.field not in UNSTEADY or loop.time() > limit:
+            if opening.source is not None or not isinstance(error, Unsteady) or loop.time() > limit:
                 raise refused or error from None
             # the spindle may have been accelerating, or the tool entering: the next second may be steady
             refused, detail = error, problems.of_input(error)

@@ -17,8 +17,7 @@ from rcsa_ident.signals.measurement import Reading, judge_air, measure_cut
 from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.signals.steady import measured_axes
 from rcsa_ident.signals.verdict import Verdict
-
-_RPM = 30.0 / np.pi
+from rcsa_ident.units import to_rpm
 
 
 def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) -> Recording:
@@ -68,7 +67,7 @@ def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) ->
     speed = reading.spindle_speed
     return described(recording) | {
         "verdict": verdict,
-        "spindle_speed_rpm": speed * _RPM if speed is not None and np.isfinite(speed) else None,
+        "spindle_speed_rpm": to_rpm(speed) if speed is not None and np.isfinite(speed) else None,
         "harmonics_above_noise": {axis.upper(): reading.harmonics.get(axis, 0) for axis in measured_axes(recording)},
     }
 
@@ -95,15 +94,16 @@ def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | 
     try:
         with np.errstate(all="ignore"):
             if role == "air":
-                reading = judge_air(recording, cut.conditions)
+                reading = judge_air(cut.id, cut.tooling, recording, cut.conditions)
             else:
                 coefficients = campaign.workpiece.coefficients
                 reading = measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, coefficients)
     except InputError as error:
-        reading = Reading(Verdict((str(error),)))
+        reading = Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((str(error),)))
     except (ArithmeticError, np.linalg.LinAlgError):
-        reading = Reading(Verdict(("numbers of these samples have no finite answer",)))
-    (row,) = recording_rows([(cut, reading)])
+        reasons = ("numbers of these samples have no finite answer",)
+        reading = Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict(reasons))
+    (row,) = recording_rows([reading])
     verdict = {
         "usable": row.usable,
         "reasons": list(row.reasons),

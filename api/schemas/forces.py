@@ -15,8 +15,8 @@ from api.work.forces import ForceQuestion, WornQuestion
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import FEED_DIRECTIONS
+from rcsa_ident.units import from_rpm
 
-_RPM = math.pi / 30.0
 MOST_CHANNELS = 32
 #: Sampling rates of a stream [Hz]; those of a file may be higher.
 LEAST_RATE, MOST_RATE = 1000.0, 500_000.0
@@ -80,7 +80,7 @@ class ForceKeys(Body):
 
     def question(self, programmed: float | None = None) -> ForceQuestion:
         """Return the query in SI; `programmed` [rad/s] is the campaign's speed."""
-        speed = programmed if self.spindle_speed_rpm is None else self.spindle_speed_rpm * _RPM
+        speed = programmed if self.spindle_speed_rpm is None else from_rpm(self.spindle_speed_rpm)
         idle = None if self.idle_percent is None else self.idle_percent / 100.0
         return ForceQuestion(speed, self.method, self.smooth, idle, None if self.cut is None else self.cut.question())
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import pickle
 from dataclasses import dataclass
 from typing import Any
@@ -12,12 +11,11 @@ import numpy as np
 from api.streams.engine import Column, Plan
 from api.work.forces import ReadPair, observed
 from api.work.machine_cache import read
-from api.work.requests import MachineText, ToolingText
-from api.work.toolings import tooling_of
+from api.work.requests import MachineText, ToolingSource
+from api.work.toolings import tooling_from
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
-
-_RPM = 30.0 / math.pi
+from rcsa_ident.units import to_hz, to_rpm
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +45,7 @@ class StreamQuestion:
 
 
 def design(
-    machine: MachineText, tooling: ToolingText, question: StreamQuestion, first: int, raw: bytes, air: ReadPair | None
+    machine: MachineText, tooling: ToolingSource, question: StreamQuestion, first: int, raw: bytes, air: ReadPair | None
 ) -> tuple[bytes, dict[str, Any]]:
     """Return the pickled plan of a stream for the stream process, and the content of the client's event `ready`.
 
@@ -66,7 +64,7 @@ def design(
     return _planned(machine, tooling, question, first, recording, still, follow=True)
 
 
-def design_replay(machine: MachineText, tooling: ToolingText, question: StreamQuestion, source: ReadPair) -> tuple[bytes, dict[str, Any]]:
+def design_replay(machine: MachineText, tooling: ToolingSource, question: StreamQuestion, source: ReadPair) -> tuple[bytes, dict[str, Any]]:
     """Return the same for a recording, whose streamed forces equal those of the whole recording to the last digit.
 
     Parameters
@@ -82,7 +80,7 @@ def design_replay(machine: MachineText, tooling: ToolingText, question: StreamQu
 
 def _planned(
     machine: MachineText,
-    tooling: ToolingText,
+    tooling: ToolingSource,
     question: StreamQuestion,
     first: int,
     recording: Recording,
@@ -91,7 +89,7 @@ def _planned(
 ) -> tuple[bytes, dict[str, Any]]:
     from rcsa_ident.workflows.stream_forces import live_observer
 
-    known, tool = read(machine.text), tooling_of(tooling.text)
+    known, tool = read(machine.text), tooling_from(tooling)
     found = observed(known, tool, recording, air, question.speed, question.method)
     axes = tuple(axis.upper() for axis in found.estimate.axes)
     if set(axes) != set(question.axes):
@@ -112,8 +110,8 @@ def _planned(
     ready = {
         "axes": list(question.axes),
         "sampling_rate_hz": recording.rate,
-        "spindle_speed_rpm": found.spindle_speed * _RPM,
-        "band_hz": [w / (2.0 * math.pi) for w in found.band],
+        "spindle_speed_rpm": to_rpm(found.spindle_speed),
+        "band_hz": [to_hz(w) for w in found.band],
         "delay_samples": round(float(delay), 3),
         "std_n": {axis: float(deviation[-1, axes.index(axis)]) for axis in question.axes},
         "first": first,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -127,7 +128,7 @@ def _summary(found: Calibrated) -> dict[str, Any]:
         data["signal"] = {
             "sensor_axes": signal.axes.tolist(),
             "runout_um": {name: (1e6 * offsets).tolist() for name, offsets in signal.runout.items()},
-            "helix_deg": None if signal.helix is None else signal.helix * 57.29577951308232,
+            "helix_deg": None if signal.helix is None else math.degrees(signal.helix),
             "dynamometer": signal.sensor.tolist(),
         }
     return data

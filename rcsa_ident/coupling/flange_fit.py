@@ -74,14 +74,15 @@ class DecoupledFlange:
     std : array, shape (n, 2, 2)
         Standard deviation of the real and of the imaginary part each; the prior's share is in it where there is one.
     condition : array, shape (n,) [-]
-        Of each frequency's equations, noise-weighted and scaled to the entries' own size.
+        Condition number of each frequency's equations, noise-weighted and scaled to the entries' own size.
     chi2 : array, shape (n,)
         Sum of squared residuals in standard deviations; `freedom` is expected where measurements outnumber unknowns.
     freedom : int
+        Real measurements less real unknowns at a frequency.
     regularised : array of bool, shape (n,)
-        Where neighbouring frequencies were needed as a prior.
+        True where neighbouring frequencies were needed as a prior.
     ambiguous : array of bool, shape (n,)
-        Where another passive solution explains the measurements as well.
+        True where another passive solution explains the measurements as well.
     dissipation : array, shape (n,) [-]
         Below zero the result feeds energy in: noise, or a tool-holder that is not as modelled.
     notes : tuple of str

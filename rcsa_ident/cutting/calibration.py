@@ -1,4 +1,4 @@
-"""Cutting coefficients from measured mean forces, with intervals."""
+"""Cutting coefficients from measured mean forces [altintas2012], with intervals."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rcsa_ident.errors import InputError
 #: Coefficients in the order of `ForceCalibration.value`; the last two of three belong to a dynamometer that measures along the axis.
 NAMES = ("K_tc", "K_rc", "K_te", "K_re", "K_ac", "K_ae")
 UNITS = {"K_tc": "N/m^2", "K_rc": "N/m^2", "K_ac": "N/m^2", "K_te": "N/m", "K_re": "N/m", "K_ae": "N/m"}
-#: ShortestPlan cuts from which a scatter between cuts can be told.
+#: Fewest cuts from which a scatter between cuts can be told.
 LEAST_CUTS = 3
 _NORMAL_95 = 1.959964
 #: Condition number of the scaled regression from which on coefficients cannot be told apart.
@@ -32,12 +32,13 @@ class ForceCalibration:
     Parameters
     ----------
     method : str
+        ``mean`` or ``signal``.
     names : tuple of str, length p
-        Of `NAMES`.
+        The coefficients that were fitted, out of `NAMES`.
     value : array, shape (p,) [N/m^2 or N/m]
     covariance : array, shape (p, p)
     half_width : array, shape (p,)
-        Of the 95 % intervals, by a t-distribution.
+        Half widths of the 95 % intervals, by a t-distribution.
     misfit : float [-]
         Root mean square of what is left over that of the forces.
     reasons, notes : tuples of str
@@ -184,7 +185,15 @@ def _runout_effect(cutter: Cutter, conditions: CuttingConditions, solution: Floa
 
 
 def plausible(names: Sequence[str], value: FloatArray, half_width: FloatArray) -> tuple[str, ...]:
-    """Return what speaks against a set of coefficients."""
+    """Return what speaks against a set of coefficients, in words.
+
+    Parameters
+    ----------
+    names : sequence of str, length p
+        Out of `NAMES`.
+    value, half_width : arrays, shape (p,) [N/m^2 or N/m]
+        Coefficients and half widths of their 95 % intervals.
+    """
     known = dict(zip(names, zip(value.tolist(), half_width.tolist(), strict=True), strict=True))
     reasons = []
     tangential, width = known["K_tc"]

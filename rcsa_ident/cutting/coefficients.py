@@ -9,7 +9,7 @@ from rcsa_ident.errors import InputError, non_negative, positive
 
 @dataclass(frozen=True, slots=True)
 class CuttingCoefficients:
-    """Linear force model: F = K_c h b + K_e b for each direction, b the width of cut.
+    """Linear force model [altintas2012]: F = K_c h b + K_e b for each direction, b the width of cut.
 
     Parameters
     ----------
@@ -18,8 +18,15 @@ class CuttingCoefficients:
     radial_ratio, axial_ratio : float [-]
         k_rc and k_ac, times K_tc.
     tangential_edge, radial_edge, axial_edge : float [N/m]
+        K_te, K_re and K_ae, force per width of cut that does not depend on the chip.
     tangential_spread, ratio_spread, edge_spread : float [-]
         Standard deviations of the logarithms of K_tc, of k_rc and of the edge forces: how well they are known. 0 means exactly.
+
+    Examples
+    --------
+    >>> aluminium = CuttingCoefficients(tangential=902e6, radial_ratio=0.26, tangential_edge=12e3, radial_edge=10e3)
+    >>> round(aluminium.tangential * aluminium.radial_ratio / 1e6, 1)  # K_rc [MPa]
+    234.5
     """
 
     tangential: float

@@ -13,12 +13,18 @@ from rcsa_ident.errors import InputError, non_negative, positive
 class Engagement:
     """Between which immersion angles the teeth cut.
 
-    Angles are measured clockwise from the normal direction Y (the feed is X), as the paper does: half-immersion
+    Angles are measured clockwise from the normal direction Y (the feed is X), as in [inprocess]: half-immersion
     down-milling is pi/2 to pi, slotting 0 to pi.
 
     Parameters
     ----------
     entry, exit : float [rad], 0 <= entry < exit <= pi
+
+    Examples
+    --------
+    >>> half = Engagement.from_immersion(0.5, "down")
+    >>> [round(float(np.degrees(angle)), 6) for angle in (half.entry, half.exit)]
+    [90.0, 180.0]
     """
 
     entry: float

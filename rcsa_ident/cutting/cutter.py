@@ -24,6 +24,14 @@ class Cutter:
         `pitch[j]` is the angle from tooth j to tooth j + 1, which runs ahead of it and has cut there before.
     runout : array, shape (teeth,) [m], default none
         Radial offset of each edge.
+
+    Examples
+    --------
+    Three teeth, unequally spaced:
+
+    >>> cutter = Cutter(3, diameter=0.012, helix=np.radians(30.0), pitch=np.radians([110.0, 120.0, 130.0]))
+    >>> np.degrees(cutter.tooth_angle).round(6).tolist(), cutter.equally_spaced
+    ([0.0, 110.0, 230.0], False)
     """
 
     teeth: int

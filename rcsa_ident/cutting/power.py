@@ -15,7 +15,7 @@ from rcsa_ident.errors import InputError, positive
 
 @dataclass(frozen=True, slots=True)
 class SpindleLoad:
-    """Means over a revolution.
+    """What a cut takes from the spindle, as means over a revolution.
 
     Parameters
     ----------
@@ -40,6 +40,12 @@ def spindle_load(cutter: Cutter, conditions: CuttingConditions, coefficients: Cu
     T = a D / (4 pi) (K_tc N c (cos phi_entry - cos phi_exit) + K_te N (phi_exit - phi_entry)) with the feed per tooth c;
     power T Omega, of which the chips take K_tc times the removal rate a a_e N c Omega / (2 pi). Pitch, helix and, for the
     chips' part, run-out change none of it.
+
+    Parameters
+    ----------
+    cutter : Cutter
+    conditions : CuttingConditions
+    coefficients : CuttingCoefficients
     """
     engagement, teeth = conditions.engagement, cutter.teeth
     chips = coefficients.tangential * conditions.feed_per_tooth * (np.cos(engagement.entry) - np.cos(engagement.exit))
@@ -80,7 +86,14 @@ class SpindleDrive:
 
     @classmethod
     def flat(cls, power: float | None = None, torque: float | None = None, max_speed: float | None = None) -> SpindleDrive:
-        """Return a drive with the same power [W] and torque [N m] at all speeds; None is no limit."""
+        """Return a drive with the same power and torque at all speeds; None is no limit.
+
+        Parameters
+        ----------
+        power : float or None [W]
+        torque : float or None [N m]
+        max_speed : float or None [rad/s]
+        """
         numbers = (("power", power, "W"), ("torque", torque, "N m"), ("max_speed", max_speed, "rad/s"))
         values = [np.inf if value is None else positive(name, value, unit) for name, value, unit in numbers]
         return cls(np.ones(1), np.array([values[0]]), np.array([values[1]]), values[2])

@@ -14,7 +14,7 @@ from rcsa_ident.errors import InputError, non_negative, positive
 
 @dataclass(frozen=True, slots=True)
 class ProcessDamping:
-    """The flank rubs on the wave that it leaves: a viscous force, the indentation model for small waves (Ahmadi & Ismail 2012).
+    """The flank rubs on the wave that it leaves: a viscous force, the indentation model for small waves [ahmadi2012].
 
     A width b of edge that moves into the workpiece with the velocity u feels F_r = K_sp w^2 b u / (4 v), v its cutting speed, and
     the friction mu F_r against the cut.
@@ -26,7 +26,7 @@ class ProcessDamping:
     wear_land : float [m]
         w, width of the flat behind the edge.
     friction : float [-]
-        mu.
+        mu, coefficient of friction between flank and workpiece.
     """
 
     indentation: float
@@ -82,6 +82,15 @@ class MillingProcess:
         Matters to stability only with run-out: it decides which teeth cut, and what they regenerate.
     damping : ProcessDamping or None
     speed_variation : SpeedVariation or None
+
+    Examples
+    --------
+    A two-tooth end mill of 12 mm in EN AW-6082, half-immersion down-milling:
+
+    >>> cutter, coefficients = Cutter(2, 0.012), CuttingCoefficients(902e6, 0.26)
+    >>> process = MillingProcess(cutter, coefficients, Engagement.from_immersion(0.5, "down"), feed_per_tooth=0.1e-3)
+    >>> process.conditions(speed=1000.0, depth=0.002).axial_depth
+    0.002
     """
 
     cutter: Cutter

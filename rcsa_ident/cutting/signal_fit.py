@@ -36,13 +36,13 @@ class ForceRecord:
     ----------
     cutter : Cutter
     conditions : CuttingConditions
-        With the spindle speed found in the record.
+        The cut as programmed, with the spindle speed that was found in the record.
     clamping : str
         Records of one clamping share the run-out.
     lines : complex array, shape (m + 1, 2) [N]
         Orders 0 to m; X and Y. Sensors with a known response are undone.
     variance : array, shape (m + 1, 2) [N^2]
-        Of the real and of the imaginary part each, noise only.
+        Variance of the real and of the imaginary part each, noise only.
     blocks : complex array, shape (b, m + 1, 2) [N]
         What each block of whole revolutions says more or less than all of them: their mean is near zero.
     """
@@ -74,7 +74,7 @@ class Dynamometer:
     frequency : float [Hz]
         Bandwidth or natural frequency to start from.
     damping : float
-        To start from, with order 2.
+        Damping ratio to start from, with order 2.
     """
 
     order: int = 0
@@ -102,7 +102,7 @@ class SignalCalibration:
         Sensors' X and Y over the force on the tool: a signed permutation.
     runout : dict of clamping to array, shape (teeth,) [m]
     helix : float or None [rad]
-        Where it was an unknown.
+        The helix angle found, where it was an unknown.
     angle : array, shape (k,) [rad]
         Immersion of tooth 1 at each record's start, up to the pitch where teeth are alike.
     sensor : array, shape (2, order)

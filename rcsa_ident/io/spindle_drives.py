@@ -10,9 +10,9 @@ from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.text_columns import read_table
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.units import from_rpm
 
 SPEED, POWER, TORQUE = "spindle_speed_rpm", "power_kw", "torque_nm"
-_RPM = np.pi / 30.0
 
 
 def read_spindle_drive(path: str | Path) -> SpindleDrive:
@@ -41,4 +41,4 @@ def read_spindle_drive(path: str | Path) -> SpindleDrive:
     columns = dict(zip(names, found, strict=True))
     unknown = np.full(speed.size, np.inf)
     power = 1e3 * columns[POWER] if POWER in columns else unknown
-    return SpindleDrive(speed * _RPM, power, columns.get(TORQUE, unknown), float(speed[-1] * _RPM))
+    return SpindleDrive(from_rpm(speed), power, columns.get(TORQUE, unknown), float(from_rpm(speed[-1])))

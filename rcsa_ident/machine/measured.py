@@ -149,6 +149,9 @@ def translations_only(omega: FloatArray, values: ComplexArray, axis: Dof = Dof.X
     ----------
     omega : array, shape (n,) [rad/s]
     values : complex array, shape (n,) [m/N]
+        Displacement per force of the flange.
+    axis : Dof
+        Machine axis X or Y: the bending plane.
     """
     block = np.zeros((np.size(omega), 2, 2), dtype=complex)
     block[:, 0, 0] = frozen(values, np.complex128)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 import scipy.optimize
@@ -78,12 +79,34 @@ class StabilityMap:
             limit[self.spindle_speed == speed] = depth
         return np.where(self.growth[:, 0] >= 0.0, self.depth[0], limit)
 
+    @classmethod
+    def joined(cls, parts: Sequence[StabilityMap]) -> StabilityMap:
+        """Return the maps of several blocks of speeds, which have the same depths, as one with rising speeds."""
+        speed = np.concatenate([part.spindle_speed for part in parts])
+        back = np.argsort(speed)
+        crossing = np.concatenate([part.crossing_speed for part in parts])
+        order = np.argsort(crossing, kind="stable")
+        return cls(
+            speed[back],
+            parts[0].depth,
+            np.concatenate([part.growth for part in parts])[back],
+            np.concatenate([part.computed for part in parts])[back],
+            crossing[order],
+            np.concatenate([part.crossing_depth for part in parts])[order],
+            sum(part.evaluations for part in parts),
+            max(part.error for part in parts),
+            parts[0].method,
+        )
 
-class MarchingMethod(Protocol):
-    """A method that gives a cut's map of a period."""
 
-    def cut(self, tip: TipModes, process: MillingProcess) -> MonodromyOperator:
-        """Return it."""
+@runtime_checkable
+class MonodromyMethod(Protocol):
+    """A method that finds the limit from Floquet multipliers: it also knows them at every other depth."""
+
+    name: ClassVar[str]
+
+    def monodromy(self, tip: TipModes, process: MillingProcess) -> MonodromyOperator:
+        """Return the cut's monodromy operator."""
         ...
 
 
@@ -92,7 +115,7 @@ def stability_map(
     process: MillingProcess,
     speeds: FloatArray,
     depths: FloatArray,
-    method: MarchingMethod | None = None,
+    method: MonodromyMethod | None = None,
     full: bool = False,
     tolerance: float = 5e-3,
 ) -> StabilityMap:
@@ -111,8 +134,8 @@ def stability_map(
         Of the crossings' depths, relative.
     """
     speeds, depths = (_ascending(name, values) for name, values in (("speeds", speeds), ("depths", depths)))
-    chosen = FullDiscretisation() if method is None else method
-    cut = chosen.cut(tip, process)
+    chosen: MonodromyMethod = FullDiscretisation() if method is None else method
+    cut = chosen.monodromy(tip, process)
     step = longest_step(cut)
     known = np.full((speeds.size, depths.size), np.nan)
     columns = [Growth(cut, float(speed), step, ROUGH) for speed in speeds]
@@ -171,7 +194,7 @@ def stability_map(
         np.array([depth for _, depth, _ in crossings]),
         sum(column.calls for column in (*columns, *exact, *probes)),
         error,
-        "semi-discretisation" if cut.frozen else "full-discretisation",
+        chosen.name,
     )
 
 

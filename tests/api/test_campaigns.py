@@ -20,8 +20,8 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import READERS, read_cut
 from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.workflows.identify import judge_cut
+from tests.api.in_process import refused
 from tests.api.recordings import TOOLING, content, declared
-from tests.api.test_machines import refused
 
 TOML = {"Content-Type": "application/toml"}
 

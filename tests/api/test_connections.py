@@ -15,7 +15,7 @@ from api import access
 from api.access import TimedHeadProtocol
 from api.main import create_app
 from api.settings import Settings
-from tests.api.conftest import Here, Near
+from tests.api.in_process import Here, Near
 
 
 class Hasty(TimedHeadProtocol):

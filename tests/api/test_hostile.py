@@ -10,7 +10,8 @@ import pytest
 from api.problems import MEDIA_TYPE
 from api.stores.entities import Unavailable
 from api.work.pool import Busy
-from tests.api.conftest import Here, embedded, example, service
+from tests.api.in_process import Here, embedded, service
+from tests.fixtures.service import example
 
 JSON = {"Content-Type": "application/json"}
 LOBES = '{"machine": "m", "toolings": ["t"], "max_depth_mm": %s}'

@@ -13,7 +13,8 @@ from starlette.websockets import WebSocketDisconnect
 
 from api.security import make_key
 from api.streams.frames import packed
-from tests.api.streaming import STREAM, closed, hello, send, streaming, until
+from tests.api.streaming import STREAM, closed, send, streaming, until
+from tests.fixtures.force_stream import hello
 
 
 @pytest.fixture(scope="module")

@@ -25,9 +25,8 @@ from api.files import STALE_FILE, STALE_PART, UPLOADS
 from api.main import create_app
 from api.settings import Settings
 from api.stores.sql import open_store
-from tests.api.conftest import Here, embedded, service
+from tests.api.in_process import Here, embedded, refused, service
 from tests.api.recordings import content, declared
-from tests.api.test_machines import refused
 
 ROOT = Path(__file__).resolve().parents[2]
 BINARY = {"Content-Type": "application/octet-stream"}
@@ -280,7 +279,7 @@ CODE = """
 import importlib, json, os, sys
 from pathlib import Path
 import api.reading.examine
-from tests.api.conftest import embedded, service
+from tests.api.in_process import embedded, service
 
 def upload(folder, id, target, survived, replacing):
     path, _, function = target.rpartition(".")

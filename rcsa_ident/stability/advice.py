@@ -11,8 +11,9 @@ from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.power import SpindleDrive, spindle_load
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.workflows.limits import Limits, least_within_tolerance
-from rcsa_ident.workflows.lobes import peaks
+from rcsa_ident.stability.pockets import least_within_tolerance, peaks
+from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, StabilityLobes
+from rcsa_ident.stability.tested_cuts import Tally
 
 
 class Bound(StrEnum):
@@ -33,108 +34,143 @@ class UsableDepths:
     ----------
     spindle_speed : array, shape (n,) [rad/s]
         Rising.
+    limit : array, shape (n,) [m]
+        The stability limit, up to the largest depth.
     stable : array, shape (n,) [m]
-        By stability alone, with the tolerance of the speed and the probability that were asked for.
+        The recommended depth by stability alone: the limit less what is held back of it.
     by_power, by_torque : array, shape (n,) [m]
         By what the spindle has, up to the largest depth.
     depth : array, shape (n,) [m]
         The smallest of them; 0 beyond the spindle's highest speed.
     bound : tuple of Bound, length n
-    removal_rate : array, shape (n,) [m^3/s]
-        At that depth.
+    removal_rate : array, shape (n,) [m^3/s], or None
+        At that depth; None without a feed.
     """
 
     spindle_speed: FloatArray
+    limit: FloatArray
     stable: FloatArray
     by_power: FloatArray
     by_torque: FloatArray
     depth: FloatArray
     bound: tuple[Bound, ...]
-    removal_rate: FloatArray
+    removal_rate: FloatArray | None
 
     def __post_init__(self) -> None:
-        for name in ("spindle_speed", "stable", "by_power", "by_torque", "depth", "removal_rate"):
+        for name in self._arrays:
             object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    @property
+    def _arrays(self) -> tuple[str, ...]:
+        names = ("spindle_speed", "limit", "stable", "by_power", "by_torque", "depth")
+        return names if self.removal_rate is None else (*names, "removal_rate")
+
+    @property
+    def removal(self) -> FloatArray:
+        """The removal rate, shape (n,) [m^3/s].
+
+        Raises
+        ------
+        InputError
+            Without a feed per tooth it is not known.
+        """
+        if self.removal_rate is None:
+            raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: the removal rate grows with it")
+        return self.removal_rate
 
     def between(self, low: float, high: float) -> UsableDepths:
         """Return what is known of a range of speeds [rad/s]."""
         inside = (self.spindle_speed >= low * (1.0 - 1e-9)) & (self.spindle_speed <= high * (1.0 + 1e-9))
-        names = ("spindle_speed", "stable", "by_power", "by_torque", "depth", "removal_rate")
-        arrays = {name: getattr(self, name)[inside] for name in names}
+        arrays = {"removal_rate": None} | {name: getattr(self, name)[inside] for name in self._arrays}
         return UsableDepths(**arrays, bound=tuple(b for b, there in zip(self.bound, inside, strict=True) if there))
 
 
 def usable_depths(
-    limits: Limits, process: MillingProcess, drive: SpindleDrive, tolerance: float = 0.0, probability: float = 0.95, margin: float = 0.0
+    lobes: StabilityLobes,
+    process: MillingProcess,
+    drive: SpindleDrive,
+    tolerance: float = TOLERANCE,
+    probability: float = PROBABILITY,
+    reserve: float = RESERVE,
 ) -> UsableDepths:
     """Return how deep one may cut at each speed.
 
     Parameters
     ----------
-    limits : Limits
+    lobes : StabilityLobes
+        Speeds rise.
     process : MillingProcess
-        With its feed per tooth: power, torque and removal rate grow with it.
+        Power, torque and removal rate grow with its feed per tooth; a drive whose power and torque have no limit does without.
     drive : SpindleDrive
-    tolerance : float
-        The limit counts that is the lowest within this share of the speed.
-    probability : float
-        That the cut is stable, where machines were drawn.
-    margin : float
-        Share of the stable depth that is kept as a reserve.
+    tolerance, probability, reserve : float
+        What is held back: see `StabilityLobes.recommended_depth`.
     """
-    if process.feed_per_tooth is None:
-        raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]")
-    if not 0.0 <= margin < 1.0:
-        raise InputError("margin", margin, "a share from 0 to below 1")
-    speed = limits.lobes.spindle_speed
-    stable = (1.0 - margin) * least_within_tolerance(speed, limits.limit_quantile(probability), tolerance)
-    # both grow in proportion to the depth
-    load = spindle_load(process.cutter, process.conditions(1.0, 1.0), process.coefficients)
-    by_torque = np.minimum(drive.torque_at(speed) / load.torque, limits.max_depth)
-    by_power = np.minimum(drive.power_at(speed) / (load.torque * speed), limits.max_depth)
+    speed = lobes.spindle_speed
+    stable = lobes.recommended_depth(tolerance, probability, reserve)
+    torque, power = drive.torque_at(speed), drive.power_at(speed)
+    removal_rate = None
+    if process.feed_per_tooth is not None:
+        # all grow in proportion to the depth
+        load = spindle_load(process.cutter, process.conditions(1.0, 1.0), process.coefficients)
+        torque, power = torque / load.torque, power / (load.torque * speed)
+    elif np.any(np.isfinite(drive.torque) | np.isfinite(drive.power)):
+        raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: power and torque grow with it")
+    by_torque, by_power = np.minimum(torque, lobes.max_depth), np.minimum(power, lobes.max_depth)
     table = np.stack([stable, by_power, by_torque])
     depth = table.min(axis=0)
     which = table.argmin(axis=0)
     names = (Bound.CHATTER, Bound.POWER, Bound.TORQUE)
-    whole = (1.0 - margin) * limits.max_depth * (1.0 - 1e-12)
+    whole = (1.0 - reserve) * lobes.max_depth * (1.0 - 1e-12)
     bound = [
         Bound.SPEED if d == 0.0 else Bound.DEPTH if d >= whole else names[k] for d, k in zip(depth.tolist(), which.tolist(), strict=True)
     ]
-    return UsableDepths(speed, stable, by_power, by_torque, depth, tuple(bound), depth * load.removal_rate * speed)
+    if process.feed_per_tooth is not None:
+        removal_rate = depth * load.removal_rate * speed
+    return UsableDepths(speed, lobes.nominal, stable, by_power, by_torque, depth, tuple(bound), removal_rate)
 
 
 @dataclass(frozen=True, slots=True)
 class OperatingPoint:
-    """A cut that one may make.
+    """A cut that is recommended.
 
     Parameters
     ----------
     spindle_speed : float [rad/s]
     depth : float [m]
+    limit : float [m]
+        The stability limit there, up to the largest depth.
     bound : Bound
         What stands against more depth.
-    removal_rate : float [m^3/s]
-    power : float [W]
-    torque : float [N m]
+    removal_rate : float or None [m^3/s]
+        None without a feed, as are power and torque.
+    power : float or None [W]
+    torque : float or None [N m]
     """
 
     spindle_speed: float
     depth: float
+    limit: float
     bound: Bound
-    removal_rate: float
-    power: float
-    torque: float
+    removal_rate: float | None
+    power: float | None
+    torque: float | None
 
 
 def highest_removal(usable: UsableDepths, process: MillingProcess, count: int = 3) -> list[OperatingPoint]:
     """Return the cuts that remove most, one for each pocket, the best first."""
     found = []
-    for speed, _ in peaks(usable.spindle_speed, usable.removal_rate, count):
+    # whatever the feed is, the removal rate grows with speed and depth
+    level = usable.depth * usable.spindle_speed if usable.removal_rate is None else usable.removal_rate
+    for speed, _ in peaks(usable.spindle_speed, level, count):
         place = int(np.argmin(np.abs(usable.spindle_speed - speed)))
-        at, depth = float(usable.spindle_speed[place]), float(usable.depth[place])
-        if depth > 0.0:
+        at, depth, limit = (float(values[place]) for values in (usable.spindle_speed, usable.depth, usable.limit))
+        if depth <= 0.0:
+            continue
+        if process.feed_per_tooth is None:
+            found.append(OperatingPoint(at, depth, limit, usable.bound[place], None, None, None))
+        else:
             load = spindle_load(process.cutter, process.conditions(at, depth), process.coefficients)
-            found.append(OperatingPoint(at, depth, usable.bound[place], load.removal_rate, load.power, load.torque))
+            found.append(OperatingPoint(at, depth, limit, usable.bound[place], load.removal_rate, load.power, load.torque))
     return found
 
 
@@ -196,8 +232,8 @@ class PlannedCut:
         Infinite where it is stable up to the depth that was asked for.
     robust_limit : float [m]
         The lowest within the tolerance of the speed and with the probability that were asked for.
-    chatter_frequency : float [rad/s]
-        Of the vibration at the limit; NaN without one.
+    chatter_frequency : float or None [rad/s]
+        Of the vibration at the limit; None where it is stable up to the depth that was asked for.
     slower, faster : float or None [rad/s]
         The nearest speeds at which the same depth is on the other side of the limit; None if the range holds none.
     probability : float or None
@@ -213,7 +249,7 @@ class PlannedCut:
     depth: float
     limit: float
     robust_limit: float
-    chatter_frequency: float
+    chatter_frequency: float | None
     slower: float | None
     faster: float | None
     probability: float | None
@@ -234,21 +270,21 @@ class PlannedCut:
 
 
 def planned_cut(
-    limits: Limits,
+    lobes: StabilityLobes,
     process: MillingProcess,
     drive: SpindleDrive,
     speed: float,
     depth: float,
-    tolerance: float = 0.0,
-    probability: float = 0.95,
+    tolerance: float = TOLERANCE,
+    probability: float = PROBABILITY,
 ) -> PlannedCut:
-    """Return how a cut stands; its speed is one of those of the limits (`pad_speeds` puts it among them)."""
+    """Return how a cut stands; its speed is one of those of the lobes (`pad_speeds` puts it among them)."""
     depth = positive("depth", depth, "m")
-    speeds = limits.lobes.spindle_speed
+    speeds = lobes.spindle_speed
     place = int(np.argmin(np.abs(speeds - positive("speed", speed, "rad/s"))))
-    if abs(speeds[place] - speed) > 1e-6 * speed or depth > limits.max_depth:
-        raise InputError("planned cut", f"{speed:g} rad/s and {depth:g} m", f"a speed of the limits and at most {limits.max_depth:g} m")
-    nominal = limits.nominal
+    if abs(speeds[place] - speed) > 1e-6 * speed or depth > lobes.max_depth:
+        raise InputError("planned cut", f"{speed:g} rad/s and {depth:g} m", f"a speed of the lobes and at most {lobes.max_depth:g} m")
+    nominal = lobes.nominal
     other = (nominal >= depth) != (nominal[place] >= depth)
     below, above = np.flatnonzero(other[:place]), np.flatnonzero(other[place + 1 :])
     slower = _crossing(speeds, nominal, int(below[-1]), depth) if below.size else None
@@ -257,18 +293,58 @@ def planned_cut(
     power, torque = drive.power_at(speeds[place : place + 1])[0], drive.torque_at(speeds[place : place + 1])[0]
     with np.errstate(divide="ignore"):
         share = float(np.max(np.array([load.power, load.torque]) / np.array([power, torque])))
-    lowest = least_within_tolerance(speeds, limits.limit_quantile(probability), tolerance)[place]
+    lowest = least_within_tolerance(speeds, lobes.limit_quantile(probability), tolerance)[place]
     return PlannedCut(
         float(speeds[place]),
         depth,
-        float(limits.lobes.limit_depth[place]),
+        float(lobes.limit_depth[place]),
         float(lowest),
-        float(limits.lobes.chatter_frequency[place]),
+        None if lobes.stable[place] else float(lobes.chatter_frequency[place]),
         slower,
         faster,
-        limits.probability(place, depth),
+        lobes.probability(place, depth),
         share,
         load.power,
         load.torque,
         load.removal_rate,
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Advice:
+    """Which cuts a tooling can make, and which of them is recommended.
+
+    Parameters
+    ----------
+    tooling : str
+        Its name.
+    stickout : float or None [m]
+    lobes : StabilityLobes
+        At the speeds that were asked for.
+    usable : UsableDepths
+        What is recommended at each of them, within power and torque.
+    recommended : tuple of OperatingPoint
+        The cuts that remove most, one for each pocket, the best first.
+    windows : tuple of SpeedWindow
+        Speeds at which a depth is recommended, where one was asked for.
+    planned : tuple of PlannedCut
+    tested : Tally or None
+        How many of the cuts that were tried the limits tell right.
+    remarks : tuple of str
+        What the user should know.
+    """
+
+    tooling: str
+    stickout: float | None
+    lobes: StabilityLobes
+    usable: UsableDepths
+    recommended: tuple[OperatingPoint, ...]
+    windows: tuple[SpeedWindow, ...]
+    planned: tuple[PlannedCut, ...]
+    tested: Tally | None
+    remarks: tuple[str, ...]
+
+    @property
+    def common(self) -> FloatArray | None:
+        """What is stable on all machines that were drawn, shape (n,) [m]; None where none were."""
+        return None if self.lobes.drawn is None else self.lobes.limit_quantile(1.0)
