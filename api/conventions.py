@@ -9,7 +9,7 @@ from fastapi import Header, Path, Query, Request
 
 from api.problems import MEDIA_TYPE, Problem, title
 from api.schemas.common import ID_PATTERN, NAME_PATTERN
-from api.stores.entities import ABSENT
+from api.stores.entities import ABSENT, Taken
 
 Item = TypeVar("Item")
 MachineId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a machine.")]
@@ -102,6 +102,13 @@ def found_or_404(thing: Item | None, what: str) -> Item:
     if thing is None:
         raise Problem(404, f"there is no such {what}")
     return thing
+
+
+def in_use(taken: Taken, name: str | None, repeat: str | None) -> Problem:
+    """Return the problem of a name, or an idempotency key, that is already in use."""
+    what = str(taken)
+    found = str(name if what == "name" else repeat)
+    return Problem(409, f"the {what} is already in use", [{"field": what, "found": found, "allowed": f"another {what}"}])
 
 
 def utf8(raw: bytes) -> str:

@@ -13,7 +13,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse, StreamingResponse
 
 from api.components import Components
-from api.conventions import found_or_404
+from api.conventions import found_or_404, in_use
 from api.jobs.event_feed import Crowded
 from api.problems import Problem
 from api.schemas.common import ID_PATTERN
@@ -81,8 +81,7 @@ def submit(components: Components, job: Job, texts: Mapping[str, str], repeat: t
     try:
         return components.store.jobs.add(job, texts, components.settings.job_queue, repeat)
     except Taken as taken:
-        entry = {"field": str(taken), "found": str(repeat and repeat[0]), "allowed": f"a {taken} of its own"}
-        raise Problem(409, f"the {taken} is already in use", [entry]) from None
+        raise in_use(taken, None, repeat and repeat[0]) from None
     except Full:
         raise Problem(503, f"{components.settings.job_queue} jobs are waiting already", headers={"Retry-After": "60"}) from None
     except KeyError:

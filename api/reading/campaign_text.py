@@ -8,7 +8,7 @@ import unicodedata
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any, NoReturn
+from typing import Any
 
 from api.work.toolings import parsed, toml_of, weigh
 from rcsa_ident.errors import InputError
@@ -215,8 +215,3 @@ def toml_text(text: str, there: Callable[[str], bool] = lambda _: True) -> str:
     head = {key: value for key, value in data.items() if key != "cuts"}
     head["toolings"] = {name: f"toolings/{name}.toml" for name in data["toolings"]}
     return toml_of(head) + "".join(f"[[cuts]]\n{toml_of(cut)}" for cut in cuts)
-
-
-def refuse_name(name: str, known: Mapping[str, File]) -> NoReturn:
-    """Raise for a recording that a campaign does not name."""
-    raise InputError("name", f'"{name[:80]}"', "a recording that the campaign names: " + ", ".join(list(known)[:5]) + ", ...")

@@ -13,7 +13,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 from api.components import Components, ThisService
-from api.conventions import BODY, After, CampaignId, Limit, MachineId, Repeat, guard, page, problems, utf8
+from api.conventions import BODY, After, CampaignId, Limit, MachineId, Repeat, guard, in_use, page, problems, utf8
 from api.files import UPLOADS
 from api.lookups import known_campaign, machine_of
 from api.problems import Problem
@@ -68,8 +68,7 @@ async def make(
     try:
         campaign = await run_in_threadpool(keep)
     except Taken as taken:
-        what, fault = str(taken), {"found": str(repeat), "allowed": f"an {taken} of its own"}
-        raise Problem(409, f"the {what} is already in use", [{"field": what, **fault}]) from None
+        raise in_use(taken, None, repeat) from None
     except KeyError:
         raise Problem(404, "there is no such machine") from None
     response.headers["Location"] = f"/v1/campaigns/{campaign.id}"

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from api.components import Components, ThisService
-from api.conventions import BODY, After, Limit, MachineId, Repeat, expected, guard, page, problems, tagged, unchanged, utf8
+from api.conventions import BODY, After, Limit, MachineId, Repeat, expected, guard, in_use, page, problems, tagged, unchanged, utf8
 from api.lookups import identification_of, known_machine, machine_of
 from api.problems import Problem
 from api.schemas.common import Page
@@ -35,9 +35,7 @@ def make(body: NewMachine, components: ThisService, caller: WhoAsks, response: R
     try:
         kept = components.store.machines.add(machine, None if repeat is None else (repeat, digest))
     except Taken as taken:
-        what = str(taken)
-        found = body.name if what == "name" else str(repeat)
-        raise Problem(409, f"the {what} is already in use", [{"field": what, "found": found, "allowed": f"a {what} of its own"}]) from None
+        raise in_use(taken, body.name, repeat) from None
     response.headers["Location"] = f"/v1/machines/{kept.id}"
     return _answer(components, kept)
 
