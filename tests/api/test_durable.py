@@ -12,6 +12,7 @@ import pytest
 from sqlalchemy import create_engine, text
 
 from tests.api.in_process import POSTGRESQL, SQLITE, database
+from tests.fixtures.waiting import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Carries jobs out until all are over, or dies in a step; each line of its output is a step that it computed.
@@ -57,7 +58,7 @@ os._exit(0)
 def engine(url: str, executor: str, deadly: str, *jobs: str) -> tuple[int, list[str]]:
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     words = [sys.executable, "-c", SCRIPT, url, executor, deadly, *jobs]
-    found = subprocess.run(words, capture_output=True, text=True, env=environment, check=False, timeout=120)
+    found = subprocess.run(words, capture_output=True, text=True, env=environment, check=False, timeout=PATIENCE)
     assert found.returncode in (0, 9), found.stderr
     return found.returncode, found.stdout.splitlines()
 
