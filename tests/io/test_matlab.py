@@ -154,7 +154,7 @@ HOSTILE = {
     "bytes beyond the end": (file(matrix(b"x", (1, 4), bytes(32), size=2**31)), "channel x"),
     "another type": (file(matrix(b"x", (1, 4), bytes(32), kind=14)), "samples of type 14"),
     "two of a name": (file(matrix(b"x", (1, 4), bytes(32)), matrix(b"x", (1, 4), bytes(32))), "two of that name"),
-    "a name without end": (file(matrix(b"x" * 9000, (1, 4), bytes(32))), "a name without end"),
+    "a name without end": (file(matrix(b"x" * 9000, (1, 4), bytes(32))), "a variable whose name is not terminated"),
     "100 dimensions": (file(matrix(b"x", (1,) * 100, bytes(32))), "a variable of 100 dimensions"),
     "no zlib": (file(struct.pack("<II", 15, 40) + bytes(40)), "cannot be read"),
     "many variables": (file(*[matrix(b"z", (1, 1), bytes(8))] * 20_000), "more than 10000 variables"),

@@ -202,7 +202,7 @@ HOSTILE = {
     ),
     "many objects in many segments": (
         segment(MANY, 20_000, b"", METADATA | NEW_LIST) + 1000 * segment(b"", 0, b"", METADATA),
-        "more segments, objects and properties than a recording has",
+        "more segments, objects and properties than any recording has",
     ),
     "samples of no size": (
         # a DAQmx channel without scalers takes no bytes and has as many samples as it likes
