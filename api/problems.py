@@ -113,7 +113,7 @@ def install(app: FastAPI) -> None:
         assert isinstance(error, HTTPException)
         words = {
             413: f"the body is too large: {error.detail}",
-            400: "the body can not be read",
+            400: "the body cannot be read",
             408: "the body comes too slowly",
             404: "nothing is there",
             405: "the path does not take this method",

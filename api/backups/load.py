@@ -104,7 +104,7 @@ def _manifest(path: Path) -> dict[str, Any]:
     except InputError:
         raise
     except (ValueError, TypeError, KeyError, RecursionError):
-        raise _no_backup("a manifest that can not be read") from None
+        raise _no_backup("a manifest that cannot be read") from None
     return dict(manifest)
 
 

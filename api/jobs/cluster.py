@@ -1,4 +1,4 @@
-"""Searches on a Dask cluster; what it can not do is done here, with the same result."""
+"""Searches on a Dask cluster; what it cannot do is done here, with the same result."""
 
 from __future__ import annotations
 

@@ -235,7 +235,7 @@ def _report(found: Identification, campaign: Campaign, judged: list[JudgedCut], 
 
 
 def _applied(text: str) -> tuple[Applied | None, str | None]:
-    """What becomes the machine's identification, or why it can not."""
+    """What becomes the machine's identification, or why it cannot."""
     try:
         summary = tasks.check(text)
     except InputError as error:

@@ -46,7 +46,7 @@ class JobContext:
         Of the job, and of the worker.
     remember : Remember
     leave : callable
-        Ends the process with an exit code: what can not go on here goes on after a start from the last step.
+        Ends the process with an exit code: what cannot go on here goes on after a start from the last step.
     """
 
     def __init__(self, jobs: Jobs, job: str, token: str, remember: Remember, leave: Callable[[int], Any] = os._exit) -> None:
@@ -183,7 +183,7 @@ class JobContext:
                     self.leave(3)
                 self.stopped.set()
                 if not self.over.wait(GRACE):
-                    # long work without a word can not be stopped otherwise
+                    # long work without a word cannot be stopped otherwise
                     self.leave(0)
                 return
 

@@ -1,1 +1,1 @@
-"""Uploads are read in a process of their own with limits; what it can not read costs nothing else."""
+"""Uploads are read in a process of their own with limits; what it cannot read costs nothing else."""

@@ -35,7 +35,7 @@ def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None)
     except InputError as error:
         raise _told(error, upload) from None
     except RecursionError:
-        raise InputError("recording", "one that cannot be read (nested without end)", "a complete file", upload.name) from None
+        raise InputError("recording", "one that cannot be read (nested too deeply)", "a complete file", upload.name) from None
 
 
 def _told(error: InputError, upload: Upload) -> InputError:

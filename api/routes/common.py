@@ -19,7 +19,7 @@ After = Annotated[str, Query(pattern=r"^[A-Za-z0-9 ._+()-]{0,64}$", description=
 Limit = Annotated[int, Query(ge=1, le=200, description="At most so many.")]
 
 _WHY = {
-    400: "The body can not be read.",
+    400: "The body cannot be read.",
     401: "No key, or not a valid one.",
     403: "The key has not the scope.",
     404: "Nothing is there, or it is another group's.",

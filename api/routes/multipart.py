@@ -91,7 +91,7 @@ async def events(request: Request, parts: Components) -> AsyncIterator[Head | by
             # the last part may be cut off, which the parser does not mind
             raise FormParserError
     except FormParserError:
-        raise Problem(400, "the body can not be read: it is no complete multipart/form-data") from None
+        raise Problem(400, "the body cannot be read: it is not complete multipart/form-data") from None
 
 
 def _head(heads: dict[bytes, bytes]) -> Head:

@@ -93,7 +93,7 @@ async def _admitted(websocket: HTTPConnection, parts: Components) -> Caller | No
     """Return who asks, None where the first message is to tell; a page from elsewhere is not let in, whatever the browser would send."""
     origin, host = websocket.headers.get("origin"), websocket.headers.get("host", "")
     if origin is not None and (urlsplit(origin).scheme not in ("http", "https") or urlsplit(origin).netloc.lower() != host.lower()):
-        raise Problem(403, "a page of another origin can not open a stream")
+        raise Problem(403, "a page of another origin cannot open a stream")
     where = websocket.client.host if websocket.client is not None else "nobody"
     _paced(parts, f"open {where}")
     if parts.settings.asks_for_keys and not websocket.headers.get(HEADER):

@@ -89,7 +89,7 @@ def object_of(text: str) -> dict[str, Any]:
     try:
         data = json.loads(text, parse_constant=no_number)
     except RecursionError:
-        raise InputError("message", "lists in lists without end", "a JSON object") from None
+        raise InputError("message", "lists nested too deeply", "a JSON object") from None
     except ValueError:
         raise InputError("message", "no JSON", "a JSON object") from None
     if not isinstance(data, dict):
