@@ -31,8 +31,8 @@ BODY_SECONDS, BYTE_SECONDS, HEAD_SECONDS, HEAD_BYTES = 60.0, 1e-4, 20.0, 262_144
 class AccessMonitor:
     """The outermost layer of the service."""
 
-    def __init__(self, app: ASGIApp, parts: Components) -> None:
-        self.app, self.parts = app, parts
+    def __init__(self, app: ASGIApp, components: Components) -> None:
+        self.app, self.components = app, components
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -44,7 +44,7 @@ class AccessMonitor:
         request.state.request_id = id
         status, start = 0, time.perf_counter()
         # routes that stream to the disk let more in
-        request.state.body = body = _Body(request, receive, self.parts.settings.max_body_bytes)
+        request.state.body = body = _Body(request, receive, self.components.settings.max_body_bytes)
 
         async def observed(message: Message) -> None:
             nonlocal status
@@ -65,14 +65,14 @@ class AccessMonitor:
             if status == 0:
                 await document(request, problem)(scope, receive, observed)
         finally:
-            self._told(scope, id, status, time.perf_counter() - start)
+            self._record(scope, id, status, time.perf_counter() - start)
 
-    def _told(self, scope: Scope, id: str, status: int, seconds: float) -> None:
+    def _record(self, scope: Scope, id: str, status: int, seconds: float) -> None:
         # the pattern, not the path: ids would make a counter each
         route = getattr(scope.get("route"), "path", "unknown")
         method = scope["method"] if scope["method"] in ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS") else "other"
-        self.parts.metrics.requests.labels(method, route, str(status)).inc()
-        self.parts.metrics.seconds.labels(method, route).observe(seconds)
+        self.components.metrics.requests.labels(method, route, str(status)).inc()
+        self.components.metrics.seconds.labels(method, route).observe(seconds)
         caller = scope.get("state", {}).get("caller")
         fields = {"request_id": id, "method": method, "route": route, "status": status, "seconds": round(seconds, 6)}
         log.info("request", extra={"fields": fields | ({} if caller is None else {"key": caller.id, "group": caller.group})})
@@ -84,13 +84,13 @@ class _Body:
     def __init__(self, request: Request, receive: Receive, most: int) -> None:
         self.source, self.most, self.seen = receive, most, 0
         self.usual, self.start = most, time.monotonic()
-        told = request.headers.get("content-length", "")
-        self.told = int(told[:20]) if told.isdecimal() and told.isascii() else 0
-        self.read = self.told == 0 and "transfer-encoding" not in request.headers
+        text = request.headers.get("content-length", "")
+        self.declared = int(text[:20]) if text.isdecimal() and text.isascii() else 0
+        self.read = self.declared == 0 and "transfer-encoding" not in request.headers
 
     async def receive(self) -> Message:
         """Return the next part."""
-        if self.told <= self.most:
+        if self.declared <= self.most:
             message = await self._in_time()
             self.seen += len(message.get("body", b""))
             if self.seen <= self.most:
@@ -109,7 +109,7 @@ class _Body:
             raise HTTPException(408, "too slow") from None
 
 
-class Patient(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
+class TimedHeadProtocol(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
     """A connection that is closed if the head of a request does not come in time, or does not end."""
 
     seconds, most = HEAD_SECONDS, HEAD_BYTES

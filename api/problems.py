@@ -47,10 +47,10 @@ def title(status: int) -> str:
 
 def document(request: Request, problem: Problem) -> JSONResponse:
     """Return a problem as the answer to a request."""
-    return JSONResponse(told(problem, getattr(request.state, "request_id", "")), problem.status, problem.headers, MEDIA_TYPE)
+    return JSONResponse(content_of(problem, getattr(request.state, "request_id", "")), problem.status, problem.headers, MEDIA_TYPE)
 
 
-def told(problem: Problem, request_id: str) -> dict[str, Any]:
+def content_of(problem: Problem, request_id: str) -> dict[str, Any]:
     """Return a problem as a document."""
     content: dict[str, Any] = {"type": "about:blank", "title": title(problem.status), "status": problem.status, "detail": problem.detail}
     if problem.errors:

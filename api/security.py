@@ -17,7 +17,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
 from starlette.requests import HTTPConnection
 
-from api.components import Components, parts_of
+from api.components import Components, components_of
 from api.problems import Problem
 from api.stores.entities import Key
 
@@ -73,7 +73,7 @@ def hash_of(secret: str) -> str:
     return hashlib.sha256(secret.encode("utf-8", "replace")).hexdigest()
 
 
-def caller_of(request: HTTPConnection, parts: Components, given: str | None = None) -> Caller:
+def caller_of(request: HTTPConnection, components: Components, given: str | None = None) -> Caller:
     """Return who asks; without a key only where none is asked for.
 
     Parameters
@@ -82,14 +82,14 @@ def caller_of(request: HTTPConnection, parts: Components, given: str | None = No
         A key that came otherwise than in the header: a page can set none on a WebSocket.
     """
     text = request.headers.get(HEADER, "") or given or ""
-    if not text and not parts.settings.asks_for_keys:
+    if not text and not components.settings.asks_for_keys:
         # a page from elsewhere may reach loopback through a name of its own
         if not _LOCAL_NAME.fullmatch(request.headers.get("host", "")):
             raise Problem(403, "without a key the service answers on localhost only")
         return Caller(LOCAL_KEY, LOCAL_GROUP, SCOPES)
     _, _, rest = text.partition("_")
     id, _, secret = rest.partition("_")
-    key = parts.store.keys.get(id) if text.startswith(f"{PREFIX}_") and id.isalnum() and id.isascii() and len(id) <= 64 else None
+    key = components.store.keys.get(id) if text.startswith(f"{PREFIX}_") and id.isalnum() and id.isascii() and len(id) <= 64 else None
     # an unknown id takes as long as a wrong secret
     kept = key.secret_hash if key is not None else hash_of("")
     if not hmac.compare_digest(hash_of(secret), kept) or key is None:
@@ -107,12 +107,12 @@ class Guarded(APIRoute):
         kinds = extra.get("x-content-types", ("application/json",)) if self.body_field or "requestBody" in extra else ()
 
         async def handler(request: Request) -> Response:
-            parts = parts_of(request)
-            caller = await run_in_threadpool(caller_of, request, parts)
+            components = components_of(request)
+            caller = await run_in_threadpool(caller_of, request, components)
             request.state.caller = caller
             if not caller.may(scope):
                 raise Problem(403, f"the key has not the scope {scope}")
-            seconds = parts.rates.wait(caller.id)
+            seconds = components.rates.wait(caller.id)
             if seconds > 0.0:
                 raise Problem(429, "too many requests with this key", headers={"Retry-After": str(math.ceil(seconds))})
             kind = request.headers.get("content-type", "").split(";")[0].strip().lower()

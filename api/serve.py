@@ -87,13 +87,13 @@ def worker(
 
     settings = context.obj
     _log()
-    crew = Supervisor(count or max(settings.job_workers, 1), job_worker, settings, settings.job_nice)
+    supervisor = Supervisor(count or max(settings.job_workers, 1), job_worker, settings, settings.job_nice)
     ended = threading.Event()
     for each in (signal.SIGTERM, signal.SIGINT):
         signal.signal(each, lambda *_: ended.set())
-    crew.start()
+    supervisor.start()
     ended.wait()
-    crew.stop()
+    supervisor.stop()
 
 
 @app.command("backup")
@@ -166,7 +166,7 @@ def _log() -> None:
 def _run(settings: object) -> None:
     import uvicorn
 
-    from api.access import Patient
+    from api.access import TimedHeadProtocol
     from api.jobs.supervisor import Supervisor
     from api.main import create_app
     from api.settings import Settings
@@ -174,19 +174,19 @@ def _run(settings: object) -> None:
     assert isinstance(settings, Settings)
     _log()
     try:
-        service = create_app(settings, crew=Supervisor(settings.job_workers, job_worker, settings, settings.job_nice))
+        service = create_app(settings, supervisor=Supervisor(settings.job_workers, job_worker, settings, settings.job_nice))
     except InputError as error:
         _fail(error)
     except OSError as error:
         _fail(InputError("RCSA_IDENT_DATA", error.strerror or "an error", "a folder that can be made and written to"))
-    told = {"store": (settings.database and "database by URL") or str(settings.data), "workers": settings.workers}
+    fields = {"store": (settings.database and "database by URL") or str(settings.data), "workers": settings.workers}
     log = logging.getLogger("rcsa_ident.service")
-    log.info("starting", extra={"fields": told | {"address": f"http://{settings.host}:{settings.port}"}})
+    log.info("starting", extra={"fields": fields | {"address": f"http://{settings.host}:{settings.port}"}})
     if not settings.asks_for_keys:
         log.warning("no keys are asked for: everybody on this machine may do everything (RCSA_IDENT_KEYS=on asks for them)")
     # streams of events and forces would keep it from ending
     # samples are noise to the last bits: packing them costs a core and gains nothing
-    limits: dict[str, Any] = {"timeout_graceful_shutdown": 3, "ws_per_message_deflate": False, "http": Patient}
+    limits: dict[str, Any] = {"timeout_graceful_shutdown": 3, "ws_per_message_deflate": False, "http": TimedHeadProtocol}
     uvicorn.run(service, host=settings.host, port=settings.port, log_config=None, access_log=False, server_header=False, **limits)
 
 

@@ -21,10 +21,11 @@ import numpy as np
 
 from api.client import Client
 from api.stream_client import Event, Forces, ForceStream
-from benchmarks.observer import DATA, relative_error
+from benchmarks.observer import DATA
 from benchmarks.service import serving
 from benchmarks.timing import row
-from benchmarks.turning import TurningCut, turning_cut
+from tests.fixtures.turning_cut import TurningCut, turning_cut
+from tests.fixtures.virtual_cut import relative_error
 
 #: Samples of a frame: 20 ms.
 FRAME = 1024

@@ -98,10 +98,10 @@ class CutSpec:
             return replace(material(self.material).coefficients, **self.coefficients)
         if workpiece is not None:
             return replace(workpiece.coefficients, **self.coefficients)
-        missing = [name for name in ("tangential", "radial_ratio") if name not in self.coefficients]
-        if missing:
-            allowed = "the tangential coefficient and the radial ratio, or a material: without a campaign no workpiece is known"
-            raise InputError(missing[0], "nothing", allowed)
+        for key, name in (("tangential", "tangential coefficient"), ("radial_ratio", "radial ratio")):
+            if key not in self.coefficients:
+                allowed = "the tangential coefficient and the radial ratio, or a material: without a campaign no workpiece is known"
+                raise InputError(name, "nothing", allowed)
         return CuttingCoefficients(**self.coefficients)
 
 

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from rcsa_ident.cli import app
 from rcsa_ident.errors import InputError
 from rcsa_ident.scaleout import ClusterLost, cluster_map
-from tests import scaleout_tasks as tasks
+from tests.fixtures import scaleout_tasks as tasks
 
 SAMPLES = Path(__file__).resolve().parents[1] / "data" / "sample_runs"
 

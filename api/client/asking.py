@@ -43,7 +43,7 @@ class Asking:
     def __init__(self, url: str = "http://127.0.0.1:8000", key: str | None = None, http: httpx2.Client | None = None) -> None:
         self.http = httpx2.Client(base_url=url, timeout=60.0) if http is None else http
         #: For answers that come when a long recording is read; a client that is given keeps its own patience.
-        self.patient: dict[str, Any] = {"timeout": httpx2.Timeout(60.0, read=1200.0)} if http is None else {}
+        self.long_timeout: dict[str, Any] = {"timeout": httpx2.Timeout(60.0, read=1200.0)} if http is None else {}
         self.headers = {} if key is None else {"X-API-Key": key}
 
     def __enter__(self) -> Self:
@@ -81,8 +81,8 @@ class Asking:
 def refused(answer: httpx2.Response) -> ServiceError:
     """Return what an answer from 400 on says."""
     # the answer to HEAD has no body
-    told = answer.headers.get("content-type", "").startswith("application/problem+json") and answer.content
-    return ServiceError(answer.status_code, ProblemDocument.model_validate_json(answer.content) if told else None)
+    is_problem = answer.headers.get("content-type", "").startswith("application/problem+json") and answer.content
+    return ServiceError(answer.status_code, ProblemDocument.model_validate_json(answer.content) if is_problem else None)
 
 
 def match(seen: str | None) -> dict[str, str]:

@@ -102,9 +102,9 @@ class Jobs(Asking):
             pass
         if found.answer is None:
             problem = found.job.problem
-            told = {"detail": f"the job is {found.job.state}"} if problem is None else problem.model_dump()
-            told |= {"type": "about:blank", "title": found.job.state, "status": 422, "request_id": id}
-            raise ServiceError(422, ProblemDocument.model_validate(told))
+            document = {"detail": f"the job is {found.job.state}"} if problem is None else problem.model_dump()
+            document |= {"type": "about:blank", "title": found.job.state, "status": 422, "request_id": id}
+            raise ServiceError(422, ProblemDocument.model_validate(document))
         return found.answer
 
     def lobes_later(self, machine: str, *toolings: str | Json, **further: Any) -> JobAnswer:

@@ -87,7 +87,9 @@ class Uploads(Asking):
             path = _recording(campaign, name or file.name)
             return read(
                 RecordingAnswer,
-                self.send("PUT", path, content=iter(partial(opened.read, _BLOCK), b""), headers=headers, params=params, **self.patient),
+                self.send(
+                    "PUT", path, content=iter(partial(opened.read, _BLOCK), b""), headers=headers, params=params, **self.long_timeout
+                ),
             )
 
     def upload_in_parts(
@@ -120,7 +122,7 @@ class Uploads(Asking):
                 }
                 try:
                     answer = self.send(
-                        "PATCH", path, content=data, headers=headers, params={"replace": "true"} if replace else {}, **self.patient
+                        "PATCH", path, content=data, headers=headers, params={"replace": "true"} if replace else {}, **self.long_timeout
                     )
                 except (httpx2.TransportError, ServiceError) as error:
                     failed += 1
@@ -158,14 +160,14 @@ class Uploads(Asking):
         with ExitStack() as stack:
             parts = [("files", (file.name, stack.enter_context(file.open("rb")), "application/octet-stream")) for file in files]
             path, params = f"/campaigns/{campaign}/recordings", {"replace": "true"} if replace else {}
-            return read(UploadAnswer, self.send("POST", path, files=parts, params=params, **self.patient))
+            return read(UploadAnswer, self.send("POST", path, files=parts, params=params, **self.long_timeout))
 
-    def upload_folder(self, machine: str, folder: Path, told: Callable[[RecordingAnswer], object] | None = None) -> CampaignAnswer:
+    def upload_folder(self, machine: str, folder: Path, report: Callable[[RecordingAnswer], object] | None = None) -> CampaignAnswer:
         """Upload the folder of a campaign: campaign.toml, its toolings and every recording that is there.
 
         Parameters
         ----------
-        told : callable, optional
+        report : callable, optional
             Given each recording when it is kept.
         """
         data = tomllib.loads((folder / "campaign.toml").read_text(encoding="utf-8-sig"))
@@ -175,8 +177,8 @@ class Uploads(Asking):
         paths = dict.fromkeys(cut[key] for key in ("air", "cut") for cut in data["cuts"] if key in cut)
         for path in paths:
             answer = self.upload(campaign.id, folder / path)
-            if told is not None:
-                told(answer)
+            if report is not None:
+                report(answer)
         return self.campaign(campaign.id)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 NOUNS = (
     "rcsa_ident.dynamics.coordinates.Dof",
     "rcsa_ident.signals.verdict.Verdict",
-    "rcsa_ident.signals.measurement.AxisLines",
+    "rcsa_ident.signals.frf.AxisLines",
     "rcsa_ident.signals.measurement.CutMeasurement",
     "rcsa_ident.signals.measurement.Reading",
     "rcsa_ident.identification.parameters.AxisLayout",

@@ -168,9 +168,9 @@ class JobContext:
             self.last[topic] = now
             found = data()
             if found is not None:
-                told = json.dumps(found, allow_nan=False)
+                text = json.dumps(found, allow_nan=False)
                 with self.lock:
-                    self.events.append(Event(0, "fit", told, topic))
+                    self.events.append(Event(0, "fit", text, topic))
         self.check()
 
     def _deliver(self) -> None:

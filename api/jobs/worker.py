@@ -52,7 +52,7 @@ def carry(
         if job is None:
             return
         start = time.monotonic()
-        outcome = _worn(attempts) if job.attempts > attempts else _outcome(jobs, carriers[job.kind], job, token, remember, leave)
+        outcome = _given_up(attempts) if job.attempts > attempts else _outcome(jobs, carriers[job.kind], job, token, remember, leave)
         if outcome is not None:
             seconds = job.seconds + time.monotonic() - start
             names = ("state", "status", "problem", "texts", "applied")
@@ -65,8 +65,8 @@ def carry(
 def _outcome(jobs: Jobs, carrier: Carrier, job: Job, token: str, remember: Remember, leave: Callable[[int], Any]) -> Outcome | None:
     """How the job ended; None where it was stopped."""
     try:
-        with JobContext(jobs, job.id, token, remember, leave) as desk:
-            return carrier(job, desk)
+        with JobContext(jobs, job.id, token, remember, leave) as context:
+            return carrier(job, context)
     except Stopped:
         return None
     except InputError as error:
@@ -88,7 +88,7 @@ def failed(detail: str, *errors: tuple[str, str, str]) -> Outcome:
     return Outcome("failed", "", problem=json.dumps({"detail": detail, "errors": entries}))
 
 
-def _worn(attempts: int) -> Outcome:
+def _given_up(attempts: int) -> Outcome:
     return failed(f"its process has died {attempts} times at the same step: perhaps it needs more memory than there is")
 
 
@@ -215,9 +215,9 @@ def process(number: int) -> str:
     return f"{number}:" if fields[0] == "Z" else f"{number}:{fields[19]}"
 
 
-def gone(told: str) -> bool:
+def gone(identity: str) -> bool:
     """Whether a process of this place has certainly ended."""
-    return not told.endswith(":") and process(int(told.partition(":")[0])) != told
+    return not identity.endswith(":") and process(int(identity.partition(":")[0])) != identity
 
 
 def _now() -> str:

@@ -33,12 +33,12 @@ def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None)
         write_normalised(upload.target, found, signals, sensors)
         return in_si(found, signals, sensors)
     except InputError as error:
-        raise _told(error, upload) from None
+        raise _with_client_name(error, upload) from None
     except RecursionError:
         raise InputError("recording", "one that cannot be read (nested too deeply)", "a complete file", upload.name) from None
 
 
-def _told(error: InputError, upload: Upload) -> InputError:
+def _with_client_name(error: InputError, upload: Upload) -> InputError:
     found = error.found.replace(str(upload.path), upload.name) if isinstance(error.found, str) else error.found
     return InputError(error.field, found, error.allowed.replace(str(upload.path), upload.name), upload.name)
 
@@ -65,7 +65,7 @@ def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) ->
         beside = None
     verdict, reading = judged(campaign, cut, recording, beside, role)
     speed = reading.spindle_speed
-    return told(recording) | {
+    return described(recording) | {
         "verdict": verdict,
         "spindle_speed_rpm": to_rpm(speed) if speed is not None and np.isfinite(speed) else None,
         "harmonics_above_noise": {axis.upper(): reading.harmonics.get(axis, 0) for axis in measured_axes(recording)},
@@ -79,7 +79,7 @@ def judge(text: str, cut_id: str, cut: Path, air: Path | None) -> dict[str, Any]
     return judged(campaign, declared, read_normalised(cut), None if air is None else read_normalised(air), "cut")[0]
 
 
-def told(recording: Recording) -> dict[str, Any]:
+def described(recording: Recording) -> dict[str, Any]:
     """Return what needs no analysis."""
     return {
         "sampling_rate_hz": recording.rate,
@@ -94,15 +94,16 @@ def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | 
     try:
         with np.errstate(all="ignore"):
             if role == "air":
-                reading = judge_air(recording, cut.conditions)
+                reading = judge_air(cut.id, cut.tooling, recording, cut.conditions)
             else:
                 coefficients = campaign.workpiece.coefficients
                 reading = measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, coefficients)
     except InputError as error:
-        reading = Reading(Verdict((str(error),)))
+        reading = Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((str(error),)))
     except (ArithmeticError, np.linalg.LinAlgError):
-        reading = Reading(Verdict(("numbers of these samples have no finite answer",)))
-    (row,) = recording_rows([(cut, reading)])
+        reasons = ("numbers of these samples have no finite answer",)
+        reading = Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict(reasons))
+    (row,) = recording_rows([reading])
     verdict = {
         "usable": row.usable,
         "reasons": list(row.reasons),

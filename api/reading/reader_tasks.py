@@ -1,4 +1,4 @@
-"""What the reader process is asked for, by functions that import nothing here: only there are formats and signals loaded."""
+"""Calls for the processes that read: they import formats and signals only where they run, so that the service does not load them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from api.reading.campaign_text import Upload
+from rcsa_ident.signals.recording import Sensor
 
 
 def warm() -> None:
@@ -20,6 +21,20 @@ def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) ->
     from api.reading import examine
 
     return examine.look(upload, text, cut_id, role, air)
+
+
+def read_alone(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) -> dict[str, Any]:
+    """Write the samples of an upload that comes without a campaign, and return its rate, duration and channels."""
+    from api.reading import examine
+
+    return examine.described(examine.read_upload(upload, sensors, rate))
+
+
+def recording_and_air(cut: Path, air: Path | None) -> tuple[Any, Any]:
+    """Return the kept samples of a recording and of its air cut, where there is one."""
+    from api.reading.samples import read_normalised
+
+    return read_normalised(cut), None if air is None else read_normalised(air)
 
 
 def judge(text: str, cut_id: str, cut: Path, air: Path | None) -> dict[str, Any]:

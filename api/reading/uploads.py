@@ -219,7 +219,7 @@ class Uploads:
             kept = {group: self.store.recordings.kept(group) for group in list(self.store.recordings.groups())}
             return self.files.sweep(kept)
 
-    async def attend(self) -> None:
+    async def maintain(self) -> None:
         """At the start and every hour: sweep, and judge what a crash has left without its verdict."""
         while True:
             try:

@@ -10,11 +10,11 @@ from fastapi import APIRouter, Path, Response
 from fastapi.responses import FileResponse, StreamingResponse
 
 from api.components import Components, ThisService
+from api.conventions import guard, problems
 from api.problems import Problem
-from api.routes.archives import zipped, zipped_bytes
-from api.routes.common import guard, problems
 from api.schemas.libraries import Example, Examples
 from api.security import Guarded
+from api.transfer.archives import zipped, zipped_bytes
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_campaign
 
@@ -34,9 +34,9 @@ SAMPLE, _SAMPLE_ABOUT = "sample-campaign.zip", "A campaign with two toolings: en
 
 
 @router.get("", summary="List examples", openapi_extra=guard("read"), responses=problems())
-def list_examples(parts: ThisService) -> Examples:
+def list_examples(components: ThisService) -> Examples:
     items = [Example(name=name, size_bytes=(_FOLDER / name).stat().st_size, about=about) for name, about in _ABOUT.items()]
-    members = _sample(parts)
+    members = _sample(components)
     if members:
         items.append(Example(name=SAMPLE, size_bytes=zipped_bytes(members), about=_SAMPLE_ABOUT))
     return Examples(items=items)
@@ -52,19 +52,19 @@ def list_examples(parts: ThisService) -> Examples:
         **problems(404, 422),
     },
 )
-def get_example(name: Annotated[str, Path(pattern=r"^[A-Za-z0-9.-]{1,64}$")], parts: ThisService) -> Response:
+def get_example(name: Annotated[str, Path(pattern=r"^[A-Za-z0-9.-]{1,64}$")], components: ThisService) -> Response:
     if name in _ABOUT:
         return FileResponse(_FOLDER / name, media_type=_TYPES[(_FOLDER / name).suffix], filename=name)
-    members = _sample(parts) if name == SAMPLE else []
+    members = _sample(components) if name == SAMPLE else []
     if not members:
         raise Problem(404, "there is no such example")
     headers = {"Content-Disposition": f'attachment; filename="{SAMPLE}"'}
     return StreamingResponse(zipped(members), media_type=_TYPES[".zip"], headers=headers)
 
 
-def _sample(parts: Components) -> list[tuple[str, Folder]]:
+def _sample(components: Components) -> list[tuple[str, Folder]]:
     """What the folder of the settings holds of a campaign, by name in the archive; nothing where there is none."""
-    folder = parts.settings.examples
+    folder = components.settings.examples
     try:
         campaign = read_campaign(folder)
         with (folder / "campaign.toml").open("rb") as file:

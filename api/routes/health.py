@@ -8,8 +8,8 @@ from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
 from api.components import ThisService
+from api.conventions import problems
 from api.problems import Problem
-from api.routes.common import problems
 from api.schemas.common import Answer
 
 router = APIRouter(tags=["health"])
@@ -27,13 +27,13 @@ async def health() -> State:
 
 
 @router.get("/ready", summary="Whether store and workers answer", responses=problems(503, always=()))
-def ready(parts: ThisService) -> State:
-    parts.store.check()
-    if not parts.work.ready:
+def ready(components: ThisService) -> State:
+    components.store.check()
+    if not components.work.ready:
         raise Problem(503, "workers are starting", headers={"Retry-After": "2"})
-    if not parts.streams.host.ready:
+    if not components.streams.host.ready:
         raise Problem(503, "the process of the streams is starting", headers={"Retry-After": "2"})
-    if parts.crew is not None and not parts.crew.ready:
+    if components.supervisor is not None and not components.supervisor.ready:
         raise Problem(503, "no worker for jobs is alive: those that are accepted wait", headers={"Retry-After": "5"})
     return State(status="ok")
 
@@ -44,5 +44,5 @@ def ready(parts: ThisService) -> State:
     response_class=Response,
     responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}, "description": "Counters since the start."}},
 )
-def metrics(parts: ThisService) -> Response:
-    return Response(generate_latest(parts.metrics.registry), media_type=CONTENT_TYPE_LATEST)
+def metrics(components: ThisService) -> Response:
+    return Response(generate_latest(components.metrics.registry), media_type=CONTENT_TYPE_LATEST)

@@ -9,8 +9,8 @@ from fastapi import APIRouter, Query, Request
 from fastapi.concurrency import run_in_threadpool
 
 from api.components import ThisService
+from api.conventions import BODY, found_or_404, guard, problems
 from api.problems import Problem
-from api.routes.common import BODY, found_or_404, guard, problems
 from api.routes.toolings import summary
 from api.schemas.common import NAME_PATTERN
 from api.schemas.libraries import ImportAnswer, ImportedTool
@@ -52,7 +52,7 @@ _BODY = {
 )
 async def import_library(
     request: Request,
-    parts: ThisService,
+    components: ThisService,
     caller: WhoAsks,
     flute_ratio: Annotated[float, Query(ge=0.3, le=1.0, description="Diameter that bends as the fluted part, over the cutting one.")] = 0.8,
     helix_deg: Annotated[float, Query(ge=0.0, le=80.0, description="Where the library gives none.")] = 30.0,
@@ -68,22 +68,22 @@ async def import_library(
         raise Problem(413, f"a tool library has at most {LARGEST_LIBRARY // 1_000_000} MB")
     joint = None
     if contact is not None:
-        joint = found_or_404(await run_in_threadpool(parts.store.toolings.get, caller.group, contact), f"tooling {contact}").text
+        joint = found_or_404(await run_in_threadpool(components.store.toolings.get, caller.group, contact), f"tooling {contact}").text
     given = Assumptions(flute_ratio, helix_deg, stickout_mm, insertion_mm, material, None, holder)
-    entries = await parts.work.run(imported, raw, given, joint)
+    entries = await components.work.run(imported, raw, given, joint)
 
     def keep() -> list[ImportedTool]:
-        return [_kept(parts, caller.group, *entry, replace) for entry in entries]
+        return [_kept(components, caller.group, *entry, replace) for entry in entries]
 
     return ImportAnswer(items=await run_in_threadpool(keep))
 
 
-def _kept(parts: Any, group: str, name: str, text: str, assumed: tuple[str, ...], reason: str, replace: bool) -> ImportedTool:
+def _kept(components: Any, group: str, name: str, text: str, assumed: tuple[str, ...], reason: str, replace: bool) -> ImportedTool:
     """What becomes of one entry; the others do not hang on it."""
     if not reason:
         try:
             document = Document(group, name, text, json.dumps(summary(text)), digest_of(text), now())
-            parts.store.toolings.put(document, None if replace else ABSENT)
+            components.store.toolings.put(document, None if replace else ABSENT)
         except InputError as error:
             reason = str(error)
         except Stale:

@@ -13,19 +13,28 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 from api.components import Components, ThisService
+from api.conventions import BODY, CampaignId, Limit, found_or_404, guard, page, problems, tagged, unchanged
 from api.files import NORMALISED, UPLOADS
+from api.lookups import known_campaign
 from api.problems import Problem
 from api.reading import reader_tasks
 from api.reading.campaign_text import File, files_of
 from api.reading.uploads import Received
-from api.routes.body_stream import append, arriving, check_digest, complete, plain, room, told_digest, told_length
-from api.routes.campaigns import CampaignId, known_campaign
-from api.routes.common import BODY, Limit, found_or_404, guard, page, problems, tagged, unchanged
 from api.schemas.campaigns import RecordingAnswer, SignalAnswer, SpectrumAnswer
 from api.schemas.common import Page
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign, Recording
 from api.stores.entities import Taken
+from api.transfer.body_stream import (
+    announced_digest,
+    announced_length,
+    append,
+    check_digest,
+    check_room,
+    complete,
+    new_part,
+    refuse_encoded,
+)
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
 BINARY = "application/octet-stream"
@@ -51,26 +60,32 @@ _STREAM = 1 << 20
     responses={201: {"model": RecordingAnswer, "description": "It is kept."}, **problems(404, 408, 409, *BODY)},
 )
 async def put(
-    id: CampaignId, name: RecordingName, request: Request, response: Response, parts: ThisService, caller: WhoAsks, replace: Replace = False
+    id: CampaignId,
+    name: RecordingName,
+    request: Request,
+    response: Response,
+    components: ThisService,
+    caller: WhoAsks,
+    replace: Replace = False,
 ) -> RecordingAnswer:
-    campaign, name, _ = await run_in_threadpool(named, parts, caller.group, id, name)
-    digest = told_digest(request, "Repr-Digest", "Content-Digest")
-    plain(request)
-    with parts.uploads.admitted():
-        await room(parts, caller.group, told_length(request))
-        async with arriving(parts, caller.group) as part:
-            await append(request, parts, caller.group, part)
+    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
+    digest = announced_digest(request, "Repr-Digest", "Content-Digest")
+    refuse_encoded(request)
+    with components.uploads.admitted():
+        await check_room(components, caller.group, announced_length(request))
+        async with new_part(components, caller.group) as part:
+            await append(request, components, caller.group, part)
             received = await complete(part)
             check_digest(digest, received.sha256)
-            response.status_code, kept = await take(parts, campaign, name, received, replace)
+            response.status_code, kept = await take(components, campaign, name, received, replace)
     response.headers.update(tagged(kept.sha256))
     return answer(campaign, kept)
 
 
-async def take(parts: Components, campaign: Campaign, name: str, received: Received, replacing: bool) -> tuple[int, Recording]:
+async def take(components: Components, campaign: Campaign, name: str, received: Received, replacing: bool) -> tuple[int, Recording]:
     """Keep what has come, or say why not."""
     try:
-        return await parts.uploads.take(campaign, name, received, replacing)
+        return await components.uploads.take(campaign, name, received, replacing)
     except Taken:
         fault = {"field": "name", "found": name[:120], "allowed": "the same content, or ?replace=true"}
         raise Problem(409, "another content is there under this name", [fault]) from None
@@ -79,16 +94,18 @@ async def take(parts: Components, campaign: Campaign, name: str, received: Recei
 
 
 @router.get("", summary="List recordings", openapi_extra=guard("read"), responses=problems(404, 422))
-def list_recordings(id: CampaignId, parts: ThisService, caller: WhoAsks, after: AfterName = "", limit: Limit = 50) -> Page[RecordingAnswer]:
-    campaign = known_campaign(parts, caller.group, id)
-    rows, following = page(parts.store.recordings.list(caller.group, id, _form(after), limit + 1), limit, lambda row: row.name)
+def list_recordings(
+    id: CampaignId, components: ThisService, caller: WhoAsks, after: AfterName = "", limit: Limit = 50
+) -> Page[RecordingAnswer]:
+    campaign = known_campaign(components, caller.group, id)
+    rows, following = page(components.store.recordings.list(caller.group, id, _form(after), limit + 1), limit, lambda row: row.name)
     known = files_of(campaign.text)
     return Page(items=[_answer(known[row.name], row) for row in rows], next=following)
 
 
 @router.get("/{name}", summary="What was found in a recording", openapi_extra=guard("read"), responses=problems(404, 422))
-def get(id: CampaignId, name: RecordingName, response: Response, parts: ThisService, caller: WhoAsks) -> RecordingAnswer:
-    campaign, row = _kept(parts, caller.group, id, name)
+def get(id: CampaignId, name: RecordingName, response: Response, components: ThisService, caller: WhoAsks) -> RecordingAnswer:
+    campaign, row = _kept(components, caller.group, id, name)
     response.headers.update(tagged(row.sha256))
     return answer(campaign, row)
 
@@ -104,8 +121,8 @@ def get(id: CampaignId, name: RecordingName, response: Response, parts: ThisServ
         **problems(404, 422),
     },
 )
-def file(id: CampaignId, name: RecordingName, request: Request, parts: ThisService, caller: WhoAsks) -> Response:
-    _, row = _kept(parts, caller.group, id, name)
+def file(id: CampaignId, name: RecordingName, request: Request, components: ThisService, caller: WhoAsks) -> Response:
+    _, row = _kept(components, caller.group, id, name)
     if unchanged(request, row.sha256):
         return Response(status_code=304, headers=tagged(row.sha256))
     # what comes from a client is never shown as a page
@@ -114,7 +131,7 @@ def file(id: CampaignId, name: RecordingName, request: Request, parts: ThisServi
         "Content-Length": str(row.size),
         "Content-Security-Policy": "default-src 'none'; sandbox",
     }
-    path = parts.files.path(caller.group, UPLOADS, row.sha256)
+    path = components.files.path(caller.group, UPLOADS, row.sha256)
     return StreamingResponse(_read(path), media_type=BINARY, headers=tagged(row.sha256) | headers)
 
 
@@ -125,18 +142,18 @@ def _read(path: FilePath) -> Iterator[bytes]:
 
 
 @router.get("/{name}/spectrum", summary="Amplitudes over frequency", openapi_extra=guard("read"), responses=problems(404, 422))
-async def spectrum(id: CampaignId, name: RecordingName, parts: ThisService, caller: WhoAsks, points: Points = 2000) -> SpectrumAnswer:
-    _, row = await run_in_threadpool(_kept, parts, caller.group, id, name)
-    path = parts.files.path(caller.group, NORMALISED, row.normalised)
+async def spectrum(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks, points: Points = 2000) -> SpectrumAnswer:
+    _, row = await run_in_threadpool(_kept, components, caller.group, id, name)
+    path = components.files.path(caller.group, NORMALISED, row.normalised)
     speed = json.loads(row.found)["spindle_speed_rpm"]
-    return SpectrumAnswer.model_validate(await parts.work.run(reader_tasks.spectrum, path, speed, points))
+    return SpectrumAnswer.model_validate(await components.work.run(reader_tasks.spectrum, path, speed, points))
 
 
 @router.get("/{name}/signal", summary="The outline over time", openapi_extra=guard("read"), responses=problems(404, 422))
-async def signal(id: CampaignId, name: RecordingName, parts: ThisService, caller: WhoAsks, points: Points = 1000) -> SignalAnswer:
-    _, row = await run_in_threadpool(_kept, parts, caller.group, id, name)
-    path = parts.files.path(caller.group, NORMALISED, row.normalised)
-    return SignalAnswer.model_validate(await parts.work.run(reader_tasks.envelope, path, points))
+async def signal(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks, points: Points = 1000) -> SignalAnswer:
+    _, row = await run_in_threadpool(_kept, components, caller.group, id, name)
+    path = components.files.path(caller.group, NORMALISED, row.normalised)
+    return SignalAnswer.model_validate(await components.work.run(reader_tasks.envelope, path, points))
 
 
 @router.delete(
@@ -146,9 +163,9 @@ async def signal(id: CampaignId, name: RecordingName, parts: ThisService, caller
     openapi_extra=guard("upload"),
     responses=problems(404, 422),
 )
-async def forget(id: CampaignId, name: RecordingName, parts: ThisService, caller: WhoAsks) -> Response:
-    campaign, name, _ = await run_in_threadpool(named, parts, caller.group, id, name)
-    if not await parts.uploads.forget(campaign, name):
+async def forget(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks) -> Response:
+    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
+    if not await components.uploads.forget(campaign, name):
         raise Problem(404, "there is no such recording")
     return Response(status_code=204)
 
@@ -157,18 +174,18 @@ def _form(name: str) -> str:
     return unicodedata.normalize("NFC", name)
 
 
-def named(parts: Components, group: str, id: str, name: str) -> tuple[Campaign, str, File]:
+def named(components: Components, group: str, id: str, name: str) -> tuple[Campaign, str, File]:
     """Return a campaign and a recording that it names."""
-    campaign = known_campaign(parts, group, id)
+    campaign = known_campaign(components, group, id)
     found = files_of(campaign.text).get(_form(name))
     if found is None:
         raise Problem(404, "the campaign names no such recording")
     return campaign, _form(name), found
 
 
-def _kept(parts: Components, group: str, id: str, name: str) -> tuple[Campaign, Recording]:
-    campaign = known_campaign(parts, group, id)
-    return campaign, found_or_404(parts.store.recordings.get(group, id, _form(name)), "recording")
+def _kept(components: Components, group: str, id: str, name: str) -> tuple[Campaign, Recording]:
+    campaign = known_campaign(components, group, id)
+    return campaign, found_or_404(components.store.recordings.get(group, id, _form(name)), "recording")
 
 
 def answer(campaign: Campaign, row: Recording) -> RecordingAnswer:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from fastapi import APIRouter, Request, Response
 
+from api.conventions import tagged, unchanged
 from api.problems import Problem
-from api.routes.common import tagged, unchanged
 
 router = APIRouter(include_in_schema=False)
 FOLDER = Path(__file__).resolve().parents[1] / "web"
@@ -84,11 +84,11 @@ def _sent(request: Request, name: str, headers: dict[str, str]) -> Response:
     small = packs and len(file.packed) < len(file.plain)
     # two forms of one file are two entities
     digest = file.digest + ("-gzip" if small else "")
-    told = tagged(digest) | {"Vary": "Accept-Encoding"} | headers
+    all_headers = tagged(digest) | {"Vary": "Accept-Encoding"} | headers
     if unchanged(request, digest):
-        return Response(status_code=304, headers=told)
+        return Response(status_code=304, headers=all_headers)
     return Response(
-        file.packed if small else file.plain, media_type=file.kind, headers=told | ({"Content-Encoding": "gzip"} if small else {})
+        file.packed if small else file.plain, media_type=file.kind, headers=all_headers | ({"Content-Encoding": "gzip"} if small else {})
     )
 
 

@@ -11,12 +11,10 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 from api.components import Components, ThisService
+from api.conventions import BODY, Repeat, guard, problems
 from api.jobs.lobes import asked
-from api.problems import Problem
-from api.routes import jobs
-from api.routes.common import BODY, guard, problems
-from api.routes.machines import Repeat, known_machine
-from api.routes.toolings import toml_text
+from api.live import jobs
+from api.lookups import known_machine, tooling_text
 from api.schemas.jobs import JobAnswer, LobeJob
 from api.schemas.queries import AdviceAnswer, AdviceQuery, LobeAnswer, LobeQuery, TipAnswer, TipQuery
 from api.schemas.toolings import ToolingKeys
@@ -137,13 +135,3 @@ async def _subject(parts: Components, group: str, machine: str, toolings: list[s
         return known, [tooling_text(parts, group, tooling, i + 1) for i, tooling in enumerate(toolings)]
 
     return await run_in_threadpool(look)
-
-
-def tooling_text(parts: Components, group: str, tooling: str | ToolingKeys, number: int = 1) -> ToolingText:
-    """Return a tooling from the library, or as it came; without a name it has a number."""
-    if isinstance(tooling, ToolingKeys):
-        return ToolingText(tooling.name or f"tooling {number}", toml_text(tooling))
-    document = parts.store.toolings.get(group, tooling)
-    if document is None:
-        raise Problem(404, f"there is no tooling {tooling}")
-    return ToolingText(tooling, document.text)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, StringConstraints
@@ -9,6 +11,8 @@ from pydantic import ConfigDict, Field, StringConstraints
 from api.schemas.common import Answer, Body, Fault, Line
 from api.schemas.toolings import EXAMPLE as TOOLING
 from api.schemas.toolings import Text, ToolingKeys
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.signals.recording import Quantity, Sensor
 
 FileName = Annotated[str, StringConstraints(min_length=1, max_length=1000)]
 
@@ -45,15 +49,35 @@ class HeadKeys(Body):
 
 
 class SensorKeys(Body):
-    """[sensors.CHANNEL]; the key is the channel's name in the recordings"""
+    """A sensor as [sensors.CHANNEL] of campaign.toml; the key is the channel's name in the recordings."""
 
     quantity: Literal["displacement", "acceleration", "trigger", "force"]
     axis: Literal["X", "Y", "Z"] | None = None
-    sensitivity: float | None = Field(None, description="V/m, V/(m/s^2), V/N; 1 where the file is in SI.")
-    delay_s: float | None = None
-    bandwidth_hz: float | None = None
-    pulses_per_revolution: int | None = None
-    tooth_angle_deg: float | None = None
+    sensitivity: float | None = Field(
+        None, ge=-1e12, le=1e12, description="Signal per quantity: V/m, V/(m/s^2), V/N; 1 where the file is in SI."
+    )
+    delay_s: float | None = Field(None, ge=-1.0, le=1.0)
+    bandwidth_hz: float | None = Field(None, gt=0.0)
+    pulses_per_revolution: int | None = Field(None, ge=1, le=100_000)
+    tooth_angle_deg: float | None = Field(None, ge=-360.0, le=360.0)
+
+    def sensor(self, name: str) -> Sensor:
+        """Return the sensor of a channel."""
+        return Sensor(
+            name,
+            Quantity(self.quantity),
+            None if self.axis is None else Dof(self.axis.lower()),
+            1.0 if self.sensitivity is None else self.sensitivity,
+            0.0 if self.delay_s is None else self.delay_s,
+            self.bandwidth_hz,
+            1 if self.pulses_per_revolution is None else self.pulses_per_revolution,
+            None if self.tooth_angle_deg is None else math.radians(self.tooth_angle_deg),
+        )
+
+
+def given_sensors(keys: Mapping[str, SensorKeys] | None) -> tuple[Sensor, ...]:
+    """Return the sensors that a query brings."""
+    return tuple(each.sensor(name) for name, each in (keys or {}).items())
 
 
 class WorkpieceKeys(Body):

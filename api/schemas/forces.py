@@ -7,15 +7,14 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, StringConstraints
 
+from api.schemas.campaigns import SensorKeys
 from api.schemas.common import Answer, Body, Id, Line
 from api.schemas.queries import Angle, Depth, Percent, Tooling, Turn
 from api.schemas.toolings import EXAMPLE
 from api.work.forces import ForceQuestion, WornQuestion
 from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import FEED_DIRECTIONS
-from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.units import from_rpm
 
 MOST_CHANNELS = 32
@@ -27,26 +26,6 @@ Method = Literal["resonators", "paper"]
 #: Last part of a path, as campaigns name their recordings; no control characters.
 FileName = Annotated[str, StringConstraints(min_length=1, max_length=255, pattern=r"^[^\x00-\x1f\x7f/\\]+$")]
 Axis = Literal["X", "Y"]
-
-
-class SensorKeys(Body):
-    """A sensor as in campaign.toml."""
-
-    quantity: Literal["displacement", "acceleration", "trigger", "force"]
-    axis: Literal["X", "Y", "Z"] | None = None
-    sensitivity: Annotated[float, Field(ge=-1e12, le=1e12, description="Signal per quantity: V/m, V/(m/s^2), V/N.")] = 1.0
-    delay_s: Annotated[float, Field(ge=-1.0, le=1.0)] = 0.0
-    bandwidth_hz: Annotated[float | None, Field(gt=0.0, le=1e9)] = None
-    pulses_per_revolution: Annotated[int, Field(ge=1, le=10_000)] = 1
-    tooth_angle_deg: Annotated[float | None, Field(ge=-360.0, le=360.0)] = None
-
-    def sensor(self, name: str) -> Sensor:
-        """Return the sensor."""
-        angle = None if self.tooth_angle_deg is None else math.radians(self.tooth_angle_deg)
-        axis = None if self.axis is None else Dof(self.axis.lower())
-        return Sensor(
-            name, Quantity(self.quantity), axis, self.sensitivity, self.delay_s, self.bandwidth_hz, self.pulses_per_revolution, angle
-        )
 
 
 Sensors = Annotated[

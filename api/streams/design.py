@@ -107,7 +107,7 @@ def _planned(
     plan = Plan(live_observer(found, recording, follow), gap, shaken, len(kinds), first, order)
     deviation = found.estimate.standard_deviation
     delay = max(found.response[axis].delay_at_lines for axis in found.response) * recording.rate
-    told = {
+    ready = {
         "axes": list(question.axes),
         "sampling_rate_hz": recording.rate,
         "spindle_speed_rpm": to_rpm(found.spindle_speed),
@@ -117,4 +117,4 @@ def _planned(
         "first": first,
         "notes": list(found.notes),
     }
-    return pickle.dumps(plan), told
+    return pickle.dumps(plan), ready

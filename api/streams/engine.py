@@ -5,11 +5,15 @@ from __future__ import annotations
 import pickle
 import struct
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
+
+if TYPE_CHECKING:
+    # loads the observers, which this module needs in the process of the streams alone
+    from rcsa_ident.workflows.stream_forces import LiveObserver, LiveState
 
 #: kind, session, first index, time of arrival [s], two numbers of the answer, bytes that follow.
 HEADER = struct.Struct("<BQQdddI")
@@ -81,7 +85,7 @@ class Plan:
         Places of the observer's axes in the answer's columns.
     """
 
-    observer: Any
+    observer: LiveObserver
     gap: tuple[Column, ...]
     acceleration: tuple[Column | None, ...]
     channels: int
@@ -100,13 +104,13 @@ class Engine:
     """All sessions of the process."""
 
     def __init__(self) -> None:
-        self.sessions: dict[int, tuple[Plan, Any]] = {}
+        self.sessions: dict[int, tuple[Plan, LiveState]] = {}
 
     def answer(self, message: Message) -> Message | None:
         """Return what a message is answered with; what fails ends its session alone."""
         try:
             if message.kind == OPEN:
-                plan = pickle.loads(message.content)
+                plan: Plan = pickle.loads(message.content)
                 self.sessions[message.session] = plan, plan.observer.init()
             elif message.kind == CLOSE:
                 self.sessions.pop(message.session, None)

@@ -9,10 +9,11 @@ import logging
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
+from api.metrics import Metrics
 from api.streams.engine import BLOCK, CLOSE, FAILED, FORCES, OPEN, REFUSED, Message
 from api.streams.listener import Listener
 from api.streams.process import Host
@@ -23,16 +24,6 @@ log = logging.getLogger("rcsa_ident.service")
 #: Frames of a session in a second: each costs the service as much as hundreds of samples.
 MOST_FRAMES = 2000
 _UNEXPECTED = "something unexpected happened; the log has it under this session"
-
-
-class Told(Protocol):
-    """Who counts."""
-
-    def streamed(self, samples: int, delay: float) -> None:
-        """So many samples have got a force, the newest so long after it came [s]."""
-
-    def missed(self, lost: int, dropped: int) -> None:
-        """So many samples never came, or were thrown away."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +58,11 @@ class Hub:
     ----------
     host : Host
     limits : StreamLimits
-    told : Told
+    metrics : Metrics
     """
 
-    def __init__(self, host: Host, limits: StreamLimits, told: Told) -> None:
-        self.host, self.limits, self.told = host, limits, told
+    def __init__(self, host: Host, limits: StreamLimits, metrics: Metrics) -> None:
+        self.host, self.limits, self.metrics = host, limits, metrics
         self.sessions: dict[str, Session] = {}
         self.numbers = itertools.count(1)
         self.by_number: dict[int, Session] = {}
@@ -123,21 +114,21 @@ class Hub:
         if self.sessions.pop(session.about.id, None) is not None:
             self.by_number.pop(session.number, None)
             self.host.post(Message(CLOSE, session.number))
-            self.told.missed(0, session.held)
+            self.metrics.missed(0, session.held)
 
     def offer(self, session: Session, first: int, samples: FloatArray) -> None:
         """Take a frame of a session's client."""
         session.frames += 1
         lost = session.counts.lost
         dropped = session.offer(first, samples, time.monotonic())
-        self.told.missed(session.counts.lost - lost, dropped)
+        self.metrics.missed(session.counts.lost - lost, dropped)
         self._feed(session)
 
     def begin(self, session: Session, plan: bytes, origin: int, ready: Mapping[str, Any]) -> None:
         """Stream: an observer is there, and begins at a sample that waits."""
         if session.stage is Stage.ENDED:
             return
-        self.told.missed(0, session.skip(origin))
+        self.metrics.missed(0, session.skip(origin))
         session.plan, session.stage, session.ready = plan, Stage.LIVE, dict(ready)
         session.notes = list(ready.get("notes", ()))
         self.host.post(Message(OPEN, session.number, content=plan))
@@ -166,13 +157,13 @@ class Hub:
             delay = time.monotonic() - message.arrived
             session.drift, session.known = message.drift, message.known > 0.0
             session.forces(message.first, values, delay)
-            self.told.streamed(values.shape[0], delay)
+            self.metrics.streamed(values.shape[0], delay)
             self._feed(session)
 
     def _anew(self) -> None:
         for session in list(self.sessions.values()):
             if session.stage is Stage.LIVE:
-                self.told.missed(0, session.lost_process())
+                self.metrics.missed(0, session.lost_process())
                 self.host.post(Message(OPEN, session.number, content=session.plan))
                 for listener in session.listeners:
                     listener.tell("restarted", detail="the observer begins anew")

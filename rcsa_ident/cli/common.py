@@ -33,6 +33,10 @@ _OPTIONS = {
     "frf": ("frf", "X=FILE, Y=FILE, XY=FILE for a response in X and a force in Y; FILE#3 is record 3 of the file"),
     "frf_units": ("frf_units", ""),
     "stickout": ("stickout_mm", ""),
+    "tangential coefficient": ("ktc_mpa", "in MPa"),
+    "radial ratio": ("krc", ""),
+    "runout": ("runout_um", "in um"),
+    "feed_per_tooth": ("feed_per_tooth_mm", "in mm"),
 }
 
 Command = TypeVar("Command", bound=Callable[..., Any])

@@ -48,7 +48,7 @@ def compare(
     """Show a hammer test of the idle machine beside the dynamics identified in process."""
     import numpy as np
 
-    from rcsa_ident.cli.results import read_machine_over_speed
+    from rcsa_ident.cli.results import read_machine, tell
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.errors import InputError, positive
     from rcsa_ident.io.hammer import labelled, read_hammer
@@ -66,14 +66,15 @@ def compare(
             if key in tests:
                 raise InputError("--hammer", f"two tests {place} {axis}", "one for each place and axis", str(path))
             tests[key] = (from_hz(np.asarray(frequency)), values)
-    machine, data = read_machine_over_speed(result)
+    machine = read_machine(result)
+    tell(machine, result)
     omega = None if speed is None else from_rpm(positive("--speed", speed, "rev/min"))
-    band = from_hz(data["band_hz"][0]), from_hz(data["band_hz"][1])
     stages = Stages(quiet=json_)
     with stages.stage("comparison"):
-        found = run(machine.at(omega), tests, read_tooling(tooling).assembly, band, omega)
+        found = run(machine, tests, read_tooling(tooling).assembly, omega)
     if out is not None:
-        _draw(found, out, (data["band_hz"][0], data["band_hz"][1]), real_imaginary)
+        assert machine.band is not None
+        _draw(found, out, (to_hz(machine.band[0]), to_hz(machine.band[1])), real_imaginary)
     if json_:
         emit({"responses": [_row(each) for each in found], "seconds": stages.seconds, "out": None if out is None else str(out)})
         return

@@ -121,10 +121,11 @@ def _supports(path: Path) -> tuple[dict[Dof, Support], tuple[float, float]]:
         edges = [f.band for f in flanges.values()]
         band = to_hz(max(e[0] for e in edges)), to_hz(min(e[1] for e in edges))
         return {axis: Support(flange, rigid) for axis, flange in flanges.items()}, band
-    from rcsa_ident.cli.results import read_machine
+    from rcsa_ident.cli.results import read_identified, tell
 
-    machine, data = read_machine(path)
-    return {axis: Support(part.spindle, part.joint) for axis, part in machine.items()}, (data["band_hz"][0], data["band_hz"][1])
+    machine, data = read_identified(path)
+    tell(machine, path)
+    return {axis: Support(part.spindle, part.joint) for axis, part in machine.identified.items()}, (data["band_hz"][0], data["band_hz"][1])
 
 
 def _remarks(found: ContactCalibration, taps: list[TapTest]) -> list[str]:

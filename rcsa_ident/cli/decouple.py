@@ -13,6 +13,8 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.units import from_hz, to_hz
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rcsa_ident.coupling.flange_fit import DecoupledFlange
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.posterior import MachineAxis
@@ -53,11 +55,13 @@ def decouple(
     if plot is not None:
         writable(plot, "--plot")
     share = positive("--least-damping", least_damping, "%") / 100.0
-    machine: dict[Dof, MachineAxis] = {}
+    machine: Mapping[Dof, MachineAxis] = {}
     if beside is not None:
-        from rcsa_ident.cli.results import read_machine
+        from rcsa_ident.cli.results import read_identified, tell
 
-        machine = read_machine(beside)[0]
+        identified = read_identified(beside)[0]
+        tell(identified, beside)
+        machine = identified.identified
     taps = _taps(tap, positive("--from", from_, "Hz"), math.inf if to is None else positive("--to", to, "Hz"))
     stages = Stages(quiet=json_)
     with stages.stage("decoupling"):
@@ -132,7 +136,7 @@ def _summary(found: DecoupledFlange) -> dict[str, Any]:
     }
 
 
-def _draw(found: dict[Dof, DecoupledFlange], machine: dict[Dof, MachineAxis], path: Path) -> None:
+def _draw(found: dict[Dof, DecoupledFlange], machine: Mapping[Dof, MachineAxis], path: Path) -> None:
     from rcsa_ident.report.comparison import FlangePair, flange_comparison, save
 
     axis, first = next(iter(found.items()))

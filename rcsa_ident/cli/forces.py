@@ -15,8 +15,10 @@ from rcsa_ident.errors import InputError, positive
 from rcsa_ident.units import from_hz, from_rpm, to_hz, to_rpm
 
 if TYPE_CHECKING:
+    from rcsa_ident.machine.machine import Machine
     from rcsa_ident.machining_setup import Tooling
     from rcsa_ident.observer.wear import WearIndicators
+    from rcsa_ident.signals.recording import Sensor
     from rcsa_ident.workflows.estimate_forces import MonitoredCut
 
 
@@ -29,7 +31,9 @@ class ObserverName(StrEnum):
 
 @answers
 def forces(
-    result: Annotated[Path, typer.Argument(help="RESULT.json of an identification.", show_default=False)],
+    result: Annotated[
+        Path, typer.Argument(help="RESULT.json of an identification, or FLANGE.csv of a measured flange.", show_default=False)
+    ],
     tooling: Annotated[Path, typer.Argument(help="TOOLING.toml that was cut with.", show_default=False)],
     recording: Annotated[Path, typer.Argument(help="Recording of the cut; channels as in the campaign.", show_default=False)],
     out: Annotated[Path, typer.Option(help="FORCES.csv to write, N.", show_default=False)],
@@ -56,6 +60,10 @@ def forces(
             show_default=False,
         ),
     ] = None,
+    sensors: Annotated[
+        Path | None,
+        typer.Option(metavar="CAMPAIGN", help="Folder of a campaign whose sensors recorded it; default: the result's.", show_default=False),
+    ] = None,
     sampling_rate_hz: Annotated[float | None, typer.Option(help="Of a recording that carries no rate, Hz.", show_default=False)] = None,
     wear: Annotated[
         Path | None,
@@ -69,8 +77,8 @@ def forces(
     json_: Json = False,
 ) -> None:
     """Estimate the cutting forces of a recording from the flange's vibration."""
-    from rcsa_ident.cli.results import read_machine_over_speed
-    from rcsa_ident.io.forces import sensors_of_result, write_forces_csv
+    from rcsa_ident.cli.results import read_machine, tell
+    from rcsa_ident.io.forces import write_forces_csv
     from rcsa_ident.io.recordings import read_recording
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.observer.force import restore_mean_force
@@ -87,17 +95,17 @@ def forces(
     programmed = None if speed_rpm is None else from_rpm(positive("--speed-rpm", speed_rpm, "rev/min"))
     bandwidth = None if bandwidth_hz is None else from_hz(positive("--bandwidth-hz", bandwidth_hz, "Hz"))
     rate = None if sampling_rate_hz is None else positive("--sampling-rate-hz", sampling_rate_hz, "Hz")
-    machine, data = read_machine_over_speed(result)
-    setup, sensors = read_tooling(tooling), sensors_of_result(data, str(result))
+    machine = read_machine(result)
+    tell(machine, result)
+    setup, known = read_tooling(tooling), _sensors(machine, sensors, result)
     stages = Stages(quiet=json_)
     with stages.stage("recordings"):
-        cut = read_recording(recording, sensors, rate)
-        still = None if air is None else read_recording(air, sensors, rate)
+        cut = read_recording(recording, known, rate)
+        still = None if air is None else read_recording(air, known, rate)
     method = Resonators() if observer is ObserverName.resonators else PaperWalk()
     with stages.stage("forces"):
-        low, high = (from_hz(f) for f in data["band_hz"])
         try:
-            found = observe(machine, setup.assembly, setup.cutter.teeth, cut, still, (low, high), programmed, method, bandwidth, smooth)
+            found = observe(machine, setup.assembly, setup.cutter.teeth, cut, still, programmed, method, bandwidth, smooth)
         except InputError as error:
             raise error if error.where else error.at(str(recording)) from None
     level = None
@@ -143,6 +151,18 @@ def forces(
     if worn and not worn["separable"]:
         warn("the harmonics in the band do not tell the coefficients from each other: only their sum means something")
     say(f"written: {out} ({estimate.force.shape[0]} samples, {stages.seconds['forces']:.2f} s)")
+
+
+def _sensors(machine: Machine, campaign: Path | None, result: Path) -> tuple[Sensor, ...]:
+    """The sensors of the recording: those of a campaign, else those that the machine was identified with."""
+    from rcsa_ident.identification.machine import IdentifiedMachine
+    from rcsa_ident.io.setups import read_campaign
+
+    if campaign is not None:
+        return read_campaign(campaign).sensors
+    if isinstance(machine, IdentifiedMachine) and machine.sensors:
+        return machine.sensors
+    raise InputError("sensors", "none", "--sensors CAMPAIGN, or a result that says which sensors it was identified with", str(result))
 
 
 def _summary(found: MonitoredCut, observer: str, smooth: bool) -> dict[str, Any]:

@@ -12,22 +12,14 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
+from rcsa_ident.stability.methods import MethodName
+
 
 class Strategy(StrEnum):
     """Which way the teeth enter."""
 
     up = "up"
     down = "down"
-
-
-class LobeMethod(StrEnum):
-    """Stability methods by name."""
-
-    zero_order = "zero-order"
-    multi_frequency = "multi-frequency"
-    semi_discretisation = "semi-discretisation"
-    full_discretisation = "full-discretisation"
-    time_domain = "time-domain"
 
 
 def takes_groups(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -66,7 +58,7 @@ StiffnessSpread = Annotated[
 
 @dataclass(frozen=True, slots=True)
 class TipOptions:
-    """Where the tip's dynamics come from, beside RESULT.json."""
+    """Where the tip's dynamics come from, in place of a machine."""
 
     modes: Annotated[
         Path | None,
@@ -148,7 +140,7 @@ class SpeedOptions:
         ),
     ] = None
     max_depth_mm: Annotated[float, typer.Option(help="Depths beyond it are not of interest, mm.", rich_help_panel=_SPEEDS)] = 10.0
-    method: Annotated[LobeMethod, typer.Option(help="How the limit is found.", rich_help_panel=_SPEEDS)] = LobeMethod.zero_order
+    method: Annotated[MethodName, typer.Option(help="How the limit is found.", rich_help_panel=_SPEEDS)] = MethodName.ZERO_ORDER
 
 
 @dataclass(frozen=True, slots=True)

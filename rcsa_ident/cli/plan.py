@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rcsa_ident.cutting.coefficients import CuttingCoefficients
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.experiment_design import Goal
-    from rcsa_ident.identification.posterior import MachineAxis
+    from rcsa_ident.identification.machine import IdentifiedMachine
     from rcsa_ident.workflows.plan import PlannedCut, PlannedCuts
 
 #: Recordings of a campaign that its noise is learned from.
@@ -71,13 +71,14 @@ def plan(
     json_: Json = False,
 ) -> None:
     """Choose the stable cuts that tell most about the tooltips that are wanted, and say what they will be good for."""
-    from rcsa_ident.cli.results import read_machine
+    from rcsa_ident.cli.results import read_identified, tell
     from rcsa_ident.io.files import write_text
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.workflows.plan import CutConstraints, plan_cuts
 
     writable(out)
-    machine, data = read_machine(result)
+    machine, data = read_identified(result)
+    tell(machine, result)
     wanted = None if band is None else 1e-2 * positive("--band", band, "%")
     allowed = CutConstraints(
         *_speeds(machine, speed_from, speed_to),
@@ -161,9 +162,9 @@ def _depths(text: str) -> tuple[float, ...]:
         raise InputError("--depths-mm", text, "numbers with commas between them [mm]") from None
 
 
-def _speeds(machine: dict[Dof, MachineAxis], lowest: float | None, highest: float | None) -> tuple[float, float]:
+def _speeds(machine: IdentifiedMachine, lowest: float | None, highest: float | None) -> tuple[float, float]:
     """The speeds asked for, those of the campaign where nothing is said [rad/s]."""
-    middle, half = next((p.posterior.speed_range for p in machine.values() if p.posterior is not None), (0.0, 0.0))
+    middle, half = next((p.posterior.speed_range for p in machine.identified.values() if p.posterior is not None), (0.0, 0.0))
     found = []
     for name, given, known in (("--speed-from", lowest, middle - half), ("--speed-to", highest, middle + half)):
         if given is None and known <= 0.0:
@@ -179,9 +180,10 @@ def _coefficients(data: dict[str, Any], where: str) -> CuttingCoefficients:
     from dataclasses import replace
 
     from rcsa_ident.cutting.force import SLOPES
-    from rcsa_ident.io.identifications import workpiece_from_json
+    from rcsa_ident.io.validated_table import Table
+    from rcsa_ident.io.workpieces import workpiece_of
 
-    given = workpiece_from_json(data, where).coefficients
+    given = workpiece_of(Table(data, where).table("workpiece")).coefficients
     found = data.get("coefficients", {})
     known = {}
     for name, spread in zip(SLOPES, ("tangential_spread", "ratio_spread"), strict=False):
@@ -190,8 +192,8 @@ def _coefficients(data: dict[str, Any], where: str) -> CuttingCoefficients:
     return replace(given, **known)
 
 
-def _model_errors(machine: dict[Dof, MachineAxis], data: dict[str, Any]) -> dict[Dof, float]:
-    return {axis: float(data["axes"][axis.upper()].get("model_error", 0.0)) for axis in machine}
+def _model_errors(machine: IdentifiedMachine, data: dict[str, Any]) -> dict[Dof, float]:
+    return {axis: float(data["axes"][axis.upper()].get("model_error", 0.0)) for axis in machine.identified}
 
 
 def _goal(name: GoalName) -> Goal:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics._kernels import pole_sum
 from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.poles import PoleResidue, pair_sum
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 
@@ -111,13 +113,17 @@ class ModalModel:
 
     def receptance(self, omega: FloatArray) -> Receptance:
         """Return the receptance between all coordinates."""
-        omega = frozen(omega)
-        m, d = self.phi.shape
-        residues = np.einsum("mp,mq->mpq", self.phi, self.phi).reshape(m, d * d)
-        both = np.concatenate([residues, residues.conj()])
-        values = pole_sum(omega, np.concatenate([self.pole, self.pole.conj()]), both)
-        values = values.reshape(omega.size, d, d) + self.residual
+        values = pair_sum(omega, self.pole, np.einsum("mp,mq->mpq", self.phi, self.phi)) + self.residual
         return Receptance(omega, values, self.coordinates, self.coordinates)
+
+    def pole_residue(self) -> PoleResidue:
+        """Return the same as poles and residues between all coordinates."""
+        return PoleResidue(self.pole, self.phi.T, self.phi, self.residual)
+
+    def to_control(self) -> Any:
+        """Return the model as python-control's ``StateSpace``: forces in, displacements out, both named after the coordinates."""
+        names = [str(each) for each in self.coordinates]
+        return self.pole_residue().to_control(names, names)
 
 
 def normal_modes(

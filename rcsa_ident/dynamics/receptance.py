@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -97,6 +97,31 @@ class Receptance:
         low, high = (w / (2.0 * np.pi) for w in (self.omega.min(initial=np.inf), self.omega.max(initial=-np.inf)))
         between = ", ".join(str(c) for c in self.rows) + ("" if self.rows == self.cols else " over " + ", ".join(str(c) for c in self.cols))
         return f"<{type(self).__name__} {between}: {self.omega.size} frequencies, {low:.0f} to {high:.0f} Hz>"
+
+    def to_control(self, tolerance: float = 1e-3) -> Any:
+        """Return a rational fit as python-control's ``StateSpace``: forces in, displacements out, both named after the coordinates.
+
+        Parameters
+        ----------
+        tolerance : float
+            Norm of the misfit, as a share of the values' own.
+
+        Raises
+        ------
+        InputError
+            If rows and columns differ, or no fit is within the tolerance.
+        """
+        # late: whoever reads receptances needs no compiled kernels
+        from rcsa_ident.dynamics.rational import fitted_poles
+
+        if self.rows != self.cols:
+            raise InputError("receptance", "rows that are not its columns", "displacements where the forces act")
+        # each value counts relative to its own size in the fit, the largest most in the norm
+        fit, error = fitted_poles(self.omega, self.values, 0.5 * tolerance)
+        if error > tolerance:
+            raise InputError("tolerance", tolerance, f"{error:.2g} or more: no fit with 60 poles or fewer comes nearer")
+        names = [str(each) for each in self.rows]
+        return fit.to_control(names, names)
 
 
 def _at(coordinates: tuple[Coordinate, ...], point: str) -> np.ndarray:

@@ -1,7 +1,8 @@
-"""Linear systems in state space: in continuous time or sampled, and in real modal form."""
+"""Linear systems in state space, in continuous time or sampled; the door to python-control."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,31 +100,35 @@ class StateSpace:
             return StateSpace(decay, decay @ ramp + kept - ramp, self.C, self.D + self.C @ ramp, step)
         raise InputError("hold", hold, "zero-order or first-order")
 
-    def modal(self) -> StateSpace:
-        """Return the same system with A in blocks of one (real pole) or two (pair of poles) states.
+    @classmethod
+    def from_control(cls, system: Any) -> StateSpace:
+        """Return a linear system of python-control: a state space, or a transfer function of one input and one output.
 
         Raises
         ------
         InputError
-            If poles coincide so closely that their states cannot be told apart.
+            If it is sampled, and nobody knows how fast.
         """
-        values, right = np.linalg.eig(self.A)
-        keep = values.imag >= 0.0
-        values, right = values[keep], right[:, keep]
-        columns = [part for value, shape in zip(values, right.T, strict=True) for part in _real_columns(value, shape)]
-        basis = np.stack(columns, axis=1) if columns else np.zeros((0, 0))
-        if basis.shape[1] != self.order or (self.order and np.linalg.cond(basis) > 1e12):
-            raise InputError("poles", values.tolist(), "poles that differ")
-        return StateSpace(np.linalg.solve(basis, self.A @ basis), np.linalg.solve(basis, self.B), self.C @ basis, self.D, self.step)
-
-    def to_control(self) -> Any:
-        """Return the system as python-control's ``StateSpace``, for its plots, its transfer functions and its design methods."""
         import control
 
-        return control.ss(self.A, self.B, self.C, self.D, self.step) if self.step else control.ss(self.A, self.B, self.C, self.D)
+        if system.dt is True:
+            raise InputError("dt", "not known", "0, or the time between samples [s]")
+        found = control.ss(system)
+        return cls(found.A, found.B, found.C, found.D, float(found.dt or 0.0))
 
+    def to_control(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Any:
+        """Return the system as python-control's ``StateSpace``, for its feedback, its plots and its design methods.
 
-def _real_columns(value: complex, shape: ComplexArray) -> tuple[FloatArray, ...]:
-    if value.imag == 0.0:
-        return (shape.real,)
-    return shape.real, -shape.imag
+        Parameters
+        ----------
+        inputs, outputs : sequence of str, optional
+            Names of the signals; a dot becomes an underscore, since python-control reserves it.
+        """
+        import control
+
+        names = {
+            key: [name.replace(".", "_") for name in given]
+            for key, given in (("inputs", inputs), ("outputs", outputs))
+            if given is not None
+        }
+        return control.ss(self.A, self.B, self.C, self.D, self.step, **names)

@@ -75,8 +75,10 @@ class UncertainReceptance(Receptance):
         found = np.zeros((sum(len(part.change) for part in parts), self.omega.size, r, r), dtype=complex)
         first = 0
         for part in parts:
-            own = np.arange(first, first + len(part.change))
-            found[np.ix_(own, np.arange(self.omega.size), part.members, part.members)] = part.change
+            own = slice(first, first + len(part.change))
+            for i, row in enumerate(part.members):
+                for j, col in enumerate(part.members):
+                    found[own, :, row, col] = part.change[:, :, i, j]
             first += len(part.change)
         return found
 

@@ -7,16 +7,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.cutting.force import SLOPES
-from rcsa_ident.dynamics.coordinates import plane
-from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import JOINT
-from rcsa_ident.identification.posterior import Posterior, spread
+from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.machine.flange_part import Candidate
 
 #: Above this share of unexplained signal the force model or the recordings are wrong.
 WORST_MODEL_ERROR = 0.02
@@ -37,7 +35,20 @@ _JOINT = ("translational stiffness", "rotational stiffness", "translational damp
 def diagnose(
     data: IdentificationData, searched: list[AxisSearch], solution: Solution, misfit: Misfit, posteriors: Sequence[Posterior]
 ) -> list[str]:
-    """Return the reasons for `suspect`; `posteriors` are those of the axes."""
+    """Return the reasons for `suspect`.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    searched : list of AxisSearch
+        One for each axis.
+    solution : Solution
+        All axes together.
+    misfit : Misfit
+        The one whose minimum it is.
+    posteriors : sequence of Posterior
+        One for each axis.
+    """
     reasons = []
     if not solution.converged:
         reasons.append(f"not converged: the joint fit was still improving after {solution.steps} steps")
@@ -83,7 +94,16 @@ def diagnose(
 
 
 def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covariance: FloatArray) -> list[str]:
-    """Return what the data cannot tell, and what was done about single cuts."""
+    """Return what the data cannot tell, and what was done about single cuts.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    solution : Solution
+    misfit : Misfit
+    covariance : array, shape (p, p)
+        Covariance of all unknowns.
+    """
     words = []
     layout, priors = solution.layout, misfit.priors
     deviation = np.sqrt(np.diag(covariance))
@@ -121,32 +141,30 @@ def _named(data: IdentificationData, bad: np.ndarray, misfit: Misfit) -> str:
     return ", ".join(f"{data.cut_ids[k]} ({1.0 / misfit.cut_weight[k]:.0f} times its variance)" for k in worst[:5]) + rest
 
 
-def _machine_contribution(axis: AxisData) -> Callable[[ModalModel, LumpedJoint], ComplexArray]:
+def _machine_contribution(axis: AxisData) -> Callable[[Candidate], ComplexArray]:
     """What a tooltip feels of the machine, a^T (A22 + K^-1 + B)^-1 a with a = A21 of the cut toolings, at the axis' lines."""
     lever = np.array([[1.0, LEVER], [LEVER, LEVER**2]])
     flange = axis.flange[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
-    directions = tuple(c.dof for c in plane("flange", axis.axis))
 
-    def felt(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
-        soft = joint.compliance_along(axis.omega, directions)[:, :, None] * np.eye(2)
-        together = flange + lever * (soft + modes.receptance(axis.omega).values)
+    def contribution(machine: Candidate) -> ComplexArray:
+        together = flange + lever * machine.interface(axis.omega)
         return np.einsum("ni,ni->n", axis.tip, np.linalg.solve(together, axis.tip[:, :, None])[:, :, 0])
 
-    return felt
+    return contribution
 
 
 def _band(posterior: Posterior, axis: AxisData) -> float:
     """Relative standard deviation of what a tooltip feels of the machine."""
-    felt = _machine_contribution(axis)
-    value = felt(*posterior.machine(axis.axis))
-    return float(np.linalg.norm(spread(posterior, axis.axis, felt)) / max(float(np.linalg.norm(value)), 1e-300))
+    value, changes = posterior.part(axis.axis).response(_machine_contribution(axis))
+    assert changes is not None
+    return float(np.linalg.norm(changes) / max(float(np.linalg.norm(value)), 1e-300))
 
 
 def _difference(axis: AxisData, one: Solution, two: Solution) -> tuple[float, float]:
     """Relative difference of two solutions in what a tooltip feels, and the first one's deviation."""
-    felt = _machine_contribution(axis)
+    contribution = _machine_contribution(axis)
     first, second = (_flange_posterior(s) for s in (one, two))
-    value, other = felt(*first.machine(axis.axis)), felt(*second.machine(axis.axis))
+    value, other = (contribution(each.candidate(axis.axis)) for each in (first, second))
     size = np.linalg.norm(value)
     if size == 0.0:
         return 0.0, 0.0

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.identification.posterior import MachineAxis
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.flange_part import FlangePart
 from rcsa_ident.machine.machine import Machine
@@ -101,6 +103,21 @@ class IdentifiedMachine(Machine):
         """What speaks against everything that is computed with it."""
         return () if self.status is Status.CONVERGED else (f"the identification is {self.status}: {'; '.join(self.reasons)}",)
 
+    def posteriors(self) -> dict[Dof, Posterior]:
+        """Return what a further identification may start from, axis by axis.
+
+        Raises
+        ------
+        InputError
+            An axis has none, as after the published method.
+        """
+        found = {axis: part.posterior for axis, part in self.identified.items() if part.posterior is not None}
+        for axis in self.identified:
+            if axis not in found:
+                allowed = "a result of the default method, with unknowns and covariance of each axis"
+                raise InputError(f"axes.{axis.upper()}", "no covariance", allowed)
+        return found
+
     def at(self, speed: float | None) -> IdentifiedMachine:
         """Return the machine at a spindle speed [rad/s]; the nearest model answers, and outside its speeds it stays as it is there."""
         if speed is None:
@@ -131,6 +148,10 @@ class IdentifiedMachine(Machine):
         if self.speed_range is not None or self.unknowns * omega.size > MOST_KEPT:
             return self
         return replace(self, kept_sides=tuple(side.kept() for side in self.sides(omega)))
+
+    def __getstate__(self) -> dict[str, Any]:
+        # what is kept for speed would cost more on its way to another process than to work out there
+        return {name: value for name, value in self.__dict__.items() if name != "parts"} | {"kept_sides": ()}
 
     def _number(self, speed: float) -> int:
         ranges = [speeds for speeds, _ in self.speed_models]

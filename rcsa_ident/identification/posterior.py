@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cached_property
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, joint_of, modes_of, unpack
@@ -27,9 +27,10 @@ class Posterior:
     Parameters
     ----------
     theta : array, shape (p,)
+        The most probable unknowns.
     covariance : array, shape (p, p)
     layout : AxisLayout
-        Without fixture.
+        Which unknown stands where; without fixture.
     speed_range : (float, float) [rad/s]
         Middle of the campaign's spindle speeds and half their range; only a layout with softening asks for it.
     rivals : tuple of array
@@ -55,6 +56,14 @@ class Posterior:
         """Return modes and joint at `theta`, by default at the optimum, and at a spindle speed [rad/s], by default the middle one.
 
         Outside the campaign's speeds the machine of the nearest of them answers.
+
+        Parameters
+        ----------
+        axis : Dof
+            Bending plane of the answer.
+        theta : array, shape (p,), optional
+            Unknowns, of this model or of a rival; by default the optimum's.
+        speed : float, optional [rad/s]
         """
         vector = self.theta if theta is None else theta
         layout = self.layout if vector.size == self.theta.size else self.layout_of(vector.size - JOINT)
@@ -71,21 +80,45 @@ class Posterior:
         return found
 
     def doubt(self, axis: Dof, speed: float | None = None) -> Doubt:
-        """Return the machines one step to both sides along each of the covariance's own axes, and the rivals, at a spindle speed [rad/s]."""
+        """Return the machines a step to both sides along each of the covariance's own axes, and the rivals, at a speed [rad/s]."""
         values, vectors = np.linalg.eigh(self.covariance)
         steps = []
         for size, direction in zip(np.sqrt(np.maximum(values, 0.0)), vectors.T, strict=True):
             # stiff directions take a full deviation, loose ones a step that stays linear
             step = min(size, LONGEST_STEP)
             if step > 0.0:
-                ends = (self.candidate(axis, self.theta + sign * step * direction, speed) for sign in (1.0, -1.0))
-                steps.append(Step(*ends, weight=size / (2.0 * step)))
+                ahead, behind = (self.candidate(axis, self.theta + sign * step * direction, speed) for sign in (1.0, -1.0))
+                steps.append(Step(ahead, behind, size / (2.0 * step)))
         return Doubt(tuple(steps), tuple(self.candidate(axis, rival, speed) for rival in self.rivals))
+
+    def part(self, axis: Dof, speed: float | None = None) -> FlangePart:
+        """Return the axis as a part of the flange, with what is not known of it, at a spindle speed [rad/s]."""
+        believed = self.candidate(axis, speed=speed)
+        return FlangePart(plane("flange", axis), believed, _OpenQuestion(self, axis, speed))
 
     def candidate(self, axis: Dof, theta: FloatArray | None = None, speed: float | None = None) -> Candidate:
         """Return `machine` as what stands behind the flange."""
         modes, joint = self.machine(axis, theta, speed)
         return Candidate(modes, joint)
+
+
+@dataclass(frozen=True, eq=False)
+class _OpenQuestion:
+    """What a posterior leaves open, worked out when it is asked for; another process works it out for itself."""
+
+    posterior: Posterior
+    axis: Dof
+    speed: float | None
+
+    @cached_property
+    def answer(self) -> Doubt:
+        return self.posterior.doubt(self.axis, self.speed)
+
+    def __call__(self) -> Doubt:
+        return self.answer
+
+    def __reduce__(self) -> tuple[type[_OpenQuestion], tuple[Posterior, Dof, float | None]]:
+        return type(self), (self.posterior, self.axis, self.speed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +143,9 @@ class MachineAxis:
 
     def part(self, axis: Dof, speed: float | None) -> FlangePart:
         """Return this axis as a part of the flange, with what the posterior leaves open, at a spindle speed [rad/s]."""
-        modes, joint = self.at(axis, speed)
-        doubt = None if self.posterior is None else cache(partial(self.posterior.doubt, axis, speed))
-        return FlangePart(modes.coordinates, Candidate(modes, joint), doubt)
+        if self.posterior is not None:
+            return self.posterior.part(axis, speed)
+        return FlangePart(plane("flange", axis), Candidate(self.spindle.modes, self.joint))
 
     @property
     def softening_range(self) -> tuple[float, float] | None:

@@ -5,13 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.spindle import Spindle
+from rcsa_ident.machining_setup import Workpiece
+from rcsa_ident.signals.measurement import MAX_FREQUENCY
+from rcsa_ident.signals.recording import Sensor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,17 +28,18 @@ class AxisResult:
     Parameters
     ----------
     modes : ModalModel
-        At the flange: translation and slope.
+        Modes of machine and spindle at the flange: translation and slope.
     joint : LumpedJoint
     chi2_per_point : float [-]
         Mean squared residual in standard deviations of noise and model error.
     per_tooling : mapping of str to float
+        The same for each tooling by itself.
     model_error : float [-]
         Share of each line that neither the model nor the records' noise explains, learned from the residuals.
     parameters : tuple of str
         Names of the unknowns of flange and joint, in the posterior's order.
     posterior : Posterior or None
-        Where the method gives one.
+        None where the method gives no covariance.
     measured : mapping with arrays omega, value, model, cut (index), coherence
         Lines without delay beside the model's: what a plot shows.
     """
@@ -73,7 +81,13 @@ class Identification:
         Tooth 1 stands at immersion 0 that much after the record's start.
     spindle_speed : array, shape (k,) [rad/s]
     trace : tuple of (axis, stage, cost)
-        The search in order.
+        The steps of the search in their order.
+    campaign : str
+        Its name.
+    workpiece : Workpiece or None
+        That it cut.
+    sensors : tuple of Sensor
+        That recorded it.
     """
 
     status: Status
@@ -88,3 +102,35 @@ class Identification:
     trace: tuple[tuple[str, str, float], ...]
     notes: tuple[str, ...] = ()
     coefficients: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    campaign: str = ""
+    workpiece: Workpiece | None = None
+    sensors: tuple[Sensor, ...] = ()
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Lowest and highest identified line [rad/s]; all that a recording may hold where the identification carries no lines."""
+        omega = [axis.measured["omega"] for axis in self.axes.values() if "omega" in axis.measured]
+        if not omega:
+            return 0.0, 2.0 * np.pi * MAX_FREQUENCY
+        return float(min(w.min() for w in omega)), float(max(w.max() for w in omega))
+
+    @property
+    def machine(self) -> IdentifiedMachine:
+        """The machine that was found: it takes any tooling.
+
+        Raises
+        ------
+        InputError
+            If the identification has failed: there is none.
+        """
+        if not self.axes:
+            raise InputError("identification", f"{self.status}: {'; '.join(self.reasons)}", "one that found a machine")
+        return IdentifiedMachine(
+            {axis: part.machine for axis, part in self.axes.items()},
+            self.band,
+            status=self.status,
+            reasons=self.reasons,
+            identified_workpiece=self.workpiece,
+            sensors=self.sensors,
+            name=self.campaign,
+        )

@@ -64,6 +64,7 @@ def write_frf_csv(
 
     Parameters
     ----------
+    path : path
     frequency_hz : array, shape (n,)
         Rising.
     values : mapping of axis to complex array, shape (n,)
@@ -116,6 +117,7 @@ def write_lobes_csv(
 
     Parameters
     ----------
+    path : path
     speed_rpm, limit_mm, chatter_hz, lobe : array, shape (n,)
         A chatter frequency or lobe that is not known is NaN; so are stable places in `extra`.
     extra : mapping of column name to array, shape (n,), optional
@@ -142,6 +144,7 @@ def write_speed_csv(path: str | Path, speed_rpm: ArrayLike, columns: Mapping[str
 
     Parameters
     ----------
+    path : path
     speed_rpm : array, shape (n,)
         Above 0.
     columns : mapping of column name to array, shape (n,)
@@ -157,6 +160,7 @@ def write_map_csv(path: str | Path, speed_rpm: FloatArray, depth_mm: FloatArray,
 
     Parameters
     ----------
+    path : path
     speed_rpm : array, shape (n,)
     depth_mm : array, shape (k,)
     growth : array, shape (n, k) [-]

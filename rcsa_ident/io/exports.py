@@ -30,7 +30,10 @@ def write_receptances_uff(path: str | Path, receptances: Mapping[str, Receptance
 
     Parameters
     ----------
+    path : path
     receptances : mapping of axis (X or Y) to Receptance
+    title : str
+        Written into each header.
     binary : bool
         Dataset 58b.
     """
@@ -68,7 +71,15 @@ def named_entries(receptances: Mapping[str, Receptance]) -> dict[str, ComplexArr
 
 
 def write_receptances_csv(path: str | Path, receptances: Mapping[str, Receptance], further: Mapping[str, FloatArray] | None = None) -> None:
-    """Write FRF.csv with all entries: motion per force first, as every reader of FRF.csv wants it."""
+    """Write FRF.csv with all entries: motion per force first, as every reader of FRF.csv wants it.
+
+    Parameters
+    ----------
+    path : path
+    receptances : mapping of axis (X or Y) to Receptance
+    further : mapping of column name to array, shape (n,), optional
+        Columns behind them.
+    """
     entries = named_entries(receptances)
     frequency = to_hz(next(iter(receptances.values())).omega)
     rest = {name: values for name, values in entries.items() if name not in receptances}
@@ -79,7 +90,14 @@ def write_receptances_csv(path: str | Path, receptances: Mapping[str, Receptance
 
 
 def write_receptances_json(path: str | Path, receptances: Mapping[str, Receptance], title: str) -> None:
-    """Write every entry as lists of real and imaginary parts."""
+    """Write every entry as lists of real and imaginary parts.
+
+    Parameters
+    ----------
+    path : path
+    receptances : mapping of axis (X or Y) to Receptance
+    title : str
+    """
     frequency = to_hz(next(iter(receptances.values())).omega)
     entries = {name: {"re": v.real.tolist(), "im": v.imag.tolist()} for name, v in named_entries(receptances).items()}
     data = {"title": title, "units": _UNITS, "frequency_hz": frequency.tolist(), "receptances": entries}
@@ -90,7 +108,14 @@ _UNITS = {"X, Y": "m/N", "tM": "m/(N m)", "rF": "rad/N", "rM": "rad/(N m)"}
 
 
 def write_receptances_hdf5(path: str | Path, receptances: Mapping[str, Receptance], title: str) -> None:
-    """Write every entry as a complex dataset beside ``frequency_hz``."""
+    """Write every entry as a complex dataset beside ``frequency_hz``.
+
+    Parameters
+    ----------
+    path : path
+    receptances : mapping of axis (X or Y) to Receptance
+    title : str
+    """
     import h5py
 
     with replacing(path) as part, h5py.File(part, "w") as file:
@@ -120,7 +145,15 @@ def mode_records(axes: Mapping[str, ModalModel]) -> list[dict[str, Any]]:
 
 
 def write_modes(path: str | Path, axes: Mapping[str, ModalModel], as_json: bool) -> None:
-    """Write modes as CSV or JSON: h_pq = sum phi_p phi_q / (i omega - lambda) + its mirror."""
+    """Write modes as CSV or JSON: h_pq = sum phi_p phi_q / (i omega - lambda) + its mirror.
+
+    Parameters
+    ----------
+    path : path
+    axes : mapping of axis (X or Y) to ModalModel
+    as_json : bool
+        JSON, else CSV.
+    """
     records: Sequence[dict[str, Any]] = mode_records(axes)
     if not records:
         raise InputError("modes", "none", "at least one mode", str(path))

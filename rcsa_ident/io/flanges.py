@@ -13,6 +13,7 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import read_table
+from rcsa_ident.machine.machine import FlangeMachine
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.units import from_hz
 
@@ -27,6 +28,8 @@ def write_flange_csv(
 
     Parameters
     ----------
+    path : path
+    frequency_hz : array, shape (n,)
     values : mapping of Dof to complex array, shape (n, 2, 2)
     std : mapping of Dof to array, shape (n, 2, 2), optional
         Columns ``X_tF_std`` and so on: of the real and of the imaginary part each.
@@ -73,3 +76,15 @@ def read_flange_csv(path: str | Path) -> dict[Dof, MeasuredFlange]:
     if not flanges:
         raise InputError("flange", "no columns X_tF_re or Y_tF_re", "a flange's receptances", str(path))
     return flanges
+
+
+def read_flange_machine(path: str | Path) -> FlangeMachine:
+    """Return a machine that is known by the flange of such a file; what was decoupled holds the joint's compliance already.
+
+    Raises
+    ------
+    InputError
+        As `read_flange_csv`.
+    """
+    flanges = tuple(read_flange_csv(path).values())
+    return FlangeMachine(flanges, flanges[0].band, name=Path(path).stem, ends=True)

@@ -131,7 +131,15 @@ def read_frfs(path: str | Path, units: str | None = None) -> list[TapTest]:
 
 
 def parse_units(text: str, field: str = "unit", where: str = "") -> tuple[float, int]:
-    """Return SI units per unit and the number of time derivatives of a motion over a force."""
+    """Return SI units per unit and the number of time derivatives of a motion over a force.
+
+    Parameters
+    ----------
+    text : str
+        A motion over a force, such as ``(m/s^2)/N`` or ``mm/N``.
+    field, where : str
+        What the text is and where it stands, for the message.
+    """
     plain = _plain(text)
     for place in (i for i, sign in enumerate(plain) if sign == "/"):
         motion, force = MOTIONS.get(plain[:place]), FORCES.get(plain[place + 1 :])

@@ -40,6 +40,9 @@ def labelled(text: str, default: str, known: Collection[str] = ()) -> tuple[str,
 
     Parameters
     ----------
+    text : str
+    default : str
+        Label of a text without one.
     known : collection of str
         Labels that are allowed; empty allows any.
     """
@@ -81,6 +84,15 @@ def read_hammer(path: str | Path, label: str = "tip") -> HammerFile:
 
 def write_calibrated_tooling(source: str | Path, target: str | Path, contact: Contact, remarks: Sequence[str] = ()) -> None:
     """Write a tooling file again with another contact; everything else stays as it was written, comments included.
+
+    Parameters
+    ----------
+    source, target : path
+        Tooling file that is read, and the one that is written.
+    contact : Contact
+        The new one.
+    remarks : sequence of str
+        Written above it as comments.
 
     Raises
     ------

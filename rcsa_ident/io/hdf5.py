@@ -43,6 +43,7 @@ def write_hdf5(path: str | Path, rate: float, channels: Mapping[str, ArrayLike])
 
     Parameters
     ----------
+    path : path
     rate : float [Hz]
     channels : mapping of name to array, shape (n,)
         In the units of the file: signal, not yet divided by a sensitivity. A lost sample is NaN.
@@ -63,7 +64,16 @@ def write_hdf5(path: str | Path, rate: float, channels: Mapping[str, ArrayLike])
 
 
 def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[FloatArray]]:
-    """Return the sampling rate [Hz] and the named channels as they stand in the file, shape (n,) each."""
+    """Return the sampling rate [Hz] and the named channels as they stand in the file, shape (n,) each.
+
+    Parameters
+    ----------
+    path : path
+    names : sequence of str
+        Channels that are wanted.
+    default_rate : float or None [Hz]
+        For a file that carries no rate.
+    """
     where = str(path)
     size = existing_file(path, "recording", LARGEST_FILE).stat().st_size
     try:
@@ -84,6 +94,9 @@ def read_vectors(path: Path, names: Sequence[str], wished: Sequence[str], kinds:
 
     Parameters
     ----------
+    path : path
+    names, wished : sequences of str
+        Vectors that have to be there, and those that are read if they are.
     kinds : sequence of str
         Allowed values of the attribute ``MATLAB_class``; without it the type of the samples decides.
     """

@@ -54,6 +54,14 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     """Return the sampling rate [Hz] and the named columns as they stand in the file, shape (n,) each; a null is a lost sample.
 
     The rate comes from a column ``time`` in seconds, else from the file's metadata ``sampling_rate_hz``, else from the campaign.
+
+    Parameters
+    ----------
+    path : path
+    names : sequence of str
+        Channels that are wanted.
+    default_rate : float or None [Hz]
+        For a file that carries no rate.
     """
     where = str(path)
     raw = read_bytes(path, "recording", LARGEST_FILE)

@@ -59,7 +59,7 @@ def spindle_from_json(data: Any, axis: Dof, where: str, path: str = "") -> tuple
     Parameters
     ----------
     data : mapping
-        As `spindle_to_json` writes it; further keys are left alone.
+        What `spindle_to_json` writes; further keys are left alone.
     axis : Dof
         X or Y.
     where, path : str

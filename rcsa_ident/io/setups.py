@@ -72,7 +72,17 @@ def read_tooling(path: str | Path) -> Tooling:
 
 
 def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
-    """Return the tooling of a table of keys as `read_tooling` finds it in a file; `name` counts where the table has none."""
+    """Return the tooling of a table of keys as `read_tooling` finds it in a file; `name` counts where the table has none.
+
+    Parameters
+    ----------
+    data : mapping
+        The table's keys.
+    where : str
+        The file, for the messages.
+    name : str
+        Counts where the table has none.
+    """
     top = Table(data, where, known=_TOOLING)
     materials = material_library(top)
     tool = top.table("tool", ("stickout_mm", "segments"))
@@ -187,6 +197,10 @@ def campaign_of(
 
     Parameters
     ----------
+    data : mapping
+        The table's keys.
+    where : str
+        The file, for the messages.
     name : str
         Counts where the table has none.
     tooling : callable
@@ -215,7 +229,17 @@ def campaign_of(
 
 
 def sensor_of(name: str, data: Any, where: str) -> Sensor:
-    """Return the sensor of one table, whose key is the channel's name; also a result file carries such tables."""
+    """Return the sensor of one table, whose key is the channel's name; also a result file carries such tables.
+
+    Parameters
+    ----------
+    name : str
+        The channel's.
+    data : mapping
+        The table's keys.
+    where : str
+        The file, for the messages.
+    """
     kind = Table(data, where, f"sensors.{name}", sorted({*_SENSOR, *_TRIGGER}))
     quantity = Quantity(kind.text("quantity", choices=tuple(Quantity)))
     trigger = quantity is Quantity.TRIGGER

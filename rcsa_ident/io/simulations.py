@@ -55,10 +55,14 @@ def write_simulation(
     ----------
     out : path
         A folder that does not exist yet, or an empty one.
+    setup : MachineFile
+        The virtual machine and its plan of cuts.
     toolings : sequence of Tooling
         Those of the cuts, in the order of ``setup.toolings``.
     cuts : iterable of SimulatedCut
     receptances : iterable of TrueReceptances
+    flange : TrueFlange
+        Receptances of the bare spindle.
     progress : callable of (done, total), optional
     """
     out = Path(out)

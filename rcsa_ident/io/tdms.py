@@ -45,6 +45,14 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
 
     A channel is called by its name, or as ``group/channel`` where two groups have one of that name. The rate is the waveform's
     (``wf_increment``), else the campaign's.
+
+    Parameters
+    ----------
+    path : path
+    names : sequence of str
+        Channels that are wanted.
+    default_rate : float or None [Hz]
+        For a file that carries no rate.
     """
     where = str(path)
     raw = read_bytes(path, "recording", LARGEST_FILE)

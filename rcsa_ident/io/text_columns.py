@@ -78,6 +78,14 @@ def read_table(path: str | Path, field: str, largest: int = LARGEST_TEXT) -> Tex
     """Return a text table with its header; every row has as many cells as the header.
 
     Lines that start with # in front of the header are comments. With semicolons or tabs the decimal sign may be a comma.
+
+    Parameters
+    ----------
+    path : path
+    field : str
+        What the file is, for the message.
+    largest : int
+        Bytes that are allowed.
     """
     where = str(path)
     lines = _text(read_bytes(path, field, largest), field, where).replace('"', "").splitlines()
@@ -106,6 +114,14 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     """Return the sampling rate [Hz] and the named channels of a recording, shape (n,) each.
 
     The rate comes from a column ``time`` in seconds, else from the campaign. Samples that the time column skips are NaN.
+
+    Parameters
+    ----------
+    path : path
+    names : sequence of str
+        Channels that are wanted.
+    default_rate : float or None [Hz]
+        For a file that carries no rate.
     """
     table = read_table(path, "recording")
     for name in names:

@@ -45,13 +45,13 @@ class Assumptions:
     flute_ratio : float
         Diameter of the solid cylinder that bends as the fluted part, over the cutting diameter.
     helix_deg : float [deg]
-        Where the library gives none.
+        Helix of tools for which the library gives none.
     stickout_mm, insertion_mm : float or None [mm]
         None takes the library's length below the holder, and what is left of the tool behind it.
     material : str or None
-        Of the tool; None takes the library's.
+        Material of the tools; None takes the library's.
     contact : Contact or None
-        Of tool and holder; None joins them rigidly.
+        Contact of tool and holder; None joins them rigidly.
     holder : str or None
         Holder of the library for tools that have none of their own.
     """
@@ -83,7 +83,7 @@ class Imported(NamedTuple):
     Parameters
     ----------
     number : int
-        In the library, from 1.
+        Place in the library, from 1.
     name, kind : str
     tooling : Tooling or None
     text : str
@@ -115,7 +115,19 @@ def read_tool_library(path: str | Path, assumptions: Assumptions | None = None) 
 
 
 def import_tools(raw: bytes, where: str, assumptions: Assumptions | None = None, most: int = MOST_ENTRIES) -> list[Imported]:
-    """Return every entry of a library that is already in memory, at most so many, see `read_tool_library`."""
+    """Return every entry of a library that is already in memory, at most so many, see `read_tool_library`.
+
+    Parameters
+    ----------
+    raw : bytes
+        The library's JSON.
+    where : str
+        The file, for the messages.
+    assumptions : Assumptions, optional
+        In place of what the library cannot tell.
+    most : int
+        Entries that are allowed.
+    """
     given = assumptions or Assumptions()
     content = _content(raw, where)
     entries = content.get("data", [content]) if isinstance(content, Mapping) else content

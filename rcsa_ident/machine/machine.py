@@ -7,9 +7,10 @@ to all of them in the same way, and nobody downstream asks which of them it is.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ from rcsa_ident.tool_holder.model import tool_holder_receptance
 LOWEST, STEP = 100.0, 1.0
 #: Relative standard deviation of a tool-holder's stiffness that stands for its mesh.
 STIFFNESS_SPREAD = 5e-4
+_Respond = Callable[[Candidate, Receptance | None, FloatArray], Receptance]
 _SLOPES = {Dof.X: Dof.SLOPE_X, Dof.Y: Dof.SLOPE_Y}
 
 
@@ -73,7 +75,7 @@ class TipSource(ABC):
         del speed
         return self
 
-    def models(self, speeds: FloatArray) -> list[tuple[TipSource, NDArray[np.intp]]]:
+    def models(self, speeds: FloatArray) -> Sequence[tuple[TipSource, NDArray[np.intp]]]:
         """Return each model that answers at some of the speeds [rad/s], and the places of those."""
         return [(self, np.arange(speeds.size))]
 
@@ -83,7 +85,11 @@ class TipSource(ABC):
 
     @abstractmethod
     def tip(
-        self, tooling: Tooling | ToolAssembly, omega: FloatArray | None = None, spread: bool = True, stiffness_spread: float = STIFFNESS_SPREAD
+        self,
+        tooling: Tooling | ToolAssembly,
+        omega: FloatArray | None = None,
+        spread: bool = True,
+        stiffness_spread: float = STIFFNESS_SPREAD,
     ) -> UncertainReceptance | TipModes:
         """Return what the tip of a tooling does."""
 
@@ -116,27 +122,40 @@ class Machine(TipSource):
         low, high = (w / (2.0 * np.pi) for w in self.band)
         return 2.0 * np.pi * np.arange(min(LOWEST, low), beyond * high + 0.5 * STEP, STEP)
 
+    def at(self, speed: float | None) -> Machine:
+        """Return the machine at a spindle speed [rad/s], by default at the middle of the speeds that it is known at."""
+        del speed
+        return self
+
+    def kept(self) -> Machine:
+        """Return the same machine, with what many toolings share worked out, where that saves time."""
+        return self
+
     def sides(self, omega: FloatArray) -> tuple[Side, ...]:
         """Return what a tip feels of the machine at some frequencies [rad/s]."""
         omega = frozen(omega)
         return tuple(Side.of(part, omega) for part in self.parts)
 
-    def receptance(self, omega: FloatArray) -> UncertainReceptance:
+    def receptance(self, omega: FloatArray, axes: Sequence[Dof] | None = None) -> UncertainReceptance:
         """Return the receptance at the flange, over all its coordinates.
 
         Parameters
         ----------
         omega : array, shape (n,) [rad/s]
+        axes : sequence of Dof, default all
+            Only these machine axes, and what they feel of others.
         """
-        return self._response(omega, lambda candidate, _holder, at: candidate.flange.receptance(at), None)
+        return self._response(omega, axes, _at_flange, None)
 
-    def coupled(self, tooling: Tooling | ToolAssembly, omega: FloatArray) -> UncertainReceptance:
+    def coupled(self, tooling: Tooling | ToolAssembly, omega: FloatArray, axes: Sequence[Dof] | None = None) -> UncertainReceptance:
         """Return the receptances of a tooling on the machine between tip and spindle, translations and slopes.
 
         Parameters
         ----------
         tooling : Tooling or ToolAssembly
         omega : array, shape (n,) [rad/s]
+        axes : sequence of Dof, default all
+            Only these machine axes, and what they feel of others.
 
         Returns
         -------
@@ -144,10 +163,14 @@ class Machine(TipSource):
             Points ``tip`` and ``spindle``; the tool-holder is taken for exact.
         """
         holder = tool_holder_receptance(_assembly(tooling), frozen(omega))
-        return self._response(omega, lambda candidate, own, at: couple(own, candidate.flange.receptance(at), candidate.joint), holder)
+        return self._response(omega, axes, _at_ends, holder)
 
     def tip(
-        self, tooling: Tooling | ToolAssembly, omega: FloatArray | None = None, spread: bool = True, stiffness_spread: float = STIFFNESS_SPREAD
+        self,
+        tooling: Tooling | ToolAssembly,
+        omega: FloatArray | None = None,
+        spread: bool = True,
+        stiffness_spread: float = STIFFNESS_SPREAD,
     ) -> UncertainReceptance:
         """Return the tip's receptance of a tooling on the machine, over ``tip.x`` and ``tip.y`` with their cross terms.
 
@@ -166,10 +189,15 @@ class Machine(TipSource):
         return tip if spread else replace(tip, variation=None)
 
     def _response(
-        self, omega: FloatArray, respond: Callable[[Candidate, Receptance, FloatArray], Receptance], holder: Receptance | None
+        self,
+        omega: FloatArray,
+        axes: Sequence[Dof] | None,
+        respond: _Respond,
+        holder: Receptance | None,
     ) -> UncertainReceptance:
         omega = frozen(omega)
-        parts = [_PartResponse(part, respond, None if holder is None else in_planes(holder, part), omega) for part in self.parts]
+        wanted = [part for part in self.parts if axes is None or any(c.dof in axes for c in part.coordinates)]
+        parts = [_PartResponse(part, respond, None if holder is None else in_planes(holder, part), omega) for part in wanted]
         whole = Receptance.block_diagonal([part.nominal for part in parts])
         known = any(part.part.doubt is not None for part in parts)
         return UncertainReceptance(omega, whole.values, whole.rows, whole.cols, _Responses(tuple(parts)) if known else None)
@@ -180,7 +208,7 @@ class _PartResponse:
     """What a part of the machine responds, alone or with its share of a tool-holder."""
 
     part: FlangePart
-    respond: Callable[[Candidate, Receptance, FloatArray], Receptance]
+    respond: _Respond
     holder: Receptance | None
     omega: FloatArray
 
@@ -204,7 +232,7 @@ class _Responses:
     @cached_property
     def members(self) -> list[tuple[int, ...]]:
         ends = np.cumsum([0, *(len(part.nominal.rows) for part in self.parts)])
-        return [tuple(range(first, last)) for first, last in zip(ends[:-1], ends[1:], strict=True)]
+        return [tuple(range(first, last)) for first, last in pairwise(ends.tolist())]
 
     @property
     def covers(self) -> frozenset[int]:
@@ -214,7 +242,7 @@ class _Responses:
     def at(self, places: Places) -> tuple[Variation, ...]:
         found = []
         for each, members in zip(self.parts, self.members, strict=True):
-            _, change = each.part.response(lambda candidate, own=each: own.of(candidate, places).values)
+            _, change = each.part.response(partial(_values, each, places))
             if change is not None:
                 found.append(Variation(members, change))
         return tuple(found)
@@ -230,12 +258,28 @@ class _Responses:
         return np.concatenate([np.zeros((0, size), dtype=complex), *rivals])
 
 
+def _at_flange(candidate: Candidate, _holder: Receptance | None, omega: FloatArray) -> Receptance:
+    return candidate.flange.receptance(omega)
+
+
+def _at_ends(candidate: Candidate, holder: Receptance | None, omega: FloatArray) -> Receptance:
+    assert holder is not None
+    return couple(holder, candidate.flange.receptance(omega), candidate.joint)
+
+
+def _values(part: _PartResponse, places: Places, candidate: Candidate) -> ComplexArray:
+    return part.of(candidate, places).values
+
+
+def in_plane(holder: Receptance, axis: Dof) -> Receptance:
+    """Return a tool-holder's receptance in the bending plane of an axis; it is the same in all of them."""
+    rows = tuple(Coordinate(c.point, _SLOPES[axis] if c.dof.is_slope else axis) for c in holder.rows)
+    return holder if rows == holder.rows else Receptance(holder.omega, holder.values, rows, rows)
+
+
 def in_planes(holder: Receptance, part: FlangePart) -> Receptance:
-    """Return a tool-holder's receptance in the bending planes of a part, in which it is the same."""
-    blocks = []
-    for axis in (c.dof for c in part.coordinates if not c.dof.is_slope):
-        rows = tuple(Coordinate(c.point, _SLOPES[axis] if c.dof.is_slope else axis) for c in holder.rows)
-        blocks.append(Receptance(holder.omega, holder.values, rows, rows))
+    """Return a tool-holder's receptance in all bending planes of a part, which it does not couple."""
+    blocks = [in_plane(holder, c.dof) for c in part.coordinates if not c.dof.is_slope]
     return blocks[0] if len(blocks) == 1 else Receptance.block_diagonal(blocks)
 
 
@@ -315,36 +359,3 @@ class _Group:
 
     def receptance(self, omega: FloatArray) -> Receptance:
         return self.flange.receptance(omega).block(self.coordinates)
-
-
-@dataclass(frozen=True, eq=False)
-class KnownTip(TipSource):
-    """The tip of one tooling, measured by tap tests or written down as modes: in the place of a machine, for that tooling alone.
-
-    Parameters
-    ----------
-    known : Receptance or TipModes
-        Over ``tip.x`` and ``tip.y``.
-    """
-
-    known: Receptance | TipModes
-
-    @property
-    def band(self) -> None:
-        """A tip that was measured says itself where it ends."""
-        return
-
-    def lines(self, beyond: float = 1.0) -> FloatArray:
-        """Return the frequencies at which it was measured, or those that resolve its modes."""
-        del beyond
-        return (self.known.receptance() if isinstance(self.known, TipModes) else self.known).omega
-
-    def tip(
-        self, tooling: Tooling | ToolAssembly, omega: FloatArray | None = None, spread: bool = True, stiffness_spread: float = STIFFNESS_SPREAD
-    ) -> UncertainReceptance | TipModes:
-        """Return the tip as it is known, whatever tooling is named."""
-        del tooling, omega, spread, stiffness_spread
-        if isinstance(self.known, TipModes):
-            return self.known
-        return UncertainReceptance(self.known.omega, self.known.values, self.known.rows, self.known.cols)
-

@@ -7,7 +7,7 @@ computed where they are asked for, and those of W, which are the same for every 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,10 @@ from rcsa_ident.tool_holder.model import tool_holder_poles
 
 #: Of a tool-holder's receptances (translation and slope of the tip, then of the flange): tip, tip over flange, flange over tip, flange.
 _ENTRIES = ((0, 0), (0, 2), (0, 3), (2, 0), (3, 0), (2, 2), (2, 3), (3, 2), (3, 3))
+
+
+def _none() -> ComplexArray:
+    return np.zeros((0, 0, 0, 0), dtype=complex)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +60,7 @@ class Side:
     omega: FloatArray
     nominal: ComplexArray
     doubt: Doubt | None = None
-    rivals: ComplexArray | None = None
+    rivals: ComplexArray = field(default_factory=_none)
     ends: Ends | None = None
 
     @classmethod
@@ -96,7 +100,9 @@ class Side:
         omega = self.omega[places]
         ahead, behind = ([_laid(c.interface(omega), self.single) for c in row] for row in _both(self.doubt))
         if self.single:
-            return Ends(*(np.array(each).reshape(-1, omega.size, 3).transpose(1, 0, 2).copy() for each in (ahead, behind))), np.arange(omega.size)
+            return Ends(*(np.array(each).reshape(-1, omega.size, 3).transpose(1, 0, 2).copy() for each in (ahead, behind))), np.arange(
+                omega.size
+            )
         size = len(self.part.coordinates)
         return Ends(*(np.array(each).reshape(-1, omega.size, size, size) for each in (ahead, behind))), np.arange(omega.size)
 
@@ -159,7 +165,7 @@ class Holder:
         return found
 
     def changes(self, side: Side, places: Places) -> ComplexArray:
-        """Return C11's change along each step of a part, per standard deviation, shape (p, k, b / 2, b / 2); places are this holder's own."""
+        """Return C11's change along each step of a part, shape (p, k, b / 2, b / 2), per standard deviation; places are this holder's."""
         assert side.doubt is not None
         weight = np.array([step.weight for step in side.doubt.steps])
         ends, own = side.ends_at(places)
@@ -238,7 +244,7 @@ def tip_over_sides(sides: Sequence[Side], assembly: ToolAssembly, stiffness_spre
     values, members = np.zeros((omega.size, len(axes), len(axes)), dtype=complex), []
     for side in sides:
         own = tuple(axes.index(c) for c in side.axes)
-        values[np.ix_(np.arange(omega.size), own, own)] = holder.tip(side.nominal)
+        values[:, own[0] : own[-1] + 1, own[0] : own[-1] + 1] = holder.tip(side.nominal)
         members.append(own)
     known = any(side.part.doubt is not None for side in sides)
     spread = TipSpread(tuple(sides), tuple(members), holder, assembly, stiffness_spread) if known else None

@@ -44,7 +44,7 @@ class RunOut:
             object.__setattr__(self, name, frozen(getattr(self, name), np.complex128))
 
     def signals(self, first: int, count: int, step: float) -> tuple[FloatArray, FloatArray]:
-        """Return gap and acceleration at `count` samples from the `first`, shape (count,) each."""
+        """Return gap and acceleration at `count` samples of a `step` [s] from the `first`, shape (count,) each [m], [m/s^2]."""
         return self.at(np.remainder(np.arange(first, first + count) * (self.spindle_speed * step / (2.0 * np.pi)), 1.0))
 
     def at(self, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -71,11 +71,12 @@ class AxisObserver:
     transfer : TransferFunction
         Tip force to the flange's displacement as the sensor shows it.
     corner : float [rad/s]
-        Of the high-pass that gap and fixture's motion share.
+        Corner frequency of the high-pass that gap and fixture's motion share.
     gap_filter, acceleration_filter : SampledModes
         The latter None without an accelerometer: the gap is then taken for the flange's motion.
     kalman : KalmanFilter
     run_out : RunOut or None
+        Taken out of the signals where it is known.
     """
 
     axis: Dof
@@ -119,7 +120,7 @@ class ForceBlock:
     Parameters
     ----------
     force : array, shape (n, a) [N]
-        Without its mean: below the band the displacement says nothing of the force.
+        The force without its mean: below the band the displacement says nothing of it.
     walking : array, shape (n, a) [N]
         The part that no oscillator holds; all of it with a random walk alone.
     innovation : array, shape (n, a) [m]
@@ -141,7 +142,7 @@ class ForceEstimate:
     step : float [s]
     force : array, shape (n, a) [N]
     standard_deviation : array, shape (n, a) [N]
-        From sensor noise and the force model, raised where the innovations scatter more than they should.
+        What follows from sensor noise and the force model, raised where the innovations scatter more than they should.
     consistency : array, shape (a,) [-]
         Scatter of the innovations in the band over the expected; 1 where model, noise and force agree, more where they are too
         sure of themselves.
@@ -155,7 +156,7 @@ class ForceEstimate:
 
     @property
     def time(self) -> FloatArray:
-        """From the first sample, shape (n,) [s]."""
+        """Time from the first sample, shape (n,) [s]."""
         return np.arange(self.force.shape[0]) * self.step
 
 
@@ -172,7 +173,7 @@ class ForceObserver:
 
     @property
     def step_time(self) -> float:
-        """Of the samples [s]."""
+        """Time between samples [s]."""
         return self.axes[0].transfer.step
 
     def init(self) -> ObserverState:
@@ -184,7 +185,14 @@ class ForceObserver:
         return ObserverState(0, tuple(states))
 
     def step(self, state: ObserverState, gap: FloatArray, acceleration: FloatArray | None = None) -> tuple[ObserverState, ForceBlock]:
-        """Return the state and the estimates after one sample of each axis, shape (a,)."""
+        """Return the state and the estimates after one sample of each axis.
+
+        Parameters
+        ----------
+        state : ObserverState
+        gap : array, shape (a,) [m]
+        acceleration : array, shape (a,) [m/s^2], optional
+        """
         return self.run(state, np.asarray(gap)[None], None if acceleration is None else np.asarray(acceleration)[None])
 
     def run(self, state: ObserverState, gap: FloatArray, acceleration: FloatArray | None = None) -> tuple[ObserverState, ForceBlock]:
@@ -194,9 +202,9 @@ class ForceObserver:
         ----------
         state : ObserverState
         gap : array, shape (n, a) [m]
-            As the displacement sensors show it, in the order of `axes`.
+            The gap as the displacement sensors show it, in the order of `axes`.
         acceleration : array, shape (n, a) [m/s^2], optional
-            Of the sensors' fixture.
+            Acceleration of the sensors' fixture.
         """
         return self._scan(state, gap, acceleration, lost=False)
 
@@ -225,8 +233,9 @@ class ForceObserver:
 
         Parameters
         ----------
+        state : ObserverState
         gap, acceleration : arrays, shape (n, a) [m], [m/s^2]
-            In place of the lost samples.
+            Substitutes for the lost samples.
         """
         return self._scan(state, gap, acceleration, lost=True)
 
@@ -235,6 +244,9 @@ class ForceObserver:
 
         Parameters
         ----------
+        gap : array, shape (n, a) [m]
+        acceleration : array, shape (n, a) [m/s^2], optional
+            Acceleration of the sensors' fixture.
         smooth : bool
             Each sample given all others; else given those before it, as live.
         """
@@ -310,9 +322,11 @@ def axis_observer(
     run_out : RunOut, optional
         Taken out of the signals.
     spindle_speed : float [rad/s]
-        Its orders below the band are taken for disturbance; 0: none.
+        Orders of this speed below the band are taken for disturbance; with 0 there are none.
     unmodelled : float [N]
-        Process noise.
+        Process noise: standard deviation of a force sample that the force model cannot follow.
+    longest_settling : int, optional
+        Steps of full covariance at most; by default as in `kalman_filter`.
     """
     step, band = transfer.step, transfer.band
     corner = CORNER * band[0]

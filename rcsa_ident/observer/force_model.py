@@ -31,6 +31,7 @@ class RandomWalk:
     Parameters
     ----------
     intensity : float [N/sqrt(s)]
+        Standard deviation of the walk after a second.
     leak : float [rad/s]
         Rate at which it forgets; 0 is the walk of [inprocess].
     """
@@ -58,6 +59,7 @@ class TeethResonators:
     omega : array, shape (j,) [rad/s]
         Multiples of the tooth-passing frequency; with cutter run-out, of the spindle's.
     intensity : array, shape (j,) [N/sqrt(s)]
+        How fast each amplitude walks.
     """
 
     walk: RandomWalk
@@ -84,11 +86,12 @@ class AugmentedModel:
 
     Parameters
     ----------
-    decay : complex array, shape (m,)
+    decay : complex array, shape (m,) [-]
+        Factor of each mode from one sample to the next.
     observed : complex array, shape (m,)
         The measurement is sum Re(observed x) + through * force + noise.
     counts : two ints
-        Plant modes, force modes.
+        Number of plant modes and of force modes.
     through : float [m/N]
     drive : array, shape (m,)
         Standard deviation of what is added, per step, to the real and to the imaginary part of a force or noise mode.

@@ -43,10 +43,11 @@ class KalmanFilter:
     gain : array, shape (s, 2, m)
         The last is the steady one.
     variance : array, shape (s,) [m^2]
-        Of the innovation.
+        Variance of the innovation.
     row : array, shape (s, 2, m)
         Covariance of the force with the state after the correction.
     force_variance : array, shape (s,) [N^2]
+        Variance of the force after the correction.
     """
 
     model: AugmentedModel
@@ -85,13 +86,15 @@ class KalmanFilter:
 
         Parameters
         ----------
-        weight : array, shape (lag,)
-            From `lag_weights`.
+        state : FilterState
+        measured : array, shape (n,) [m]
+        weight : array, shape (lag,) [N/m]
+            As `lag_weights` gives them.
 
         Returns
         -------
         FilterState and array, shape (k,) [N]
-            Of the first block the lag is missing: k = n - lag; later ones are complete.
+            In the first block the lag is missing: k = n - lag; later ones are complete.
         """
         state, result = self.run(state, measured)
         joined = np.concatenate([state.waiting, result])
@@ -112,8 +115,10 @@ class KalmanFilter:
 
         Parameters
         ----------
+        lag : int
+            Number of later innovations.
         at : int, optional
-            Of which sample of the settling phase; by default in the steady state.
+            Number of the sample in the settling phase; by default one of the steady state.
         """
         at = self.gain.shape[0] - 1 if at is None else min(at, self.gain.shape[0] - 1)
         modes, result = -np.array(self.row[at]), np.empty((lag, 3))
@@ -125,6 +130,9 @@ class KalmanFilter:
 
         Parameters
         ----------
+        count : int
+        smoothed : bool
+            Given all samples; else given those before.
         longest : int
             How far a sample looks ahead.
         """

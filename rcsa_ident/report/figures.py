@@ -97,7 +97,7 @@ def cross_frf(axis: AxisResult, tooling: Sequence[str], name: str) -> Figure:
     ----------
     axis : AxisResult
     tooling : sequence of str, length k
-        Of each cut.
+        Name of each cut's tooling.
     name : str
         X or Y.
     """
@@ -203,9 +203,9 @@ def tooltip_frf(
     tip : mapping of X or Y to complex array, shape (n,) [m/N]
     deviation : mapping of X or Y to (real, imaginary) standard deviations [m/N]
     truth : mapping of X or Y to complex array, shape (n,) [m/N]
-        Where it is known.
+        The true one, where it is known.
     band_hz : (low, high) [Hz]
-        That was identified; what lies outside is shaded.
+        Band that was identified; what lies outside is shaded.
     """
     figure, grid = _grid(2, len(tip), 4.8, (1.3, 1.0))
     with mpl.rc_context(_STYLE):

@@ -27,7 +27,7 @@ def force_history(
     spindle_speed : float [rad/s]
     revolutions : float
     start : float [s], optional
-        By default the middle of the record.
+        Time of the first one drawn; by default they lie in the middle of the record.
     true : array, shape (n, a) [N], optional
         A measured or simulated force, with or without its mean as the estimate.
     """
@@ -59,7 +59,7 @@ def observer_frf(responses: Mapping[Dof, ObserverFRF], band: tuple[float, float]
     ----------
     responses : mapping of Dof to ObserverFRF
     band : two floats [rad/s]
-        In which forces are estimated; outside is shaded.
+        Frequencies between which forces are estimated; outside is shaded.
     """
     figure, grid = _grid(2, len(responses), 5.2, (1.0, 1.0))
     with mpl.rc_context(_STYLE):

@@ -13,7 +13,7 @@ from rcsa_ident.errors import InputError, positive
 
 
 class Quantity(StrEnum):
-    """What a channel measures."""
+    """The physical quantity that a channel measures."""
 
     DISPLACEMENT = "displacement"
     ACCELERATION = "acceleration"
@@ -37,11 +37,19 @@ class Sensor:
     delay : float [s]
         The channel lags by it.
     bandwidth : float or None [Hz]
-        First-order low-pass of the sensor.
+        Cut-off frequency of the sensor's first-order low-pass.
     pulses_per_revolution : int
-        Of a trigger.
+        Marks that a trigger sees in one turn.
     tooth_angle : float or None [rad]
         Immersion angle of tooth 1 at the trigger's edge, if known.
+
+    Examples
+    --------
+    A capacitive gap sensor of 10 mV/um that is 2 % low at 2 kHz:
+
+    >>> sensor = Sensor("gap_x", Quantity.DISPLACEMENT, Dof.X, sensitivity=10e3, bandwidth=10e3)
+    >>> round(float(abs(sensor.response(2 * np.pi * 2000.0))), 3)
+    0.981
     """
 
     name: str
@@ -81,6 +89,13 @@ class Recording:
     samples : array, shape (n, c) [m, m/s^2, N; a trigger as it is]
         A sample that was lost is NaN.
     sensors : tuple of Sensor, length c
+
+    Examples
+    --------
+    >>> recording = Recording(51200.0, np.zeros((512, 1)), (Sensor("gap_x", Quantity.DISPLACEMENT, Dof.X),))
+    >>> sensor, samples = recording.channel(Quantity.DISPLACEMENT, Dof.X)
+    >>> sensor.name, samples.shape, recording.time[-1].round(6).item()
+    ('gap_x', (512,), 0.00998)
     """
 
     rate: float

@@ -135,8 +135,9 @@ def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) ->
     samples : array, shape (n, c)
         Displacements.
     lines : LineSpectrum
-        Of these, in its first channels; others may follow.
+        Their lines, in its first channels; others may follow.
     programmed : float [rad/s]
+        The spindle speed that was set.
     """
     speed, rate = lines.spindle_speed, lines.rate
     order = np.arange(1, lines.amplitude.shape[0])[:, None]
@@ -202,7 +203,7 @@ def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: 
     forced : array, one entry per displacement [m]
         Largest tooth-passing amplitude.
     band : (float, float) [Hz]
-        Where to look.
+        Frequencies between which chatter is looked for.
     """
     n = lines.rest.shape[0]
     window = hann(n)
@@ -243,6 +244,8 @@ def tooth_count_fault(power: FloatArray, teeth: int) -> str | None:
     ----------
     power : array, shape (m + 1,)
         Squared amplitude of cut less air cut at each spindle order, all channels together.
+    teeth : int
+        Number of teeth that the cutter is said to have.
     """
     order = np.arange(power.size)
     shared = (order % teeth == 0) & (order > 0)

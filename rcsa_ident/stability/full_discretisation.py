@@ -23,7 +23,7 @@ class FullDiscretisation:
     p' = pole p + inputs F moves exactly, F = K(t) (y - y(t - T)) + C(t) y' is a polynomial within each step: a straight line in the
     published method (degree 1), through Gauss-Lobatto nodes here. Steps begin and end where teeth enter and leave, so the error falls
     with the degree's order even in interrupted cuts. The map of a period is applied, never written down: its cost is linear in steps
-    and modes, and Arnoldi's method finds its largest multiplier.
+    and modes, and Arnoldi's method [arnoldi1951] finds its largest multiplier.
 
     Takes unequal pitch, run-out (with the feed per tooth), helix, a varying speed, process damping, modes with a shape along the edge.
 

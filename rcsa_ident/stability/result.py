@@ -128,9 +128,7 @@ class StabilityLobes:
         """Return the share of the drawn machines that are stable at a speed's place and a depth [m], or None without them."""
         return None if self.drawn is None else float(np.mean(self.drawn[:, place] >= depth))
 
-    def recommended_depth(
-        self, tolerance: float = TOLERANCE, probability: float = PROBABILITY, reserve: float = RESERVE
-    ) -> FloatArray:
+    def recommended_depth(self, tolerance: float = TOLERANCE, probability: float = PROBABILITY, reserve: float = RESERVE) -> FloatArray:
         """Return the depth that is recommended at each speed, shape (n,) [m]: the limit less what is held back of it.
 
         Parameters
@@ -181,8 +179,7 @@ class StabilityLobes:
         """Return the lobes of several blocks of speeds as one, each speed back in its place; drawn limits if all blocks have them."""
         back = np.argsort(np.concatenate(places))
         arrays = {name: np.concatenate([getattr(part, name) for part in parts])[back] for name in _ARRAYS}
-        told = [part for part in parts if part.absolute_limit is not None]
-        lowest = min(told, key=lambda part: part.absolute_limit) if told else parts[0]
+        lowest = min(parts, key=lambda part: np.inf if part.absolute_limit is None else part.absolute_limit)
         drawn = [part.drawn for part in parts if part.drawn is not None]
         return cls(
             **arrays,

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 import scipy.optimize
@@ -78,7 +79,27 @@ class StabilityMap:
             limit[self.spindle_speed == speed] = depth
         return np.where(self.growth[:, 0] >= 0.0, self.depth[0], limit)
 
+    @classmethod
+    def joined(cls, parts: Sequence[StabilityMap]) -> StabilityMap:
+        """Return the maps of several blocks of speeds, which have the same depths, as one with rising speeds."""
+        speed = np.concatenate([part.spindle_speed for part in parts])
+        back = np.argsort(speed)
+        crossing = np.concatenate([part.crossing_speed for part in parts])
+        order = np.argsort(crossing, kind="stable")
+        return cls(
+            speed[back],
+            parts[0].depth,
+            np.concatenate([part.growth for part in parts])[back],
+            np.concatenate([part.computed for part in parts])[back],
+            crossing[order],
+            np.concatenate([part.crossing_depth for part in parts])[order],
+            sum(part.evaluations for part in parts),
+            max(part.error for part in parts),
+            parts[0].method,
+        )
 
+
+@runtime_checkable
 class MonodromyMethod(Protocol):
     """A method that finds the limit from Floquet multipliers: it also knows them at every other depth."""
 

@@ -8,14 +8,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.coupling.rcsa import SPINDLE, couple
+from rcsa_ident.coupling.rcsa import SPINDLE
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, Unsteady
-from rcsa_ident.identification.posterior import MachineAxis, spread
+from rcsa_ident.machine.machine import Machine
 from rcsa_ident.observer.force import AxisObserver, ForceEstimate, ForceObserver, RunOut, axis_observer, force_observer
 from rcsa_ident.observer.response import ObserverFRF, observer_response
 from rcsa_ident.observer.transfer_function import HIGHEST, transfer_function
@@ -28,10 +27,7 @@ from rcsa_ident.signals.spectra import line_spectrum
 from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
 from rcsa_ident.signals.verdict import raw_faults, speed_faults
 from rcsa_ident.tool_holder.geometry import ToolAssembly
-from rcsa_ident.tool_holder.model import tool_holder_receptance
-from rcsa_ident.units import to_rpm
-from rcsa_ident.workflows.speeds import MachineOverSpeed
-from rcsa_ident.workflows.tip import tooltip, turned_plane
+from rcsa_ident.units import to_hz, to_rpm
 
 #: The band begins this much below the lowest identified line: a model is as good a little beyond its last point.
 BELOW = 0.7
@@ -82,12 +78,11 @@ class MonitoredCut:
 
 
 def observe(
-    machine: MachineOverSpeed,
+    machine: Machine,
     assembly: ToolAssembly,
     teeth: int,
     cut: Recording,
     air: Recording | None,
-    identified: tuple[float, float],
     programmed: float | None = None,
     method: ObserverMethod = METHOD,
     bandwidth: float | None = None,
@@ -97,15 +92,12 @@ def observe(
 
     Parameters
     ----------
-    machine : MachineOverSpeed
-        Identified.
+    machine : Machine
     assembly : ToolAssembly
         Of the tooling that was cut with; it need not be one of the identification's.
     teeth : int
     cut, air : Recording
         The air cut, where there is one, with the same clamping and speed: its run-out is taken out.
-    identified : two floats [rad/s]
-        Band of the identification.
     programmed : float [rad/s], optional
         Spindle speed, to 1 %; by default from the trigger.
     method : ObserverMethod
@@ -125,10 +117,12 @@ def observe(
     faults = (*raw_faults(cut), *(f"air cut: {fault}" for fault in (raw_faults(air) if air is not None else ())))
     if faults:
         raise Unsteady("recording", "; ".join(faults), "a record without lost, frozen or clipped samples")
-    axes = tuple(axis for axis in measured_axes(cut) if axis in machine.whole)
+    axes = tuple(axis for axis in measured_axes(cut) if axis in machine.axes)
     if not axes:
         raise InputError("sensors", "no displacement along an identified axis", "a displacement sensor for X or Y")
     programmed = trigger_speed(cut) if programmed is None else programmed
+    assert machine.band is not None
+    identified = machine.band
     top = min(identified[1], HIGHEST * 2.0 * np.pi * cut.rate)
     steady = steady_record(cut, axes, programmed, top / (2.0 * np.pi), teeth)
     speed = steady.spindle_speed
@@ -143,18 +137,18 @@ def observe(
             f"the machine was identified from {low:.0f} to {high:.0f} rev/min, the recording was made at {to_rpm(speed):.0f} rev/min"
         )
     omega = 2.0 * np.pi * np.arange(max(0.25 * band[0] / (2.0 * np.pi), STEP_HZ), 1.3 * band[1] / (2.0 * np.pi), STEP_HZ)
-    coupled = tooltip(machine.at(speed), assembly, omega, bands=False, speed=speed).coupled
+    here = machine.at(speed)
+    coupled = here.coupled(assembly, omega, axes)
     tuning = {axis: Tuning(_noise(steady, i), bandwidth or band[1], _response_time(method, speed)) for i, axis in enumerate(axes)}
     observers = []
     for i, axis in enumerate(axes):
-        cross = coupled[axis][SPINDLE, "tip"][:, 0, 0]
-        observers.append(_axis(steady, axis, i, omega, cross, band, tuning[axis], method, speed, teeth, run_out))
+        observers.append(_axis(steady, axis, i, omega, _cross(coupled, axis), band, tuning[axis], method, speed, teeth, run_out))
     observer = force_observer(observers)
     estimate = observer.observe(*_signals(cut, axes), smooth=smooth)
     if not method.colours_noise:
         estimate = replace(estimate, force=_above(estimate.force, band[0], estimate.step))
-    errors = {axis: _model_error(machine.at(speed)[axis], axis, assembly, estimate, i, band, speed) for i, axis in enumerate(axes)}
-    response = {each.axis: _response(each, steady, omega, coupled[each.axis][SPINDLE, "tip"][:, 0, 0], speed, smooth) for each in observers}
+    errors = {axis: _model_error(here, axis, assembly, estimate, i, band, speed) for i, axis in enumerate(axes)}
+    response = {each.axis: _response(each, steady, omega, _cross(coupled, each.axis), speed, smooth) for each in observers}
     return MonitoredCut(
         _widened(estimate, [errors[axis] for axis in axes]),
         observer,
@@ -328,28 +322,27 @@ def _signals(recording: Recording, axes: tuple[Dof, ...]) -> tuple[FloatArray, F
     return np.stack(gap, axis=1), np.stack(acceleration, axis=1)
 
 
+def _cross(coupled: Receptance, axis: Dof) -> ComplexArray:
+    """C31: the spindle's motion over a force at the tip, along one axis, shape (n,) [m/N]."""
+    return coupled.between(f"{SPINDLE}.{axis}", f"tip.{axis}")
+
+
 def _model_error(
-    part: MachineAxis, axis: Dof, assembly: ToolAssembly, estimate: ForceEstimate, column: int, band: tuple[float, float], speed: float
+    machine: Machine, axis: Dof, assembly: ToolAssembly, estimate: ForceEstimate, column: int, band: tuple[float, float], speed: float
 ) -> float:
-    """Standard deviation of the force that the machine's posterior leaves [N]: the force's lines, each with its C31's."""
-    if part.posterior is None:
-        return 0.0
+    """Standard deviation of the force that is left by what is not known of the machine [N]: the force's lines, each with its C31's."""
     rate, force = 1.0 / estimate.step, estimate.force[:, column : column + 1]
     # the second half: a live estimate has settled by then
-    amplitude = line_spectrum(force[force.size // 2 :], rate, speed, band[1] / (2.0 * np.pi)).amplitude[:, 0]
+    amplitude = line_spectrum(force[force.size // 2 :], rate, speed, to_hz(band[1])).amplitude[:, 0]
     order = np.arange(amplitude.size)
     order = order[(order * speed >= band[0]) & (order * speed <= band[1])]
     power = np.abs(amplitude[order]) ** 2
-    omega = order * speed
-    plane = tool_holder_receptance(assembly, omega)
-    plane = plane if axis is Dof.X else turned_plane(plane)
-
-    def cross(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
-        return couple(plane, modes.receptance(omega), joint)[SPINDLE, "tip"][:, 0, 0]
-
-    changes = spread(part.posterior, axis, cross, speed)
-    middle = cross(*part.at(axis, speed))
-    relative = np.sum(np.abs(changes / middle) ** 2, axis=0)
+    coupled = machine.coupled(assembly, order * speed, (axis,))
+    entry = Coordinate(SPINDLE, axis), Coordinate("tip", axis)
+    known = coupled.deviation().get(entry)
+    if known is None:
+        return 0.0
+    relative = (known[0] ** 2 + known[1] ** 2) / np.abs(_cross(coupled, axis)) ** 2
     return float(np.sqrt(0.5 * np.sum(power * relative)))
 
 

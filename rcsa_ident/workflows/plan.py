@@ -31,16 +31,17 @@ from rcsa_ident.identification.experiment_design import (
     tip_changes,
     unknowns,
 )
-from rcsa_ident.identification.posterior import MachineAxis, Posterior
+from rcsa_ident.identification.machine import IdentifiedMachine
+from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.machine.machine import STIFFNESS_SPREAD
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.signals.measurement import MAX_FREQUENCY, CutMeasurement
-from rcsa_ident.stability.lobes import StabilityMethod
+from rcsa_ident.stability.lobes import stability_lobes
+from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.tool_holder.geometry import stiffened
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.units import from_rpm, to_rpm
-from rcsa_ident.workflows.lobes import LobeConditions, tooling_lobes
-from rcsa_ident.workflows.tip import STIFFNESS_SPREAD, tooltip
 
 #: Two cuts of one tooling differ by at least this share of their speed; a programmed speed is met within as much.
 SPACING = 0.01
@@ -176,7 +177,7 @@ class PlannedCuts:
 
 
 def plan_cuts(
-    machine: Mapping[Dof, MachineAxis],
+    machine: IdentifiedMachine,
     toolings: Sequence[Tooling],
     targets: Sequence[Tooling],
     allowed: CutConstraints,
@@ -192,7 +193,7 @@ def plan_cuts(
 
     Parameters
     ----------
-    machine : mapping of Dof to MachineAxis
+    machine : IdentifiedMachine
         With posteriors.
     toolings : sequence of Tooling
         To cut with.
@@ -221,7 +222,7 @@ def plan_cuts(
     """
     _check(machine, toolings, targets, count, band_hz)
     goal = MeanVariance() if goal is None else goal
-    posteriors = {axis: part.posterior for axis, part in machine.items() if part.posterior is not None}
+    posteriors = {axis: part.posterior for axis, part in machine.identified.items() if part.posterior is not None}
     candidates, unstable, deepest = _candidates(machine, toolings, allowed, coefficients)
     if not candidates:
         found = f"none of {unstable} stable with a margin of {allowed.margin:g} (the deepest stable one would be {1e3 * deepest:.3g} mm)"
@@ -260,9 +261,9 @@ def line_noise(measurements: Sequence[CutMeasurement]) -> float:
 
 
 def _check(
-    machine: Mapping[Dof, MachineAxis], toolings: Sequence[Tooling], targets: Sequence[Tooling], count: int, band_hz: tuple[float, float]
+    machine: IdentifiedMachine, toolings: Sequence[Tooling], targets: Sequence[Tooling], count: int, band_hz: tuple[float, float]
 ) -> None:
-    for axis, part in machine.items():
+    for axis, part in machine.identified.items():
         if part.posterior is None:
             raise InputError(f"axis {axis.upper()}", "no covariance", "an identification with a posterior")
     for name, given in (("toolings", toolings), ("targets", targets)):
@@ -278,7 +279,7 @@ def _check(
 
 
 def _candidates(
-    machine: Mapping[Dof, MachineAxis], toolings: Sequence[Tooling], allowed: CutConstraints, coefficients: CuttingCoefficients
+    machine: IdentifiedMachine, toolings: Sequence[Tooling], allowed: CutConstraints, coefficients: CuttingCoefficients
 ) -> tuple[list[PlannedCut], int, float]:
     """All stable cuts, tooling by tooling, speed by speed; how many may chatter; the deepest that would be stable anywhere [m]."""
     omega = 2.0 * np.pi * np.arange(LOBE_FREQUENCIES[0], MAX_FREQUENCY, LOBE_FREQUENCIES[1])
@@ -290,13 +291,9 @@ def _candidates(
         seen = speeds[speeds * tooling.cutter.teeth <= 2.0 * np.pi * MAX_FREQUENCY]
         if not seen.size:
             continue
-        conditions = LobeConditions(
-            MillingProcess(tooling.cutter, coefficients, allowed.engagement, allowed.feed_angle),
-            np.outer(around, seen).ravel(),
-            2.0 * allowed.margin * max(allowed.depths),
-            allowed.method,
-        )
-        lobes = tooling_lobes(tooltip(machine, tooling.assembly, omega, bands=False), conditions)
+        process = MillingProcess(tooling.cutter, coefficients, allowed.engagement, allowed.feed_angle)
+        tip, deepest_asked = machine.tip(tooling, omega, spread=False), 2.0 * allowed.margin * max(allowed.depths)
+        lobes = stability_lobes(tip, process, np.outer(around, seen).ravel(), deepest_asked, allowed.method)
         limits = lobes.limit_depth.reshape(around.size, -1).min(axis=0)
         deepest = max(deepest, float(limits.max()) / allowed.margin)
         for speed, limit in zip(seen.tolist(), limits.tolist(), strict=True):

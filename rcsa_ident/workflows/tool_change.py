@@ -14,32 +14,22 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.errors import InputError
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
 from rcsa_ident.machine.speed_dependence import tips_over_speed
 from rcsa_ident.machining_setup import CutSpec, Tooling
+from rcsa_ident.stability.advice import Advice, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import DRAWS, both_directions, stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.pockets import pad_speeds
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, StabilityLobes
-from rcsa_ident.stability.stability_map import StabilityMap, stability_map
+from rcsa_ident.stability.stability_map import MonodromyMethod, StabilityMap, stability_map
 from rcsa_ident.stability.surface_error import SurfaceError, surface_location_error
 from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, tally
-from rcsa_ident.stability.tip_fit import fitted_modes
-from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.stability.tip_modes import fitted_modes
+from rcsa_ident.stability.tip_modes import TIP, TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.units import to_hz, to_rpm
-from rcsa_ident.workflows.advice import (
-    OperatingPoint,
-    PlannedCut,
-    SpeedWindow,
-    UsableDepths,
-    highest_removal,
-    planned_cut,
-    speed_windows,
-    usable_depths,
-)
 
 #: How far beyond the identified band receptances are computed where a method fits modes to them: those above it are the tool's own.
 BEYOND = 1.5
@@ -91,8 +81,8 @@ def tooltip(
     """
     tip = machine.at(speed).tip(tooling, omega, spread, stiffness_spread)
     if isinstance(tip, TipModes):
-        known = tip.receptance() if omega is None else tip.on(omega)
-        tip = UncertainReceptance(known.omega, known.values, known.rows, known.cols)
+        lines = tip.receptance().omega if omega is None else omega
+        tip = UncertainReceptance(lines, tip.response(lines), TIP, TIP)
     remarks = [*machine.remarks, *([] if speed is None else _outside(machine, np.array([speed])))]
     if machine.band is not None and tip.omega.max() > 1.001 * machine.band[1]:
         top = to_hz(machine.band[1])
@@ -171,43 +161,6 @@ class ToolChange:
         return tuple(dict.fromkeys(said))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Advice:
-    """Which cuts a tooling can make, and which of them is recommended.
-
-    Parameters
-    ----------
-    tooling : Tooling
-    lobes : StabilityLobes
-        At the speeds that were asked for.
-    usable : UsableDepths
-        What is recommended at each of them, within power and torque.
-    recommended : tuple of OperatingPoint
-        The cuts that remove most, one for each pocket, the best first.
-    windows : tuple of SpeedWindow
-        Speeds at which a depth is recommended, where one was asked for.
-    planned : tuple of PlannedCut
-    tested : Tally or None
-        How many of the cuts that were tried the limits tell right.
-    remarks : tuple of str
-        What the user should know.
-    """
-
-    tooling: Tooling
-    lobes: StabilityLobes
-    usable: UsableDepths
-    recommended: tuple[OperatingPoint, ...]
-    windows: tuple[SpeedWindow, ...]
-    planned: tuple[PlannedCut, ...]
-    tested: Tally | None
-    remarks: tuple[str, ...]
-
-    @property
-    def common(self) -> FloatArray | None:
-        """What is stable on all machines that were drawn, shape (n,) [m]; None where none were."""
-        return None if self.lobes.drawn is None else self.lobes.limit_quantile(1.0)
-
-
 def advise(
     change: ToolChange,
     drive: SpindleDrive = _UNLIMITED,
@@ -240,7 +193,8 @@ def advise(
     usable = usable_depths(wide, process, drive, tolerance, probability, reserve).between(low, high)
     lobes = wide.between(low, high)
     return Advice(
-        change.tooling,
+        change.tooling.name,
+        change.tooling.assembly.stickout,
         lobes,
         usable,
         tuple(highest_removal(usable, process)),
@@ -270,7 +224,7 @@ def map_of(change: ToolChange, depths: int = 100, full: bool = False) -> Stabili
     full : bool
         Compute every point.
     """
-    method = change.method if change.method.gives_maps else FullDiscretisation()
+    method = change.method if isinstance(change.method, MonodromyMethod) else FullDiscretisation()
     speeds, depth = np.unique(change.speeds), change.max_depth * np.arange(1, depths + 1) / depths
     parts = []
     for places, tip in tips_over_speed(change.machine, change.tooling, change.machine.lines(BEYOND), speeds, spread=False):

@@ -21,15 +21,16 @@ from typer.testing import CliRunner
 from api.backups import save
 from api.backups.load import restore
 from api.backups.save import backup
+from api.client import Client
 from api.files import NORMALISED, UPLOADS, Files
 from api.serve import app
 from api.stores.entities import Document
 from api.stores.sql import open_store
 from api.stores.tables import SCHEMA_VERSION
 from rcsa_ident.errors import InputError
-from tests.api.conftest import Client, service
+from tests.api.in_process import service
 from tests.api.recordings import content, declared
-from tests.cli import by_hand
+from tests.fixtures import by_hand
 
 
 @pytest.fixture

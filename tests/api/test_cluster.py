@@ -9,7 +9,7 @@ import pytest
 from api.jobs.cluster import over_cluster
 from api.settings import from_environment
 from rcsa_ident.errors import InputError
-from tests import scaleout_tasks as tasks
+from tests.fixtures import scaleout_tasks as tasks
 
 
 @pytest.fixture(scope="module")

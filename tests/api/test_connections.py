@@ -12,13 +12,13 @@ import pytest
 import uvicorn
 
 from api import access
-from api.access import Patient
+from api.access import TimedHeadProtocol
 from api.main import create_app
 from api.settings import Settings
-from tests.api.conftest import Here, Near
+from tests.api.in_process import Here, Near
 
 
-class Hasty(Patient):
+class Hasty(TimedHeadProtocol):
     seconds, most = 0.6, 20_000
 
 

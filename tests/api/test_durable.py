@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import create_engine, text
 
-from tests.api.conftest import POSTGRESQL, SQLITE, database
+from tests.api.in_process import POSTGRESQL, SQLITE, database
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Carries jobs out until all are over, or dies in a step; each line of its output is a step that it computed.

@@ -19,10 +19,10 @@ from api.main import create_app
 from api.problems import MEDIA_TYPE
 from api.reading.reader import Limits, Reader
 from api.settings import Settings
-from tests.api.conftest import Here, embedded
+from tests.api.in_process import Here, embedded
 from tests.api.recordings import RATE, channels, content, declared
+from tests.fixtures.recording_formats import FORMATS
 from tests.io import test_hdf5, test_matlab, test_tdms
-from tests.io.formats import FORMATS
 
 BINARY = {"Content-Type": "application/octet-stream"}
 NAMES = ["flange_x", "flange_y", "fixture_x", "fixture_y"]

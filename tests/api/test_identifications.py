@@ -27,9 +27,8 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import read_cut
 from rcsa_ident.io.setups import read_campaign
 from tests.api import identifying
-from tests.api.conftest import URL, embedded, service
 from tests.api.identifying import Steps, carried, declared, uploaded
-from tests.api.test_machines import refused
+from tests.api.in_process import URL, embedded, refused, service
 
 KINDS = {"progress", "trace", "fit", "end"}
 
@@ -407,7 +406,7 @@ def test_a_job_reads_what_was_there_when_it_began(tmp_path, store):
         plan = desk.remember("plan", lambda: [work._files(cut) for cut in found.cuts])
         planned = work._planned(found, plan)
         read = partial(read_cut, sensors, campaign.sampling_rate)
-        return [each.cut.id for each in work._judged(planned, read, desk)]
+        return [each.cut_id for each in work._readings(planned, read, desk)]
 
     assert judged(there[0]) == judged(there[1]) == [cut.id for cut in cuts[:2]]
     with pytest.raises(InputError, match="since the job began"):

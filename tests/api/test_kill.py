@@ -22,10 +22,10 @@ from api.stores.jobs import Job
 from api.stores.sql import open_store
 from api.work.requests import CutQuestion, LobeQuestion, MachineText, ToolingText
 from rcsa_ident.cutting.conditions import Engagement
-from tests.api.conftest import POSTGRESQL, SQLITE, database, example
 from tests.api.identifying import uploaded
-from tests.api.test_serve import command, serving
-from tests.cli import by_hand
+from tests.api.in_process import POSTGRESQL, SQLITE, database
+from tests.fixtures import by_hand
+from tests.fixtures.service import command, example, serving
 
 pytestmark = pytest.mark.skipif(os.name != "posix" or not Path("/proc/self/stat").exists(), reason="processes are looked up in /proc")
 
@@ -69,9 +69,9 @@ def after(client: Client, id: str, count: int) -> None:
 @contextmanager
 def started(folder: Path, url: str) -> Iterator[tuple[Client, subprocess.Popen]]:
     settings = {"RCSA_IDENT_JOB_NICE": "0"} | ({} if url.startswith("sqlite") else {"RCSA_IDENT_DATABASE": url})
-    with serving(folder, folder.parent / "log", **settings) as (address, running), Client(address) as client:
-        yield client, running
-        kill([*descendants(running.pid), running.pid])
+    with serving(folder, **settings) as served, Client(served.url) as client:
+        yield client, served.process
+        kill([*descendants(served.process.pid), served.process.pid])
 
 
 @pytest.mark.parametrize("kind", [SQLITE, POSTGRESQL])

@@ -19,8 +19,8 @@ from rcsa_ident.workflows.limits import machine_limits
 from rcsa_ident.workflows.lobes import LobeConditions
 from rcsa_ident.workflows.speeds import MachineOverSpeed
 from rcsa_ident.workflows.tip import tooltip
-from tests.api.conftest import example
-from tests.cli import by_hand
+from tests.fixtures import by_hand
+from tests.fixtures.service import example
 
 OMEGA = 2.0 * np.pi * np.arange(100.0, 3001.0, 1.0)
 SPEEDS = np.arange(5000.0, 18001.0, 250.0) * np.pi / 30.0

@@ -14,10 +14,9 @@ from api.files import NORMALISED, UPLOADS
 from api.reading.samples import read_normalised
 from rcsa_ident.io.recordings import read_recording, write_hdf5
 from rcsa_ident.signals.recording import Quantity, Sensor
-from tests.api.conftest import service
+from tests.api.in_process import refused, service
 from tests.api.recordings import RATE, RPM, channels, content, declared, pair
-from tests.api.test_machines import refused
-from tests.io.formats import FORMATS
+from tests.fixtures.recording_formats import FORMATS
 
 BINARY = {"Content-Type": "application/octet-stream"}
 
@@ -154,7 +153,7 @@ def test_every_format_tells_the_same(client, tmp_path, kind):
     assert (found.sampling_rate_hz, found.duration_s) == (RATE, pytest.approx(0.28))
     assert found.spindle_speed_rpm == pytest.approx(pair().speed * 30.0 / np.pi, rel=1e-5)
     assert found.harmonics_above_noise["X"] >= 6
-    parts = client.http.app.state.parts
+    parts = client.http.app.state.components
     row = parts.store.recordings.get("local", id, path.name)
     assert parts.files.path("local", UPLOADS, row.sha256).read_bytes() == path.read_bytes()
     sensors = tuple(Sensor(name, Quantity.TRIGGER) for name in volts)

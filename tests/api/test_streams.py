@@ -15,12 +15,12 @@ from api.streams.process import StreamProcess
 from api.work.forces import observed
 from api.work.machine_cache import read
 from api.work.toolings import tooling_of
-from benchmarks.observer import relative_error
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
-from tests.api.conftest import Near
-from tests.api.streaming import CHANNELS, SENSITIVITY, STREAM, closed, hello, result, send, signals, streaming, tooling, until
-from tests.workflows.test_stream_forces import RATE, streamed
+from tests.api.in_process import Near
+from tests.api.streaming import STREAM, closed, send, streaming, until
+from tests.fixtures.force_stream import CHANNELS, RATE, SENSITIVITY, hello, result, signals, streamed, tooling
+from tests.fixtures.virtual_cut import relative_error
 
 SETTLE = round(0.2 * RATE)
 
@@ -32,7 +32,7 @@ def shop(tmp_path):
 
 
 def hub_of(http):
-    return http.app.state.parts.streams
+    return http.app.state.components.streams
 
 
 def batch(raw: np.ndarray) -> np.ndarray:

@@ -16,9 +16,9 @@ from rcsa_ident.workflows.limits import machine_limits
 from rcsa_ident.workflows.lobes import LobeConditions
 from rcsa_ident.workflows.speeds import MachineOverSpeed
 from rcsa_ident.workflows.tip import tooltip
-from tests.api.conftest import example, result_text
-from tests.api.test_machines import refused
-from tests.cli import by_hand
+from tests.api.in_process import refused
+from tests.fixtures import by_hand
+from tests.fixtures.service import example
 
 SPEEDS = {"from_rpm": 6000, "to_rpm": 9000, "step_rpm": 500}
 RPM = math.pi / 30.0
@@ -42,7 +42,7 @@ def tooling(tmp_path):
 @pytest.mark.parametrize("softening", [False, True])
 def test_lobes_are_those_of_the_command(client, tmp_path, tooling, softening):
     """With bands, for a machine that stays the same at all speeds and for one that changes."""
-    result = result_text(tmp_path, softening)
+    result = by_hand.result_text(tmp_path, softening)
     id = client.make_machine("m").id
     client.identify(id, result)
     client.write_tooling("T1", by_hand.TOOLING)
@@ -174,7 +174,7 @@ def test_tooltip_is_that_of_the_command(shop, result, tooling, tmp_path):
 
 def test_a_speed_that_the_machine_was_not_cut_at(client, tmp_path):
     id = client.make_machine("m").id
-    client.identify(id, result_text(tmp_path, True))
+    client.identify(id, by_hand.result_text(tmp_path, True))
     inside, outside = (client.tooltip(id, example(), spindle_speed_rpm=n, step_hz=10) for n in (9000, 30000))
     assert not any("identified from" in w for w in inside.warnings)
     assert any("identified from 5730 to 13369 rev/min" in w for w in outside.warnings)

@@ -25,9 +25,8 @@ from api.files import STALE_FILE, STALE_PART, UPLOADS
 from api.main import create_app
 from api.settings import Settings
 from api.stores.sql import open_store
-from tests.api.conftest import Here, embedded, service
+from tests.api.in_process import Here, embedded, refused, service
 from tests.api.recordings import content, declared
-from tests.api.test_machines import refused
 
 ROOT = Path(__file__).resolve().parents[2]
 BINARY = {"Content-Type": "application/octet-stream"}
@@ -280,7 +279,7 @@ CODE = """
 import importlib, json, os, sys
 from pathlib import Path
 import api.reading.examine
-from tests.api.conftest import embedded, service
+from tests.api.in_process import embedded, service
 
 def upload(folder, id, target, survived, replacing):
     path, _, function = target.rpartition(".")
@@ -312,7 +311,7 @@ for folder, *step in json.loads(sys.argv[1]):
 def whole(folder: Path, group: str = "local") -> dict[str, str]:
     """Names and hashes of recordings, each of which is there to the last byte."""
     with service(open_store(f"sqlite:///{folder / 'store.db'}"), folder) as http:
-        parts = http.app.state.parts
+        parts = http.app.state.components
         (machine,) = parts.store.machines.list(group, "", 9)
         (campaign,) = parts.store.campaigns.list(group, machine.id, "", 9)
         found = {}
@@ -355,7 +354,7 @@ def test_a_kill_at_every_step_loses_nothing_and_leaves_nothing(tmp_path, replaci
         # the next start sweeps, and judges what is owed
         with service(open_store(f"sqlite:///{copy / 'store.db'}"), copy) as http:
             until(lambda copy=copy, there=there: len(files_in(copy)) == 2 * len(there))
-            store = http.app.state.parts.store
+            store = http.app.state.components.store
             until(lambda store=store: store.campaigns.unsettled() == [])
             again = http.put(f"/v1/campaigns/{id}/recordings/c0_cut.h5?replace=true", content=new, headers=BINARY)
             assert again.status_code == (200 if kept else 201)

@@ -9,14 +9,15 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from benchmarks.observer import DATA, relative_error
 from rcsa_ident.cli.forces import forces
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.forces import read_forces_csv, sensors_of_result, write_forces_csv
 from rcsa_ident.io.recordings import write_hdf5
 from rcsa_ident.io.results import read_result, spindle_to_json, write_result
-from tests.observer.flange_machine import BAND, flange_machine, paper_cut
+from tests.fixtures.flange_machine import BAND, flange_machine, paper_cut
+from tests.fixtures.paths import TOOLINGS
+from tests.fixtures.virtual_cut import relative_error
 
 app = typer.Typer()
 app.command()(forces)
@@ -43,7 +44,7 @@ def folder(tmp_path_factory):
             "band_hz": [w / (2.0 * np.pi) for w in BAND], "axes": axes,
         },
     )  # fmt: skip
-    text = (DATA / "machines" / "toolings" / "S2-PG25.toml").read_text(encoding="utf-8")
+    text = (TOOLINGS / "S2-PG25.toml").read_text(encoding="utf-8")
     (folder / "T.toml").write_text(text.replace("teeth = 4", "teeth = 2"), encoding="utf-8")
     for name, recording in (("cut.h5", made.cut), ("air.h5", made.air)):
         channels = {s.name: recording.samples[:, i] * s.sensitivity for i, s in enumerate(recording.sensors)}

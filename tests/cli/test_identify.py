@@ -14,7 +14,7 @@ from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.workflows.tip import tooltip
-from tests.cli import by_hand
+from tests.fixtures import by_hand
 
 
 def run(*arguments, code=0):

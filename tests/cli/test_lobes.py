@@ -15,7 +15,7 @@ from rcsa_ident.cli import advice, cases, export, lobes
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.curves import read_lobes_csv, write_frf_csv
 from rcsa_ident.io.frf_files import Source, read_tap_tests
-from tests.cli import by_hand
+from tests.fixtures import by_hand
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 APP = typer.Typer(pretty_exceptions_enable=False)

@@ -14,7 +14,7 @@ from rcsa_ident.io.curves import read_frf_csv, read_lobes_csv
 from rcsa_ident.io.identifications import machine_from_json, speed_band_to_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.workflows.tip import STIFFNESS_SPREAD, tooltip
-from tests.cli import by_hand
+from tests.fixtures import by_hand
 
 RPM = 30.0 / np.pi
 SPEEDS = ("--speed-from", 6000, "--speed-to", 13000, "--speed-step", 500)

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from rcsa_ident.cli import tools
 from rcsa_ident.io.setups import read_tooling
-from tests.io.fusion import END_MILL, end_mill, library
+from tests.fixtures.tool_library import END_MILL, end_mill, library
 
 TOOLING = Path(__file__).resolve().parents[2] / "data" / "machines" / "toolings" / "S1-ER32.toml"
 app = typer.Typer()

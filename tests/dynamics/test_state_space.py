@@ -1,9 +1,10 @@
-"""State space: sampling against closed forms and against a fine integration, modal form, python-control."""
+"""State space: sampling against closed forms and against a fine integration, python-control."""
 
 from __future__ import annotations
 
 import warnings
 
+import control
 import numpy as np
 import pytest
 import scipy.integrate
@@ -76,32 +77,25 @@ def test_sampling_maps_poles_and_keeps_stability_and_the_static_gain(seed, order
     np.testing.assert_allclose(sampled.response(np.zeros(1))[0].real, static, rtol=1e-7, atol=1e-7 * np.abs(static).max())
 
 
-@settings(max_examples=30, deadline=None)
-@given(st.integers(0, 2**31), st.integers(1, 8))
-def test_modal_form_is_the_same_system_in_blocks(seed, order):
-    system = random_system(seed, order)
-    modal = system.modal()
-    omega = np.linspace(0.0, 10.0, 7)
-    np.testing.assert_allclose(modal.response(omega), system.response(omega), rtol=1e-7, atol=1e-7)
-    outside = np.abs(np.subtract.outer(np.arange(order), np.arange(order))) > 1
-    np.testing.assert_allclose(modal.A[outside], 0.0, atol=1e-8 * np.abs(modal.A).max())
-    pairs = system.pole.imag > 0.0
-    np.testing.assert_allclose(np.sum(np.abs(np.triu(modal.A, 1)) > 1e-8 * np.abs(modal.A).max()), np.sum(pairs))
-
-
-def test_coinciding_poles_have_no_modal_form():
-    with pytest.raises(InputError, match="poles that differ"):
-        StateSpace([[0.0, 1.0], [0.0, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]]).modal()
-
-
-def test_python_control_agrees():
+def test_python_control_there_and_back():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        other = OSCILLATOR.to_control()
+        other = OSCILLATOR.to_control(["tip.x"], ["tip.x"])
         sampled = OSCILLATOR.sampled(0.02).to_control()
+        transfer = control.tf([2.0], [1.0, 2.0, 400.0])
     omega = np.array([3.0, 19.0])
     np.testing.assert_allclose(np.squeeze(other(1j * omega)), OSCILLATOR.response(omega)[:, 0, 0], rtol=1e-12)
+    assert other.input_labels == other.output_labels == ["tip_x"]
+    assert other.isctime(strict=True)
     assert sampled.dt == 0.02
+    back, again = StateSpace.from_control(other), StateSpace.from_control(sampled)
+    assert (back.step, again.step) == (0.0, 0.02)
+    for name in "ABCD":
+        np.testing.assert_array_equal(getattr(back, name), getattr(OSCILLATOR, name))
+        np.testing.assert_array_equal(getattr(again, name), getattr(OSCILLATOR.sampled(0.02), name))
+    np.testing.assert_allclose(StateSpace.from_control(transfer).response(omega), 2.0 * OSCILLATOR.response(omega), rtol=1e-12)
+    with pytest.raises(InputError, match="time between samples"):
+        StateSpace.from_control(control.ss(0.5, 1.0, 1.0, 0.0, True))
 
 
 def test_shapes_and_holds_are_checked():

@@ -14,7 +14,7 @@ from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.workflows.tip import tooltip
-from tests.identification.conftest import AXES, TIP_OMEGA, open_shop
+from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, open_shop
 
 SMALL = EvidenceSelection(search=SearchSettings(modes=8, population=4, generations=2, steps=6), candidates=2)
 #: For what must not crash, whatever comes out.
@@ -32,7 +32,7 @@ def tip_errors(shop, found, speed=None, told=None):
 
 def off(found, data, delays):
     """Errors of the delays, in the tooth-passing period that is nearest [s]."""
-    period = data.cut_prior[:, 3]
+    period = data.cut_prior.tooth_period
     miss = found.delay - delays
     return miss - period * np.round(miss / period)
 

@@ -31,7 +31,7 @@ from rcsa_ident.identification.parameters import AxisLayout, Layout, plain
 from rcsa_ident.identification.posterior import Posterior, spread
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.tool_holder.model import tool_holder_receptance
-from tests.identification.conftest import machine_vector, remade, vector_of
+from tests.identification.models import machine_vector, remade, vector_of
 
 NOISE = 1e-10
 

@@ -67,7 +67,7 @@ def test_cost_of_a_candidate_is_that_of_its_coupled_modes(few, problem, shop):
     modes = ModalModel(omega_n, zeta, np.stack([phi_t, phi_r], axis=1), np.zeros((2, 2)), plane("flange"))
     axis = few.axes[0]
     value = np.empty(axis.omega.size, dtype=complex)
-    delays = np.random.default_rng(2).integers(0, 64, len(few.cut_ids)) / 64 * few.cut_prior[:, 3]
+    delays = np.random.default_rng(2).integers(0, 64, len(few.cut_ids)) / 64 * few.cut_prior.tooth_period
     for k in range(len(few.cut_ids)):
         mine = axis.cut == k
         holder = tool_holder_receptance(shop.toolings[few.toolings[few.cut_tooling[k]]].assembly, axis.omega[mine])

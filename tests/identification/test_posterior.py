@@ -11,7 +11,7 @@ from rcsa_ident.identification.posterior import MachineAxis, Posterior, spread
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.tool_holder.model import tool_holder_receptance
-from tests.identification.conftest import machine_vector, remade, vector_of
+from tests.identification.models import machine_vector, remade, vector_of
 from tests.identification.test_parameters import receptance
 
 THREE = AxisLayout(3)

@@ -20,7 +20,7 @@ from rcsa_ident.io.identifications import (
     workpiece_from_json,
 )
 from rcsa_ident.io.results import read_result, write_result
-from tests.cli import by_hand
+from tests.fixtures import by_hand
 
 
 @pytest.fixture(params=[False, True], ids=["still", "softening"])

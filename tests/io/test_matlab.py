@@ -15,7 +15,7 @@ import scipy.io
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
-from tests.io.formats import mat73
+from tests.fixtures.recording_formats import mat73
 
 X = Sensor("x", Quantity.TRIGGER)
 Y = Sensor("y", Quantity.TRIGGER)

@@ -14,7 +14,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io import tdms as reader
 from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
-from tests.io.formats import tdms
+from tests.fixtures.recording_formats import tdms
 
 nptdms = pytest.importorskip("nptdms", reason="npTDMS is not installed")
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"

@@ -17,7 +17,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.io.tool_libraries import Assumptions, file_names, import_tools, read_tool_library
 from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
-from tests.io.fusion import END_MILL, end_mill, inches, library
+from tests.fixtures.tool_library import END_MILL, end_mill, inches, library
 
 
 def imported(*entries, **assumed):

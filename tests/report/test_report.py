@@ -22,7 +22,8 @@ from rcsa_ident.machining_setup import Campaign, Cut, Tooling, Workpiece
 from rcsa_ident.report.figures import svg, tooltip_frf
 from rcsa_ident.report.html import ToolingPage, report_html
 from rcsa_ident.report.summaries import coefficient_rows, mode_rows, recording_rows, two_digits
-from rcsa_ident.signals.measurement import AxisLines, CutMeasurement, Reading
+from rcsa_ident.signals.frf import AxisLines
+from rcsa_ident.signals.measurement import CutMeasurement, Reading
 from rcsa_ident.signals.verdict import Verdict
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
@@ -49,8 +50,9 @@ def readings(campaign):
     force = np.ones(2, dtype=complex)
     slope = np.zeros((2, 5), dtype=complex)
     lines = AxisLines(np.array([4, 8]), np.array([4e3, 8e3]), value, 0.0 * value, variance, np.ones(2), force, slope)
-    good = Reading(Verdict((), ("no air cut",)), CutMeasurement("cut-0", NAME, 1001.0, {Dof.X: lines}, 0.0))
-    return [(campaign.cuts[0], good), (campaign.cuts[1], good), (campaign.cuts[2], Reading(Verdict(("chatter: 3 µm at 1500 Hz",))))]
+    measurement = CutMeasurement("cut-0", NAME, 1001.0, {Dof.X: lines}, 0.0)
+    good = [Reading(cut.id, NAME, 1000.0, Verdict((), ("no air cut",)), measurement) for cut in campaign.cuts[:2]]
+    return [*good, Reading(campaign.cuts[2].id, NAME, 1000.0, Verdict(("chatter: 3 µm at 1500 Hz",)))]
 
 
 @pytest.fixture

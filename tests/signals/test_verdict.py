@@ -9,7 +9,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.signals.measurement import judge_air
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.signals.verdict import implausible, raw_faults, tooth_count_fault
-from tests.signals.synthetic import RATE, RPM, changed, conditions, drift, pair, profile, wave
+from tests.fixtures.synthetic import RATE, RPM, changed, conditions, drift, pair, profile, wave
 
 
 @pytest.fixture(scope="module")
@@ -248,15 +248,15 @@ def test_noise_has_no_harmonics(good):
 
 
 def test_an_air_cut_alone(good):
-    found = judge_air(good.air, conditions(9000.0))
+    found = judge_air("c", "t", good.air, conditions(9000.0))
     assert found.verdict.usable
     assert found.measurement is None
     assert found.spindle_speed == pytest.approx(9000.0 * RPM, rel=2e-3)
     assert min(found.harmonics.values()) >= 8
-    assert not judge_air(good.air, conditions(6500.0)).verdict.usable
+    assert not judge_air("c", "t", good.air, conditions(6500.0)).verdict.usable
     short = Recording(RATE, good.air.samples[:300], good.air.sensors)
-    assert judge_air(short, conditions(9000.0)).verdict.reasons[0].startswith("too short")
+    assert judge_air("c", "t", short, conditions(9000.0)).verdict.reasons[0].startswith("too short")
     frozen = changed(good.air, lambda x: x.__setitem__((slice(None), 1), 0.5))
-    assert judge_air(frozen, conditions(9000.0)).verdict.reasons[0].startswith("no signal")
+    assert judge_air("c", "t", frozen, conditions(9000.0)).verdict.reasons[0].startswith("no signal")
     with pytest.raises(InputError, match="no displacement"):
-        judge_air(Recording(RATE, good.air.samples[:, 2:], good.air.sensors[2:]), conditions(9000.0))
+        judge_air("c", "t", Recording(RATE, good.air.samples[:, 2:], good.air.sensors[2:]), conditions(9000.0))

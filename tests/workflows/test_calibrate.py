@@ -16,7 +16,7 @@ from rcsa_ident.machining_setup import Campaign, Cut, Tooling, Workpiece
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 from rcsa_ident.workflows.calibrate import calibrate, measure_force
-from tests.workflows.dynamometer import COEFFICIENTS, CUTTER, DOWN, RPM, SLOT, TRUE, plan, true_force
+from tests.fixtures.dynamometer import COEFFICIENTS, CUTTER, DOWN, RPM, SLOT, TRUE, plan, true_force
 
 RATE = 25600.0
 SENSORS = (Sensor("fx", Quantity.FORCE, Dof.X), Sensor("fy", Quantity.FORCE, Dof.Y))

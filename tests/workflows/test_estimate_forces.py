@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.observer import relative_error, virtual_cut
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
@@ -18,7 +17,8 @@ from rcsa_ident.signals.measurement import NO_AIR
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.workflows.estimate_forces import observe, trigger_speed, wear_of
 from rcsa_ident.workflows.speeds import MachineOverSpeed
-from tests.observer.flange_machine import BAND, flange_machine, paper_cut
+from tests.fixtures.flange_machine import BAND, flange_machine, paper_cut
+from tests.fixtures.virtual_cut import relative_error, virtual_cut
 
 RPM = np.pi / 30.0
 
@@ -119,7 +119,7 @@ def test_the_posterior_widens_the_bands(found):
 def test_wear_of_the_paper_case(found):
     """Through machine, sensors and observer: K_tc and K_rc of the virtual workpiece (902 MPa, 0.26), no edges."""
     made = paper_cut()
-    from benchmarks.observer import CASE
+    from tests.fixtures.virtual_cut import CASE
 
     worn = wear_of(found, Cutter(2, 0.012, made.tooling.cutter.helix), CASE)
     assert worn.separable

@@ -19,7 +19,7 @@ from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.workflows.lobes import LobeConditions, tooling_lobes
 from rcsa_ident.workflows.plan import CutConstraints, line_noise, plan_cuts
 from rcsa_ident.workflows.tip import tooltip
-from tests.identification.conftest import open_shop
+from tests.fixtures.virtual_shop import open_shop
 
 TOOLINGS = Path(__file__).parents[2] / "data" / "machines" / "toolings"
 RPM = np.pi / 30.0

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import functools
-import json
 import math
-import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,16 +12,10 @@ from typing import Any
 from fastapi.concurrency import iterate_in_threadpool, run_in_threadpool
 
 from api.components import Components
-from api.files import NORMALISED
-from api.problems import Problem
-from api.reading.both import recording_and_air
-from api.reading.campaign_text import campaign_of_text
-from api.routes.common import found_or_404
-from api.routes.machines import known_machine
-from api.routes.tool_change import tooling_text
-from api.schemas.forces import ReplayHello, SensorKeys, StreamHello
+from api.lookups import air_cut, channels_of, known_machine, pair_reader, tooling_text, uploaded
+from api.schemas.campaigns import given_sensors
+from api.schemas.forces import ReplayHello, StreamHello
 from api.security import now
-from api.stores.campaigns import Recording as Kept
 from api.streams.design import StreamQuestion, design, design_replay
 from api.streams.hub import Hub
 from api.streams.session import About, Session, Stage
@@ -87,7 +78,7 @@ class Opening:
     async def design(self, work: Work, first: int, samples: FloatArray | None) -> tuple[bytes, dict[str, Any]]:
         """Return plan and what the client is told, from a worker."""
         if self.source is not None:
-            return await work.run(design_replay, self.machine, self.tooling, self.question, reader(self.source.cut, self.source.air))
+            return await work.run(design_replay, self.machine, self.tooling, self.question, pair_reader(self.source.cut, self.source.air))
         assert samples is not None
         raw = samples.astype("<f8").tobytes()
         return await work.run(design, self.machine, self.tooling, self.question, first, raw, self.air)
@@ -110,12 +101,12 @@ class Opening:
                 hub.offer(session, start + first, samples)
 
 
-async def logger(parts: Components, group: str, hello: StreamHello) -> Opening:
+async def open_logger(components: Components, group: str, hello: StreamHello) -> Opening:
     """Return the opening of a data logger's stream."""
 
     def look() -> Opening:
-        known = known_machine(parts, group, hello.machine)
-        tooling = tooling_text(parts, group, hello.tooling)
+        known = known_machine(components, group, hello.machine)
+        tooling = tooling_text(components, group, hello.tooling)
         channels = channels_of(hello.channels, given_sensors(hello.sensors) or sensors_of(known.text))
         speed = None if hello.spindle_speed_rpm is None else from_rpm(hello.spindle_speed_rpm)
         if speed is None and not any(sensor.quantity is Quantity.TRIGGER for sensor in channels):
@@ -124,100 +115,34 @@ async def logger(parts: Components, group: str, hello: StreamHello) -> Opening:
         if len(set(axes)) < len(axes):
             raise InputError("axes", list(axes), "each axis once")
         seconds = max(hello.settle_s, 0.0 if speed is None else REVOLUTIONS * 2.0 * math.pi / speed)
-        if seconds > 0.5 * parts.settings.stream_buffer_seconds:
+        if seconds > 0.5 * components.settings.stream_buffer_seconds:
             raise InputError("spindle_speed_rpm", hello.spindle_speed_rpm, f"a speed of which {REVOLUTIONS} revolutions can wait")
         settle = math.ceil(seconds * hello.sampling_rate_hz)
         air = None
         if hello.air is not None:
             if hello.begins == "air":
                 raise InputError("air", "a recording, and a stream that begins in air", "one of them")
-            air = air_cut(parts, group, hello.air.campaign, hello.air.recording)
+            air = air_cut(components, group, hello.air.campaign, hello.air.recording)
         question = StreamQuestion(hello.sampling_rate_hz, speed, channels, axes, hello.begins, hello.method)
         return Opening(known, tooling, hello.machine, hello.name, question, settle, air)
 
     return await run_in_threadpool(look)
 
 
-async def replayed(parts: Components, group: str, hello: ReplayHello) -> Opening:
+async def open_replay(components: Components, group: str, hello: ReplayHello) -> Opening:
     """Return the opening of a recording that is played."""
 
     def look() -> Opening:
-        found = uploaded(parts, group, hello.replay.campaign, hello.replay.recording)
+        found = uploaded(components, group, hello.replay.campaign, hello.replay.recording)
         machine_id = hello.machine or found.machine
-        known = known_machine(parts, group, machine_id)
-        tooling = found.tooling if hello.tooling is None else tooling_text(parts, group, hello.tooling)
+        known = known_machine(components, group, machine_id)
+        tooling = found.tooling if hello.tooling is None else tooling_text(components, group, hello.tooling)
         axes = displacement_axes(found.sensors)
         question = StreamQuestion(found.rate, found.speed, found.sensors, axes, "cut", hello.method)
         source = Source(found.cut, found.air, hello.replay.rate)
         return Opening(known, tooling, machine_id, hello.name or hello.replay.recording, question, 0, None, source)
 
     return await run_in_threadpool(look)
-
-
-@dataclass(frozen=True, slots=True)
-class Uploaded:
-    """A cut's recording in a campaign, with what the campaign says of it; speed in rad/s."""
-
-    machine: str
-    tooling: ToolingText
-    cut: Path
-    air: Path | None
-    sensors: tuple[Sensor, ...]
-    rate: float
-    speed: float
-
-
-def uploaded(parts: Components, group: str, campaign: str, recording: str) -> Uploaded:
-    """Return a cut's recording that was uploaded; its air cut is the campaign's, where it is there."""
-    row = found_or_404(parts.store.campaigns.get(group, campaign), "campaign")
-    name = unicodedata.normalize("NFC", recording)
-    declared = campaign_of_text(row.text)
-    cut = next((each for each in declared.cuts if each.recording == Path(name)), None)
-    if cut is None:
-        raise Problem(404, f"the campaign has no cut with a recording {recording}")
-    kept = _kept(parts, group, campaign, name)
-    found = json.loads(kept.found)
-    air = None if cut.air is None else parts.store.recordings.get(group, campaign, cut.air.name)
-    tooling = ToolingText(cut.tooling, json.loads(row.text)["toolings"][cut.tooling])
-    sensors = channels_of(found["channels"], declared.sensors)
-    still = None if air is None else parts.files.path(group, NORMALISED, air.normalised)
-    path = parts.files.path(group, NORMALISED, kept.normalised)
-    return Uploaded(row.machine, tooling, path, still, sensors, found["sampling_rate_hz"], cut.conditions.spindle_speed)
-
-
-def air_cut(parts: Components, group: str, campaign: str, recording: str) -> ReadPair:
-    """Return what reads an uploaded recording alone."""
-    kept = _kept(parts, group, campaign, unicodedata.normalize("NFC", recording))
-    return reader(parts.files.path(group, NORMALISED, kept.normalised), None)
-
-
-def _kept(parts: Components, group: str, campaign: str, name: str) -> Kept:
-    return found_or_404(parts.store.recordings.get(group, campaign, name), "recording")
-
-
-def reader(cut: Path, air: Path | None) -> ReadPair:
-    """Return what reads a recording and its air cut in a worker."""
-    return functools.partial(recording_and_air, cut, air)
-
-
-def given_sensors(keys: dict[str, SensorKeys] | None) -> tuple[Sensor, ...]:
-    """Return sensors that a query brings."""
-    return tuple(each.sensor(name) for name, each in (keys or {}).items())
-
-
-def channels_of(names: Sequence[str], sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
-    """Return the sensors of channels, in their order."""
-    known = {sensor.name: sensor for sensor in sensors}
-    if len(set(names)) < len(names):
-        raise InputError("channels", list(names), "each channel once")
-    for name in names:
-        if name not in known:
-            raise InputError("channels", name, f"some of {', '.join(known)}")
-    found = tuple(known[name] for name in names)
-    kinds = [(sensor.quantity, sensor.axis) for sensor in found]
-    if len(set(kinds)) < len(kinds):
-        raise InputError("channels", list(names), "one channel of each quantity and axis")
-    return found
 
 
 def displacement_axes(channels: Sequence[Sensor]) -> tuple[str, ...]:

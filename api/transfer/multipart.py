@@ -15,7 +15,7 @@ from api.files import Part
 from api.problems import Problem
 from api.reading.campaign_text import recording_name
 from api.reading.uploads import Received
-from api.routes.body_stream import arriving, blocks, complete, write
+from api.transfer.body_stream import blocks, complete, new_part, write
 
 FORM = "multipart/form-data"
 MOST_PARTS, LARGEST_TEXT = 1000, 1_000_000
@@ -36,7 +36,7 @@ class Head:
     name: str | None
 
 
-async def events(request: Request, parts: Components) -> AsyncIterator[Head | bytes | None]:
+async def events(request: Request, components: Components) -> AsyncIterator[Head | bytes | None]:
     """Yield of each part its head, its content in pieces, and None at its end.
 
     Raises
@@ -44,7 +44,7 @@ async def events(request: Request, parts: Components) -> AsyncIterator[Head | by
     Problem
         400 for a body that is no form, 408 and 413 as `blocks`.
     """
-    told = parse_options_header(request.headers.get("content-type", ""))[1]
+    options = parse_options_header(request.headers.get("content-type", ""))[1]
     found: list[Head | bytes | None] = []
     heads: dict[bytes, bytes] = {}
     name, value, count, whole = bytearray(), bytearray(), 0, False
@@ -67,7 +67,7 @@ async def events(request: Request, parts: Components) -> AsyncIterator[Head | by
 
     try:
         parser = MultipartParser(
-            told.get(b"boundary", b""),
+            options.get(b"boundary", b""),
             {
                 "on_part_begin": begin,
                 "on_header_field": lambda data, start, end: name.extend(data[start:end]),
@@ -79,9 +79,9 @@ async def events(request: Request, parts: Components) -> AsyncIterator[Head | by
                 "on_end": end,
             },
         )
-        if not told.get(b"boundary"):
+        if not options.get(b"boundary"):
             raise FormParserError
-        async for block in blocks(request, parts):
+        async for block in blocks(request, components):
             parser.write(bytes(block))
             for each in found:
                 yield each
@@ -103,7 +103,7 @@ def _head(heads: dict[bytes, bytes]) -> Head:
 
 @asynccontextmanager
 async def form(
-    request: Request, parts: Components, group: str, texts: Collection[str], files: Collection[str]
+    request: Request, components: Components, group: str, texts: Collection[str], files: Collection[str]
 ) -> AsyncIterator[tuple[dict[str, bytes], dict[str, tuple[str, Received]]]]:
     """The named texts and files of a form; files, by name and content, are on the disk until the end of the block.
 
@@ -116,7 +116,7 @@ async def form(
     received: dict[str, tuple[str, Received]] = {}
     async with AsyncExitStack() as stack:
         head, text, part, seen = Head("", None), bytearray(), None, 0
-        async for event in events(request, parts):
+        async for event in events(request, components):
             if isinstance(event, Head):
                 head, text, part = event, bytearray(), None
                 if head.field in found or head.field in received or head.field not in {*texts, *files}:
@@ -124,7 +124,7 @@ async def form(
                     fault = {"field": head.field[:80] or "part", "found": "such a part", "allowed": allowed}
                     raise Problem(422, f"a part of the form: found {head.field[:80]!r}, allowed is {allowed}", [fault])
                 if head.field in files:
-                    part = await stack.enter_async_context(arriving(parts, group))
+                    part = await stack.enter_async_context(new_part(components, group))
             elif event is None:
                 if isinstance(part, Part):
                     received[head.field] = (head.name or "", await complete(part))
@@ -132,7 +132,7 @@ async def form(
                     found[head.field] = bytes(text)
             elif isinstance(part, Part):
                 seen += len(event)
-                await write(parts, group, part, event, seen)
+                await write(components, group, part, event, seen)
             else:
                 text += event
                 if len(text) > LARGEST_TEXT:

@@ -25,7 +25,7 @@ BLOCK, LOOK = 1 << 20, 64 << 20
 _DIGEST = re.compile(r"(?:^|,)\s*sha-256=:([A-Za-z0-9+/=]*):")
 
 
-async def blocks(request: Request, parts: Components) -> AsyncIterator[bytearray]:
+async def blocks(request: Request, components: Components) -> AsyncIterator[bytearray]:
     """Yield the body in blocks; what arrives too slowly, or not at all, ends it.
 
     Raises
@@ -35,7 +35,7 @@ async def blocks(request: Request, parts: Components) -> AsyncIterator[bytearray
     HTTPException
         413 where the body is larger than an upload may be.
     """
-    settings, waited, seen, buffer = parts.settings, 0.0, 0, bytearray()
+    settings, waited, seen, buffer = components.settings, 0.0, 0, bytearray()
     request.state.body.most = settings.max_upload_bytes
     stream = request.stream()
     while True:
@@ -63,32 +63,32 @@ async def blocks(request: Request, parts: Components) -> AsyncIterator[bytearray
         yield buffer
 
 
-async def append(request: Request, parts: Components, group: str, part: Part) -> None:
+async def append(request: Request, components: Components, group: str, part: Part) -> None:
     """Write a body behind a part; the disk keeps what it has to keep."""
     seen = 0
-    async for block in blocks(request, parts):
+    async for block in blocks(request, components):
         seen += len(block)
-        await write(parts, group, part, block, seen)
+        await write(components, group, part, block, seen)
 
 
-async def write(parts: Components, group: str, part: Part, block: bytes | bytearray, seen: int) -> None:
+async def write(components: Components, group: str, part: Part, block: bytes | bytearray, seen: int) -> None:
     """Write a block, `seen` being the bytes of this request so far."""
-    with spacious():
+    with storage_problems():
         if seen // LOOK != (seen - len(block)) // LOOK:
-            await run_in_threadpool(parts.files.check_space, group)
+            await run_in_threadpool(components.files.check_space, group)
         await run_in_threadpool(part.write, block)
 
 
-async def room(parts: Components, group: str, told: int) -> None:
+async def check_room(components: Components, group: str, announced: int) -> None:
     """Refuse an upload of so many bytes that has no place."""
-    if told > parts.settings.max_upload_bytes:
-        raise Problem(413, f"the body is too large: at most {parts.settings.max_upload_bytes} bytes")
-    with spacious():
-        await run_in_threadpool(parts.files.check_space, group, told)
+    if announced > components.settings.max_upload_bytes:
+        raise Problem(413, f"the body is too large: at most {components.settings.max_upload_bytes} bytes")
+    with storage_problems():
+        await run_in_threadpool(components.files.check_space, group, announced)
 
 
 @contextmanager
-def spacious() -> Iterator[None]:
+def storage_problems() -> Iterator[None]:
     """Tell in words that there is no more room."""
     try:
         yield
@@ -103,10 +103,10 @@ def spacious() -> Iterator[None]:
 
 
 @asynccontextmanager
-async def arriving(parts: Components, group: str) -> AsyncIterator[Part]:
+async def new_part(components: Components, group: str) -> AsyncIterator[Part]:
     """A new part, which is gone afterwards unless it has become something else."""
-    with spacious():
-        part = await run_in_threadpool(parts.files.part, group)
+    with storage_problems():
+        part = await run_in_threadpool(components.files.part, group)
     try:
         yield part
     finally:
@@ -120,24 +120,24 @@ async def complete(part: Part) -> Received:
         part.sync()
         return Received(part.path, part.size, part.sha256())
 
-    with spacious():
+    with storage_problems():
         return await run_in_threadpool(finish)
 
 
-def plain(request: Request) -> None:
+def refuse_encoded(request: Request) -> None:
     """Refuse what would have to be unpacked."""
     coding = request.headers.get("content-encoding", "identity").strip().lower()
     if coding not in ("", "identity"):
         raise Problem(415, f"found content encoding {coding[:80]}, allowed is none: send the file as it is")
 
 
-def told_length(request: Request) -> int:
+def announced_length(request: Request) -> int:
     """Return the length that a request tells, 0 where it does not."""
     text = request.headers.get("content-length", "")
     return int(text[:20]) if text.isdecimal() and text.isascii() else 0
 
 
-def told_digest(request: Request, *headers: str) -> str | None:
+def announced_digest(request: Request, *headers: str) -> str | None:
     """Return the SHA-256, hexadecimal, that one of the headers tells (RFC 9530); other hashes are left alone."""
     for header in headers:
         text = request.headers.get(header, "")
@@ -160,8 +160,8 @@ def _digest_fault(header: str, text: str) -> Problem:
     return Problem(422, f"{header} is not understood", [fault])
 
 
-def check_digest(told: str | None, found: str, header: str = "Repr-Digest") -> None:
+def check_digest(announced: str | None, found: str, header: str = "Repr-Digest") -> None:
     """Refuse a content that is not the one that was told of."""
-    if told is not None and told != found:
-        fault = {"field": header, "found": f"content with the SHA-256 {found}", "allowed": told}
+    if announced is not None and announced != found:
+        fault = {"field": header, "found": f"content with the SHA-256 {found}", "allowed": announced}
         raise Problem(422, "the content is not the one that the digest tells: it was damaged on its way", [fault])

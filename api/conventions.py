@@ -1,11 +1,11 @@
-"""What routes share: documented answers, entity tags, parts of lists."""
+"""What all routes of the interface have in common: parameters, documented answers, entity tags, pages of lists."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, TypeVar
 
-from fastapi import Path, Query, Request
+from fastapi import Header, Path, Query, Request
 
 from api.problems import MEDIA_TYPE, Problem, title
 from api.schemas.common import ID_PATTERN, NAME_PATTERN
@@ -14,9 +14,14 @@ from api.stores.entities import ABSENT
 Item = TypeVar("Item")
 MachineId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a machine.")]
 ToolingName = Annotated[str, Path(pattern=NAME_PATTERN, description="Name in the library.")]
+CampaignId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a campaign.")]
 KeyId = Annotated[str, Path(pattern=ID_PATTERN)]
 After = Annotated[str, Query(pattern=r"^[A-Za-z0-9 ._+()-]{0,64}$", description="`next` of the part before.")]
 Limit = Annotated[int, Query(ge=1, le=200, description="At most so many.")]
+Repeat = Annotated[
+    str | None,
+    Header(alias="Idempotency-Key", pattern=r"^[\x21-\x7e]{1,128}$", description="The same again answers as the first time, for a day."),
+]
 
 _WHY = {
     400: "The body cannot be read.",

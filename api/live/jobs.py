@@ -13,9 +13,9 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse, StreamingResponse
 
 from api.components import Components
+from api.conventions import found_or_404
 from api.jobs.event_feed import Crowded
 from api.problems import Problem
-from api.routes.common import found_or_404
 from api.schemas.common import ID_PATTERN
 from api.schemas.jobs import JobAnswer
 from api.security import now
@@ -59,9 +59,9 @@ STREAM: dict[str, Any] = {
 def answer(job: Job) -> JobAnswer:
     """Return a job as clients see it."""
     names = ("id", "kind", "machine", "campaign", "state", "created", "started", "finished", "status")
-    told = {name: getattr(job, name) for name in names}
+    columns = {name: getattr(job, name) for name in names}
     texts = {name: None if text is None else json.loads(text) for name, text in (("progress", job.progress), ("problem", job.problem))}
-    return JobAnswer.model_validate(told | texts)
+    return JobAnswer.model_validate(columns | texts)
 
 
 def place(job: Job) -> str:
@@ -74,66 +74,66 @@ def accepted(job: Job) -> JSONResponse:
     return JSONResponse(answer(job).model_dump(mode="json"), 202, {"Location": place(job), "Retry-After": AGAIN})
 
 
-def submit(parts: Components, job: Job, texts: Mapping[str, str], repeat: tuple[str, str] | None) -> Job:
+def submit(components: Components, job: Job, texts: Mapping[str, str], repeat: tuple[str, str] | None) -> Job:
     """Keep a job; from then on it is carried out."""
     try:
-        return parts.store.jobs.add(job, texts, parts.settings.job_queue, repeat)
+        return components.store.jobs.add(job, texts, components.settings.job_queue, repeat)
     except Taken as taken:
         entry = {"field": str(taken), "found": str(repeat and repeat[0]), "allowed": f"a {taken} of its own"}
         raise Problem(409, f"the {taken} is in use", [entry]) from None
     except Full:
-        raise Problem(503, f"{parts.settings.job_queue} jobs wait already", headers={"Retry-After": "60"}) from None
+        raise Problem(503, f"{components.settings.job_queue} jobs wait already", headers={"Retry-After": "60"}) from None
     except KeyError:
         raise Problem(404, "there is no such machine") from None
 
 
-def job_of(parts: Components, group: str, id: str, kind: str) -> Job:
+def job_of(components: Components, group: str, id: str, kind: str) -> Job:
     """Return a job of a group and kind."""
-    found = parts.store.jobs.get(group, id)
+    found = components.store.jobs.get(group, id)
     return found_or_404(found if found is not None and found.kind == kind else None, "job")
 
 
-async def awaited(parts: Components, group: str, id: str, kind: str, prefer: str | None) -> Job:
+async def awaited(components: Components, group: str, id: str, kind: str, prefer: str | None) -> Job:
     """Return a job, and where the client prefers so, when it has ended."""
-    job = await run_in_threadpool(job_of, parts, group, id, kind)
+    job = await run_in_threadpool(job_of, components, group, id, kind)
     wanted = re.search(r"(?:^|[,;\s])wait\s*=\s*\"?(\d{1,6})", prefer or "")
     end = time.monotonic() + min(float(wanted[1]) if wanted else 0.0, LONGEST_WAIT)
     while job.state in OPEN and time.monotonic() < end:
-        await parts.feeds.wait(id, job.events, end - time.monotonic())
-        job = await run_in_threadpool(job_of, parts, group, id, kind)
+        await components.feeds.wait(id, job.events, end - time.monotonic())
+        job = await run_in_threadpool(job_of, components, group, id, kind)
     return job
 
 
-def cancel(parts: Components, group: str, id: str, kind: str, response: Response) -> JobAnswer:
+def cancel(components: Components, group: str, id: str, kind: str, response: Response) -> JobAnswer:
     """End a job; one that has ended answers 409."""
-    job_of(parts, group, id, kind)
-    job, cancelled = found_or_404(parts.store.jobs.cancel(group, id, now()), "job")
+    job_of(components, group, id, kind)
+    job, cancelled = found_or_404(components.store.jobs.cancel(group, id, now()), "job")
     if not cancelled:
         raise Problem(409, f"the job has ended before: it is {job.state}")
     response.headers["Location"] = place(job)
     return answer(job)
 
 
-def finished(parts: Components, group: str, id: str, kind: str, name: str) -> str:
+def finished(components: Components, group: str, id: str, kind: str, name: str) -> str:
     """Return what a job has found."""
-    job = job_of(parts, group, id, kind)
+    job = job_of(components, group, id, kind)
     if job.state != "done":
         raise Problem(409, f"the job has no result: it is {job.state}", headers={"Retry-After": AGAIN} if job.state in OPEN else {})
-    return found_or_404(parts.store.jobs.text(id, name), "result")
+    return found_or_404(components.store.jobs.text(id, name), "result")
 
 
-async def events(parts: Components, group: str, id: str, kind: str, seen: str | None) -> StreamingResponse:
+async def events(components: Components, group: str, id: str, kind: str, seen: str | None) -> StreamingResponse:
     """Return the stream of a job's events behind a number."""
-    job = await run_in_threadpool(job_of, parts, group, id, kind)
+    job = await run_in_threadpool(job_of, components, group, id, kind)
     try:
-        watching = parts.feeds.stream()
+        watching = components.feeds.stream()
         watching.__enter__()
     except Crowded:
         raise Problem(503, "too many watch jobs", headers={"Retry-After": "30"}) from None
 
     async def stream() -> AsyncIterator[str]:
         try:
-            async for part in _told(parts, job, int(seen or 0)):
+            async for part in _events(components, job, int(seen or 0)):
                 yield part
         finally:
             watching.__exit__(None, None, None)
@@ -141,16 +141,16 @@ async def events(parts: Components, group: str, id: str, kind: str, seen: str | 
     return StreamingResponse(stream(), media_type=EVENTS, headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"})
 
 
-async def _told(parts: Components, job: Job, after: int) -> AsyncIterator[str]:
-    end = time.monotonic() + parts.settings.watch_seconds
+async def _events(components: Components, job: Job, after: int) -> AsyncIterator[str]:
+    end = time.monotonic() + components.settings.watch_seconds
     # what is known at once; without a number, so that it is no event that could be missed
     yield f"retry: 2000\n{_event(None, 'progress', answer(job).model_dump_json())}"
     while time.monotonic() < end:
-        found = await parts.feeds.events(job.id, after)
+        found = await components.feeds.events(job.id, after)
         for event in found:
             after = event.number
             if event.kind in ("progress", "end"):
-                current = await run_in_threadpool(parts.store.jobs.find, job.id)
+                current = await run_in_threadpool(components.store.jobs.find, job.id)
                 if current is None:
                     return
                 yield _event(after, event.kind, answer(current).model_dump_json())
@@ -160,14 +160,14 @@ async def _told(parts: Components, job: Job, after: int) -> AsyncIterator[str]:
                 return
         if found:
             continue
-        current = await run_in_threadpool(parts.store.jobs.find, job.id)
+        current = await run_in_threadpool(components.store.jobs.find, job.id)
         if current is None:
             return
         if current.state not in OPEN:
             # a client that has seen the end asks once more
             yield _event(None, "end", answer(current).model_dump_json())
             return
-        if not await parts.feeds.wait(job.id, after, min(HEARTBEAT, max(end - time.monotonic(), 0.0))):
+        if not await components.feeds.wait(job.id, after, min(HEARTBEAT, max(end - time.monotonic(), 0.0))):
             yield ": still there\n\n"
 
 

@@ -15,25 +15,18 @@ from typer.testing import CliRunner
 from rcsa_ident.cli import app
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.curves import read_frf_csv, read_lobes_csv, write_frf_csv
-from rcsa_ident.io.identifications import identification_to_json, machine_from_json
-from rcsa_ident.io.results import read_result, write_result
+from rcsa_ident.io.identifications import machine_from_json
+from rcsa_ident.io.results import read_result
+from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.workflows.tip import tooltip
+from tests.fixtures import by_hand
 from tests.oracles import literature
-
-LEFT_OUT = [("T1-2", "chatter: 3 µm at 1500 Hz")]
 
 
 def run(*arguments, code=0):
     result = CliRunner().invoke(app, [str(a) for a in arguments])
     assert result.exit_code == code, result.output + repr(result.exception)
     return result
-
-
-@pytest.fixture
-def result_file(tmp_path, identification, campaign):
-    path = tmp_path / "RESULT.json"
-    write_result(path, identification_to_json(identification, campaign, LEFT_OUT))
-    return path
 
 
 def test_help_names_every_command():
@@ -86,10 +79,10 @@ def test_bad_input_for_machines(tmp_path):
     assert json.loads(result.stdout)["field"] == "campaign"
 
 
-def test_the_result_holds_what_later_commands_need(result_file, identification, campaign):
+def test_the_result_holds_what_later_commands_need(result_file):
     data = read_result(result_file)
     assert data["status"] == "suspect"
-    assert data["campaign"] == {"name": "by hand", "cuts_used": 2, "cuts_left_out": [{"id": "T1-2", "reason": LEFT_OUT[0][1]}]}
+    assert data["campaign"] == {"name": "by hand", "cuts_used": 2, "cuts_left_out": [{"id": "T1-2", "reason": by_hand.LEFT_OUT[0][1]}]}
     assert data["band_hz"] == pytest.approx([600.0, 3000.0])
     assert data["sensors"]["trigger"] == {"quantity": "trigger", "pulses_per_revolution": 2, "tooth_angle_deg": pytest.approx(45.0)}
     assert data["sensors"]["flange_x"]["delay_s"] == 1e-5
@@ -99,7 +92,7 @@ def test_the_result_holds_what_later_commands_need(result_file, identification, 
     assert data["delays"]["T1-1"]["angle_deg"] == pytest.approx(67.5634, rel=1e-5)
     assert data["axes"]["X"]["model_error"] == 0.004
     machine = machine_from_json(data, str(result_file))
-    for axis, part in identification.axes.items():
+    for axis, part in by_hand.identification().axes.items():
         np.testing.assert_array_equal(machine[axis].posterior.theta, part.posterior.theta)
         np.testing.assert_array_equal(machine[axis].posterior.covariance, part.posterior.covariance)
         np.testing.assert_array_equal(machine[axis].spindle.modes.phi, part.modes.phi)
@@ -114,14 +107,14 @@ def test_unknowns_that_do_not_fit_the_covariance_are_refused(tmp_path, result_fi
     assert "axes.Y.unknowns" in run("tooltip", bad, tooling_file, "--out", tmp_path / "F.csv", code=2).stderr
 
 
-def test_tooltip_writes_the_coupled_receptance_with_bands(tmp_path, result_file, tooling_file, campaign):
+def test_tooltip_writes_the_coupled_receptance_with_bands(tmp_path, result_file, tooling_file):
     out = tmp_path / "FRF.csv"
     result = run("tooltip", result_file, tooling_file, "--out", out, "--from", 500, "--to", 2500, "--step", 20)
     assert "suspect" in result.stderr
     curves = read_frf_csv(out)
     np.testing.assert_allclose(curves.frequency, np.arange(500.0, 2501.0, 20.0))
     machine = machine_from_json(read_result(result_file), "")
-    response = tooltip(machine, campaign.toolings["T1"].assembly, 2.0 * np.pi * curves.frequency)
+    response = tooltip(machine, read_tooling(tooling_file).assembly, 2.0 * np.pi * curves.frequency)
     for axis in (Dof.X, Dof.Y):
         np.testing.assert_allclose(curves.values[axis.upper()], response.tip(axis), rtol=1e-12)
         real, imaginary = response.deviation[axis]
@@ -137,10 +130,10 @@ def test_tooltip_for_machines(tmp_path, result_file, tooling_file):
     assert list(read_frf_csv(tmp_path / "F.csv").bands) == []
 
 
-def test_lobes_from_a_result_and_from_its_own_tip_agree(tmp_path, result_file, tooling_file):
+def test_lobes_from_a_result_and_from_its_own_tip_agree(tmp_path, certain_file, tooling_file):
     speeds = ("--speed-from", 6000, "--speed-to", 12000, "--speed-step", 200)
-    run("lobes", result_file, tooling_file, "--out", tmp_path / "a.csv", *speeds)
-    run("tooltip", result_file, tooling_file, "--out", tmp_path / "F.csv", "--no-bands")
+    run("lobes", certain_file, tooling_file, "--out", tmp_path / "a.csv", *speeds)
+    run("tooltip", certain_file, tooling_file, "--out", tmp_path / "F.csv", "--no-bands")
     known = ("--ktc-mpa", 902, "--krc", 0.26)
     run("lobes", "--frf", tmp_path / "F.csv", tooling_file, "--out", tmp_path / "b.csv", *speeds, *known)
     run("lobes", "--frf", f"Y={tmp_path}/F.csv", "--frf", f"x={tmp_path}/F.csv", tooling_file, "--out", tmp_path / "c.csv", *speeds, *known)

@@ -13,6 +13,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.stability.pockets import least_within_tolerance, peaks
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, StabilityLobes
+from rcsa_ident.stability.tested_cuts import Tally
 
 
 class Bound(StrEnum):
@@ -63,6 +64,19 @@ class UsableDepths:
     def _arrays(self) -> tuple[str, ...]:
         names = ("spindle_speed", "limit", "stable", "by_power", "by_torque", "depth")
         return names if self.removal_rate is None else (*names, "removal_rate")
+
+    @property
+    def removal(self) -> FloatArray:
+        """The removal rate, shape (n,) [m^3/s].
+
+        Raises
+        ------
+        InputError
+            Without a feed per tooth it is not known.
+        """
+        if self.removal_rate is None:
+            raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: the removal rate grows with it")
+        return self.removal_rate
 
     def between(self, low: float, high: float) -> UsableDepths:
         """Return what is known of a range of speeds [rad/s]."""
@@ -294,3 +308,43 @@ def planned_cut(
         load.torque,
         load.removal_rate,
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Advice:
+    """Which cuts a tooling can make, and which of them is recommended.
+
+    Parameters
+    ----------
+    tooling : str
+        Its name.
+    stickout : float or None [m]
+    lobes : StabilityLobes
+        At the speeds that were asked for.
+    usable : UsableDepths
+        What is recommended at each of them, within power and torque.
+    recommended : tuple of OperatingPoint
+        The cuts that remove most, one for each pocket, the best first.
+    windows : tuple of SpeedWindow
+        Speeds at which a depth is recommended, where one was asked for.
+    planned : tuple of PlannedCut
+    tested : Tally or None
+        How many of the cuts that were tried the limits tell right.
+    remarks : tuple of str
+        What the user should know.
+    """
+
+    tooling: str
+    stickout: float | None
+    lobes: StabilityLobes
+    usable: UsableDepths
+    recommended: tuple[OperatingPoint, ...]
+    windows: tuple[SpeedWindow, ...]
+    planned: tuple[PlannedCut, ...]
+    tested: Tally | None
+    remarks: tuple[str, ...]
+
+    @property
+    def common(self) -> FloatArray | None:
+        """What is stable on all machines that were drawn, shape (n,) [m]; None where none were."""
+        return None if self.lobes.drawn is None else self.lobes.limit_quantile(1.0)

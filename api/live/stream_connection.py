@@ -15,8 +15,8 @@ from starlette.websockets import WebSocketDisconnect
 
 from api import problems
 from api.components import Components
+from api.live.stream_opening import Opening
 from api.problems import Problem
-from api.routes.stream_opening import Opening
 from api.schemas.forces import Hello
 from api.security import LOCAL_KEY, Caller
 from api.stores.entities import Unavailable
@@ -40,50 +40,52 @@ UNEXPECTED = End(1011, 500, "something unexpected happened; the log has it under
 _WORDS = {1009: 413, 1003: 415}
 
 
-async def owned(websocket: WebSocket, parts: Components, caller: Caller, session: Session, opening: Opening, hello: Hello) -> End:
+async def serve_owner(
+    websocket: WebSocket, components: Components, caller: Caller, session: Session, opening: Opening, hello: Hello
+) -> End:
     """Serve the client that a session belongs to."""
-    hub, listener = parts.streams, Listener(len(session.about.axes), hello.format == "json", hello.envelope)
+    hub, listener = components.streams, Listener(len(session.about.axes), hello.format == "json", hello.envelope)
     hub.listen(session, listener)
     about = session.about
     listener.tell("opened", session=about.id, axes=list(about.axes), sampling_rate_hz=about.rate, settle_samples=opening.settle)
     tasks = [
-        _told(hub, session, _received(websocket, hub, session, hello.format == "json", opening.source is None)),
-        _told(hub, session, _prepared(parts, session, opening)),
-        _told(hub, session, _allowed(parts, caller)),
+        _session_task(hub, session, _receive_frames(websocket, hub, session, hello.format == "json", opening.source is None)),
+        _session_task(hub, session, _prepare(components, session, opening)),
+        _session_task(hub, session, _watch_key(components, caller)),
     ]
     return await _until_over(websocket, session, listener, tasks)
 
 
-async def watched(websocket: WebSocket, parts: Components, caller: Caller, session: Session, hello: Hello) -> End:
+async def serve_viewer(websocket: WebSocket, components: Components, caller: Caller, session: Session, hello: Hello) -> End:
     """Serve a viewer; a session does not end with it."""
     listener, about = Listener(len(session.about.axes), hello.format == "json", hello.envelope), session.about
-    parts.streams.listen(session, listener)
+    components.streams.listen(session, listener)
     listener.tell("watching", session=about.id, name=about.name, axes=list(about.axes), sampling_rate_hz=about.rate)
     if session.stage is Stage.LIVE:
         listener.tell("ready", **session.ready)
     try:
-        tasks = [asyncio.create_task(_silent(websocket)), asyncio.create_task(_allowed(parts, caller))]
+        tasks = [asyncio.create_task(_until_disconnect(websocket)), asyncio.create_task(_watch_key(components, caller))]
         return await _until_over(websocket, session, listener, tasks)
     finally:
         session.listeners.remove(listener)
 
 
-async def _silent(websocket: WebSocket) -> None:
+async def _until_disconnect(websocket: WebSocket) -> None:
     """Return when a viewer goes; what it says meanwhile nobody needs."""
     while (await websocket.receive())["type"] != "websocket.disconnect":
         pass
     raise WebSocketDisconnect
 
 
-async def _allowed(parts: Components, caller: Caller) -> None:
+async def _watch_key(components: Components, caller: Caller) -> None:
     """Look now and then whether the key is still one."""
     while True:
         await asyncio.sleep(LOOK)
-        if caller.id != LOCAL_KEY and await run_in_threadpool(parts.store.keys.get, caller.id) is None:
+        if caller.id != LOCAL_KEY and await run_in_threadpool(components.store.keys.get, caller.id) is None:
             raise Problem(401, "the key has been withdrawn")
 
 
-def _told(hub: Hub, session: Session, doing: Awaitable[None]) -> asyncio.Task[None]:
+def _session_task(hub: Hub, session: Session, doing: Awaitable[None]) -> asyncio.Task[None]:
     """Do something for a session; what fails ends it with the reason."""
 
     async def guarded() -> None:
@@ -93,7 +95,7 @@ def _told(hub: Hub, session: Session, doing: Awaitable[None]) -> asyncio.Task[No
             hub.close(session, End())
             raise
         except Exception as error:
-            end = ended(error)
+            end = end_of(error)
             if end.status == 500:
                 log.error("unexpected", exc_info=error, extra={"fields": {"session": session.about.id}})
             hub.close(session, end)
@@ -103,7 +105,7 @@ def _told(hub: Hub, session: Session, doing: Awaitable[None]) -> asyncio.Task[No
 
 async def _until_over(websocket: WebSocket, session: Session, listener: Listener, tasks: list[asyncio.Task[None]]) -> End:
     """Send what there is until the session is over, or its reader has gone."""
-    sending = asyncio.create_task(_sent(websocket, session, listener))
+    sending = asyncio.create_task(_send(websocket, session, listener))
     over = asyncio.create_task(session.over.wait())
     try:
         waiting: set[asyncio.Task[Any]] = {over, sending, *tasks}
@@ -117,11 +119,11 @@ async def _until_over(websocket: WebSocket, session: Session, listener: Listener
     except TimeoutError:
         pass
     finally:
-        await _ended({sending, over, *tasks})
+        await _cancel({sending, over, *tasks})
     return session.end
 
 
-async def _ended(tasks: set[asyncio.Task[Any]]) -> None:
+async def _cancel(tasks: set[asyncio.Task[Any]]) -> None:
     """Have tasks ended; what became of them has been told."""
     for task in tasks:
         task.cancel()
@@ -131,7 +133,7 @@ async def _ended(tasks: set[asyncio.Task[Any]]) -> None:
             task.exception()
 
 
-async def _sent(websocket: WebSocket, session: Session, listener: Listener) -> None:
+async def _send(websocket: WebSocket, session: Session, listener: Listener) -> None:
     while not session.over.is_set() or listener.pending:
         await listener.awake.wait()
         for each in listener.taken():
@@ -140,7 +142,7 @@ async def _sent(websocket: WebSocket, session: Session, listener: Listener) -> N
             listener.awake.set()
 
 
-async def _received(websocket: WebSocket, hub: Hub, session: Session, text: bool, feeds: bool) -> None:
+async def _receive_frames(websocket: WebSocket, hub: Hub, session: Session, text: bool, feeds: bool) -> None:
     """Take frames until the client has no more."""
     channels = session.about.channels
     while True:
@@ -159,10 +161,10 @@ async def _received(websocket: WebSocket, hub: Hub, session: Session, text: bool
         if session.counts.following >= 0 and ahead > MOST_AHEAD * session.about.rate:
             raise InputError("first", first, f"an index at most an hour ahead of the last one, {session.counts.following}")
         hub.offer(session, first, samples)
-    await finished(hub, session)
+    await finish(hub, session)
 
 
-async def finished(hub: Hub, session: Session) -> None:
+async def finish(hub: Hub, session: Session) -> None:
     """End a session when all its samples have their forces, those among them that an observer still has to be made from."""
     session.finishing = True
     session.arrived.set()
@@ -174,9 +176,9 @@ async def finished(hub: Hub, session: Session) -> None:
     hub.close(session, End())
 
 
-async def _prepared(parts: Components, session: Session, opening: Opening) -> None:
+async def _prepare(components: Components, session: Session, opening: Opening) -> None:
     """Have the observer made, then stream; of a replay also feed it."""
-    hub, loop = parts.streams, asyncio.get_running_loop()
+    hub, loop = components.streams, asyncio.get_running_loop()
     limit, refused = loop.time() + SETTLING, None
     while session.stage is not Stage.LIVE:
         window = (0, None) if opening.source is not None else session.window(opening.settle)
@@ -192,7 +194,7 @@ async def _prepared(parts: Components, session: Session, opening: Opening) -> No
             continue
         session.stage = Stage.DESIGNING
         try:
-            plan, ready = await _patiently(functools.partial(opening.design, parts.work, *window))
+            plan, ready = await _retried(functools.partial(opening.design, components.work, *window))
         except InputError as error:
             if opening.source is not None or not isinstance(error, Unsteady) or loop.time() > limit:
                 raise refused or error from None
@@ -201,16 +203,16 @@ async def _prepared(parts: Components, session: Session, opening: Opening) -> No
             for listener in session.listeners:
                 listener.tell("settling", detail=detail.detail, errors=detail.errors)
             session.stage = Stage.SETTLING if session.stage is Stage.DESIGNING else session.stage
-            parts.metrics.missed(0, session.skip(window[0] + opening.settle))
+            components.metrics.missed(0, session.skip(window[0] + opening.settle))
             await asyncio.sleep(PAUSE)
             continue
         hub.begin(session, plan, window[0], {"session": session.about.id, **ready})
     if opening.source is not None:
         await opening.feed(hub, session)
-        await finished(hub, session)
+        await finish(hub, session)
 
 
-async def _patiently(call: Callable[[], Awaitable[Any]], seconds: float = 30.0) -> Any:
+async def _retried(call: Callable[[], Awaitable[Any]], seconds: float = 30.0) -> Any:
     """Return what a call answers; where too much waits, ask again."""
     loop = asyncio.get_running_loop()
     limit = loop.time() + seconds
@@ -223,7 +225,7 @@ async def _patiently(call: Callable[[], Awaitable[Any]], seconds: float = 30.0) 
             await asyncio.sleep(0.5)
 
 
-def ended(error: Exception) -> End:
+def end_of(error: Exception) -> End:
     """Return how an error ends a stream."""
     found: Problem
     if isinstance(error, InputError):

@@ -1,0 +1,1 @@
+"""Bodies on their way in and out: streamed to the disk, taken apart into parts, packed into archives."""
