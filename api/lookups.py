@@ -19,8 +19,7 @@ from api.schemas.toolings import ToolingKeys
 from api.stores.campaigns import Campaign, Recording
 from api.stores.entities import Document, Machine
 from api.work.forces import ReadPair
-from api.work.requests import MachineText, ToolingText
-from api.work.toolings import toml_of
+from api.work.requests import MachineText, ToolingSource
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Sensor
 
@@ -44,15 +43,14 @@ def identification_of(components: Components, group: str, id: str) -> Document:
     return found_or_404(components.store.identifications.get(group, id), "identification of the machine")
 
 
-def tooling_text(components: Components, group: str, tooling: str | ToolingKeys, number: int = 1) -> ToolingText:
+def tooling_source(components: Components, group: str, tooling: str | ToolingKeys, number: int = 1) -> ToolingSource:
     """Return a tooling from the library, or as it came; without a name it has a number."""
     if isinstance(tooling, ToolingKeys):
-        text = toml_of(tooling.model_dump(exclude_unset=True, exclude_none=True))
-        return ToolingText(tooling.name or f"tooling {number}", text)
+        return ToolingSource(tooling.name or f"tooling {number}", keys=tooling.model_dump(exclude_unset=True, exclude_none=True))
     document = components.store.toolings.get(group, tooling)
     if document is None:
         raise Problem(404, f"there is no tooling {tooling}")
-    return ToolingText(tooling, document.text)
+    return ToolingSource(tooling, document.text)
 
 
 def known_campaign(components: Components, group: str, id: str) -> Campaign:
@@ -65,7 +63,7 @@ class Uploaded:
     """A cut's recording in a campaign, with what the campaign says of it; speed in rad/s."""
 
     machine: str
-    tooling: ToolingText
+    tooling: ToolingSource
     cut: Path
     air: Path | None
     sensors: tuple[Sensor, ...]
@@ -84,7 +82,7 @@ def uploaded(components: Components, group: str, campaign: str, recording: str) 
     kept = _kept(components, group, campaign, name)
     found = json.loads(kept.found)
     air = None if cut.air is None else components.store.recordings.get(group, campaign, cut.air.name)
-    tooling = ToolingText(cut.tooling, json.loads(row.text)["toolings"][cut.tooling])
+    tooling = ToolingSource(cut.tooling, json.loads(row.text)["toolings"][cut.tooling])
     sensors = channels_of(found["channels"], declared.sensors)
     still = None if air is None else components.files.path(group, NORMALISED, air.normalised)
     path = components.files.path(group, NORMALISED, kept.normalised)

@@ -30,9 +30,9 @@ NOUNS = (
     "rcsa_ident.cutting.conditions.Engagement",
     "rcsa_ident.cutting.process.ProcessDamping",
     "api.work.requests.MachineText",
-    "api.work.requests.ToolingText",
-    "api.work.requests.CutQuestion",
-    "api.work.requests.LobeQuestion",
+    "rcsa_ident.machining_setup.CutSpec",
+    "api.work.requests.ToolingSource",
+    "api.work.requests.LobeRequest",
 )
 _PLACES = {place.rpartition(".")[2]: place for place in NOUNS}
 

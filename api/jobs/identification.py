@@ -124,7 +124,7 @@ def _all(reading: Callable[[Cut], Reading], cuts: Iterable[Cut]) -> list[Reading
 def _method(name: str, start: str | None, desk: JobContext, job: Job) -> Method:
     if name == "paper":
         return PaperGeneticAlgorithm()
-    known = None if start is None else posteriors(json.loads(start))
+    known = None if start is None else posteriors(start)
     return _Telling(EvidenceSelection(start=known), desk, datetime.fromisoformat(str(job.started)))
 
 

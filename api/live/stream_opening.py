@@ -12,7 +12,7 @@ from typing import Any
 from fastapi.concurrency import iterate_in_threadpool, run_in_threadpool
 
 from api.components import Components
-from api.lookups import air_cut, channels_of, known_machine, pair_reader, tooling_text, uploaded
+from api.lookups import air_cut, channels_of, known_machine, pair_reader, tooling_source, uploaded
 from api.schemas.campaigns import given_sensors
 from api.schemas.forces import ReplayHello, StreamHello
 from api.security import now
@@ -21,7 +21,7 @@ from api.streams.hub import Hub
 from api.streams.session import About, Session, Stage
 from api.work.forces import ReadPair, sensors_of
 from api.work.pool import Work
-from api.work.requests import MachineText, ToolingText
+from api.work.requests import MachineText, ToolingSource
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Quantity, Sensor
@@ -60,7 +60,7 @@ class Opening:
     """
 
     machine: MachineText
-    tooling: ToolingText
+    tooling: ToolingSource
     machine_id: str
     name: str
     question: StreamQuestion
@@ -106,7 +106,7 @@ async def open_logger(components: Components, group: str, hello: StreamHello) ->
 
     def look() -> Opening:
         known = known_machine(components, group, hello.machine)
-        tooling = tooling_text(components, group, hello.tooling)
+        tooling = tooling_source(components, group, hello.tooling)
         channels = channels_of(hello.channels, given_sensors(hello.sensors) or sensors_of(known.text))
         speed = None if hello.spindle_speed_rpm is None else from_rpm(hello.spindle_speed_rpm)
         if speed is None and not any(sensor.quantity is Quantity.TRIGGER for sensor in channels):
@@ -136,7 +136,7 @@ async def open_replay(components: Components, group: str, hello: ReplayHello) ->
         found = uploaded(components, group, hello.replay.campaign, hello.replay.recording)
         machine_id = hello.machine or found.machine
         known = known_machine(components, group, machine_id)
-        tooling = found.tooling if hello.tooling is None else tooling_text(components, group, hello.tooling)
+        tooling = found.tooling if hello.tooling is None else tooling_source(components, group, hello.tooling)
         axes = displacement_axes(found.sensors)
         question = StreamQuestion(found.rate, found.speed, found.sensors, axes, "cut", hello.method)
         source = Source(found.cut, found.air, hello.replay.rate)

@@ -14,7 +14,7 @@ from starlette.background import BackgroundTask
 
 from api.components import Components, ThisService
 from api.conventions import BODY, guard, problems
-from api.lookups import known_machine, pair_reader, tooling_text, uploaded
+from api.lookups import known_machine, pair_reader, tooling_source, uploaded
 from api.problems import Problem
 from api.reading import reader_tasks
 from api.reading.campaign_text import FORMATS, Upload
@@ -25,7 +25,7 @@ from api.schemas.forces import ForceAnswer, ForceQuery, ForceUpload
 from api.security import Guarded, WhoAsks
 from api.transfer.multipart import FORM, form
 from api.work.forces import ForceQuestion, ReadPair, forces, sensors_of
-from api.work.requests import MachineText, ToolingText
+from api.work.requests import MachineText, ToolingSource
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Sensor
 
@@ -76,18 +76,18 @@ async def estimate(request: Request, components: ThisService, caller: WhoAsks) -
                 return await _answered(components, caller.group, machine, tooling, question, source, csv)
 
 
-def _of_campaign(components: Components, group: str, query: ForceQuery) -> tuple[MachineText, ToolingText, ForceQuestion, ReadPair]:
+def _of_campaign(components: Components, group: str, query: ForceQuery) -> tuple[MachineText, ToolingSource, ForceQuestion, ReadPair]:
     found = uploaded(components, group, query.campaign, query.recording)
-    tooling = found.tooling if query.tooling is None else tooling_text(components, group, query.tooling)
+    tooling = found.tooling if query.tooling is None else tooling_source(components, group, query.tooling)
     return known_machine(components, group, query.machine), tooling, query.question(found.speed), pair_reader(found.cut, found.air)
 
 
 def _of_upload(
     components: Components, group: str, upload: ForceUpload
-) -> tuple[MachineText, ToolingText, ForceQuestion, tuple[Sensor, ...]]:
+) -> tuple[MachineText, ToolingSource, ForceQuestion, tuple[Sensor, ...]]:
     machine = known_machine(components, group, upload.machine)
     sensors = given_sensors(upload.sensors) or sensors_of(machine.text)
-    return machine, tooling_text(components, group, upload.tooling), upload.question(), sensors
+    return machine, tooling_source(components, group, upload.tooling), upload.question(), sensors
 
 
 @contextlib.asynccontextmanager
@@ -109,7 +109,7 @@ async def _read(
 
 
 async def _answered(
-    components: Components, group: str, machine: MachineText, tooling: ToolingText, question: ForceQuestion, source: ReadPair, csv: bool
+    components: Components, group: str, machine: MachineText, tooling: ToolingSource, question: ForceQuestion, source: ReadPair, csv: bool
 ) -> Any:
     if not csv:
         return ForceAnswer.model_validate(await components.work.run(forces, machine, tooling, question, source))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
@@ -51,7 +50,7 @@ def identify(body: NewIdentification, components: ThisService, caller: WhoAsks, 
         known = components.store.identifications.get(caller.group, campaign.machine)
         if known is None:
             raise InputError("start", "true for a machine without an identification", "a machine that has one")
-        posteriors(json.loads(known.text))
+        posteriors(known.text)
         texts["start"] = known.text
     request = body.model_dump_json()
     job = Job(new_id(), caller.group, KIND, campaign.machine, campaign.id, request, "queued", now())
@@ -106,7 +105,7 @@ async def events(id: JobId, components: ThisService, caller: WhoAsks, seen: Seen
 
 @router.get("/{id}/modes", summary="Modes with their uncertainties", openapi_extra=guard("read"), responses=problems(404, 409, 422))
 def modes(id: JobId, components: ThisService, caller: WhoAsks) -> Modes:
-    return Modes.model_validate(tasks.modes(json.loads(jobs.finished(components, caller.group, id, KIND, "result"))))
+    return Modes.model_validate(tasks.modes(jobs.finished(components, caller.group, id, KIND, "result")))
 
 
 @router.get("/{id}/frf", summary="Measured lines beside the model's", openapi_extra=guard("read"), responses=problems(404, 409, 422))

@@ -18,9 +18,14 @@ from api.schemas.machines import Frf, Identification, IdentificationSummary, Mac
 from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.entities import Document, Machine, Stale, Taken, digest_of
 from api.work import tasks
+from api.work.machine_cache import is_result
 
 router = APIRouter(prefix="/machines", tags=["machines"], route_class=Guarded)
-_RESULT = {"content": {"application/json": {"schema": {"$ref": "#/components/schemas/Identification"}}}, "required": True}
+JSON, CSV = "application/json", "text/csv"
+_RESULT = {
+    "content": {JSON: {"schema": {"$ref": "#/components/schemas/Identification"}}, CSV: {"schema": {"type": "string"}}},
+    "required": True,
+}
 
 
 @router.post("", status_code=201, summary="Make a machine", openapi_extra=guard("upload"), responses=problems(409, *BODY))
@@ -63,9 +68,9 @@ def forget(id: MachineId, components: ThisService, caller: WhoAsks) -> Response:
 
 @router.put(
     "/{id}/identification",
-    summary="Say how a machine vibrates: RESULT.json of `rcsa-ident identify`",
+    summary="Say how a machine vibrates: RESULT.json of `rcsa-ident identify`, or FLANGE.csv of a measured or decoupled flange",
     description="If-Match or If-None-Match: * keep what somebody else has written meanwhile.",
-    openapi_extra=guard("upload", requestBody=_RESULT),
+    openapi_extra=guard("upload", requestBody=_RESULT, **{"x-content-types": (JSON, CSV)}),
     responses={201: {"model": IdentificationSummary, "description": "There was none before."}, **problems(404, 412, *BODY)},
 )
 async def identify(id: MachineId, request: Request, response: Response, components: ThisService, caller: WhoAsks) -> IdentificationSummary:
@@ -88,7 +93,7 @@ async def identify(id: MachineId, request: Request, response: Response, componen
 
 @router.get(
     "/{id}/identification",
-    summary="RESULT.json as it was written",
+    summary="RESULT.json or FLANGE.csv, as it was written",
     openapi_extra=guard("read"),
     response_class=Response,
     responses={
@@ -101,14 +106,15 @@ def result(id: MachineId, request: Request, components: ThisService, caller: Who
     document = identification_of(components, caller.group, id)
     if unchanged(request, document.digest):
         return Response(status_code=304, headers=tagged(document.digest))
-    return Response(document.text.encode(), media_type="application/json", headers=tagged(document.digest))
+    media_type = JSON if is_result(document.text) else CSV
+    return Response(document.text.encode(), media_type=media_type, headers=tagged(document.digest))
 
 
 @router.get(
     "/{id}/identification/modes", summary="Modes with their uncertainties", openapi_extra=guard("read"), responses=problems(404, 422)
 )
 def modes(id: MachineId, components: ThisService, caller: WhoAsks) -> Modes:
-    return Modes.model_validate(tasks.modes(json.loads(identification_of(components, caller.group, id).text)))
+    return Modes.model_validate(tasks.modes(identification_of(components, caller.group, id).text))
 
 
 @router.get(

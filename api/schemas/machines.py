@@ -31,7 +31,7 @@ class MachineAnswer(Answer):
 class IdentificationSummary(Answer):
     """An identification in short."""
 
-    status: str = Field(description="converged, suspect or failed")
+    status: str = Field(description="converged, suspect or failed; measured where a flange was measured in place of it")
     reasons: list[str]
     campaign: str
     axes: list[str]

@@ -11,8 +11,8 @@ import numpy as np
 from api.streams.engine import Column, Plan
 from api.work.forces import ReadPair, observed
 from api.work.machine_cache import read
-from api.work.requests import MachineText, ToolingText
-from api.work.toolings import tooling_of
+from api.work.requests import MachineText, ToolingSource
+from api.work.toolings import tooling_from
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.units import to_hz, to_rpm
@@ -45,7 +45,7 @@ class StreamQuestion:
 
 
 def design(
-    machine: MachineText, tooling: ToolingText, question: StreamQuestion, first: int, raw: bytes, air: ReadPair | None
+    machine: MachineText, tooling: ToolingSource, question: StreamQuestion, first: int, raw: bytes, air: ReadPair | None
 ) -> tuple[bytes, dict[str, Any]]:
     """Return the plan of a stream, pickled for the process of the streams, and what its client is told.
 
@@ -64,7 +64,7 @@ def design(
     return _planned(machine, tooling, question, first, recording, still, follow=True)
 
 
-def design_replay(machine: MachineText, tooling: ToolingText, question: StreamQuestion, source: ReadPair) -> tuple[bytes, dict[str, Any]]:
+def design_replay(machine: MachineText, tooling: ToolingSource, question: StreamQuestion, source: ReadPair) -> tuple[bytes, dict[str, Any]]:
     """Return the same for a recording: its forces are those of the recording as a whole, to the last digit.
 
     Parameters
@@ -80,7 +80,7 @@ def design_replay(machine: MachineText, tooling: ToolingText, question: StreamQu
 
 def _planned(
     machine: MachineText,
-    tooling: ToolingText,
+    tooling: ToolingSource,
     question: StreamQuestion,
     first: int,
     recording: Recording,
@@ -89,7 +89,7 @@ def _planned(
 ) -> tuple[bytes, dict[str, Any]]:
     from rcsa_ident.workflows.stream_forces import live_observer
 
-    known, tool = read(machine.text), tooling_of(tooling.text)
+    known, tool = read(machine.text), tooling_from(tooling)
     found = observed(known, tool, recording, air, question.speed, question.method)
     axes = tuple(axis.upper() for axis in found.estimate.axes)
     if set(axes) != set(question.axes):

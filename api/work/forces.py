@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from api.work.machine_cache import Known, read
-from api.work.requests import MachineText, ToolingText
-from api.work.toolings import tooling_of, weigh
+from api.work.machine_cache import is_result, read
+from api.work.requests import MachineText, ToolingSource
+from api.work.toolings import tooling_from, weigh
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.errors import InputError
+from rcsa_ident.machine.machine import Machine
 from rcsa_ident.signals.recording import Recording, Sensor
-from rcsa_ident.units import from_hz, to_hz, to_rpm
+from rcsa_ident.units import to_hz, to_rpm
 
 #: Buckets of an answer's picture, and samples that one answer may take.
 BUCKETS, MOST_SAMPLES = 2000, 8_000_000
@@ -64,7 +65,7 @@ def sensors_of(text: str) -> tuple[Sensor, ...]:
     from rcsa_ident.io.forces import sensors_of_result
 
     try:
-        return sensors_of_result(json.loads(text), "")
+        return sensors_of_result(json.loads(text) if is_result(text) else {"sensors": {}}, "")
     except InputError as error:
         if error.field != "sensors":
             raise
@@ -72,7 +73,7 @@ def sensors_of(text: str) -> tuple[Sensor, ...]:
         raise InputError("sensors", found, "a table of sensors, as in campaign.toml") from None
 
 
-def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, source: ReadPair, csv: Path | None = None) -> Any:
+def forces(machine: MachineText, tooling: ToolingSource, question: ForceQuestion, source: ReadPair, csv: Path | None = None) -> Any:
     """Return the forces of a recording as an answer, or write FORCES.csv and return None.
 
     Parameters
@@ -84,7 +85,7 @@ def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, 
     from rcsa_ident.io.forces import write_forces_csv
     from rcsa_ident.observer.force import restore_mean_force
 
-    known, tool = read(machine.text), tooling_of(tooling.text)
+    known, tool = read(machine.text), tooling_from(tooling)
     cut, air = source()
     found = observed(known, tool, cut, air, question.speed, question.method, question.smooth)
     estimate, level = found.estimate, None
@@ -116,7 +117,7 @@ def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, 
         "spindle_speed_rpm": to_rpm(found.spindle_speed),
         "sampling_rate_hz": cut.rate,
         "band_hz": [to_hz(w) for w in found.band],
-        "notes": [*_doubts(known), *found.notes],
+        "notes": [*known.remarks, *found.notes],
         "axes": axes,
         "time_s": (begin * estimate.step).tolist(),
         "harmonics": lines,
@@ -126,7 +127,9 @@ def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, 
     return answer
 
 
-def observed(known: Known, tool: Any, cut: Recording, air: Recording | None, speed: float | None, method: str, smooth: bool = False) -> Any:
+def observed(
+    machine: Machine, tool: Any, cut: Recording, air: Recording | None, speed: float | None, method: str, smooth: bool = False
+) -> Any:
     """Return a `MonitoredCut`."""
     from rcsa_ident.observer.tuning import PaperWalk, Resonators
     from rcsa_ident.workflows.estimate_forces import observe
@@ -134,11 +137,10 @@ def observed(known: Known, tool: Any, cut: Recording, air: Recording | None, spe
     samples = cut.samples.shape[0] + (0 if air is None else air.samples.shape[0])
     if samples > MOST_SAMPLES:
         raise InputError("recording", f"{samples} samples", f"at most {MOST_SAMPLES} in one answer, the air cut's among them")
-    low, high = known.data["band_hz"]
-    weigh(tool.assembly, 1.3 * high)
-    band = from_hz(low), from_hz(high)
+    assert machine.band is not None
+    weigh(tool.assembly, 1.3 * to_hz(machine.band[1]))
     how = PaperWalk() if method == "paper" else Resonators()
-    return observe(known.machine, tool.assembly, tool.cutter.teeth, cut, air, band, speed, how, None, smooth)
+    return observe(machine, tool.assembly, tool.cutter.teeth, cut, air, speed, how, None, smooth)
 
 
 def _harmonics(force: Any, rate: float, speed: float, band: tuple[float, float]) -> list[dict[str, Any]]:
@@ -174,11 +176,6 @@ def _wear(found: Any, tool: Any, question: WornQuestion) -> dict[str, Any]:
             "unit": unit,
         }
     return {"coefficients": rows, "separable": bool(worn.separable), "misfit": float(worn.misfit)}
-
-
-def _doubts(known: Known) -> list[str]:
-    data = known.data
-    return [] if data["status"] == "converged" else [f"the identification is {data['status']}: {'; '.join(data['reasons'])}"]
 
 
 def _check_finite(value: Any) -> None:

@@ -57,6 +57,7 @@ def tooltip(
 ) -> None:
     """Predict the tooltip FRF of any tooling on the identified machine."""
     from rcsa_ident.errors import positive
+    from rcsa_ident.io.curves import write_tip_csv
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.workflows.tool_change import tooltip as ask
 
@@ -71,7 +72,7 @@ def tooltip(
     with stages.stage("tooltip"):
         found = ask(machine, tool, from_hz(frequency), spindle_speed, bands, share)
         deviation = found.tip.deviation()
-    write_response(out, frequency, found.tip)
+    write_tip_csv(out, found.tip)
     peaks = peaks_of(frequency, found.tip, deviation)
     if json_:
         summary = {"frequencies": len(frequency), "peaks": {a.upper(): asdict(p) for a, (p, _) in peaks.items()}}
@@ -181,18 +182,6 @@ def check_plot(path: Path | None) -> None:
     if path.suffix.lower() not in (".png", ".svg"):
         raise InputError("--plot", f"suffix '{path.suffix}'", "a file that ends in .png or .svg", str(path))
     writable(path, "--plot")
-
-
-def write_response(path: Path, frequency: FloatArray, tip: UncertainReceptance) -> None:
-    """Write FRF.csv with standard deviations in further columns."""
-    from rcsa_ident.io.curves import write_frf_csv
-
-    curves = {c.dof.upper(): tip.between(str(c), str(c)) for c in tip.rows}
-    columns: dict[str, FloatArray] = {}
-    for (row, col), (real, imaginary) in tip.deviation().items():
-        if row == col:
-            columns |= {f"{row.dof.upper()}_re_std": real, f"{row.dof.upper()}_im_std": imaginary}
-    write_frf_csv(path, frequency, curves, columns)
 
 
 def peaks_of(frequency: FloatArray, tip: UncertainReceptance, deviation: Deviation) -> dict[Dof, Any]:

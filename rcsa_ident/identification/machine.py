@@ -91,7 +91,7 @@ class IdentifiedMachine(Machine):
     @property
     def prepared(self) -> bool:
         """Whether a further tooling costs milliseconds, its spread included."""
-        return bool(self.kept_sides)
+        return bool(self.kept_sides) and all(side.part.doubt is None or side.ends is not None for side in self.kept_sides)
 
     @property
     def workpiece(self) -> Workpiece | None:
@@ -139,15 +139,23 @@ class IdentifiedMachine(Machine):
             return self.kept_sides
         return super().sides(omega)
 
-    def kept(self) -> IdentifiedMachine:
-        """Return the same machine with all that a tip feels of it at `lines` worked out: a new tooling then costs milliseconds.
+    def kept(self, spread: bool = True) -> IdentifiedMachine:
+        """Return the same machine with what a tip feels of it at `lines` worked out: a new tooling then costs milliseconds.
 
         A machine that changes with the speed, or with too many unknowns to keep them all, is returned as it is.
+
+        Parameters
+        ----------
+        spread : bool
+            Also what the records leave open.
         """
+        if self.prepared or (self.kept_sides and not spread):
+            return self
         omega = self.lines()
         if self.speed_range is not None or self.unknowns * omega.size > MOST_KEPT:
             return self
-        return replace(self, kept_sides=tuple(side.kept() for side in self.sides(omega)))
+        sides = self.sides(omega)
+        return replace(self, kept_sides=tuple(side.kept() for side in sides) if spread else sides)
 
     def __getstate__(self) -> dict[str, Any]:
         # what is kept for speed would cost more on its way to another process than to work out there

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import TextTable, read_table
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.units import to_hz
 
 AXES = ("X", "Y")
 FREQUENCY = "frequency_hz"
@@ -80,6 +82,17 @@ def write_frf_csv(
             columns |= {f"{axis}_re": column.real, f"{axis}_im": column.imag}
     _check_rising(columns[FREQUENCY], where)
     _write(path, columns, bands or {}, finite=list(columns) + list(bands or {}))
+
+
+def write_tip_csv(path: str | Path, tip: UncertainReceptance) -> None:
+    """Write the direct receptances of a tip, with standard deviations in further columns where there are some."""
+    columns: dict[str, ArrayLike] = {}
+    for (row, col), (real, imaginary) in tip.deviation().items():
+        if row == col:
+            columns |= {f"{row.dof.upper()}_re_std": real, f"{row.dof.upper()}_im_std": imaginary}
+    curves = {c.dof.upper(): tip.between(str(c), str(c)) for c in tip.rows}
+    # rad/s and back leaves a last digit that nobody asked for
+    write_frf_csv(path, np.round(to_hz(tip.omega), 9), curves, columns)
 
 
 def read_frf_csv(path: str | Path) -> FrfCurves:

@@ -12,7 +12,7 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
-from rcsa_ident.io.text_columns import read_table
+from rcsa_ident.io.text_columns import TextTable, read_table, table_of
 from rcsa_ident.machine.machine import FlangeMachine
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.units import from_hz
@@ -55,27 +55,7 @@ def read_flange_csv(path: str | Path) -> dict[Dof, MeasuredFlange]:
     InputError
         A column is missing, or the frequencies do not rise.
     """
-    table = read_table(path, "flange")
-    flanges = {}
-    for axis in (Dof.X, Dof.Y):
-        names = [f"{axis.upper()}_{name}_{part}" for name in _ENTRIES for part in ("re", "im")]
-        if not any(name in table.header for name in names):
-            continue
-        missing = [name for name in ("frequency_hz", *names) if name not in table.header]
-        if missing:
-            raise InputError(f"column {missing[0]}", "nothing", "real and imaginary parts of tF, tM and rM", str(path))
-        frequency, *parts = table.columns(["frequency_hz", *names])
-        block = np.zeros((frequency.size, 2, 2), dtype=complex)
-        for k, (i, j) in enumerate(_ENTRIES.values()):
-            block[:, i, j] = block[:, j, i] = parts[2 * k] + 1j * parts[2 * k + 1]
-        rows = plane("flange", axis)
-        try:
-            flanges[axis] = MeasuredFlange(Receptance(from_hz(frequency), block, rows, rows))
-        except InputError as error:
-            raise error.at(str(path)) from None
-    if not flanges:
-        raise InputError("flange", "no columns X_tF_re or Y_tF_re", "a flange's receptances", str(path))
-    return flanges
+    return _flanges(read_table(path, "flange"))
 
 
 def read_flange_machine(path: str | Path) -> FlangeMachine:
@@ -86,5 +66,37 @@ def read_flange_machine(path: str | Path) -> FlangeMachine:
     InputError
         As `read_flange_csv`.
     """
-    flanges = tuple(read_flange_csv(path).values())
-    return FlangeMachine(flanges, flanges[0].band, name=Path(path).stem, ends=True)
+    return _machine(read_table(path, "flange"), Path(path).stem)
+
+
+def flange_machine_of(text: str, name: str = "flange") -> FlangeMachine:
+    """Return the same of a text; errors name its lines."""
+    return _machine(table_of(text, "flange", ""), name)
+
+
+def _machine(table: TextTable, name: str) -> FlangeMachine:
+    flanges = tuple(_flanges(table).values())
+    return FlangeMachine(flanges, flanges[0].band, name=name, ends=True)
+
+
+def _flanges(table: TextTable) -> dict[Dof, MeasuredFlange]:
+    flanges = {}
+    for axis in (Dof.X, Dof.Y):
+        names = [f"{axis.upper()}_{name}_{part}" for name in _ENTRIES for part in ("re", "im")]
+        if not any(name in table.header for name in names):
+            continue
+        missing = [name for name in ("frequency_hz", *names) if name not in table.header]
+        if missing:
+            raise InputError(f"column {missing[0]}", "nothing", "real and imaginary parts of tF, tM and rM", table.where)
+        frequency, *parts = table.columns(["frequency_hz", *names])
+        block = np.zeros((frequency.size, 2, 2), dtype=complex)
+        for k, (i, j) in enumerate(_ENTRIES.values()):
+            block[:, i, j] = block[:, j, i] = parts[2 * k] + 1j * parts[2 * k + 1]
+        rows = plane("flange", axis)
+        try:
+            flanges[axis] = MeasuredFlange(Receptance(from_hz(frequency), block, rows, rows))
+        except InputError as error:
+            raise error.at(table.where) from None
+    if not flanges:
+        raise InputError("flange", "no columns X_tF_re or Y_tF_re", "a flange's receptances", table.where)
+    return flanges

@@ -87,8 +87,12 @@ def read_table(path: str | Path, field: str, largest: int = LARGEST_TEXT) -> Tex
     largest : int
         Bytes that are allowed.
     """
-    where = str(path)
-    lines = _text(read_bytes(path, field, largest), field, where).replace('"', "").splitlines()
+    return table_of(_text(read_bytes(path, field, largest), field, str(path)), field, str(path))
+
+
+def table_of(text: str, field: str, where: str) -> TextTable:
+    """Return the table of a text, as `read_table` does of a file; `where` is named in the messages."""
+    lines = text.replace('"', "").splitlines()
     numbers = [i for i, line in enumerate(lines, start=1) if line and not line.isspace()]
     while numbers and lines[numbers[0] - 1].lstrip().startswith("#"):
         numbers.pop(0)

@@ -127,8 +127,9 @@ class Machine(TipSource):
         del speed
         return self
 
-    def kept(self) -> Machine:
-        """Return the same machine, with what many toolings share worked out, where that saves time."""
+    def kept(self, spread: bool = True) -> Machine:
+        """Return the same machine, with what many toolings share worked out, where that saves time; of its spread only if asked."""
+        del spread
         return self
 
     def sides(self, omega: FloatArray) -> tuple[Side, ...]:

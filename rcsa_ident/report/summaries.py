@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.force import REFERENCE_RUNOUT, SLOPES
+from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
@@ -251,24 +252,30 @@ def _planned(cut: PlannedCut) -> dict[str, Any]:
     }
 
 
-def frf_summary(tip: UncertainReceptance) -> dict[str, Any]:
+def frf_summary(receptance: UncertainReceptance, coordinates: Sequence[Coordinate]) -> dict[str, Any]:
     """Return direct receptances over frequency, axis by axis, with standard deviations where there are some [m/N].
+
+    Parameters
+    ----------
+    receptance : UncertainReceptance
+    coordinates : sequence of Coordinate
+        Translations, one for each axis.
 
     Raises
     ------
     InputError
         If a receptance is not finite.
     """
-    deviation = tip.deviation()
+    deviation = receptance.deviation()
     axes = {}
-    for coordinate in tip.rows:
+    for coordinate in coordinates:
         real, imaginary = deviation.get((coordinate, coordinate), (None, None))
-        values = tip.between(str(coordinate), str(coordinate))
+        values = receptance.between(str(coordinate), str(coordinate))
         parts = {"re": values.real, "im": values.imag, "re_std": real, "im_std": imaginary}
         if not all(part is None or np.all(np.isfinite(part)) for part in parts.values()):
             raise InputError("tooling", "a receptance that is not finite", "a tooling whose receptance is finite at every frequency")
         axes[coordinate.dof.upper()] = {key: None if part is None else part.tolist() for key, part in parts.items()}
-    return {"frequency_hz": np.round(to_hz(tip.omega), 9).tolist(), "axes": axes}
+    return {"frequency_hz": np.round(to_hz(receptance.omega), 9).tolist(), "axes": axes}
 
 
 def finite(value: float | None, unit: float = 1.0) -> float | None:

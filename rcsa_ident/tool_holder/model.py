@@ -169,13 +169,22 @@ def _pieces(assembly: ToolAssembly) -> list[tuple[int, float, float, BeamSegment
     return pieces
 
 
+def expected_elements(assembly: ToolAssembly, max_frequency: float) -> float:
+    """Return about how many finite elements an assembly has up to a frequency [Hz], before any of them is made."""
+    return sum(_elements(segment, segment.length, max_frequency, cowper) for segment in (*assembly.tool, *assembly.holder))
+
+
 def _division(segment: BeamSegment, length: float, max_frequency: float, shear_coefficient: ShearCoefficient) -> int:
+    """Elements of a stretch."""
+    return int(np.ceil(_elements(segment, length, max_frequency, shear_coefficient)))
+
+
+def _elements(segment: BeamSegment, length: float, max_frequency: float, shear_coefficient: ShearCoefficient) -> float:
     """Elements of a stretch, short against the bending wavelength and the diameter."""
     beam = section(segment, shear_coefficient)
     wavelength = 2.0 * np.pi * float((beam.bending / beam.mass) ** 0.25) / np.sqrt(2.0 * np.pi * max(max_frequency, 1.0))
     density = max(ELEMENTS_PER_WAVELENGTH / wavelength, ELEMENTS_PER_DIAMETER / max(segment.diameter, segment.end))
-    least = 2 if segment.end_diameter is None else ELEMENTS_PER_TAPER
-    return max(int(np.ceil(length * density)), least)
+    return max(length * density, 2.0 if segment.end_diameter is None else float(ELEMENTS_PER_TAPER))
 
 
 def _key(z: float) -> int:

@@ -14,7 +14,6 @@ from rcsa_ident.identification.result import Identification
 from rcsa_ident.machining_setup import Campaign
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.units import to_rpm
-from rcsa_ident.units import to_rpm
 from rcsa_ident.workflows.identify import Map, Method, data_of
 
 

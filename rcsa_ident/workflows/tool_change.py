@@ -26,8 +26,7 @@ from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Stabili
 from rcsa_ident.stability.stability_map import MonodromyMethod, StabilityMap, stability_map
 from rcsa_ident.stability.surface_error import SurfaceError, surface_location_error
 from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, tally
-from rcsa_ident.stability.tip_modes import fitted_modes
-from rcsa_ident.stability.tip_modes import TIP, TipModes
+from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.units import to_hz, to_rpm
 
@@ -140,7 +139,7 @@ class ToolChange:
             found *= _PITCH_FACTOR
         if not (zero_order and self.machine.prepared):
             found += _CHANGING_SECONDS if self.machine.speed_range is not None else 0.0
-            found += _SPREAD_SECONDS * self.machine.unknowns * self.omega.size if self.draws else 0.0
+            found += spread_seconds(self.machine, self.omega) if self.draws else 0.0
         return found
 
     def limits(self, speeds: FloatArray | None = None, max_depth: float | None = None, draws: int | None = None) -> StabilityLobes:
@@ -244,6 +243,11 @@ def surface_of(change: ToolChange, depth: float) -> SurfaceError:
         parts.append(part)
     warnings = tuple(dict.fromkeys(warning for part in parts for warning in part.warnings))
     return SurfaceError(speeds, parts[0].height, error, parts[0].wall, warnings)
+
+
+def spread_seconds(machine: TipSource, omega: FloatArray) -> float:
+    """Return about how long the spread of a tip at some frequencies takes where nothing is worked out before [s]."""
+    return _SPREAD_SECONDS * machine.unknowns * omega.size
 
 
 def _outside_band(lobes: StabilityLobes, band: tuple[float, float]) -> str | None:
