@@ -137,7 +137,7 @@ def test_a_wrong_holder_shows():
         wrong = ToolAssembly((BeamSegment(float(length), 0.04, heavy),), blank(float(length)).holder, 0.0)
         made.append(Observation(tool_holder_receptance(wrong, OMEGA), o.row, o.col, o.values, o.std))
     found = least_squares_flange(made, truth("stiff")[1])
-    assert any("not as modelled" in note for note in found.notes)
+    assert any("differ from their models" in note for note in found.notes)
 
 
 def test_the_result_is_judged_for_passivity():
