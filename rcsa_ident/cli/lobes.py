@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 ResultFile = Annotated[
     Path, typer.Argument(help="RESULT.json of an identification, or FLANGE.csv of a measured flange.", show_default=False)
 ]
-ToolingFile = Annotated[Path, typer.Argument(help="TOOLING.toml; it need not have been cut with.", show_default=False)]
+ToolingFile = Annotated[Path, typer.Argument(help="TOOLING.toml of any tool, also of one that has never cut.", show_default=False)]
 Plot = Annotated[Path | None, typer.Option(metavar="FILE.png|svg", help="Draw a figure.", show_default=False)]
 
 

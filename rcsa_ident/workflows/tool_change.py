@@ -271,4 +271,6 @@ def _outside(machine: TipSource, speeds: FloatArray) -> list[str]:
     if known is None or (speeds.min() >= known[0] * (1.0 - 1e-9) and speeds.max() <= known[1] * (1.0 + 1e-9)):
         return []
     low, high = (to_rpm(speed) for speed in known)
-    return [f"the machine was identified from {low:.0f} to {high:.0f} rev/min; outside it stays what it is at the nearest of them"]
+    return [
+        f"the machine was identified from {low:.0f} to {high:.0f} rev/min; outside this range its dynamics at the nearest speed are used"
+    ]

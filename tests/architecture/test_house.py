@@ -110,15 +110,6 @@ def test_importing_does_nothing_heavy():
     assert run(sys.executable, "-c", code).stdout.strip() == "[]"
 
 
-#: being rewritten; each leaves this list with its own constants
-UNITS_STILL_IN_LINE = {
-    *(f"rcsa_ident/workflows/{name}.py" for name in ("tip", "lobes", "limits", "maps", "speeds", "advice")),
-    *(f"rcsa_ident/cli/{name}.py" for name in ("conditions", "lobes", "advice", "demo", "cases", "results")),
-    *(f"api/work/{name}.py" for name in ("tasks", "machine_cache", "machine_side", "requests", "toolings")),
-    *("api/schemas/queries.py", "api/routes/tool_change.py"),
-}
-
-
 def test_one_place_turns_speeds_into_rad_per_s():
     """30/π and π/30 stand in units.py and nowhere else, whether written as a quotient or as digits."""
     factor = re.compile(r"\b30(\.0*)?\s*/\s*(np|math)\.pi|(np|math)\.pi\s*/\s*30\b|\b9\.549\d|\b0\.1047\d")
@@ -126,7 +117,7 @@ def test_one_place_turns_speeds_into_rad_per_s():
     for path in (p for folder in ("rcsa_ident", "api") for p in (ROOT / folder).rglob("*.py")):
         if factor.search(path.read_text()):
             offenders.add(str(path.relative_to(ROOT)))
-    assert offenders - UNITS_STILL_IN_LINE == {"rcsa_ident/units.py"}
+    assert offenders == {"rcsa_ident/units.py"}
 
 
 def test_errors_are_in_the_words_of_the_library():
