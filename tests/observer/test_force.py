@@ -23,7 +23,7 @@ PROGRAMMED = 12000.0 * np.pi / 30.0
 def monitored(method, smooth=False, air=True, cut=None):
     made = paper_cut()
     record, still = cut or made.cut, made.air if air else None
-    return observe(flange_machine(), made.tooling.assembly, 2, record, still, BAND, PROGRAMMED, method, None, smooth)
+    return observe(flange_machine(), made.tooling.assembly, 2, record, still, PROGRAMMED, method, None, smooth)
 
 
 @pytest.fixture(scope="module")
