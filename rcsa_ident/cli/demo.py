@@ -127,7 +127,7 @@ def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out
     advice = advise(change)
     safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
     write_tip_csv(out / f"FRF_{safe}.csv", response)
-    write_lobes(out / f"LOBES_{safe}.csv", advice.lobes)
+    write_lobes(out / f"LOBES_{safe}.csv", advice)
     tip = {c.dof.upper(): response.between(str(c), str(c)) for c in response.rows}
     deviation = {row.dof.upper(): each for (row, col), each in response.deviation().items() if row == col}
     true, error, coverage = _truth(truth / "tip" / f"{name}.csv", frequency, tip, deviation)

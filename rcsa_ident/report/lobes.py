@@ -59,6 +59,7 @@ def stability_figure(
     tested: Judged | None = None,
     surface: SurfaceError | None = None,
     chart: StabilityMap | None = None,
+    usable: UsableDepths | None = None,
 ) -> Figure:
     """Stability limit and recommended depth over spindle speed, the recommended cuts marked, the chatter frequency below.
 
@@ -75,6 +76,8 @@ def stability_figure(
         Drawn below them.
     chart : StabilityMap, optional
         Tells the cuts that are stable above the first limit.
+    usable : UsableDepths, optional
+        The recommended depths; by default those of the lobes alone.
     """
     rows = (2.2, 1.0) if surface is None else (2.2, 1.0, 1.0)
     figure, grid = _grid(len(rows), 1, 4.6 if surface is None else 5.8, rows, sharey="none")
@@ -92,9 +95,10 @@ def stability_figure(
             label = f"stable at any speed: {1e3 * lobes.absolute_limit:.2f} mm"
             top.axhline(1e3 * lobes.absolute_limit, color=_GREY, ls=":", lw=1.2, label=label)
         if recommended:
-            rising = lobes.ordered()
-            speed, depth = to_rpm(rising.spindle_speed), 1e3 * rising.recommended_depth()
-            top.plot(speed, depth, color=_GREEN, lw=1.1, label="recommended depth")
+            speed, depth = lobes.ordered().spindle_speed, lobes.ordered().recommended_depth()
+            if usable is not None:
+                speed, depth = usable.spindle_speed, usable.stable
+            top.plot(to_rpm(speed), 1e3 * depth, color=_GREEN, lw=1.1, label="recommended depth")
         for point in recommended:
             x, y = to_rpm(point.spindle_speed), 1e3 * point.depth
             top.plot(x, y, "v", color=_GREEN, ms=8.0)

@@ -144,16 +144,18 @@ class StabilityLobes:
             raise InputError("reserve", reserve, "a share from 0 to below 1")
         return (1.0 - reserve) * least_within_tolerance(self.spindle_speed, self.limit_quantile(probability), tolerance)
 
-    def best_speeds(self, count: int = 3) -> list[Pocket]:
+    def best_speeds(self, count: int = 3, recommended: FloatArray | None = None) -> list[Pocket]:
         """Return the speeds with the highest limits, one for each pocket of the lobes, the highest first.
 
         Parameters
         ----------
         count : int
             At most so many. The middle of a range that is stable up to `max_depth` stands for it.
+        recommended : array, shape (n,) [m], default `recommended_depth`
+            At rising speeds.
         """
         lobes = self.ordered()
-        recommended = lobes.recommended_depth()
+        recommended = lobes.recommended_depth() if recommended is None else recommended
         found = []
         for speed, limit in peaks(lobes.spindle_speed, lobes.limit_depth, count):
             found.append(Pocket(speed, limit, float(np.interp(speed, lobes.spindle_speed, recommended))))
