@@ -102,9 +102,10 @@ def stability_figure(
         for point in recommended:
             x, y = to_rpm(point.spindle_speed), 1e3 * point.depth
             top.plot(x, y, "v", color=_GREEN, ms=8.0)
-            top.annotate(
-                f"{x:.0f} rev/min\n{y:.2f} mm", (x, y), xytext=(0, -26), textcoords="offset points", ha="center", fontsize=8.5, color=_GREEN
-            )
+            # above the limit, where no line crosses it
+            above = (x, min(1e3 * point.limit, 0.86 * ceiling))
+            text = f"{x:.0f} rev/min\n{y:.2f} mm"
+            top.annotate(text, above, xytext=(0, 6), textcoords="offset points", ha="center", fontsize=8.5, color=_GREEN)
         if tested is not None:
             _draw_tested(top, tested)
         top.set_ylim(0.0, ceiling)
