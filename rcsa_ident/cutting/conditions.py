@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, non_negative, positive
 
 
@@ -45,6 +47,11 @@ class Engagement:
         if strategy == "down":
             return cls(float(np.arccos(2.0 * immersion - 1.0)), float(np.pi))
         raise InputError("strategy", strategy, "up or down")
+
+
+#: An engagement that changes along the edge: spindle speed [rad/s] and axial depth [m] to an array, shape (k, 4), whose rows say
+#: between which shares of the depth, counted from the tip, a part of the edge lies, and between which angles [rad] it cuts.
+EngagementProfile = Callable[[float, float], FloatArray]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, EngagementProfile
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.errors import InputError, non_negative, positive
 
@@ -82,6 +82,8 @@ class MillingProcess:
         Matters to stability only with run-out: it decides which teeth cut, and what they regenerate.
     damping : ProcessDamping or None
     speed_variation : SpeedVariation or None
+    engagement_profile : EngagementProfile or None
+        How the engagement changes along the edge, as with a deflected tool; `engagement` is then the programmed one.
 
     Examples
     --------
@@ -100,6 +102,7 @@ class MillingProcess:
     feed_per_tooth: float | None = None
     damping: ProcessDamping | None = None
     speed_variation: SpeedVariation | None = None
+    engagement_profile: EngagementProfile | None = None
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.feed_angle):
@@ -114,5 +117,13 @@ class MillingProcess:
         return np.array([[c, -s], [s, c]])
 
     def conditions(self, speed: float, depth: float) -> CuttingConditions:
-        """Return the cut at a speed [rad/s] and a depth [m]; without a feed it is 0."""
+        """Return the cut at a speed [rad/s] and a depth [m]; without a feed it is 0.
+
+        Raises
+        ------
+        InputError
+            If the engagement changes along the edge.
+        """
+        if self.engagement_profile is not None:
+            raise InputError("engagement_profile", "an engagement that changes along the edge", "one engagement for the whole edge")
         return CuttingConditions(speed, depth, self.feed_per_tooth or 0.0, self.engagement, self.feed_angle)
