@@ -9,8 +9,8 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.parameters import AxisLayout, parameter_names
-from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.search import SearchSettings
+from rcsa_ident.identification.status import Status
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, open_shop
 
 SMALL = EvidenceSelection(search=SearchSettings(modes=8, population=4, generations=2, steps=6), candidates=2)
