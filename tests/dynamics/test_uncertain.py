@@ -52,7 +52,7 @@ def known(seed=1, blocks=(((0, 2), 4), ((1,), 3)), guide=None):
 
 def test_the_spread_is_written_block_by_block():
     tip = known()
-    (first, one), (second, other) = tip.variation.blocks
+    (first, one), (_, other) = tip.variation.blocks
     spread = tip.spread
     assert spread.shape == (7, OMEGA.size, 3, 3)
     for i, row in enumerate(first):

@@ -74,7 +74,7 @@ def test_bands_hold_the_truth(shop, found):
         # neighbouring frequencies are wrong together: one draw of a few unknowns
         assert 0.2 < np.sqrt(np.mean(z**2)) < 2.5
         # and they are not wide because they say nothing
-        width = np.hypot(*response.deviation[axis])
+        width = np.hypot(real, imaginary)
         assert np.median(width / np.abs(true[:, i])) < 0.05
 
 
