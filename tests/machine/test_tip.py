@@ -165,11 +165,8 @@ def candidate(vector):
     modes = oblique(1.0 + frequency)
     phi = modes.phi.copy()
     phi[1] = phi[1] * (1.0 + shape) + shape * phi[2]
-    stiff = np.exp(joint)
-    own = replace(
-        JOINT, translational_stiffness=stiff * JOINT.translational_stiffness, rotational_stiffness=stiff * JOINT.rotational_stiffness
-    )
-    return Candidate(replace(modes, phi=phi), own)
+    stiff = {name: np.exp(joint) * getattr(JOINT, name) for name in ("translational_stiffness", "rotational_stiffness")}
+    return Candidate(replace(modes, phi=phi), replace(JOINT, **stiff))
 
 
 def doubt():
