@@ -10,8 +10,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
-from rcsa_ident import __version__
 from rcsa_ident.errors import InputError, RcsaIdentError
+from rcsa_ident.version import __version__
 
 ADDRESS = re.compile(r"(tcp|tls)://(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9.-]+):\d{1,5}")
 _ALLOWED = "the address of a Dask scheduler, as tcp://host:8786"

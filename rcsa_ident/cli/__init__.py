@@ -50,7 +50,7 @@ for _title, _commands in _COMMANDS.items():
 
 def _version(asked: bool) -> None:
     if asked:
-        from rcsa_ident import __version__
+        from rcsa_ident.version import __version__
 
         typer.echo(f"rcsa-ident {__version__}")
         raise typer.Exit
