@@ -1,7 +1,7 @@
 """Force observer: cost of a step beside filterpy, and forces of a virtual cut at a speed below the identification's lines.
 
-The case is the paper's: half-immersion down-milling at 12 000 rev/min, 2 teeth, 1 mm deep, 0.15 mm a tooth, here on the sample machine of
-`data/machines/hpm.toml`. The observer knows the machine as `rcsa-ident identify data/sample_runs` found it, not as it is.
+The case is that of [inprocess]: half-immersion down-milling at 12 000 rev/min, 2 teeth, 1 mm deep, 0.15 mm a tooth, here on the
+sample machine of `data/machines/hpm.toml`. The observer knows the machine as `rcsa-ident identify data/sample_runs` found it, not as it is.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Force streams against the service as its command starts it: a minute at its pace beside an identification, an hour as fast as it goes.
 
-The signals are those of the virtual machine in the paper's cut (`turning`), 51.2 kHz, gap and fixture's acceleration of two axes: half a
-second more than the first second in air, then the cut, under a spindle whose speed wanders. The service knows the machine as it was
+The signals are those of the virtual machine in the cut of [inprocess] (`turning`), 51.2 kHz, gap and fixture's acceleration of two axes:
+half a second more than the first second in air, then the cut, under a spindle whose speed wanders. The service knows the machine as it was
 identified from the sample runs. The client is this process, on the same cores.
 """
 

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import TextTable, read_table
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.units import to_hz
 
 AXES = ("X", "Y")
 FREQUENCY = "frequency_hz"
@@ -64,6 +66,7 @@ def write_frf_csv(
 
     Parameters
     ----------
+    path : path
     frequency_hz : array, shape (n,)
         Rising.
     values : mapping of axis to complex array, shape (n,)
@@ -81,6 +84,17 @@ def write_frf_csv(
     _write(path, columns, bands or {}, finite=list(columns) + list(bands or {}))
 
 
+def write_tip_csv(path: str | Path, tip: UncertainReceptance) -> None:
+    """Write the direct receptances of a tip, with standard deviations in further columns where there are some."""
+    columns: dict[str, ArrayLike] = {}
+    for (row, col), (real, imaginary) in tip.deviation().items():
+        if row == col:
+            columns |= {f"{row.dof.upper()}_re_std": real, f"{row.dof.upper()}_im_std": imaginary}
+    curves = {c.dof.upper(): tip.between(str(c), str(c)) for c in tip.rows}
+    # rad/s and back leaves a last digit that nobody asked for
+    write_frf_csv(path, np.round(to_hz(tip.omega), 9), curves, columns)
+
+
 def read_frf_csv(path: str | Path) -> FrfCurves:
     """Return tip receptances and further columns of FRF.csv."""
     table = read_table(path, "FRF")
@@ -94,7 +108,7 @@ def read_frf_csv(path: str | Path) -> FrfCurves:
     row = _first(np.diff(columns[FREQUENCY], prepend=-1.0) <= 0.0)
     if row is not None or columns[FREQUENCY][0] < 0.0:
         row = row or 0
-        raise InputError(f"column {FREQUENCY}", f"{columns[FREQUENCY][row]:g}", "frequencies from 0 that rise [Hz]", table.at(row))
+        raise InputError(f"column {FREQUENCY}", f"{columns[FREQUENCY][row]:g}", "increasing frequencies of 0 or more [Hz]", table.at(row))
     values = {}
     for axis in axes:
         column = np.empty(columns[FREQUENCY].size, dtype=complex)
@@ -116,6 +130,7 @@ def write_lobes_csv(
 
     Parameters
     ----------
+    path : path
     speed_rpm, limit_mm, chatter_hz, lobe : array, shape (n,)
         A chatter frequency or lobe that is not known is NaN; so are stable places in `extra`.
     extra : mapping of column name to array, shape (n,), optional
@@ -142,6 +157,7 @@ def write_speed_csv(path: str | Path, speed_rpm: ArrayLike, columns: Mapping[str
 
     Parameters
     ----------
+    path : path
     speed_rpm : array, shape (n,)
         Above 0.
     columns : mapping of column name to array, shape (n,)
@@ -157,6 +173,7 @@ def write_map_csv(path: str | Path, speed_rpm: FloatArray, depth_mm: FloatArray,
 
     Parameters
     ----------
+    path : path
     speed_rpm : array, shape (n,)
     depth_mm : array, shape (k,)
     growth : array, shape (n, k) [-]
@@ -231,7 +248,7 @@ def _columns(table: TextTable, required: Sequence[str]) -> dict[str, FloatArray]
 def _check_rising(frequency: FloatArray, where: str) -> None:
     row = _first(~(np.diff(frequency, prepend=-1.0) > 0.0)) if frequency.ndim == 1 else None
     if row is not None or (frequency.size and frequency.flat[0] < 0.0):
-        raise InputError(FREQUENCY, float(frequency.flat[row or 0]), "frequencies from 0 that rise [Hz]", where)
+        raise InputError(FREQUENCY, float(frequency.flat[row or 0]), "increasing frequencies of 0 or more [Hz]", where)
 
 
 def _first(wrong: np.ndarray) -> int | None:

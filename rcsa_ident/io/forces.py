@@ -26,6 +26,7 @@ def write_forces_csv(path: str | Path, time: ArrayLike, force: Mapping[str, Arra
 
     Parameters
     ----------
+    path : path
     time : array, shape (n,)
         Rising.
     force, deviation : mappings of axis to array, shape (n,)
@@ -68,7 +69,7 @@ def sensors_of_result(data: Mapping[str, Any], where: str) -> tuple[Sensor, ...]
     Parameters
     ----------
     data : mapping
-        As `read_result` returns it.
+        The result as `read_result` returns it.
     where : str
         The file, for the messages.
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.stability import _time_kernels as kernels
 from rcsa_ident.stability.first_instability import first_loss
+from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.monodromy import common_period, stable_depth_bound
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import TipModes, modes_of
@@ -60,7 +62,7 @@ class MillingHistory:
 
 @dataclass(frozen=True, slots=True)
 class TimeDomain:
-    """Regenerative time-domain simulation with a Poincare test, the method that decides disputes.
+    """Regenerative time-domain simulation [tlusty1981] with a Poincare test, the method that decides disputes.
 
     Two cuts run side by side, one of them a little pushed, and are looked at once per period (a tooth's, a revolution's where teeth
     differ, a swing's of a varying speed): what their states differ by grows or dies away. The limit is where it does neither. Teeth
@@ -79,6 +81,11 @@ class TimeDomain:
         of percents.
     """
 
+    name: ClassVar[str] = MethodName.TIME_DOMAIN.value
+    needs: ClassVar[Literal["receptance", "modes"]] = "modes"
+    seconds_per_speed: ClassVar[float] = 4.5
+    gives_maps: ClassVar[bool] = False
+
     periods: int = 150
     tolerance: float = 3e-3
     contact_loss: bool = True
@@ -91,7 +98,7 @@ class TimeDomain:
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""
-        modes = modes_of(tip, "time-domain")
+        modes = modes_of(tip, self.name)
         limit = np.full(speeds.size, np.inf)
         chatter, lobe = np.full(speeds.size, np.nan), np.full(speeds.size, -1, dtype=np.intp)
         flip = np.zeros(speeds.size, dtype=bool)
@@ -104,7 +111,7 @@ class TimeDomain:
             limit[i] = depth
             chatter[i], flip[i] = cut.vibration(depth, self.periods)
             lobe[i] = int(chatter[i] / (speed * process.cutter.teeth))
-        return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), "time-domain", (), flip)
+        return StabilityLobes(speeds, limit, chatter, lobe, max_depth, self.name, flip=flip)
 
 
 def milling_history(
@@ -125,7 +132,7 @@ def milling_history(
     """
     if process.feed_per_tooth is None:
         raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m] of the cut to simulate")
-    cut = _Cut(modes_of(tip, "time-domain"), process, positive("speed", speed, "rad/s"), leaves=True)
+    cut = _Cut(modes_of(tip, TimeDomain.name), process, positive("speed", speed, "rad/s"), leaves=True)
     run = cut.begin(positive("depth", depth, "m")).pushed(push)
     samples = run.march(int(np.ceil(positive("revolutions", revolutions) * cut.per_turn)))
     back = process.machine_from_feed.T
@@ -208,6 +215,9 @@ class _Cut:
         self.feed = process.feed_per_tooth or _FEED
         if process.feed_per_tooth is None and np.ptp(process.cutter.runout) > 0.0:
             raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: with run-out it decides which teeth cut")
+        if process.engagement_profile is not None:
+            allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
+            raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
         turn = process.machine_from_feed
         self.pole = modes.pole.copy()
         self.outputs = np.ascontiguousarray(turn.T @ modes.outputs)

@@ -12,14 +12,14 @@ import pytest
 import uvicorn
 
 from api import access
-from api.access import Patient
+from api.access import TimedHeadProtocol
 from api.main import create_app
 from api.settings import Settings
 from tests.api.in_process import Here, Near
 from tests.fixtures.waiting import PATIENCE, until
 
 
-class Hasty(Patient):
+class Hasty(TimedHeadProtocol):
     seconds, most = 0.6, 20_000
 
 
@@ -73,7 +73,7 @@ def test_a_body_that_stops(port, body):
     answer = told(port, HEAD + body)
     assert answer.startswith(b"HTTP/1.1 408")
     assert b"application/problem+json" in answer
-    assert b"the body comes too slowly" in answer
+    assert b"the body arrives too slowly" in answer
 
 
 def test_a_body_that_trickles(port):

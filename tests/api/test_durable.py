@@ -83,7 +83,7 @@ def test_a_killed_engine_goes_on_and_another_takes_over(request, tmp_path, kind)
 
 @pytest.mark.parametrize("kind", [SQLITE, POSTGRESQL])
 def test_what_is_kept_is_json(request, tmp_path, kind):
-    """No pickle: whoever can write to the engine's tables can not have code run by reading them."""
+    """No pickle: whoever can write to the engine's tables cannot have code run by reading them."""
     url = database(request, kind, tmp_path)
     engine(url, "w-1", "c", "j1")
     tables = create_engine(url)

@@ -117,7 +117,7 @@ def test_every_sample_as_a_file(shop, tmp_path):
     assert np.all(relative_error(both, true_force(), RATE) < 0.05)
     assert set(deviation) == {"X", "Y"}
     # nothing stays
-    assert not [path for path in http.app.state.parts.files.folder.rglob("*") if path.is_file() and "parts" in str(path)]
+    assert not [path for path in http.app.state.components.files.folder.rglob("*") if path.is_file() and "parts" in str(path)]
 
 
 def test_without_an_air_cut_it_is_told(shop):

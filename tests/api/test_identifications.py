@@ -408,7 +408,7 @@ def test_a_job_reads_what_was_there_when_it_began(tmp_path, store):
         plan = desk.remember("plan", lambda: [work._files(cut) for cut in found.cuts])
         planned = work._planned(found, plan)
         read = partial(read_cut, sensors, campaign.sampling_rate)
-        return [each.cut.id for each in work._judged(planned, read, desk)]
+        return [each.cut_id for each in work._readings(planned, read, desk)]
 
     assert judged(there[0]) == judged(there[1]) == [cut.id for cut in cuts[:2]]
     with pytest.raises(InputError, match="since the job began"):

@@ -117,8 +117,8 @@ def test_refusals_are_remembered_as_such(quiet):
     ("fault", "words"),
     [
         (InputError("cuts", "none", "some"), "cuts: found none, allowed is some"),
-        (RuntimeError("secret detail"), "something unexpected happened; the log has it under this job's id"),
-        (MemoryError(), "something unexpected happened; the log has it under this job's id"),
+        (RuntimeError("secret detail"), "an internal error occurred; it is logged under this job's id"),
+        (MemoryError(), "an internal error occurred; it is logged under this job's id"),
     ],
 )
 @pytest.mark.parametrize("inside", [True, False])

@@ -20,8 +20,9 @@ from api.security import new_id, now
 from api.stores.entities import Machine, Store, digest_of
 from api.stores.jobs import Job
 from api.stores.sql import open_store
-from api.work.requests import CutQuestion, LobeQuestion, MachineText, ToolingText
+from api.work.requests import LobeRequest, MachineText, ToolingSource
 from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.machining_setup import CutSpec
 from tests.api.identifying import uploaded
 from tests.api.in_process import POSTGRESQL, SQLITE, database
 from tests.fixtures import by_hand
@@ -110,9 +111,9 @@ def test_an_identification_survives_everything(request, tmp_path, kind):
 
 def lobe_job(store: Store, machine: str, result: str, speeds: int, method: str) -> str:
     """A job that keeps a worker at work for a while."""
-    cut = CutQuestion(Engagement(1.57, 3.14))
-    question = LobeQuestion(cut, tuple(800.0 + k for k in range(speeds)), 0.005, method, False, 0.0, 1e6)
-    text = lobes.asked(MachineText(digest_of(result), result), [ToolingText(f"T{k}", by_hand.TOOLING) for k in range(3)], question)
+    cut = CutSpec(Engagement(1.57, 3.14))
+    question = LobeRequest(cut, tuple(800.0 + k for k in range(speeds)), 0.005, method, False, 0.0, 1e6)
+    text = lobes.asked(MachineText(digest_of(result), result), [ToolingSource(f"T{k}", by_hand.TOOLING) for k in range(3)], question)
     return store.jobs.add(Job(new_id(), "A", "lobes", machine, None, "{}", "queued", now()), {"question": text}, 1000).id
 
 

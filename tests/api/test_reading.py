@@ -277,10 +277,10 @@ def test_damaged_samples_are_noticed(tmp_path):
         read_normalised(path)
     for content in (b"", b"x" * 100):
         path.write_bytes(content)
-        with pytest.raises(InputError, match="gone or damaged"):
+        with pytest.raises(InputError, match="missing or damaged"):
             read_normalised(path)
     path.unlink()
-    with pytest.raises(InputError, match="gone or damaged"):
+    with pytest.raises(InputError, match="missing or damaged"):
         read_normalised(path)
 
 

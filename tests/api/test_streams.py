@@ -33,7 +33,7 @@ def shop(tmp_path):
 
 
 def hub_of(http):
-    return http.app.state.parts.streams
+    return http.app.state.components.streams
 
 
 def batch(raw: np.ndarray) -> np.ndarray:
@@ -306,7 +306,7 @@ def test_the_end_of_the_service_is_told(tmp_path):
         until(socket, "opened")
         http.portal.call(hub_of(http).stop)
         code, problem = closed(socket)
-    assert (code, problem["status"], problem["detail"]) == (1001, 503, "the service ends")
+    assert (code, problem["status"], problem["detail"]) == (1001, 503, "the service is shutting down")
 
 
 def test_what_fails_unforeseen_is_told_without_its_text(shop):

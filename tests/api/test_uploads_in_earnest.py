@@ -132,7 +132,7 @@ def test_a_length_that_is_a_lie(place, tmp_path):
         with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
             link.sendall(head("PUT", path, f"Content-Length: {len(raw) + 1}") + raw)
             status, text = answer_of(link)
-        assert (status, b"nothing has come for 0.3 s" in text) == (408, True)
+        assert (status, b"no data has arrived for 0.3 s" in text) == (408, True)
         with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
             link.sendall(head("PUT", path, f"Content-Length: {len(raw) - 1000}") + raw)
             assert answer_of(link)[0] == 422
@@ -310,7 +310,7 @@ for folder, *step in json.loads(sys.argv[1]):
 def whole(folder: Path, group: str = "local") -> dict[str, str]:
     """Names and hashes of recordings, each of which is there to the last byte."""
     with service(open_store(f"sqlite:///{folder / 'store.db'}"), folder) as http:
-        parts = http.app.state.parts
+        parts = http.app.state.components
         (machine,) = parts.store.machines.list(group, "", 9)
         (campaign,) = parts.store.campaigns.list(group, machine.id, "", 9)
         found = {}
@@ -353,7 +353,7 @@ def test_a_kill_at_every_step_loses_nothing_and_leaves_nothing(tmp_path, replaci
         # the next start sweeps, and judges what is owed
         with service(open_store(f"sqlite:///{copy / 'store.db'}"), copy) as http:
             until(lambda copy=copy, there=there: len(files_in(copy)) == 2 * len(there))
-            store = http.app.state.parts.store
+            store = http.app.state.components.store
             until(lambda store=store: store.campaigns.unsettled() == [])
             again = http.put(f"/v1/campaigns/{id}/recordings/c0_cut.h5?replace=true", content=new, headers=BINARY)
             assert again.status_code == (200 if kept else 201)

@@ -110,6 +110,31 @@ def test_importing_does_nothing_heavy():
     assert run(sys.executable, "-c", code).stdout.strip() == "[]"
 
 
+def test_one_place_turns_speeds_into_rad_per_s():
+    """30/π and π/30 stand in units.py and nowhere else, whether written as a quotient or as digits."""
+    factor = re.compile(r"\b30(\.0*)?\s*/\s*(np|math)\.pi|(np|math)\.pi\s*/\s*30\b|\b9\.549\d|\b0\.1047\d")
+    offenders = set()
+    for path in (p for folder in ("rcsa_ident", "api") for p in (ROOT / folder).rglob("*.py")):
+        if factor.search(path.read_text()):
+            offenders.add(str(path.relative_to(ROOT)))
+    assert offenders == {"rcsa_ident/units.py"}
+
+
+def test_errors_are_in_the_words_of_the_library():
+    """No option of the command line stands in a text outside cli/: the commands turn the library's fields into their options."""
+    option = re.compile(r"(^| )--[a-z][a-z-]+( |$|[,;.)])")
+    offenders = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        if path.is_relative_to(PACKAGE / "cli"):
+            continue
+        tree = ast.parse(path.read_text())
+        documents = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        texts = [n for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str) and id(n) not in documents]
+        offenders += [f"{path.relative_to(ROOT)}:{text.lineno}" for text in texts if option.search(text.value)]
+    # the last one is an option of Dask's own worker
+    assert [offender.split(":")[0] for offender in offenders] == ["rcsa_ident/scaleout.py"], offenders
+
+
 def drawn_tree() -> set[str]:
     """Files and folders of the README's fenced block that begins with ``rcsa_ident/``.
 

@@ -23,12 +23,12 @@ def response(w):
 
 def test_receptance():
     w = np.linspace(1.0, 20_000.0, 500)
-    np.testing.assert_allclose(tip(SKEWED).at(w), response(w), rtol=1e-10, atol=1e-20)
+    np.testing.assert_allclose(tip(SKEWED).response(w), response(w), rtol=1e-10, atol=1e-20)
     constant = np.array([[3e-8, 0.0], [0.0, 1e-8]])
-    np.testing.assert_allclose(tip(SKEWED, (3e-8, 1e-8)).at(w), response(w) + constant, rtol=1e-10, atol=1e-20)
+    np.testing.assert_allclose(tip(SKEWED, (3e-8, 1e-8)).response(w), response(w) + constant, rtol=1e-10, atol=1e-20)
     c, s = np.cos(0.4), np.sin(0.4)
     turn = np.array([[c, -s], [s, c]])
-    np.testing.assert_allclose(tip(SKEWED, turn=0.4).at(w), turn @ response(w) @ turn.T, rtol=1e-9, atol=1e-20)
+    np.testing.assert_allclose(tip(SKEWED, turn=0.4).response(w), turn @ response(w) @ turn.T, rtol=1e-9, atol=1e-20)
 
 
 @pytest.mark.parametrize("wide", [False, True])
@@ -51,7 +51,7 @@ def test_a_real_pole():
     """With half its residue it stands for one exponential."""
     modes = TipModes(np.array([-500.0]), np.array([[1.0], [0.0]]), np.array([[1e-4, 0.0]]), np.zeros((2, 2)))
     w = np.array([0.0, 300.0, 5000.0])
-    np.testing.assert_allclose(modes.at(w)[:, 0, 0], 2e-4 / (1j * w + 500.0), rtol=1e-12)
+    np.testing.assert_allclose(modes.response(w)[:, 0, 0], 2e-4 / (1j * w + 500.0), rtol=1e-12)
     assert modes.largest == pytest.approx(2e-4 / 500.0)
     assert np.all(np.isfinite(modes.receptance().values))
 

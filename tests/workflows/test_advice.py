@@ -21,6 +21,7 @@ from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import uncoupled_planes
 from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.tip_modes import fitted_modes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.advice import Bound, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.workflows.limits import Limits, least_within_tolerance, machine_limits, machine_surface, pad_speeds, tip_limits
