@@ -135,7 +135,15 @@ class StabilityLobes(Drawn, Saved):
         return ranked[int((1.0 - probability) * ranked.shape[0] + 1e-9)]
 
     def probability(self, place: int, depth: float) -> float | None:
-        """Return the share of the drawn machines that are stable at a speed's place and a depth [m], or None without them."""
+        """Return the share of the drawn machines that are stable at a speed's place and a depth [m], or None without them.
+
+        Raises
+        ------
+        InputError
+            Beyond `max_depth` no limit was looked for.
+        """
+        if not 0.0 < depth <= self.max_depth:
+            raise InputError("depth", depth, f"above 0 and up to {self.max_depth:g} m")
         return None if self.drawn is None else float(np.mean(self.drawn[:, place] >= depth))
 
     def recommended_depth(self, tolerance: float = TOLERANCE, probability: float = PROBABILITY, reserve: float = RESERVE) -> FloatArray:
