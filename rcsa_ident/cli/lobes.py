@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rcsa_ident.arrays import FloatArray
     from rcsa_ident.dynamics.coordinates import Coordinate, Dof
     from rcsa_ident.dynamics.uncertain import UncertainReceptance
-    from rcsa_ident.stability.result import StabilityLobes
+    from rcsa_ident.stability.advice import Advice
     from rcsa_ident.stability.stability_map import StabilityMap
     from rcsa_ident.stability.surface_error import SurfaceError
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 ResultFile = Annotated[
     Path, typer.Argument(help="RESULT.json of an identification, or FLANGE.csv of a measured flange.", show_default=False)
 ]
-ToolingFile = Annotated[Path, typer.Argument(help="TOOLING.toml; it need not have been cut with.", show_default=False)]
+ToolingFile = Annotated[Path, typer.Argument(help="TOOLING.toml of any tool, also of one that has never cut.", show_default=False)]
 Plot = Annotated[Path | None, typer.Option(metavar="FILE.png|svg", help="Draw a figure.", show_default=False)]
 
 
@@ -146,12 +146,14 @@ def lobes(
         with stages.stage("map"):
             chart = map_of(change, map_depths, map_full)
         write_map(map_, chart)
-    write_lobes(out, found, surface)
+    write_lobes(out, advice, surface)
     if plot is not None:
         from rcsa_ident.report.lobes import save_figure, stability_figure
 
         tested = None if cuts is None or advice.tested is None else Judged(cuts, advice.tested)
-        save_figure(stability_figure(found, advice.recommended, tested=tested, surface=surface, chart=chart), str(plot))
+        save_figure(
+            stability_figure(found, advice.recommended, tested=tested, surface=surface, chart=chart, usable=advice.usable), str(plot)
+        )
     if json_:
         from rcsa_ident.report.summaries import lobes_summary
 
@@ -212,15 +214,15 @@ def write_map(path: Path, chart: StabilityMap) -> None:
     write_map_csv(path, to_rpm(chart.spindle_speed, 9), np.round(chart.depth * 1e3, 9), chart.growth)
 
 
-def write_lobes(path: Path, found: StabilityLobes, surface: SurfaceError | None = None) -> None:
+def write_lobes(path: Path, advice: Advice, surface: SurfaceError | None = None) -> None:
     """Write LOBES.csv; the band's columns are empty where even its edge is beyond the largest depth."""
     import numpy as np
 
     from rcsa_ident.io.curves import write_lobes_csv
 
-    band = found.band
+    found, band = advice.lobes, advice.lobes.band
     extra = {} if band is None else {"limit_depth_low_mm": band[0] * 1e3, "limit_depth_high_mm": band[1] * 1e3}
-    extra["recommended_depth_mm"] = found.recommended_depth() * 1e3
+    extra["recommended_depth_mm"] = advice.usable.stable * 1e3
     extra["flip"] = np.where(found.stable, np.nan, found.flip.astype(float))
     if surface is not None:
         extra |= {"surface_error_um": surface.largest * 1e6, "surface_error_mean_um": surface.mean * 1e6}

@@ -25,9 +25,11 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_part import Candidate, FlangePart, independent_parts
 from rcsa_ident.machine.tip import Side, tip_over_sides
 from rcsa_ident.machining_setup import Tooling, Workpiece
+from rcsa_ident.shown import Drawn, Saved, Shown
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.units import to_hz
 
 #: Lower end of the receptances that limits are computed from, and their step [Hz].
 LOWEST, STEP = 100.0, 1.0
@@ -37,7 +39,7 @@ _Respond = Callable[[Candidate, Receptance | None, FloatArray], Receptance]
 _SLOPES = {Dof.X: Dof.SLOPE_X, Dof.Y: Dof.SLOPE_Y}
 
 
-class TipSource(ABC):
+class TipSource(Shown, ABC):
     """Whoever knows what the tip of a tooling does: a machine that takes any, or a test of one."""
 
     @property
@@ -94,7 +96,7 @@ class TipSource(ABC):
         """Return what the tip of a tooling does."""
 
 
-class Machine(TipSource):
+class Machine(TipSource, Drawn):
     """What stands behind the flange.
 
     A subclass says what it is by `parts` and `band`, and what else it knows of itself: how it changes with the speed (`at`, `models`,
@@ -288,8 +290,8 @@ def _assembly(tooling: Tooling | ToolAssembly) -> ToolAssembly:
     return tooling.assembly if isinstance(tooling, Tooling) else tooling
 
 
-@dataclass(frozen=True, eq=False)
-class FlangeMachine(Machine):
+@dataclass(frozen=True, eq=False, repr=False)
+class FlangeMachine(Machine, Saved):
     """A machine that is known by its flange's receptance: modes, a measurement, or another structure, taken for exact.
 
     Parameters
@@ -330,11 +332,9 @@ class FlangeMachine(Machine):
         found = []
         for flange in self.flanges:
             look = flange.receptance(frozen(np.linspace(*self.known, 5)))
-            groups = independent_parts(look)
-            if len(groups) == 1:
-                found.append(FlangePart(look.rows, Candidate(flange, self.joint)))
-            else:
-                found += [FlangePart(group, Candidate(_Group(flange, group), self.joint)) for group in groups]
+            for group in independent_parts(look):
+                own = flange if group == look.rows else _Group(flange, group)
+                found.append(FlangePart(group, Candidate(own, self.joint)))
         return tuple(found)
 
     @property
@@ -349,6 +349,10 @@ class FlangeMachine(Machine):
         low, high = (w / (2.0 * np.pi) for w in self.known)
         inner = np.arange(np.ceil(low / STEP + 1e-9), np.floor(high / STEP - 1e-9) + 0.5) * STEP
         return 2.0 * np.pi * np.concatenate([[low], inner[(inner > low) & (inner < high)], [high]])
+
+    def __str__(self) -> str:
+        low, high = (to_hz(w) for w in self.known)
+        return f"{self.name}: {', '.join(axis.upper() for axis in self.axes)}, {low:.0f} to {high:.0f} Hz"
 
 
 @dataclass(frozen=True, eq=False)
