@@ -37,14 +37,14 @@ def advise(
     speeds: SpeedOptions,
     drive: DriveOptions,
     depth_mm: Annotated[
-        float | None, typer.Option(help="At which speeds may one cut so deep? mm", show_default=False, rich_help_panel="Questions")
+        float | None, typer.Option(help="Axial depth to find speeds for, mm.", show_default=False, rich_help_panel="Questions")
     ] = None,
     planned: Annotated[
         list[str] | None,
         typer.Option(
             "--cut",
             metavar="RPM:MM",
-            help="How far is this cut from chatter? Spindle speed and depth; again for more.",
+            help="Planned cut whose distance to chatter is computed: spindle speed and depth; may be repeated.",
             show_default=False,
             rich_help_panel="Questions",
         ),
@@ -54,19 +54,20 @@ def advise(
         typer.Option(metavar="A,B,...", help="Compare the tool at these stickouts, mm.", show_default=False, rich_help_panel="Questions"),
     ] = None,
     tolerance: Annotated[
-        float, typer.Option(help="The limit shall hold for speeds so much slower or faster, %.", rich_help_panel="Questions")
+        float, typer.Option(help="Tolerance of the spindle speed within which a cut stays stable, %.", rich_help_panel="Questions")
     ] = 1.0,
     probability: Annotated[
         float,
         typer.Option(
-            help="That a cut is stable, %, where a posterior tells it; 100: on every machine that it allows.", rich_help_panel="Questions"
+            help="Probability that a recommended cut is stable, %, where there is a posterior; 100: on every machine drawn from it.",
+            rich_help_panel="Questions",
         ),
     ] = 95.0,
     reserve: Annotated[
         float, typer.Option(help="Share of the stable depth that is kept in reserve, %.", rich_help_panel="Questions")
     ] = 10.0,
     out: Annotated[
-        Path | None, typer.Option(help="ADVICE.csv to write: what is usable over speed, of each tooling.", show_default=False)
+        Path | None, typer.Option(help="ADVICE.csv to write: recommended depth over speed for each tooling.", show_default=False)
     ] = None,
     plot: Plot = None,
     bands: Bands = True,

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 ResultFile = Annotated[
     Path, typer.Argument(help="RESULT.json of an identification, or FLANGE.csv of a measured flange.", show_default=False)
 ]
-ToolingFile = Annotated[Path, typer.Argument(help="TOOLING.toml; it need not have been cut with.", show_default=False)]
+ToolingFile = Annotated[Path, typer.Argument(help="TOOLING.toml of any tool, also of one that has never cut.", show_default=False)]
 Plot = Annotated[Path | None, typer.Option(metavar="FILE.png|svg", help="Draw a figure.", show_default=False)]
 
 
@@ -144,12 +144,14 @@ def lobes(
         with stages.stage("map"):
             chart = map_of(change, map_depths, map_full)
         write_map(map_, chart)
-    write_lobes(out, found, surface)
+    write_lobes(out, found, surface, advice.usable.stable)
     if plot is not None:
         from rcsa_ident.report.lobes import save_figure, stability_figure
 
         tested = None if cuts is None or advice.tested is None else Judged(cuts, advice.tested)
-        save_figure(stability_figure(found, advice.recommended, tested=tested, surface=surface, chart=chart), str(plot))
+        save_figure(
+            stability_figure(found, advice.recommended, tested=tested, surface=surface, chart=chart, usable=advice.usable), str(plot)
+        )
     if json_:
         from rcsa_ident.report.summaries import lobes_summary
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, non_negative, positive
 from rcsa_ident.shown import Shown
 from rcsa_ident.units import to_rpm
@@ -50,6 +52,11 @@ class Engagement(Shown):
 
     def __str__(self) -> str:
         return f"{np.degrees(self.entry):.4g}° to {np.degrees(self.exit):.4g}°"
+
+
+#: An engagement that changes along the edge: spindle speed [rad/s] and axial depth [m] to an array, shape (k, 4), whose rows say
+#: between which shares of the depth, counted from the tip, a part of the edge lies, and between which angles [rad] it cuts.
+EngagementProfile = Callable[[float, float], FloatArray]
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -82,7 +82,7 @@ class SpindleDrive(Shown):
             if getattr(self, name).shape != self.speed.shape or not np.all(getattr(self, name) > 0.0):
                 raise InputError(name, getattr(self, name).tolist(), f"{self.speed.size} numbers above 0")
         if not np.all(np.isfinite(self.speed)) or np.any(np.diff(self.speed) <= 0.0):
-            raise InputError("speed", self.speed.tolist(), "finite speeds that rise [rad/s]")
+            raise InputError("speed", self.speed.tolist(), "finite, increasing speeds [rad/s]")
         if not self.max_speed > 0.0:
             raise InputError("max_speed", self.max_speed, "a speed above 0 [rad/s]")
 

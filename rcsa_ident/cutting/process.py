@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, feed_direction
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, EngagementProfile, feed_direction
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.errors import InputError, non_negative, positive
 from rcsa_ident.shown import Shown
@@ -89,6 +89,8 @@ class MillingProcess(Shown):
         Matters to stability only with run-out: it decides which teeth cut, and what they regenerate.
     damping : ProcessDamping or None
     speed_variation : SpeedVariation or None
+    engagement_profile : EngagementProfile or None
+        How the engagement changes along the edge, as with a deflected tool; `engagement` is then the programmed one.
 
     Examples
     --------
@@ -107,6 +109,7 @@ class MillingProcess(Shown):
     feed_per_tooth: float | None = None
     damping: ProcessDamping | None = None
     speed_variation: SpeedVariation | None = None
+    engagement_profile: EngagementProfile | None = None
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.feed_angle):
@@ -121,7 +124,15 @@ class MillingProcess(Shown):
         return np.array([[c, -s], [s, c]])
 
     def conditions(self, speed: float, depth: float) -> CuttingConditions:
-        """Return the cut at a speed [rad/s] and a depth [m]; without a feed it is 0."""
+        """Return the cut at a speed [rad/s] and a depth [m]; without a feed it is 0.
+
+        Raises
+        ------
+        InputError
+            If the engagement changes along the edge.
+        """
+        if self.engagement_profile is not None:
+            raise InputError("engagement_profile", "an engagement that changes along the edge", "one engagement for the whole edge")
         return CuttingConditions(speed, depth, self.feed_per_tooth or 0.0, self.engagement, self.feed_angle)
 
     def __str__(self) -> str:

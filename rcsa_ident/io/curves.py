@@ -131,7 +131,7 @@ def read_frf_csv(path: str | Path) -> FrfCurves:
     row = _first(np.diff(columns[FREQUENCY], prepend=-1.0) <= 0.0)
     if row is not None or columns[FREQUENCY][0] < 0.0:
         row = row or 0
-        raise InputError(f"column {FREQUENCY}", f"{columns[FREQUENCY][row]:g}", "frequencies from 0 that rise [Hz]", table.at(row))
+        raise InputError(f"column {FREQUENCY}", f"{columns[FREQUENCY][row]:g}", "increasing frequencies of 0 or more [Hz]", table.at(row))
     values = {}
     for axis in axes:
         column = np.empty(columns[FREQUENCY].size, dtype=complex)
@@ -271,7 +271,7 @@ def _columns(table: TextTable, required: Sequence[str]) -> dict[str, FloatArray]
 def _check_rising(frequency: FloatArray, where: str) -> None:
     row = _first(~(np.diff(frequency, prepend=-1.0) > 0.0)) if frequency.ndim == 1 else None
     if row is not None or (frequency.size and frequency.flat[0] < 0.0):
-        raise InputError(FREQUENCY, float(frequency.flat[row or 0]), "frequencies from 0 that rise [Hz]", where)
+        raise InputError(FREQUENCY, float(frequency.flat[row or 0]), "increasing frequencies of 0 or more [Hz]", where)
 
 
 def _first(wrong: np.ndarray) -> int | None:

@@ -13,8 +13,9 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance, Substructure
+from rcsa_ident.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,14 +109,18 @@ class FlangePart:
 
 
 def independent_parts(flange: Receptance) -> list[tuple[Coordinate, ...]]:
-    """Return the coordinates of each group that feels nothing of the others: bending planes without cross terms stand apart."""
-    count = len(flange.rows)
-    feels = np.any(flange.values != 0.0, axis=0)
-    feels = feels | feels.T
-    planes = [{i for i in range(count) if flange.rows[i].dof.plane is flange.rows[k].dof.plane} for k in range(count)]
-    groups: list[set[int]] = []
-    for i in range(count):
-        own = planes[i] | {j for j in range(count) if feels[i, j]}
-        joined = [g for g in groups if g & own]
-        groups = [g for g in groups if not g & own] + [own.union(*joined)]
-    return [tuple(flange.rows[i] for i in sorted(group)) for group in sorted(groups, key=min)]
+    """Return the coordinates of each group that feels nothing of the others: bending planes without cross terms stand apart.
+
+    Raises
+    ------
+    InputError
+        If a bending plane is not known by translation and slope, or something else is.
+    """
+    axes = dict.fromkeys(c.dof.plane for c in flange.rows)
+    planes: list[tuple[Coordinate, ...]] = [plane("flange", axis) for axis in axes if axis is not Dof.Z]
+    whole = tuple(c for each in planes for c in each)
+    if set(whole) != set(flange.rows):
+        allowed = "translation and slope of each bending plane, at the flange"
+        raise InputError("flange coordinates", ", ".join(str(c) for c in flange.rows), allowed)
+    values = flange.block(whole).values
+    return planes if not np.any(values[:, :2, 2:]) and not np.any(values[:, 2:, :2]) else [whole]

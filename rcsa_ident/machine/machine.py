@@ -332,11 +332,9 @@ class FlangeMachine(Machine):
         found = []
         for flange in self.flanges:
             look = flange.receptance(frozen(np.linspace(*self.known, 5)))
-            groups = independent_parts(look)
-            if len(groups) == 1:
-                found.append(FlangePart(look.rows, Candidate(flange, self.joint)))
-            else:
-                found += [FlangePart(group, Candidate(_Group(flange, group), self.joint)) for group in groups]
+            for group in independent_parts(look):
+                own = flange if group == look.rows else _Group(flange, group)
+                found.append(FlangePart(group, Candidate(own, self.joint)))
         return tuple(found)
 
     @property

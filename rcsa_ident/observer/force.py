@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -87,6 +88,19 @@ class AxisObserver:
     acceleration_filter: SampledModes | None
     kalman: KalmanFilter
     run_out: RunOut | None = None
+
+    def to_control(self) -> Any:
+        """Return the observer in the steady state as python-control's sampled ``StateSpace``.
+
+        Inputs are ``gap`` [m] and, with an accelerometer, ``acceleration`` [m/s^2], run-out taken out of both; outputs ``force`` [N]
+        and ``innovation`` [m].
+        """
+        import control
+
+        filters = [each.state_space().to_control() for each in (self.gap_filter, self.acceleration_filter) if each is not None]
+        added = control.ss([], [], [], np.ones((1, len(filters))), self.transfer.step)
+        whole = self.kalman.state_space().to_control() * added * control.append(*filters)
+        return control.ss(whole, inputs=["gap", "acceleration"][: len(filters)], outputs=["force", "innovation"])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -39,7 +39,7 @@ def usable_figure(
     planned : sequence of Mark
         Cuts that somebody wants to make.
     common : array, shape (n,) [m], optional
-        What is stable on all machines that the records allow.
+        What is stable on all machines that are consistent with the recordings.
     """
     figure, grid = _grid(2, 1, 5.2, (2.0, 1.0), sharey="none")
     top, bottom = grid[:, 0]
@@ -52,10 +52,10 @@ def usable_figure(
         for values, colour, name in ((depths.by_power, "#CC79A7", "power"), (depths.by_torque, "#8c6d00", "torque")):
             curve = 1e3 * values
             if np.any(curve < limit):
-                top.plot(speed, np.where(curve < ceiling, curve, np.nan), color=colour, lw=1.3, label=f"{name} ends here")
+                top.plot(speed, np.where(curve < ceiling, curve, np.nan), color=colour, lw=1.3, label=f"limited by {name}")
                 top.fill_between(speed, np.minimum(curve, limit), limit, color=colour, alpha=0.13, lw=0)
         if common is not None:
-            top.plot(speed, 1e3 * common, ":", color=_TRUTH, lw=1.2, label="stable on all machines that the records allow")
+            top.plot(speed, 1e3 * common, ":", color=_TRUTH, lw=1.2, label="stable on all machines consistent with the recordings")
         if np.any(np.abs(depths.stable - depths.limit) > 1e-9):
             top.plot(speed, 1e3 * depths.stable, color=_GREEN, lw=1.1, label="recommended depth by stability alone")
         top.plot(speed, limit, color=COLOURS["X"], label="stability limit")
@@ -70,7 +70,7 @@ def usable_figure(
         figure.legend(*top.get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=9.0, frameon=False)
         bottom.plot(speed, to_cm3_per_min(depths.removal), color=_GREEN)
         bottom.set_ylim(bottom=0.0)
-        bottom.set_ylabel("removal [cm³/min]")
+        bottom.set_ylabel("removal rate [cm³/min]")
         bottom.set_xlabel("spindle speed [rev/min]")
         bottom.set_xlim(speed.min(), speed.max())
     return figure
@@ -84,7 +84,7 @@ def advice_figure(answers: Sequence[Advice]) -> Figure:
     if len(answers) == 1:
         (answer,) = answers
         if answer.usable.removal_rate is None:
-            return stability_figure(answer.lobes, answer.recommended)
+            return stability_figure(answer.lobes, answer.recommended, usable=answer.usable)
         marks = [[_mark(cut) for cut in cuts if cut.removal_rate is not None] for cuts in (answer.recommended, answer.planned)]
         return usable_figure(answer.usable, *marks, answer.common)
     best = {answer.tooling: _mark(answer.recommended[0]) for answer in answers if answer.recommended}
@@ -140,7 +140,7 @@ def comparison_figure(curves: Mapping[str, UsableDepths], marks: Mapping[str, Ma
         top.set_ylabel("recommended depth [mm]\n(thin: stability limit)")
         bottom.set_ylim(bottom=0.0)
         bottom.margins(y=0.15)
-        bottom.set_ylabel("removal [cm³/min]")
+        bottom.set_ylabel("removal rate [cm³/min]")
         bottom.set_xlabel("spindle speed [rev/min]")
         figure.legend(*top.get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=9.0, frameon=False)
     return figure

@@ -172,7 +172,9 @@ def _tooling(number: int, page: ToolingPage) -> dict[str, Any]:
         "tip": figures.svg(figures.tooltip_frf(page.frequency, page.tip, page.deviation, page.truth, page.band_hz), f"tip{number}"),
         "lobes": ""
         if page.advice is None
-        else figures.svg(stability_figure(page.advice.lobes, page.advice.recommended, page.true_limit), f"lobes{number}"),
+        else figures.svg(
+            stability_figure(page.advice.lobes, page.advice.recommended, page.true_limit, usable=page.advice.usable), f"lobes{number}"
+        ),
         "recommended": [] if found is None else found["recommended"],
         "anywhere": None if found is None else found["absolute_limit_mm"],
         "critical": None if found is None else found["absolute_frequency_hz"],

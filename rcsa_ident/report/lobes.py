@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS, _grid
-from rcsa_ident.stability.advice import OperatingPoint
+from rcsa_ident.stability.advice import OperatingPoint, UsableDepths
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.stability_map import StabilityMap
 from rcsa_ident.stability.surface_error import SurfaceError
@@ -59,6 +59,7 @@ def stability_figure(
     tested: Judged | None = None,
     surface: SurfaceError | None = None,
     chart: StabilityMap | None = None,
+    usable: UsableDepths | None = None,
 ) -> Figure:
     """Stability limit and recommended depth over spindle speed, the recommended cuts marked, the chatter frequency below.
 
@@ -75,6 +76,8 @@ def stability_figure(
         Drawn below them.
     chart : StabilityMap, optional
         Tells the cuts that are stable above the first limit.
+    usable : UsableDepths, optional
+        The recommended depths; by default those of the lobes alone.
     """
     rows = (2.2, 1.0) if surface is None else (2.2, 1.0, 1.0)
     figure, grid = _grid(len(rows), 1, 4.6 if surface is None else 5.8, rows, sharey="none")
@@ -92,15 +95,17 @@ def stability_figure(
             label = f"stable at any speed: {1e3 * lobes.absolute_limit:.2f} mm"
             top.axhline(1e3 * lobes.absolute_limit, color=_GREY, ls=":", lw=1.2, label=label)
         if recommended:
-            rising = lobes.ordered()
-            speed, depth = to_rpm(rising.spindle_speed), 1e3 * rising.recommended_depth()
-            top.plot(speed, depth, color=_GREEN, lw=1.1, label="recommended depth")
+            speed, depth = lobes.ordered().spindle_speed, lobes.ordered().recommended_depth()
+            if usable is not None:
+                speed, depth = usable.spindle_speed, usable.stable
+            top.plot(to_rpm(speed), 1e3 * depth, color=_GREEN, lw=1.1, label="recommended depth")
         for point in recommended:
             x, y = to_rpm(point.spindle_speed), 1e3 * point.depth
             top.plot(x, y, "v", color=_GREEN, ms=8.0)
-            top.annotate(
-                f"{x:.0f} rev/min\n{y:.2f} mm", (x, y), xytext=(0, -26), textcoords="offset points", ha="center", fontsize=8.5, color=_GREEN
-            )
+            # above the limit, where no line crosses it
+            above = (x, min(1e3 * point.limit, 0.86 * ceiling))
+            text = f"{x:.0f} rev/min\n{y:.2f} mm"
+            top.annotate(text, above, xytext=(0, 6), textcoords="offset points", ha="center", fontsize=8.5, color=_GREEN)
         if tested is not None:
             _draw_tested(top, tested)
         top.set_ylim(0.0, ceiling)
@@ -132,7 +137,7 @@ def _draw_limit(ax: Axes, lobes: StabilityLobes, ceiling: float, chart: Stabilit
         _draw_map(ax, chart)
     if band is not None:
         low, high = (1e3 * np.minimum(edge, max_depth) for edge in band)
-        ax.fill_between(speed, low, high, color=COLOURS["X"], alpha=0.35, lw=0, label="95 % of what the records leave open")
+        ax.fill_between(speed, low, high, color=COLOURS["X"], alpha=0.35, lw=0, label="95 % uncertainty band")
     ax.plot(speed, limit, color=COLOURS["X"], label="stability limit")
     if np.any(lobes.flip):
         ax.plot(speed[lobes.flip], limit[lobes.flip], "o", color="#CC79A7", ms=3.5, label="by period doubling")
@@ -186,7 +191,7 @@ def _draw_tested(ax: Axes, tested: Judged) -> None:
 
 def _told(tally: Tally) -> str:
     """The four cases in one line."""
-    words = f"{tally.stable_stable + tally.chatter_chatter} of {tally.decided} tested cuts told right"
+    words = f"{tally.stable_stable + tally.chatter_chatter} of {tally.decided} tested cuts classified correctly"
     wrong = [
         f"{count} {what}"
         for count, what in ((tally.stable_chatter, "unexpected chatter"), (tally.chatter_stable, "stable above the limit"))

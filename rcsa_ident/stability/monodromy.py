@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -24,9 +23,6 @@ _SWINGS = 60
 _KEPT = 512
 #: Slices of the edge per metre where modes have a shape along it.
 SLICES = 6000.0
-
-#: Speed [rad/s] and depth [m] to rows of (upper share, lower share, start, end): between which angles each part of the edge cuts.
-EngagementProfile = Callable[[float, float], FloatArray]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,14 +63,10 @@ class MonodromyOperator:
         Of the polynomials for the force within a step.
     frozen : bool
         Constant coefficients within a step, and what was there a delay ago on a straight line.
-    engagements : callable or None
-        Engagement along the edge, by speed and depth; the process's own by default.
     """
 
-    def __init__(
-        self, modes: TipModes, process: MillingProcess, degree: int, frozen: bool = False, engagements: EngagementProfile | None = None
-    ) -> None:
-        self.modes, self.process, self.frozen, self.engagements = modes, process, frozen, engagements
+    def __init__(self, modes: TipModes, process: MillingProcess, degree: int, frozen: bool = False) -> None:
+        self.modes, self.process, self.frozen = modes, process, frozen
         cutter = process.cutter
         self.table = lobatto(degree)
         #: By which power of the step the error falls.
@@ -83,8 +75,8 @@ class MonodromyOperator:
         uneven = bool(np.ptp(cutter.runout) > 0.0)
         if uneven and process.feed_per_tooth is None:
             raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: with run-out it decides which teeth cut")
-        if uneven and engagements is not None:
-            raise InputError("runout", cutter.runout.tolist(), "equal teeth beside a deflected tool")
+        if uneven and process.engagement_profile is not None:
+            raise InputError("runout", cutter.runout.tolist(), "equal teeth beside an engagement that changes along the edge")
         # (offset, start, end, delay) of the teeth that differ
         entry, leave = process.engagement.entry, process.engagement.exit
         if equal and not uneven:
@@ -122,7 +114,7 @@ class MonodromyOperator:
         self.pole = modes.pole.copy()
         self._straight: tuple[FloatArray, FloatArray] | None = None
         #: Whether all forces are proportional to the depth.
-        self.proportional = cutter.helix == 0.0 and engagements is None and modes.shape is None
+        self.proportional = cutter.helix == 0.0 and process.engagement_profile is None and modes.shape is None
         self._unit: dict[tuple[float, float], tuple[FloatArray, ...]] = {}
 
     def duration(self, speed: float) -> float:
@@ -209,13 +201,13 @@ class MonodromyOperator:
                 rows.append((offset, opens, closes, upper, lower, delay))
                 shapes.append(self.rotation @ self._directions(0.5 * (upper + lower) * depth))
         found = np.array(rows), np.array(shapes)
-        if self.engagements is None and self.modes.shape is None:
+        if self.process.engagement_profile is None and self.modes.shape is None:
             self._straight = found
         return found
 
     def _slices(self, speed: float, depth: float, start: float, end: float) -> FloatArray:
-        if self.engagements is not None:
-            return self.engagements(speed, depth)
+        if self.process.engagement_profile is not None:
+            return self.process.engagement_profile(speed, depth)
         if self.modes.shape is None:
             return np.array([[0.0, 1.0, start, end]])
         edges = np.linspace(0.0, 1.0, max(2, int(np.ceil(SLICES * depth))) + 1)

@@ -59,12 +59,17 @@ def least_within_tolerance(speed: FloatArray, limit: FloatArray, tolerance: floa
     """
     if not 0.0 <= tolerance < 0.5:
         raise InputError("tolerance", tolerance, "a share from 0 to below 0.5")
+    if np.any(np.diff(speed) < 0.0):
+        raise InputError("speeds", np.asarray(speed).tolist(), "speeds that rise [rad/s]")
     if tolerance == 0.0:
         return np.array(limit, dtype=float)
     low, high = speed * (1.0 - tolerance), speed * (1.0 + tolerance)
     least = np.minimum(np.interp(low, speed, limit), np.interp(high, speed, limit))
     first, last = np.searchsorted(speed, low), np.searchsorted(speed, high, side="right")
-    return np.array([min(edge, limit[a:b].min()) for edge, a, b in zip(least.tolist(), first.tolist(), last.tolist(), strict=True)])
+    # a speed lies within its own tolerance, so that no range is empty; one that ends with the last speed ends before the infinity
+    ranges = np.stack([first, last], axis=1).ravel()
+    within = np.minimum.reduceat(np.append(limit, np.inf), ranges)[::2]
+    return np.minimum(least, within)
 
 
 def pad_speeds(speeds: FloatArray, tolerance: float, also: Sequence[float] = ()) -> FloatArray:

@@ -135,7 +135,15 @@ class StabilityLobes(Drawn):
         return ranked[int((1.0 - probability) * ranked.shape[0] + 1e-9)]
 
     def probability(self, place: int, depth: float) -> float | None:
-        """Return the share of the drawn machines that are stable at a speed's place and a depth [m], or None without them."""
+        """Return the share of the drawn machines that are stable at a speed's place and a depth [m], or None without them.
+
+        Raises
+        ------
+        InputError
+            Beyond `max_depth` no limit was looked for.
+        """
+        if not 0.0 < depth <= self.max_depth:
+            raise InputError("depth", depth, f"above 0 and up to {self.max_depth:g} m")
         return None if self.drawn is None else float(np.mean(self.drawn[:, place] >= depth))
 
     def recommended_depth(self, tolerance: float = TOLERANCE, probability: float = PROBABILITY, reserve: float = RESERVE) -> FloatArray:
@@ -154,16 +162,18 @@ class StabilityLobes(Drawn):
             raise InputError("reserve", reserve, "a share from 0 to below 1")
         return (1.0 - reserve) * least_within_tolerance(self.spindle_speed, self.limit_quantile(probability), tolerance)
 
-    def best_speeds(self, count: int = 3) -> list[Pocket]:
+    def best_speeds(self, count: int = 3, recommended: FloatArray | None = None) -> list[Pocket]:
         """Return the speeds with the highest limits, one for each pocket of the lobes, the highest first.
 
         Parameters
         ----------
         count : int
             At most so many. The middle of a range that is stable up to `max_depth` stands for it.
+        recommended : array, shape (n,) [m], default `recommended_depth`
+            At rising speeds.
         """
         lobes = self.ordered()
-        recommended = lobes.recommended_depth()
+        recommended = lobes.recommended_depth() if recommended is None else recommended
         found = []
         for speed, limit in peaks(lobes.spindle_speed, lobes.limit_depth, count):
             found.append(Pocket(speed, limit, float(np.interp(speed, lobes.spindle_speed, recommended))))

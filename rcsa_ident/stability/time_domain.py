@@ -215,6 +215,9 @@ class _Cut:
         self.feed = process.feed_per_tooth or _FEED
         if process.feed_per_tooth is None and np.ptp(process.cutter.runout) > 0.0:
             raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: with run-out it decides which teeth cut")
+        if process.engagement_profile is not None:
+            allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
+            raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
         turn = process.machine_from_feed
         self.pole = modes.pole.copy()
         self.outputs = np.ascontiguousarray(turn.T @ modes.outputs)

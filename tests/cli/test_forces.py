@@ -14,8 +14,8 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.forces import read_forces_csv, sensors_of_result, write_forces_csv
 from rcsa_ident.io.recordings import write_hdf5
-from rcsa_ident.io.results import read_result, spindle_to_json, write_result
-from tests.fixtures.flange_machine import BAND, flange_machine, paper_cut
+from rcsa_ident.io.results import read_result, write_result
+from tests.fixtures.flange_machine import BAND, flange_keys, paper_cut
 from tests.fixtures.paths import TOOLINGS
 from tests.fixtures.virtual_cut import relative_error
 
@@ -34,14 +34,13 @@ def folder(tmp_path_factory):
     """RESULT.json of the machine, TOOLING.toml with two teeth, both recordings."""
     folder, made = tmp_path_factory.mktemp("forces"), paper_cut()
     sensors = {s.name: {"quantity": str(s.quantity), "axis": s.axis.upper(), "sensitivity": s.sensitivity} for s in made.cut.sensors}
-    axes = {axis.upper(): spindle_to_json(*part.at(axis, None)) for axis, part in flange_machine().whole.items()}
     write_result(
         folder / "RESULT.json",
         {
             "schema_version": 1, "status": "converged", "reasons": [], "seed": 1, "method": "default", "software": "by hand",
             "campaign": {"name": "by hand", "cuts_used": 0, "cuts_left_out": []}, "sensors": sensors,
             "workpiece": {"name": "EN AW-6082", "tangential_coefficient_mpa": 902.0, "radial_ratio": 0.26},
-            "band_hz": [w / (2.0 * np.pi) for w in BAND], "axes": axes,
+            "band_hz": [w / (2.0 * np.pi) for w in BAND], "axes": flange_keys(),
         },
     )  # fmt: skip
     text = (TOOLINGS / "S2-PG25.toml").read_text(encoding="utf-8")

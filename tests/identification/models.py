@@ -18,7 +18,7 @@ def remade(data, theta, layout, rng, noise=1e-2, scatter=0.0):
     """
     misfit = Misfit(data, Priors(), (0.0,) * len(data.axes))
     models = misfit.evaluate(theta, layout, np.zeros((len(data.cut_ids), 2))).models
-    delay = rng.uniform(0.0, data.cut_prior[:, 3])
+    delay = rng.uniform(0.0, data.cut_prior.tooth_period)
     axes = []
     for axis, model in zip(data.axes, models, strict=True):
         draws = (rng.standard_normal((2, *model.shape)) + 1j * rng.standard_normal((2, *model.shape))) / np.sqrt(2.0)

@@ -307,14 +307,14 @@ def _elliptic():
     return TipModes(modes.pole, out, out.T, modes.constant, np.array([0.0]), np.ones((1, 2)))
 
 
-ROUGH_TEETH = mill(2, 0.5, runout=[0.0, 1e-5], feed_per_tooth=1e-4)
+ROUGH_TEETH = mill(2, 0.5, runout=[0.0, 1e-5], feed_per_tooth=1e-4, engagement_profile=lambda speed, depth: np.zeros((1, 4)))
 
 
 @pytest.mark.parametrize(
     ("make", "field", "words"),
     [
         (lambda: MonodromyOperator(tip(ONE), mill(2, 0.5, runout=[0.0, 1e-5]), 6), "feed_per_tooth", "which teeth cut"),
-        (lambda: MonodromyOperator(tip(ONE), ROUGH_TEETH, 6, engagements=lambda s, d: np.zeros((1, 4))), "runout", "equal teeth beside"),
+        (lambda: MonodromyOperator(tip(ONE), ROUGH_TEETH, 6), "runout", "equal teeth beside"),
         (lambda: MonodromyOperator(tip(ONE), mill(2, 0.5, speed_variation=SpeedVariation(0.1, np.pi / 7)), 6), "ratio", "whole number"),
         (lambda: MonodromyOperator(_elliptic(), mill(), 6), "tip modes", "one direction each"),
     ],
