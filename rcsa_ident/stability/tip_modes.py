@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.poles import PoleResidue
@@ -123,6 +124,21 @@ class TipModes(PoleResidue, Shown):
     def __str__(self) -> str:
         frequency = np.sort(to_hz(np.abs(self.pole)))
         return f"{self.pole.size} modes of the tip, {frequency[0]:.0f} to {frequency[-1]:.0f} Hz"
+
+
+class ModeArrays(NamedTuple):
+    """What kernels take of modes, p' = pole p + inputs F, y = 2 Re(outputs p) + constant F, with m modes and r displacements.
+
+    The order is that in which the kernels unpack it. They are compiled anew for read-only arrays: these are not.
+    """
+
+    #: Complex, shape (m,).
+    pole: ComplexArray
+    #: Complex, shapes (r, m), (m, r).
+    outputs: ComplexArray
+    inputs: ComplexArray
+    #: Shape (r, r).
+    constant: FloatArray
 
 
 def fitted_modes(tip: Receptance) -> tuple[TipModes, float]:
