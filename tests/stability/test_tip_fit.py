@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rcsa_ident.workflows.lobes import LobeConditions, modal_tip, receptance_from_dc
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
@@ -16,7 +17,6 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.tip_modes import DAMPED_OUTSIDE, TIP, TipModes, fitted_modes
-from rcsa_ident.workflows.lobes import LobeConditions, modal_tip, receptance_from_dc
 
 #: Natural frequencies [Hz], damping ratios, stiffnesses [N/m] of a plane; the last mode lies above the band.
 PLANES = {
