@@ -18,7 +18,14 @@ from rcsa_ident.io.validated_table import describe
 MEDIA_TYPE = "application/problem+json"
 _LONGEST = 200
 #: The library's fields as the bodies call them.
-_FIELDS = {"spindle_speed": "spindle_speed_rpm", "idle share": "idle_percent"}
+_FIELDS = {
+    "spindle_speed": "spindle_speed_rpm",
+    "idle share": "idle_percent",
+    "runout": "cut.runout_um",
+    "tangential coefficient": "cut.ktc_mpa",
+    "radial ratio": "cut.krc",
+    "feed_per_tooth": "cut.feed_per_tooth_mm",
+}
 _TITLES = {413: "Content too large", 422: "Input not usable"}
 
 

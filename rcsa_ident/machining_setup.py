@@ -14,14 +14,14 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.materials import material
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
 from rcsa_ident.errors import InputError
-from rcsa_ident.shown import Drawn, Saved, Shown
+from rcsa_ident.shown import Saved, Shown
 from rcsa_ident.signals.recording import Sensor
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.units import to_rpm
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Tooling(Drawn, Saved):
+class Tooling(Saved):
     """A cutter, with the tool and holder that carry it."""
 
     name: str

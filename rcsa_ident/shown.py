@@ -26,8 +26,19 @@ class Shown:
         return text
 
 
-class Drawn(Shown):
-    """A noun with a figure."""
+class Saved(Shown):
+    """A noun with a file format of its own."""
+
+    __slots__ = ()
+
+    def save(self, path: str | Path) -> Path:
+        """Write it in the format that the path's suffix says, one that the command line reads and writes, and return the path."""
+        written: Path = import_module(_DOOR).save(self, Path(path))
+        return written
+
+
+class Drawn(Saved):
+    """A noun with a figure, which can be saved as a picture."""
 
     __slots__ = ()
 
@@ -40,14 +51,3 @@ class Drawn(Shown):
             Of the figure's function: see `rcsa_ident.notebook.figure_of`.
         """
         return import_module(_DOOR).plot(self, **options)
-
-
-class Saved(Shown):
-    """A noun with a file format."""
-
-    __slots__ = ()
-
-    def save(self, path: str | Path) -> Path:
-        """Write it in the format that the command line reads and writes, and return the path."""
-        written: Path = import_module(_DOOR).save(self, Path(path))
-        return written

@@ -12,13 +12,14 @@ from typing import Any
 
 from api.work.toolings import parsed, toml_of, weigh
 from rcsa_ident.errors import InputError
+from rcsa_ident.io.recordings import READERS
 from rcsa_ident.io.setups import campaign_of
 from rcsa_ident.io.setups import tooling_of as tooling_of_keys
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machining_setup import Campaign, Tooling
 
 #: Suffixes of recordings in lower case.
-FORMATS = (".h5", ".hdf5", ".csv", ".tdms", ".uff", ".unv", ".wav", ".mat", ".parquet")
+FORMATS = tuple(READERS)
 #: Largest text of a campaign, and of its toolings together [characters].
 LARGEST, LARGEST_TOOLINGS = 1_000_000, 4_000_000
 MOST_CUTS, MOST_SENSORS, MOST_TOOLINGS = 2000, 64, 200

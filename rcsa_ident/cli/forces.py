@@ -84,7 +84,7 @@ def forces(
 ) -> None:
     """Estimate the cutting forces of a recording from the flange's vibration."""
     from rcsa_ident.cli.results import read_machine, tell
-    from rcsa_ident.io.forces import write_forces_csv
+    from rcsa_ident.io.forces import write_forces
     from rcsa_ident.io.recordings import read_recording
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.observer.force import restore_mean_force
@@ -120,12 +120,7 @@ def forces(
         raised, level = restore_mean_force(found.estimate, idle_percent / 100.0, min(settled, found.estimate.force.shape[0] // 2))
         found = replace(found, estimate=raised)
     estimate = found.estimate
-    write_forces_csv(
-        out,
-        estimate.time,
-        {axis.upper(): estimate.force[:, i] for i, axis in enumerate(estimate.axes)},
-        {axis.upper(): estimate.standard_deviation[:, i] for i, axis in enumerate(estimate.axes)},
-    )
+    write_forces(out, estimate)
     if plot is not None:
         _draw(plot, found)
     worn = None
@@ -187,7 +182,7 @@ def _summary(found: MonitoredCut, observer: str, smooth: bool) -> dict[str, Any]
             "highest_n": float(force.max()),
             "std_n": float(np.median(estimate.standard_deviation[settled, i])),
             "model_std_n": found.model_error[axis],
-            "innovation_over_expected": float(estimate.consistency[i]),
+            "innovation_over_expected": None if estimate.consistency is None else float(estimate.consistency[i]),
             "usable_at_lines_hz": hz,
             "usable_hz": anywhere,
             "delay_s": response.delay_at_lines,

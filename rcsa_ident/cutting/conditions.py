@@ -53,6 +53,7 @@ class Engagement(Shown):
     def __str__(self) -> str:
         return f"{np.degrees(self.entry):.4g}° to {np.degrees(self.exit):.4g}°"
 
+
 #: An engagement that changes along the edge: spindle speed [rad/s] and axial depth [m] to an array, shape (k, 4), whose rows say
 #: between which shares of the depth, counted from the tip, a part of the edge lies, and between which angles [rad] it cuts.
 EngagementProfile = Callable[[float, float], FloatArray]

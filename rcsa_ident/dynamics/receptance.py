@@ -11,11 +11,11 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.errors import InputError
-from rcsa_ident.shown import Drawn, Saved
+from rcsa_ident.shown import Drawn
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Receptance(Drawn, Saved):
+class Receptance(Drawn):
     """Displacements of `rows` per unit force on `cols`.
 
     Parameters

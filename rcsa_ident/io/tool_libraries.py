@@ -20,6 +20,7 @@ from typing import Any, NamedTuple, NoReturn
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes
 from rcsa_ident.io.setups import tooling_of
+from rcsa_ident.io.toolings import tooling_text
 from rcsa_ident.io.validated_table import Table, listed
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
@@ -156,7 +157,7 @@ def import_tools(raw: bytes, where: str, assumptions: Assumptions | None = None,
         name, kind = _name(entry), _line(entry.get("type", ""))
         try:
             data, notes = _tooling(Table(entry, where, place), name, given, spare)
-            text = _toml(data, notes)
+            text = tooling_text(data, notes)
             tooling = tooling_of(tomllib.loads(text), where, name)
             found.append(Imported(number, name, kind, tooling, text, tuple(notes), ""))
         except _Skipped as skipped:
@@ -426,25 +427,3 @@ def _cut(cones: list[dict[str, Any]], length: float) -> tuple[list[dict[str, Any
 def _bored(cones: list[dict[str, Any]], insertion: float, shank: float) -> list[dict[str, Any]]:
     front, behind = _cut(cones, insertion)
     return [c | {"inner_diameter_mm": shank} for c in front] + behind
-
-
-def _toml(data: Mapping[str, Any], notes: Sequence[str]) -> str:
-    """A tooling file."""
-    lines = [f"# {note}" for note in notes]
-    lines.append(f"name = {json.dumps(data['name'], ensure_ascii=False)}")
-    for key in ("cutter", "tool", "holder", "contact"):
-        if key not in data:
-            continue
-        lines.append(f"[{key}]")
-        lines += [f"{name} = {_number(value)}" for name, value in data[key].items() if name != "segments"]
-        if "segments" in data[key]:
-            lines += ["segments = [", *(f"  {_inline(segment)}," for segment in data[key]["segments"]), "]"]
-    return "\n".join(lines) + "\n"
-
-
-def _inline(segment: Mapping[str, Any]) -> str:
-    return "{ " + ", ".join(f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {_number(v)}" for k, v in segment.items()) + " }"
-
-
-def _number(value: float | int) -> str:
-    return str(value) if isinstance(value, int) else repr(round(value, 9)) if abs(value) < 1e6 else repr(float(value))

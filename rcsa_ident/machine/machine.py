@@ -25,7 +25,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_part import Candidate, FlangePart, independent_parts
 from rcsa_ident.machine.tip import Side, tip_over_sides
 from rcsa_ident.machining_setup import Tooling, Workpiece
-from rcsa_ident.shown import Drawn, Saved, Shown
+from rcsa_ident.shown import Drawn, Shown
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
@@ -291,7 +291,7 @@ def _assembly(tooling: Tooling | ToolAssembly) -> ToolAssembly:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FlangeMachine(Machine, Saved):
+class FlangeMachine(Machine):
     """A machine that is known by its flange's receptance: modes, a measurement, or another structure, taken for exact.
 
     Parameters

@@ -158,16 +158,16 @@ class ForceEstimate(Saved):
     force : array, shape (n, a) [N]
     standard_deviation : array, shape (n, a) [N]
         What follows from sensor noise and the force model, raised where the innovations scatter more than they should.
-    consistency : array, shape (a,) [-]
+    consistency : array, shape (a,) [-], or None
         Scatter of the innovations in the band over the expected; 1 where model, noise and force agree, more where they are too
-        sure of themselves.
+        sure of themselves. None of forces from a file.
     """
 
     axes: tuple[Dof, ...]
     step: float
     force: FloatArray
     standard_deviation: FloatArray
-    consistency: FloatArray
+    consistency: FloatArray | None = None
 
     @property
     def time(self) -> FloatArray:

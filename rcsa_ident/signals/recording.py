@@ -10,7 +10,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.shown import Drawn, Saved
+from rcsa_ident.shown import Drawn
 
 
 class Quantity(StrEnum):
@@ -81,7 +81,7 @@ class Sensor:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Recording(Drawn, Saved):
+class Recording(Drawn):
     """Samples of all channels.
 
     Parameters

@@ -11,7 +11,7 @@ from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.power import SpindleDrive, spindle_load
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.shown import Drawn, Saved, Shown
+from rcsa_ident.shown import Drawn, Shown
 from rcsa_ident.stability.pockets import least_within_tolerance, peaks
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally
@@ -29,7 +29,7 @@ class Bound(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class UsableDepths(Drawn):
+class UsableDepths(Shown):
     """How deep one may cut at each speed, and what stands against more.
 
     Parameters
@@ -336,7 +336,7 @@ def planned_cut(
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Advice(Drawn, Saved):
+class Advice(Drawn):
     """Which cuts a tooling can make, and which of them is recommended.
 
     Parameters

@@ -59,6 +59,8 @@ def least_within_tolerance(speed: FloatArray, limit: FloatArray, tolerance: floa
     """
     if not 0.0 <= tolerance < 0.5:
         raise InputError("tolerance", tolerance, "a share from 0 to below 0.5")
+    if np.any(np.diff(speed) < 0.0):
+        raise InputError("speeds", np.asarray(speed).tolist(), "speeds that rise [rad/s]")
     if tolerance == 0.0:
         return np.array(limit, dtype=float)
     low, high = speed * (1.0 - tolerance), speed * (1.0 + tolerance)

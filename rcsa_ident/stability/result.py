@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.errors import InputError
-from rcsa_ident.shown import Drawn, Saved, Shown
+from rcsa_ident.shown import Drawn, Shown
 from rcsa_ident.stability.pockets import least_within_tolerance, peaks
 from rcsa_ident.units import to_rpm
 
@@ -47,7 +47,7 @@ class Pocket(Shown):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class StabilityLobes(Drawn, Saved):
+class StabilityLobes(Drawn):
     """The smallest depth at which a cut loses stability, over spindle speed.
 
     Parameters
@@ -135,7 +135,15 @@ class StabilityLobes(Drawn, Saved):
         return ranked[int((1.0 - probability) * ranked.shape[0] + 1e-9)]
 
     def probability(self, place: int, depth: float) -> float | None:
-        """Return the share of the drawn machines that are stable at a speed's place and a depth [m], or None without them."""
+        """Return the share of the drawn machines that are stable at a speed's place and a depth [m], or None without them.
+
+        Raises
+        ------
+        InputError
+            Beyond `max_depth` no limit was looked for.
+        """
+        if not 0.0 < depth <= self.max_depth:
+            raise InputError("depth", depth, f"above 0 and up to {self.max_depth:g} m")
         return None if self.drawn is None else float(np.mean(self.drawn[:, place] >= depth))
 
     def recommended_depth(self, tolerance: float = TOLERANCE, probability: float = PROBABILITY, reserve: float = RESERVE) -> FloatArray:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError
-from rcsa_ident.shown import Drawn, Saved
+from rcsa_ident.shown import Drawn
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import ROUGH, Growth, longest_step
@@ -30,7 +30,7 @@ _PROBES, _SHORTER = 5, 1.6
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class StabilityMap(Drawn, Saved):
+class StabilityMap(Drawn):
     """How fast the most persistent vibration grows, over speed and depth.
 
     Parameters

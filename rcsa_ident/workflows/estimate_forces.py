@@ -20,7 +20,7 @@ from rcsa_ident.observer.response import ObserverFRF, observer_response
 from rcsa_ident.observer.transfer_function import HIGHEST, transfer_function
 from rcsa_ident.observer.tuning import ObserverMethod, Resonators, Tuning, harmonics
 from rcsa_ident.observer.wear import WearIndicators, wear_indicators
-from rcsa_ident.shown import Drawn, Saved
+from rcsa_ident.shown import Drawn
 from rcsa_ident.signals.alignment import angle_to_air
 from rcsa_ident.signals.measurement import NO_AIR
 from rcsa_ident.signals.recording import Quantity, Recording
@@ -44,7 +44,7 @@ METHOD = Resonators()
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class MonitoredCut(Drawn, Saved):
+class MonitoredCut(Drawn):
     """Forces of a recording and what they rest on.
 
     Parameters

@@ -10,6 +10,7 @@ import sys
 
 import numpy as np
 import pytest
+from rcsa_ident.workflows.tip import tooltip
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
@@ -18,7 +19,6 @@ from rcsa_ident.io.curves import read_frf_csv, read_lobes_csv, write_frf_csv
 from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.workflows.tip import tooltip
 from tests.fixtures import by_hand
 from tests.oracles import literature
 

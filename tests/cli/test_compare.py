@@ -6,13 +6,13 @@ import json
 
 import numpy as np
 import pytest
+from rcsa_ident.workflows.tip import tooltip
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.curves import write_frf_csv
 from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.workflows.tip import tooltip
 from tests.cli.measurements import run
 
 

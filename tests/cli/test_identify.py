@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from rcsa_ident.workflows.tip import tooltip
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
@@ -13,7 +14,6 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_campaign
-from rcsa_ident.workflows.tip import tooltip
 from tests.fixtures import by_hand
 
 

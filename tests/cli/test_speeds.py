@@ -7,13 +7,13 @@ import json
 
 import numpy as np
 import pytest
+from rcsa_ident.workflows.tip import STIFFNESS_SPREAD, tooltip
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app, lobes
 from rcsa_ident.io.curves import read_frf_csv, read_lobes_csv
 from rcsa_ident.io.identifications import machine_from_json, speed_band_to_json
 from rcsa_ident.io.results import read_result
-from rcsa_ident.workflows.tip import STIFFNESS_SPREAD, tooltip
 from tests.fixtures import by_hand
 
 RPM = 30.0 / np.pi
