@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rcsa_ident.workflows.tip import MachineAxis, tooltip
 
 from benchmarks.timing import best_of, row
 from rcsa_ident.coupling.joint import LumpedJoint
@@ -19,7 +20,6 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.stability.lobes import stability_lobes, uncoupled_planes
-from rcsa_ident.workflows.tip import MachineAxis, tooltip
 
 TOOLING = Path(__file__).resolve().parent.parent / "data" / "machines" / "toolings" / "S3-PG25-long.toml"
 

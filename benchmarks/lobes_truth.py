@@ -20,6 +20,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rcsa_ident.workflows.lobes import LobeConditions, stability_probability, tooling_lobes
+from rcsa_ident.workflows.speeds import MachineOverSpeed
+from rcsa_ident.workflows.tip import TooltipResponse, tooltip
 
 from benchmarks.machines import CONDITIONS, EVALUATION
 from benchmarks.page import append_row, read_rows
@@ -42,9 +45,6 @@ from rcsa_ident.virtual.limit import STEP, multiplier, true_limit
 from rcsa_ident.virtual.milling import mill_cut
 from rcsa_ident.virtual.reduction import Poles, ReducedRotor, poles, reduced
 from rcsa_ident.virtual.rotor import rotor
-from rcsa_ident.workflows.lobes import LobeConditions, stability_probability, tooling_lobes
-from rcsa_ident.workflows.speeds import MachineOverSpeed
-from rcsa_ident.workflows.tip import TooltipResponse, tooltip
 
 RPM = np.pi / 30.0
 #: Speeds per tooling, where around each the truth is looked at, and the change beyond which a speed is left out.

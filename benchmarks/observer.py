@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rcsa_ident.workflows.speeds import MachineOverSpeed
 
 from benchmarks.timing import best_of, row
 from rcsa_ident.io.identifications import machine_from_json, speed_bands_from_json
@@ -25,7 +26,6 @@ from rcsa_ident.observer._kernels import kalman_steps
 from rcsa_ident.observer.kalman import KalmanFilter
 from rcsa_ident.observer.tuning import ObserverMethod, PaperWalk, Resonators
 from rcsa_ident.workflows.estimate_forces import MonitoredCut, observe
-from rcsa_ident.workflows.speeds import MachineOverSpeed
 from tests.fixtures.virtual_cut import AXES, BAND_HZ, CASE, VirtualCut, relative_error, true_response, virtual_cut
 
 DATA = Path(__file__).resolve().parent.parent / "data"

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rcsa_ident.workflows.lobes import LobeConditions, measured_tip
 
 from benchmarks.timing import once, row
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
@@ -25,7 +26,6 @@ from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, Verdict, tally
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
-from rcsa_ident.workflows.lobes import LobeConditions, measured_tip
 
 FILES = Path(__file__).resolve().parents[2] / "shared" / "data"
 FACE_MILL = tuple(FILES / f"facemill_{axis}.frf" for axis in "xy")

@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rcsa_ident.workflows.tip import tooltip
 
 from benchmarks.machines import CONDITIONS, EVALUATION, random_machine, under
 from benchmarks.page import DOCS, append_row, draw_study, read_rows, write_block
@@ -47,7 +48,6 @@ from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.workflows.compile_kernels import STEPS
 from rcsa_ident.workflows.identify import Method, data_of, judge, left_out
-from rcsa_ident.workflows.tip import tooltip
 
 MACHINES = Path(__file__).resolve().parent.parent / "data" / "machines"
 #: The machine that lies inside the search space of the published algorithm, seed of its cuts.

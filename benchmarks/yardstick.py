@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from rcsa_ident.workflows.tip import tooltip
 
 from benchmarks.study import FREQUENCY, relative_error
 from rcsa_ident.arrays import ComplexArray, FloatArray
@@ -17,7 +18,6 @@ from rcsa_ident.io.curves import read_frf_csv
 from rcsa_ident.io.machines import MachineFile
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machine.spindle import Spindle
-from rcsa_ident.workflows.tip import tooltip
 
 #: Model error of the misfit.
 SHARE = 0.02

@@ -23,6 +23,7 @@ from rcsa_ident.identification.misfit import Evaluation, Residual
 from rcsa_ident.identification.parameters import AxisLayout, Layout
 from rcsa_ident.machining_setup import CutSpec
 from rcsa_ident.signals.verdict import Verdict
+from tests.fixtures.effort import examples
 
 DTYPES = st.sampled_from(["<f8", ">f8", "<c16", "<i8", "<i4", "<u2", "?", "<f4"])
 ARRAYS = DTYPES.flatmap(lambda kind: arrays.arrays(kind, arrays.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=4)))
@@ -75,7 +76,7 @@ def same(a, b) -> bool:
     return a == b
 
 
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=examples(60, 300))
 @given(VALUES)
 def test_what_is_told_comes_back(value):
     text = encode(value)

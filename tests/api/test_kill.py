@@ -68,7 +68,9 @@ def after(client: Client, id: str, count: int) -> None:
 
 @contextmanager
 def started(folder: Path, url: str) -> Iterator[tuple[Client, subprocess.Popen]]:
-    settings = {"RCSA_IDENT_JOB_NICE": "0"} | ({} if url.startswith("sqlite") else {"RCSA_IDENT_DATABASE": url})
+    settings = {"RCSA_IDENT_JOB_WORKERS": "1", "RCSA_IDENT_JOB_NICE": "0"} | (
+        {} if url.startswith("sqlite") else {"RCSA_IDENT_DATABASE": url}
+    )
     with serving(folder, **settings) as served, Client(served.url) as client:
         yield client, served.process
         kill([*descendants(served.process.pid), served.process.pid])

@@ -19,7 +19,7 @@ from tests.fixtures.waiting import PATIENCE, until
 @pytest.fixture(scope="module")
 def served(tmp_path_factory):
     """A service with the machine and its tooling: its process, port and the machine's id."""
-    with serving(tmp_path_factory.mktemp("served"), RCSA_IDENT_JOB_WORKERS="0") as found, Client(found.url) as client:
+    with serving(tmp_path_factory.mktemp("served")) as found, Client(found.url) as client:
         id = client.make_machine("m").id
         client.identify(id, result())
         client.write_tooling("T1", tooling())

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rcsa_ident.workflows.tip import tooltip
 
 from benchmarks import search_trace, study, yardstick
 from benchmarks.page import read_rows
@@ -30,7 +31,6 @@ from rcsa_ident.io.curves import write_frf_csv
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machine.spindle import Spindle
-from rcsa_ident.workflows.tip import tooltip
 
 TOOLINGS = study.MACHINES / "toolings"
 

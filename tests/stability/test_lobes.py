@@ -169,9 +169,7 @@ def test_draws_with_cross_terms_have_the_lobes_of_each_drawn_tip(pitch):
 def test_a_machine_that_is_turned_with_its_feed_has_the_same_limits_and_draws(angle):
     tip = oblique_tip()
     turn = rotation(angle)
-    turned = UncertainReceptance(
-        OMEGA, turn @ tip.values @ turn.T, TIP, TIP, Written((0, 1), turn @ tip.variation.change @ turn.T)
-    )
+    turned = UncertainReceptance(OMEGA, turn @ tip.values @ turn.T, TIP, TIP, Written((0, 1), turn @ tip.variation.change @ turn.T))
     here, there = asked(tip), asked(turned, process=replace(PROCESS, feed_angle=PROCESS.feed_angle + angle))
     np.testing.assert_allclose(there.limit_depth, here.limit_depth, rtol=1e-9)
     # told from other frequencies

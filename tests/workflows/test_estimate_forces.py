@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rcsa_ident.workflows.speeds import MachineOverSpeed
 
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
@@ -16,7 +17,6 @@ from rcsa_ident.report.forces import force_history, observer_frf
 from rcsa_ident.signals.measurement import NO_AIR
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.workflows.estimate_forces import observe, trigger_speed, wear_of
-from rcsa_ident.workflows.speeds import MachineOverSpeed
 from tests.fixtures.flange_machine import BAND, flange_machine, paper_cut
 from tests.fixtures.virtual_cut import relative_error, virtual_cut
 

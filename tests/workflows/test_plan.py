@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rcsa_ident.workflows.lobes import LobeConditions, tooling_lobes
+from rcsa_ident.workflows.tip import tooltip
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
@@ -16,9 +18,7 @@ from rcsa_ident.identification.parameters import AxisLayout, AxisParameters, pac
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machine.spindle import Spindle
-from rcsa_ident.workflows.lobes import LobeConditions, tooling_lobes
 from rcsa_ident.workflows.plan import CutConstraints, line_noise, plan_cuts
-from rcsa_ident.workflows.tip import tooltip
 from tests.fixtures.virtual_shop import open_shop
 
 TOOLINGS = Path(__file__).parents[2] / "data" / "machines" / "toolings"
