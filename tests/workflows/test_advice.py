@@ -8,6 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rcsa_ident.workflows.advice import Bound, highest_removal, planned_cut, speed_windows, usable_depths
+from rcsa_ident.workflows.limits import Limits, least_within_tolerance, machine_limits, machine_surface, pad_speeds, tip_limits
+from rcsa_ident.workflows.lobes import LobeConditions, lobe_bands, tooling_lobes
+from rcsa_ident.workflows.speeds import MachineOverSpeed, lobes_over_speed
+from rcsa_ident.workflows.tip import MachineAxis, tooltip
+from rcsa_ident.workflows.tip_fit import fitted_modes
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
@@ -23,12 +29,6 @@ from rcsa_ident.stability.lobes import uncoupled_planes
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import fitted_modes
 from rcsa_ident.stability.zero_order import ZeroOrder
-from rcsa_ident.workflows.advice import Bound, highest_removal, planned_cut, speed_windows, usable_depths
-from rcsa_ident.workflows.limits import Limits, least_within_tolerance, machine_limits, machine_surface, pad_speeds, tip_limits
-from rcsa_ident.workflows.lobes import LobeConditions, lobe_bands, tooling_lobes
-from rcsa_ident.workflows.speeds import MachineOverSpeed, lobes_over_speed
-from rcsa_ident.workflows.tip import MachineAxis, tooltip
-from rcsa_ident.workflows.tip_fit import fitted_modes
 from tests.fixtures import by_hand
 
 PROCESS = MillingProcess(Cutter(4, 12e-3), CuttingCoefficients(900e6, 0.3), Engagement(0.0, np.pi), feed_per_tooth=1e-4)

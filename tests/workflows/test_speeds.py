@@ -6,6 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rcsa_ident.workflows.lobes import LobeConditions, lobe_bands, tooling_lobes
+from rcsa_ident.workflows.speeds import BLOCK, MachineOverSpeed, lobes_over_speed
+from rcsa_ident.workflows.tip import tooltip
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
@@ -14,9 +17,6 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.posterior import MachineAxis
 from rcsa_ident.machine.spindle import Spindle
-from rcsa_ident.workflows.lobes import LobeConditions, lobe_bands, tooling_lobes
-from rcsa_ident.workflows.speeds import BLOCK, MachineOverSpeed, lobes_over_speed
-from rcsa_ident.workflows.tip import tooltip
 from tests.fixtures import by_hand
 
 OMEGA = 2.0 * np.pi * np.arange(300.0, 3000.0, 10.0)
