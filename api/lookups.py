@@ -115,5 +115,5 @@ def channels_of(names: Sequence[str], sensors: tuple[Sensor, ...]) -> tuple[Sens
     found = tuple(known[name] for name in names)
     kinds = [(sensor.quantity, sensor.axis) for sensor in found]
     if len(set(kinds)) < len(kinds):
-        raise InputError("channels", list(names), "one channel of each quantity and axis")
+        raise InputError("channels", list(names), "at most one channel for each quantity and axis")
     return found

@@ -1,4 +1,4 @@
-"""The service, put together in one place."""
+"""The application: its components are chosen and wired here."""
 
 from __future__ import annotations
 
@@ -68,9 +68,9 @@ def create_app(
     ----------
     settings : Settings
     store, work, reader, host : optional
-        In place of the database and the processes that the settings name.
-    crew : Supervisor, optional
-        Who carries out jobs; without one they wait for workers that run elsewhere.
+        Replace the database and the processes that the settings name.
+    supervisor : Supervisor, optional
+        Of the job workers; without one, jobs wait for workers that run elsewhere.
     """
     if store is None and not settings.database:
         settings.data.mkdir(parents=True, exist_ok=True)
@@ -135,7 +135,7 @@ def _openapi(app: FastAPI) -> dict[str, Any]:
     if app.openapi_schema is None:
         schema = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
         components = schema.setdefault("components", {})
-        # bodies that a route reads itself, and the answer that every route may give
+        # bodies that routes parse themselves, and the error answer of all routes
         for model in (ProblemDocument, NewCampaign, ForceQuery, ForceUpload):
             described = model.model_json_schema(ref_template="#/components/schemas/{model}")
             components.setdefault("schemas", {}).update(described.pop("$defs"))

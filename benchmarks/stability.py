@@ -16,10 +16,10 @@ from benchmarks.timing import best_of, once, row
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.deflection import ToolDeflection, deflected_edge, deflected_process
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
-from rcsa_ident.stability.deformation import ToolDeflection, deflected_edge, deflected_engagement
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.stability_map import stability_map
@@ -124,8 +124,8 @@ def _robot_cut() -> list[dict[str, Any]]:
     }
     rows, at_8200 = [], {}
     for name, (process, deflection, reference) in columns.items():
-        engagements = None if deflection is None else deflected_engagement(process, deflection)
-        limit = 1e3 * stability_lobes(tip, process, speeds, 0.02, FullDiscretisation(engagements=engagements)).limit_depth
+        cut = process if deflection is None else deflected_process(process, deflection)
+        limit = 1e3 * stability_lobes(tip, cut, speeds, 0.02, FullDiscretisation()).limit_depth
         at_8200[name] = float(limit[4])
         worst = 100.0 * float(np.max(np.abs(limit / np.array(reference) - 1.0)))
         shown = ", ".join(f"{value:.3f}" for value in limit)

@@ -24,6 +24,7 @@ from api.stream_client import Event, Forces, ForceStream
 from benchmarks.observer import DATA
 from benchmarks.service import serving
 from benchmarks.timing import row
+from tests.fixtures.service import processes
 from tests.fixtures.turning_cut import TurningCut, turning_cut
 from tests.fixtures.virtual_cut import relative_error
 
@@ -186,27 +187,6 @@ def told(found: dict[str, Any], count: int, true: np.ndarray, rate: float, besid
 def taken() -> float:
     """Return the time that the host of a virtual machine has kept its cores for others [s]."""
     return int(Path("/proc/stat").read_text().split(maxsplit=9)[8]) / os.sysconf("SC_CLK_TCK")
-
-
-def processes() -> dict[str, tuple[float, float]]:
-    """Return time on a core [s] and memory [MB] of the service's process and that of its streams, newest first."""
-    found: dict[str, tuple[float, float]] = {}
-    ours = {str(os.getpid())}
-    for folder in sorted(Path("/proc").glob("[0-9]*"), key=lambda f: int(f.name)):
-        try:
-            fields = (folder / "stat").read_text().rsplit(")", 1)[1].split()
-            name, parent = (folder / "comm").read_text().strip(), fields[1]
-            pages = int((folder / "statm").read_text().split()[1])
-        except (OSError, IndexError):
-            continue
-        if parent in ours:
-            # children of this process, and theirs
-            ours.add(folder.name)
-            kind = "streams" if name == "rcsa-streams" else "service" if parent == str(os.getpid()) else ""
-            if kind:
-                ticks = int(fields[11]) + int(fields[12])
-                found[kind] = ticks / os.sysconf("SC_CLK_TCK"), pages * os.sysconf("SC_PAGE_SIZE") / 1e6
-    return found
 
 
 def hour(seconds: float) -> None:

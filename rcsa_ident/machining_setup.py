@@ -9,34 +9,42 @@ from pathlib import Path
 import numpy as np
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, feed_direction
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.materials import material
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
 from rcsa_ident.errors import InputError
+from rcsa_ident.shown import Saved, Shown
 from rcsa_ident.signals.recording import Sensor
 from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.units import to_rpm
 
 
-@dataclass(frozen=True, slots=True)
-class Tooling:
+@dataclass(frozen=True, slots=True, repr=False)
+class Tooling(Saved):
     """A cutter, with the tool and holder that carry it."""
 
     name: str
     cutter: Cutter
     assembly: ToolAssembly
 
+    def __str__(self) -> str:
+        return f"{self.name}: {self.cutter}, {self.assembly}"
 
-@dataclass(frozen=True, slots=True)
-class Workpiece:
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Workpiece(Shown):
     """A material and its cutting coefficients with the campaign's cutters."""
 
     name: str
     coefficients: CuttingCoefficients
 
+    def __str__(self) -> str:
+        return f"{self.name}: {self.coefficients}"
 
-@dataclass(frozen=True, slots=True)
-class CutSpec:
+
+@dataclass(frozen=True, slots=True, repr=False)
+class CutSpec(Shown):
     """A cut that is asked about: all that a tooling and a workpiece leave open.
 
     Parameters
@@ -104,9 +112,17 @@ class CutSpec:
                 raise InputError(name, "nothing", allowed)
         return CuttingCoefficients(**self.coefficients)
 
+    def __str__(self) -> str:
+        parts = [str(self.engagement), f"feed {feed_direction(self.feed_angle)}"]
+        parts += [] if self.feed_per_tooth is None else [f"{1e3 * self.feed_per_tooth:.3g} mm per tooth"]
+        parts += [] if self.material is None else [self.material]
+        parts += [f"{name} {value:.4g}" for name, value in self.coefficients.items()]
+        parts += [] if self.runout is None else [f"run-out {1e6 * (max(self.runout) - min(self.runout)):.2g} µm"]
+        return ", ".join([*parts, *(str(each) for each in (self.damping, self.speed_variation) if each is not None)])
 
-@dataclass(frozen=True, slots=True)
-class Cut:
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Cut(Shown):
     """One cut, and the files that it was recorded in.
 
     Parameters
@@ -127,9 +143,12 @@ class Cut:
     recording: Path
     air: Path | None = None
 
+    def __str__(self) -> str:
+        return f"{self.id}: {self.tooling}, {self.conditions}{'' if self.air else ', no air cut'}"
 
-@dataclass(frozen=True, slots=True)
-class Campaign:
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Campaign(Shown):
     """Recordings of one machine.
 
     Parameters
@@ -144,3 +163,8 @@ class Campaign:
     workpiece: Workpiece
     toolings: Mapping[str, Tooling]
     cuts: tuple[Cut, ...]
+
+    def __str__(self) -> str:
+        speeds = to_rpm(np.array([cut.conditions.spindle_speed for cut in self.cuts]))
+        made = f"{self.name}: {len(self.cuts)} cuts with {', '.join(self.toolings)}"
+        return f"{made}, {speeds.min():.0f} to {speeds.max():.0f} rev/min, {self.workpiece.name}" if speeds.size else made

@@ -234,7 +234,7 @@ def _report(found: Identification, campaign: Campaign, readings: list[Reading], 
 
 
 def _applied(text: str) -> tuple[Applied | None, str | None]:
-    """What becomes the machine's identification, or why it can not."""
+    """What becomes the machine's identification, or why it cannot."""
     try:
         summary = tasks.check(text)
     except InputError as error:

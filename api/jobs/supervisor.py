@@ -1,4 +1,4 @@
-"""Job workers beside the service: processes of their own, at lower priority, started again when they die, gone with it."""
+"""Supervisor of the job workers beside the service: processes at lower priority, restarted when they die, ended with the service."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from typing import Any
 from api.processes import BackOff, Child, spawn_context
 
 log = logging.getLogger("rcsa_ident.jobs")
-#: Seconds between two looks at the workers, and until one that is asked to end is killed.
+#: Interval between two checks of the workers, and time for one to end before it is killed [s].
 LOOK, FAREWELL = 0.2, 5.0
-#: Takes settings and what sets ready, and works until the event is set.
+#: Takes the settings and a function that reports readiness, and works until the event is set.
 Work = Callable[[Any, Callable[[], None], threading.Event], None]
 
 
 class Supervisor:
-    """Worker processes.
+    """Supervisor of worker processes.
 
     Parameters
     ----------
     count : int
     work : callable of (settings, ready, stop)
-        What each of them does; its module has to be importable.
+        What each worker does; importable by name.
     settings : object
-        That crosses processes.
+        Picklable.
     nice : int
-        How far they step back behind others.
+        Increment of their niceness.
     """
 
     def __init__(self, count: int, work: Work, settings: Any, nice: int = 0) -> None:
@@ -41,7 +41,7 @@ class Supervisor:
 
     @property
     def ready(self) -> bool:
-        """Whether a worker is there that takes jobs, or will in a moment, where there should be some."""
+        """Whether a worker takes jobs or is at its first start; true where there should be none."""
         return self.count == 0 or any(member.hopeful for member in self.members)
 
     def start(self) -> None:
@@ -56,7 +56,7 @@ class Supervisor:
                 member.keep_alive()
 
     def stop(self) -> None:
-        """End all workers; what they are at goes on after the next start, or elsewhere."""
+        """End all workers; their jobs continue after the next start, or elsewhere."""
         self.ending.set()
         if self.watch is not None:
             self.watch.join()
@@ -67,10 +67,10 @@ class Supervisor:
 
 
 class _Member:
-    """A worker that is started again when it dies."""
+    """A worker process that is restarted when it dies."""
 
     def __init__(self, *arguments: Any) -> None:
-        # without a lock, which a process that is killed may hold for ever
+        # without a lock, which a killed process could hold for ever
         self.arguments, self.ready = arguments, spawn_context().Value("b", 0, lock=False)
         self.back_off, self.due = BackOff(), 0.0
         self._start()
@@ -85,7 +85,7 @@ class _Member:
         return self.child.is_alive() and bool(self.ready.value or not self.back_off.failures)
 
     def keep_alive(self) -> None:
-        """Start it again when it has died and its pause is over."""
+        """Restart the process when it has died and its pause is over."""
         if self.child.is_alive():
             return
         if not self.due:
@@ -102,5 +102,5 @@ def _work(work: Work, settings: Any, nice: int, ready: Any) -> None:
     if hasattr(os, "nice"):
         os.nice(nice)
     work(settings, lambda: setattr(ready, "value", 1), stop)
-    # what computes in a thread does not end by itself
+    # threads that still compute do not end by themselves
     os._exit(0)

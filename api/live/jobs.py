@@ -1,4 +1,4 @@
-"""What routes of jobs share: the job as it stands, waiting for it, its events as a stream, its end."""
+"""Jobs as their clients follow them: submission, state, waiting, server-sent events, result and cancellation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse, StreamingResponse
 
 from api.components import Components
-from api.conventions import found_or_404
+from api.conventions import found_or_404, in_use
 from api.jobs.event_feed import Crowded
 from api.problems import Problem
 from api.schemas.common import ID_PATTERN
@@ -23,19 +23,21 @@ from api.stores.entities import Taken
 from api.stores.jobs import OPEN, Full, Job
 
 EVENTS = "text/event-stream"
-#: Seconds after which a client may ask again, and between two signs that a stream without events is still there.
+#: Retry-After [s], and interval of the heartbeat of an event stream without events [s].
 AGAIN, HEARTBEAT = "2", 15.0
-#: Longest time [s] that a query waits for the end of a job.
+#: Longest wait of a request for the end of a job [s].
 LONGEST_WAIT = 30.0
 JobId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a job.")]
-Prefer = Annotated[str | None, Header(max_length=200, description="`wait=N`: answer when the job has ended, after N s (30) at the latest.")]
+Prefer = Annotated[
+    str | None, Header(max_length=200, description="`wait=N`: answer when the job has ended, after N s (at most 30) at the latest.")
+]
 Seen = Annotated[
     str | None, Header(alias="Last-Event-ID", pattern=r"^\d{1,18}$", description="Number of the last event that the client knows.")
 ]
 RETRY = {"Retry-After": {"description": "Seconds.", "schema": {"type": "string"}}}
 ACCEPTED: dict[str, Any] = {
     "model": JobAnswer,
-    "description": "Accepted: it survives whatever happens to the service.",
+    "description": "The job is accepted; it survives restarts of the service.",
     "headers": {"Location": {"description": "Of the job.", "schema": {"type": "string"}}, **RETRY},
 }
 _EVENT: dict[str, Any] = {
@@ -65,24 +67,23 @@ def answer(job: Job) -> JobAnswer:
 
 
 def place(job: Job) -> str:
-    """Return where a job is found."""
+    """Return the path of a job."""
     return f"/v1/{'lobes' if job.kind == 'lobes' else 'identifications'}/{job.id}"
 
 
 def accepted(job: Job) -> JSONResponse:
-    """Return the answer to what has become a job."""
+    """Return the answer 202 to a submitted job."""
     return JSONResponse(answer(job).model_dump(mode="json"), 202, {"Location": place(job), "Retry-After": AGAIN})
 
 
 def submit(components: Components, job: Job, texts: Mapping[str, str], repeat: tuple[str, str] | None) -> Job:
-    """Keep a job; from then on it is carried out."""
+    """Store a job, which a worker then carries out."""
     try:
         return components.store.jobs.add(job, texts, components.settings.job_queue, repeat)
     except Taken as taken:
-        entry = {"field": str(taken), "found": str(repeat and repeat[0]), "allowed": f"a {taken} of its own"}
-        raise Problem(409, f"the {taken} is in use", [entry]) from None
+        raise in_use(taken, None, repeat and repeat[0]) from None
     except Full:
-        raise Problem(503, f"{components.settings.job_queue} jobs wait already", headers={"Retry-After": "60"}) from None
+        raise Problem(503, f"{components.settings.job_queue} jobs are waiting already", headers={"Retry-After": "60"}) from None
     except KeyError:
         raise Problem(404, "there is no such machine") from None
 
@@ -94,7 +95,7 @@ def job_of(components: Components, group: str, id: str, kind: str) -> Job:
 
 
 async def awaited(components: Components, group: str, id: str, kind: str, prefer: str | None) -> Job:
-    """Return a job, and where the client prefers so, when it has ended."""
+    """Return a job, where the client prefers so after it has ended."""
     job = await run_in_threadpool(job_of, components, group, id, kind)
     wanted = re.search(r"(?:^|[,;\s])wait\s*=\s*\"?(\d{1,6})", prefer or "")
     end = time.monotonic() + min(float(wanted[1]) if wanted else 0.0, LONGEST_WAIT)
@@ -105,31 +106,31 @@ async def awaited(components: Components, group: str, id: str, kind: str, prefer
 
 
 def cancel(components: Components, group: str, id: str, kind: str, response: Response) -> JobAnswer:
-    """End a job; one that has ended answers 409."""
+    """Cancel a job; one that has ended answers 409."""
     job_of(components, group, id, kind)
     job, cancelled = found_or_404(components.store.jobs.cancel(group, id, now()), "job")
     if not cancelled:
-        raise Problem(409, f"the job has ended before: it is {job.state}")
+        raise Problem(409, f"the job has already ended: its state is {job.state}")
     response.headers["Location"] = place(job)
     return answer(job)
 
 
 def finished(components: Components, group: str, id: str, kind: str, name: str) -> str:
-    """Return what a job has found."""
+    """Return a result of a finished job."""
     job = job_of(components, group, id, kind)
     if job.state != "done":
-        raise Problem(409, f"the job has no result: it is {job.state}", headers={"Retry-After": AGAIN} if job.state in OPEN else {})
+        raise Problem(409, f"the job has no result: its state is {job.state}", headers={"Retry-After": AGAIN} if job.state in OPEN else {})
     return found_or_404(components.store.jobs.text(id, name), "result")
 
 
 async def events(components: Components, group: str, id: str, kind: str, seen: str | None) -> StreamingResponse:
-    """Return the stream of a job's events behind a number."""
+    """Return the stream of a job's events after a number."""
     job = await run_in_threadpool(job_of, components, group, id, kind)
     try:
         watching = components.feeds.stream()
         watching.__enter__()
     except Crowded:
-        raise Problem(503, "too many watch jobs", headers={"Retry-After": "30"}) from None
+        raise Problem(503, "too many event streams of jobs are open", headers={"Retry-After": "30"}) from None
 
     async def stream() -> AsyncIterator[str]:
         try:
@@ -143,7 +144,7 @@ async def events(components: Components, group: str, id: str, kind: str, seen: s
 
 async def _events(components: Components, job: Job, after: int) -> AsyncIterator[str]:
     end = time.monotonic() + components.settings.watch_seconds
-    # what is known at once; without a number, so that it is no event that could be missed
+    # the current state first, without a number: it is not an event that could be missed
     yield f"retry: 2000\n{_event(None, 'progress', answer(job).model_dump_json())}"
     while time.monotonic() < end:
         found = await components.feeds.events(job.id, after)
@@ -164,7 +165,7 @@ async def _events(components: Components, job: Job, after: int) -> AsyncIterator
         if current is None:
             return
         if current.state not in OPEN:
-            # a client that has seen the end asks once more
+            # the client reconnected after the end
             yield _event(None, "end", answer(current).model_dump_json())
             return
         if not await components.feeds.wait(job.id, after, min(HEARTBEAT, max(end - time.monotonic(), 0.0))):

@@ -1,4 +1,4 @@
-"""An open stream: frames are taken, the observer is made, forces are sent, and every end has its reason."""
+"""WebSocket of an open stream: frames are received, the observer is designed, forces are sent, and every end has its reason."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ from api.work.pool import Busy
 from rcsa_ident.errors import InputError, Unsteady
 
 log = logging.getLogger("rcsa_ident.service")
-#: Time for what waits for a reader at the end, and for a steady part that an observer can be made from [s].
+#: Time limits for sending what remains at the end, and for finding a steady part to design the observer from [s].
 LINGER, SETTLING = 5.0, 120.0
-#: Between two attempts to make an observer [s].
+#: Pause between two attempts to design an observer [s].
 PAUSE = 0.5
-#: Between two looks at the key [s].
+#: Interval between two checks of the API key [s].
 LOOK = 20.0
-#: An index further ahead is a fault of its sender, not a gap [s].
+#: A larger jump of the sample index is an error of the sender, not a gap [s].
 MOST_AHEAD = 3600.0
-UNEXPECTED = End(1011, 500, "something unexpected happened; the log has it under this session")
+UNEXPECTED = End(1011, 500, "an internal error occurred; it is logged under this session's id")
 _WORDS = {1009: 413, 1003: 415}
 
 
@@ -57,7 +57,7 @@ async def serve_owner(
 
 
 async def serve_viewer(websocket: WebSocket, components: Components, caller: Caller, session: Session, hello: Hello) -> End:
-    """Serve a viewer; a session does not end with it."""
+    """Serve a viewer, whose end does not end the session."""
     listener, about = Listener(len(session.about.axes), hello.format == "json", hello.envelope), session.about
     components.streams.listen(session, listener)
     listener.tell("watching", session=about.id, name=about.name, axes=list(about.axes), sampling_rate_hz=about.rate)
@@ -71,22 +71,22 @@ async def serve_viewer(websocket: WebSocket, components: Components, caller: Cal
 
 
 async def _until_disconnect(websocket: WebSocket) -> None:
-    """Return when a viewer goes; what it says meanwhile nobody needs."""
+    """Wait for the viewer to disconnect; its messages are ignored."""
     while (await websocket.receive())["type"] != "websocket.disconnect":
         pass
     raise WebSocketDisconnect
 
 
 async def _watch_key(components: Components, caller: Caller) -> None:
-    """Look now and then whether the key is still one."""
+    """Check periodically that the API key has not been revoked."""
     while True:
         await asyncio.sleep(LOOK)
         if caller.id != LOCAL_KEY and await run_in_threadpool(components.store.keys.get, caller.id) is None:
-            raise Problem(401, "the key has been withdrawn")
+            raise Problem(401, "the API key has been revoked")
 
 
 def _session_task(hub: Hub, session: Session, doing: Awaitable[None]) -> asyncio.Task[None]:
-    """Do something for a session; what fails ends it with the reason."""
+    """Run a task of a session; an error ends the session with its reason."""
 
     async def guarded() -> None:
         try:
@@ -104,7 +104,7 @@ def _session_task(hub: Hub, session: Session, doing: Awaitable[None]) -> asyncio
 
 
 async def _until_over(websocket: WebSocket, session: Session, listener: Listener, tasks: list[asyncio.Task[None]]) -> End:
-    """Send what there is until the session is over, or its reader has gone."""
+    """Send events and forces until the session is over or its client has disconnected."""
     sending = asyncio.create_task(_send(websocket, session, listener))
     over = asyncio.create_task(session.over.wait())
     try:
@@ -112,9 +112,9 @@ async def _until_over(websocket: WebSocket, session: Session, listener: Listener
         while not over.done() and not sending.done():
             done, waiting = await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
             for task in done:
-                # a reader that has gone
+                # the client has disconnected
                 task.result()
-        # who does not read does not hold the end up for long
+        # a client that does not read delays the end only briefly
         await asyncio.wait_for(sending, LINGER)
     except TimeoutError:
         pass
@@ -124,10 +124,10 @@ async def _until_over(websocket: WebSocket, session: Session, listener: Listener
 
 
 async def _cancel(tasks: set[asyncio.Task[Any]]) -> None:
-    """Have tasks ended; what became of them has been told."""
+    """Cancel tasks; their outcomes have been handled."""
     for task in tasks:
         task.cancel()
-    # not gathered: were this task cancelled meanwhile, it would be told that they were
+    # not gathered: their cancellation would look like one of this task
     for task in (await asyncio.wait(tasks))[0]:
         if not task.cancelled():
             task.exception()
@@ -143,7 +143,7 @@ async def _send(websocket: WebSocket, session: Session, listener: Listener) -> N
 
 
 async def _receive_frames(websocket: WebSocket, hub: Hub, session: Session, text: bool, feeds: bool) -> None:
-    """Take frames until the client has no more."""
+    """Receive frames until the client ends the stream."""
     channels = session.about.channels
     while True:
         message = await websocket.receive()
@@ -155,7 +155,7 @@ async def _receive_frames(websocket: WebSocket, hub: Hub, session: Session, text
         if not feeds:
             raise WrongKind("message", "a frame", 'nothing but {"event": "end"}: the samples are those of the recording')
         if (words is not None) is not text:
-            raise WrongKind("frame", "bytes" if raw is not None else "text", "JSON" if text else "bytes, as the hello says")
+            raise WrongKind("frame", "bytes" if raw is not None else "text", "JSON" if text else "bytes, as declared in the first message")
         first, samples = samples_of_text(words, channels) if words is not None else samples_of(raw or b"", channels)
         ahead = first - session.counts.following
         if session.counts.following >= 0 and ahead > MOST_AHEAD * session.about.rate:
@@ -165,7 +165,7 @@ async def _receive_frames(websocket: WebSocket, hub: Hub, session: Session, text
 
 
 async def finish(hub: Hub, session: Session) -> None:
-    """End a session when all its samples have their forces, those among them that an observer still has to be made from."""
+    """End a session once the forces of all its samples have been computed, including those the observer is still designed from."""
     session.finishing = True
     session.arrived.set()
     if session.stage is not Stage.LIVE or session.counts.backlog:
@@ -177,7 +177,7 @@ async def finish(hub: Hub, session: Session) -> None:
 
 
 async def _prepare(components: Components, session: Session, opening: Opening) -> None:
-    """Have the observer made, then stream; of a replay also feed it."""
+    """Have the observer designed and start the stream; play the recording of a replay."""
     hub, loop = components.streams, asyncio.get_running_loop()
     limit, refused = loop.time() + SETTLING, None
     while session.stage is not Stage.LIVE:
@@ -185,7 +185,7 @@ async def _prepare(components: Components, session: Session, opening: Opening) -
         if session.stage is Stage.ENDED:
             return
         if window is None and session.finishing:
-            # too few samples for an observer, and no more will come
+            # too few samples for an observer, and no more will arrive
             session.drained.set()
             return
         if window is None:
@@ -198,7 +198,7 @@ async def _prepare(components: Components, session: Session, opening: Opening) -
         except InputError as error:
             if opening.source is not None or not isinstance(error, Unsteady) or loop.time() > limit:
                 raise refused or error from None
-            # perhaps the spindle has still come up to speed, or the tool has entered: the next second may do
+            # the spindle may have been accelerating, or the tool entering: the next second may be steady
             refused, detail = error, problems.of_input(error)
             for listener in session.listeners:
                 listener.tell("settling", detail=detail.detail, errors=detail.errors)
@@ -213,7 +213,7 @@ async def _prepare(components: Components, session: Session, opening: Opening) -
 
 
 async def _retried(call: Callable[[], Awaitable[Any]], seconds: float = 30.0) -> Any:
-    """Return what a call answers; where too much waits, ask again."""
+    """Return the answer of a call, repeated while the queue is full."""
     loop = asyncio.get_running_loop()
     limit = loop.time() + seconds
     while True:
@@ -226,7 +226,7 @@ async def _retried(call: Callable[[], Awaitable[Any]], seconds: float = 30.0) ->
 
 
 def end_of(error: Exception) -> End:
-    """Return how an error ends a stream."""
+    """Return the end of a stream that an error causes."""
     found: Problem
     if isinstance(error, InputError):
         found = problems.of_input(error)
@@ -240,5 +240,5 @@ def end_of(error: Exception) -> End:
     if isinstance(error, Full):
         return End(1013, 503, str(error))
     if isinstance(error, Busy | Unavailable):
-        return End(1013, 503, "too much waits for an answer, or the store does not answer now")
+        return End(1013, 503, "too many queries are waiting for an answer, or the database does not answer")
     return UNEXPECTED

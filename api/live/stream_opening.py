@@ -1,4 +1,4 @@
-"""What a stream opens with: machine, tooling, channels, and where the samples come from."""
+"""Opening of a stream: from its first message to machine, tooling, channels and the source of its samples."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.units import from_rpm
 
-#: That an observer is made from, at least.
+#: Fewest revolutions to design an observer from.
 REVOLUTIONS = 12
-#: Of a replay [s]: what is read at once, and what comes at once.
+#: Lengths of the parts that a replay reads, and of those that it feeds [s].
 PART, TICK = 1.0, 0.02
 
 
@@ -44,7 +44,7 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """What a session begins with.
+    """Everything that a session begins with.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Opening:
     machine_id, name : str
     question : StreamQuestion
     settle : int
-        Samples that an observer is made from; 0 of a replay.
+        Samples that the observer is designed from; 0 for a replay.
     air : callable or None
         Reads an uploaded air cut.
     source : Source or None
@@ -69,14 +69,14 @@ class Opening:
     source: Source | None = None
 
     def about(self, id: str, group: str, seconds: float) -> About:
-        """Return what a session is of."""
+        """Return the description of the session."""
         rate, q = self.question.rate, self.question
         return About(
             id, group, self.name, self.machine_id, self.tooling.name, now(), rate, q.axes, len(q.sensors), math.ceil(seconds * rate)
         )
 
     async def design(self, work: Work, first: int, samples: FloatArray | None) -> tuple[bytes, dict[str, Any]]:
-        """Return plan and what the client is told, from a worker."""
+        """Return the plan of the observer and the content of the client's event `ready`, computed by a worker."""
         if self.source is not None:
             return await work.run(design_replay, self.machine, self.tooling, self.question, pair_reader(self.source.cut, self.source.air))
         assert samples is not None
@@ -84,7 +84,7 @@ class Opening:
         return await work.run(design, self.machine, self.tooling, self.question, first, raw, self.air)
 
     async def feed(self, hub: Hub, session: Session) -> None:
-        """Play the recording at its pace; where the service is behind, the recording waits."""
+        """Play the recording at its rate; it pauses where the service lags behind."""
         from api.reading.samples import blocks
 
         assert self.source is not None
@@ -110,18 +110,20 @@ async def open_logger(components: Components, group: str, hello: StreamHello) ->
         channels = channels_of(hello.channels, given_sensors(hello.sensors) or sensors_of(known.text))
         speed = None if hello.spindle_speed_rpm is None else from_rpm(hello.spindle_speed_rpm)
         if speed is None and not any(sensor.quantity is Quantity.TRIGGER for sensor in channels):
-            raise InputError("spindle_speed_rpm", "nothing, and no channel of a trigger", "the programmed speed [rev/min]")
+            raise InputError("spindle_speed_rpm", "nothing, and no trigger channel", "the programmed speed [rev/min]")
         axes = tuple(hello.axes) if hello.axes is not None else displacement_axes(channels)
         if len(set(axes)) < len(axes):
             raise InputError("axes", list(axes), "each axis once")
         seconds = max(hello.settle_s, 0.0 if speed is None else REVOLUTIONS * 2.0 * math.pi / speed)
         if seconds > 0.5 * components.settings.stream_buffer_seconds:
-            raise InputError("spindle_speed_rpm", hello.spindle_speed_rpm, f"a speed of which {REVOLUTIONS} revolutions can wait")
+            raise InputError(
+                "spindle_speed_rpm", hello.spindle_speed_rpm, f"a speed at which {REVOLUTIONS} revolutions fit into the buffer"
+            )
         settle = math.ceil(seconds * hello.sampling_rate_hz)
         air = None
         if hello.air is not None:
             if hello.begins == "air":
-                raise InputError("air", "a recording, and a stream that begins in air", "one of them")
+                raise InputError("air", "a recording, and a stream that begins in air", "one of the two")
             air = air_cut(components, group, hello.air.campaign, hello.air.recording)
         question = StreamQuestion(hello.sampling_rate_hz, speed, channels, axes, hello.begins, hello.method)
         return Opening(known, tooling, hello.machine, hello.name, question, settle, air)
@@ -130,7 +132,7 @@ async def open_logger(components: Components, group: str, hello: StreamHello) ->
 
 
 async def open_replay(components: Components, group: str, hello: ReplayHello) -> Opening:
-    """Return the opening of a recording that is played."""
+    """Return the opening of a replayed recording."""
 
     def look() -> Opening:
         found = uploaded(components, group, hello.replay.campaign, hello.replay.recording)

@@ -1,4 +1,4 @@
-"""What the reader process does with an upload: read it, write its samples in one form, and tell what was found. Answers are plain."""
+"""Examination of an upload in the reader process: read, normalise its samples, judge it; answers are plain JSON types."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from rcsa_ident.units import to_rpm
 
 
 def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) -> Recording:
-    """Return the samples of an upload in SI, and write them; errors name the file as the client does.
+    """Return the samples of an upload in SI and write them normalised; errors carry the client's file name.
 
     Parameters
     ----------
     rate : float or None [Hz]
-        For a file that carries none.
+        Of a file without a rate.
     """
     try:
         found, signals = read_signals(upload.path, [sensor.name for sensor in sensors], rate, Path(upload.name).suffix)
@@ -35,7 +35,7 @@ def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None)
     except InputError as error:
         raise _with_client_name(error, upload) from None
     except RecursionError:
-        raise InputError("recording", "one that cannot be read (nested without end)", "a complete file", upload.name) from None
+        raise InputError("recording", "a file nested too deeply to be read", "a complete file", upload.name) from None
 
 
 def _with_client_name(error: InputError, upload: Upload) -> InputError:
@@ -44,16 +44,16 @@ def _with_client_name(error: InputError, upload: Upload) -> InputError:
 
 
 def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) -> dict[str, Any]:
-    """Read an upload of a campaign and return what was found in it.
+    """Read an upload of a campaign and return its description with the verdict.
 
     Parameters
     ----------
     text : str
         The campaign as declared.
     cut_id, role : str
-        The cut that it belongs to, one of them where it is an air cut.
+        The cut it belongs to; one of them for an air cut.
     air : Path or None
-        Samples of the air cut, where the upload is a cut and they are there.
+        Samples of the cut's air cut, where they have been uploaded.
     """
     campaign = campaign_of_text(text)
     cut = next(each for each in campaign.cuts if each.id == cut_id)
@@ -61,7 +61,7 @@ def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) ->
     try:
         beside = None if air is None else read_normalised(air)
     except InputError:
-        # it went in this moment: the verdict is looked at once more anyway
+        # deleted meanwhile: the cut will be judged again
         beside = None
     verdict, reading = judged(campaign, cut, recording, beside, role)
     speed = reading.spindle_speed
@@ -73,14 +73,14 @@ def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) ->
 
 
 def judge(text: str, cut_id: str, cut: Path, air: Path | None) -> dict[str, Any]:
-    """Return the verdict on samples of a cut that are there already."""
+    """Return the verdict on the stored samples of a cut."""
     campaign = campaign_of_text(text)
     declared = next(each for each in campaign.cuts if each.id == cut_id)
     return judged(campaign, declared, read_normalised(cut), None if air is None else read_normalised(air), "cut")[0]
 
 
 def described(recording: Recording) -> dict[str, Any]:
-    """Return what needs no analysis."""
+    """Return rate, duration and channels of a recording."""
     return {
         "sampling_rate_hz": recording.rate,
         "duration_s": recording.samples.shape[0] / recording.rate,
@@ -89,7 +89,7 @@ def described(recording: Recording) -> dict[str, Any]:
 
 
 def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | None, role: str) -> tuple[dict[str, Any], Reading]:
-    """Return the verdict on a cut, beside its air cut where there is one, or on an air cut alone; and what it rests on."""
+    """Return the verdict on a cut (with its air cut, where there is one) or on an air cut, and the reading it is based on."""
     cutter = campaign.toolings[cut.tooling].cutter
     try:
         with np.errstate(all="ignore"):
@@ -116,7 +116,7 @@ def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | 
 
 
 def warm() -> None:
-    """Judge a small record, so that what a verdict needs is imported and compiled."""
+    """Judge a small record: imports and compiles everything a verdict needs."""
     from rcsa_ident.cutting.coefficients import CuttingCoefficients
     from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
     from rcsa_ident.cutting.cutter import Cutter

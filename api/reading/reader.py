@@ -1,4 +1,4 @@
-"""One process that reads uploads, with limits: what costs more than them is refused, and the process is replaced."""
+"""The reader process: reads uploads within limits of memory and time, and is replaced where an upload exceeds them."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from rcsa_ident.errors import InputError
 
 log = logging.getLogger("rcsa_ident.reading")
 MEBIBYTE = 1 << 20
-#: For the start of a process, imports and compiling [s].
+#: Time limit for the start of the process, including imports and compilation [s].
 _START = 300.0
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one call may cost.
+    """Limits of one call.
 
     Parameters
     ----------
     memory : int [MiB]
-        Address space beyond what the process takes before it reads anything.
+        Address space beyond that of the idle process.
     seconds : float [s]
-        Of one core.
+        CPU time.
     wall_seconds : float [s]
-        By the clock.
+        Wall-clock time.
     calls : int
-        After so many the process is replaced.
+        After which the process is replaced.
     """
 
     memory: int = 2048
@@ -50,19 +50,19 @@ class Limits:
     def costly(self) -> InputError:
         """The refusal of an upload that costs more."""
         found = f"a file that costs more than {self.memory} MiB or {self.seconds:g} s to read"
-        return InputError("recording", found, "a recording that takes less: fewer samples, or a plainer format")
+        return InputError("recording", found, "a recording that is cheaper to read: fewer samples, or a simpler format")
 
 
 class Reader:
-    """A spawned process that serves one call at a time.
+    """A spawned process that answers one call at a time.
 
     Parameters
     ----------
     limits : Limits
     queue : int
-        Calls that may wait beyond the one at work.
+        Calls that may wait beyond the running one.
     prepare : callable
-        What the process does first, outside of the limits.
+        Called first in the process, without limits.
     """
 
     def __init__(self, limits: Limits, queue: int, prepare: Callable[[], None] = reader_tasks.warm) -> None:
@@ -88,7 +88,7 @@ class Reader:
             self.waiting -= 1
 
     def _ask(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-        # one that was killed from outside is asked once more: that says nothing about the upload
+        # a process killed from outside says nothing about the upload: ask a new one once
         for _ in range(2):
             if self.threads is None:
                 break
@@ -104,7 +104,7 @@ class Reader:
                 raise InputError(*answer)
             if kind == "failed":
                 log.error("a call of the reader has failed", extra={"fields": {"error": answer}})
-                raise InputError("recording", "one that cannot be read", "a complete file of its format")
+                raise InputError("recording", "a file that cannot be read", "a complete file of its format")
         raise Busy
 
     def _replace(self) -> None:
@@ -115,7 +115,7 @@ class Reader:
     def stop(self) -> None:
         threads, self.threads = self.threads, None
         if self.child is not None:
-            # a call at work ends with its process
+            # a running call ends with its process
             self.child.process.kill()
         if threads is not None:
             threads.shutdown(wait=True, cancel_futures=True)
@@ -125,7 +125,7 @@ class Reader:
 
 
 class _Reading:
-    """The process that reads, and the pipe to it."""
+    """One reader process and the pipe to it."""
 
     def __init__(self, limits: Limits, prepare: Callable[[], None]) -> None:
         self.limits, self.calls, self.ready = limits, 0, False
@@ -134,7 +134,7 @@ class _Reading:
         theirs.close()
 
     def ask(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
-        """Return what became of a call (answer, refused, failed, costly, or killed by others), and what belongs to that."""
+        """Return the outcome of a call (answer, refused, failed, costly, or killed from outside) and its content."""
         try:
             if not self.ready:
                 self._receive(_START)
@@ -156,11 +156,11 @@ class _Reading:
     def _receive(self, seconds: float) -> Any:
         if not self.pipe.poll(seconds):
             raise TimeoutError
-        # parsed as data: the process may be in the hands of what it has read
+        # parsed as JSON, never unpickled: an upload may have taken the process over
         return json.loads(self.pipe.recv_bytes())
 
     def end(self) -> None:
-        """End it: by itself where the pipe's end is enough."""
+        """End the process: by closing its pipe, else by SIGKILL."""
         self.pipe.close()
         self.process.end(0.5)
 
@@ -174,7 +174,7 @@ def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None]) -> Non
     prepare()
     taken = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (taken + limits.memory * MEBIBYTE,) * 2)
-    # no core of somebody's data, and no file larger than what it may write
+    # no core dump of a client's data, and no file larger than the largest result
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_DATA + LARGEST_DATA // 8,) * 2)
     pipe.send_bytes(b"{}")
@@ -183,7 +183,7 @@ def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None]) -> Non
             call, arguments = pipe.recv()
         except EOFError:
             return
-        # counted from the start of the process; the system ends it at the limit
+        # CPU time counts from the start of the process
         resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time() + limits.seconds) + 1, resource.RLIM_INFINITY))
         pipe.send_bytes(_answer(call, arguments))
 

@@ -1,4 +1,4 @@
-"""Calls for the processes that read: they import formats and signals only where they run, so that the service does not load them."""
+"""Calls of the reader process and the workers; they import formats and signals where they run, so that the service does not."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def warm() -> None:
 
 
 def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) -> dict[str, Any]:
-    """Return what was found in an upload, see `examine.look`."""
+    """Return the description of an upload, see `examine.look`."""
     from api.reading import examine
 
     return examine.look(upload, text, cut_id, role, air)
@@ -31,21 +31,21 @@ def read_alone(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) 
 
 
 def recording_and_air(cut: Path, air: Path | None) -> tuple[Any, Any]:
-    """Return the kept samples of a recording and of its air cut, where there is one."""
+    """Return the stored samples of a recording and of its air cut, where there is one."""
     from api.reading.samples import read_normalised
 
     return read_normalised(cut), None if air is None else read_normalised(air)
 
 
 def judge(text: str, cut_id: str, cut: Path, air: Path | None) -> dict[str, Any]:
-    """Return the verdict on samples that are there, see `examine.judge`."""
+    """Return the verdict on stored samples, see `examine.judge`."""
     from api.reading import examine
 
     return examine.judge(text, cut_id, cut, air)
 
 
 def envelope(path: Path, points: int) -> dict[str, Any]:
-    """Return the outline of a recording, see `previews.envelope`."""
+    """Return the envelope of a recording, see `previews.envelope`."""
     from api.reading import previews
 
     return previews.envelope(path, points)

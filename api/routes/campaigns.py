@@ -1,4 +1,4 @@
-"""Campaigns of a machine: what was cut, with which toolings, measured by which sensors."""
+"""Campaigns of a machine: cuts, toolings and sensors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 from api.components import Components, ThisService
-from api.conventions import BODY, After, CampaignId, Limit, MachineId, Repeat, guard, page, problems, utf8
+from api.conventions import BODY, After, CampaignId, Limit, MachineId, Repeat, guard, in_use, page, problems, utf8
 from api.files import UPLOADS
 from api.lookups import known_campaign, machine_of
 from api.problems import Problem
@@ -43,9 +43,9 @@ _BODY = {
 @router.post(
     "/machines/{id}/campaigns",
     status_code=201,
-    summary="Make a campaign: campaign.toml, or the same keys as JSON",
-    description="Toolings are copied: what happens to the library later does not change the campaign. "
-    "Recordings are named by the last part of their paths.",
+    summary="Make a campaign from campaign.toml, or from its keys as JSON",
+    description="Toolings are copied: later changes of the library do not affect the campaign. "
+    "Recordings are named by the last parts of their paths.",
     openapi_extra=guard("upload", requestBody=_BODY, **{"x-content-types": (JSON, TOML)}),
     responses=problems(404, 409, *BODY),
 )
@@ -68,8 +68,7 @@ async def make(
     try:
         campaign = await run_in_threadpool(keep)
     except Taken as taken:
-        what, fault = str(taken), {"found": str(repeat), "allowed": f"an {taken} of its own"}
-        raise Problem(409, f"the {what} is in use", [{"field": what, **fault}]) from None
+        raise in_use(taken, None, repeat) from None
     except KeyError:
         raise Problem(404, "there is no such machine") from None
     response.headers["Location"] = f"/v1/campaigns/{campaign.id}"
@@ -96,7 +95,7 @@ def list_campaigns(id: MachineId, components: ThisService, caller: WhoAsks, afte
 
 @router.get(
     "/campaigns/{id}",
-    summary="A campaign, as JSON or as campaign.toml (Accept: application/toml)",
+    summary="A campaign as JSON, or as campaign.toml (Accept: application/toml)",
     openapi_extra=guard("read"),
     response_class=Response,
     responses={
@@ -114,12 +113,12 @@ def get(id: CampaignId, request: Request, components: ThisService, caller: WhoAs
 
 @router.get(
     "/campaigns/{id}/archive",
-    summary="What `rcsa-ident identify` takes: campaign.toml, toolings and the recordings as they came, ZIP",
-    description="Cuts whose recording is not there are left out.",
+    summary="ZIP archive for `rcsa-ident identify`: campaign.toml, toolings and the original recordings",
+    description="Cuts without a recording are omitted.",
     openapi_extra=guard("read"),
     response_class=StreamingResponse,
     responses={
-        200: {"description": "A folder.", "content": {ZIP: {"schema": {"type": "string", "format": "binary"}}}},
+        200: {"description": "The archive.", "content": {ZIP: {"schema": {"type": "string", "format": "binary"}}}},
         **problems(404, 409, 422),
     },
 )
@@ -127,7 +126,7 @@ def archive(id: CampaignId, components: ThisService, caller: WhoAsks) -> Streami
     campaign = known_campaign(components, caller.group, id)
     rows = {row.name: row for row in components.store.recordings.list(caller.group, id, "", 1_000_000)}
     if not any(row.role == "cut" for row in rows.values()):
-        raise Problem(409, "no recording of a cut is uploaded yet")
+        raise Problem(409, "no recording of a cut has been uploaded yet")
     headers = {"Content-Disposition": f'attachment; filename="campaign-{campaign.id}.zip"'}
     return StreamingResponse(zipped(_members(components, campaign, rows)), media_type=ZIP, headers=headers)
 
@@ -135,7 +134,7 @@ def archive(id: CampaignId, components: ThisService, caller: WhoAsks) -> Streami
 @router.delete(
     "/campaigns/{id}",
     status_code=204,
-    summary="Forget a campaign and its recordings",
+    summary="Delete a campaign and its recordings",
     openapi_extra=guard("upload"),
     responses=problems(404, 422),
 )

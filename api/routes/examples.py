@@ -1,4 +1,4 @@
-"""Files to start with: a tooling, a campaign, tested cuts, modes, a tool library, and recordings."""
+"""Example files: toolings, a campaign, tested cuts, modes, a tool library and recordings."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _TYPES = {".toml": "application/toml", ".csv": "text/csv; charset=utf-8", ".json
 _ABOUT = {
     "S1-ER32.toml": "A tooling: end mill of 12 mm in a collet chuck.",
     "S2-PG25.toml": "A tooling: the same end mill, shorter, in a press-fit chuck.",
-    "campaign.toml": "A campaign of one cut, with a word to every key.",
-    "CUTS.csv": "Tested cuts, which lobes are drawn with.",
-    "MODES.toml": "A tooltip's modes, which lobes are computed from without an identification.",
-    "tool-library.json": "A tool library as CAM programs export it.",
+    "campaign.toml": "A campaign of one cut, with an explanation of every key.",
+    "CUTS.csv": "Tested cuts, drawn together with lobes.",
+    "MODES.toml": "Tooltip modes, from which lobes are computed without an identification.",
+    "tool-library.json": "A tool library as exported by CAM programs.",
     "small-campaign.zip": "A campaign of two cuts with their air cuts: to see uploads and verdicts.",
 }
 SAMPLE, _SAMPLE_ABOUT = "sample-campaign.zip", "A campaign with two toolings: enough for an identification."
@@ -44,7 +44,7 @@ def list_examples(components: ThisService) -> Examples:
 
 @router.get(
     "/{name}",
-    summary="An example's file",
+    summary="The file of an example",
     openapi_extra=guard("read"),
     response_class=Response,
     responses={
@@ -63,7 +63,7 @@ def get_example(name: Annotated[str, Path(pattern=r"^[A-Za-z0-9.-]{1,64}$")], co
 
 
 def _sample(components: Components) -> list[tuple[str, Folder]]:
-    """What the folder of the settings holds of a campaign, by name in the archive; nothing where there is none."""
+    """Files of the campaign in the folder of the settings, by name in the archive; empty where there is none."""
     folder = components.settings.examples
     try:
         campaign = read_campaign(folder)

@@ -1,4 +1,4 @@
-"""Forces of a recording: one that comes with the query, or one of a campaign."""
+"""Forces of a recording, uploaded with the query or of a campaign."""
 
 from __future__ import annotations
 
@@ -41,8 +41,12 @@ _BODY = {
                 "required": ["query", "recording"],
                 "properties": {
                     "query": {"$ref": "#/components/schemas/ForceUpload"},
-                    "recording": {"type": "string", "format": "binary", "description": "Its file name's suffix says the format."},
-                    "air": {"type": "string", "format": "binary", "description": "Of an air cut with the same clamping and speed."},
+                    "recording": {"type": "string", "format": "binary", "description": "The suffix of its file name is the format."},
+                    "air": {
+                        "type": "string",
+                        "format": "binary",
+                        "description": "Recording of an air cut with the same clamping and speed.",
+                    },
                 },
                 "additionalProperties": False,
             },
@@ -55,7 +59,8 @@ _BODY = {
 @router.post(
     "/forces",
     summary="Forces of a recording; Accept: text/csv for FORCES.csv",
-    description="Either a form with the recording, or JSON that names one of a campaign. Without an air cut run-out stays in the forces.",
+    description="Either a form with the recording, or JSON that names a recording of a campaign. "
+    "Without an air cut run-out remains in the forces.",
     openapi_extra=guard("run", requestBody=_BODY, **{"x-content-types": (JSON, FORM)}),
     response_model=ForceAnswer,
     responses={200: {"description": "Forces.", "content": {CSV: {"schema": {"type": "string"}}}}, **problems(404, 408, *BODY)},
@@ -69,7 +74,9 @@ async def estimate(request: Request, components: ThisService, caller: WhoAsks) -
         async with form(request, components, caller.group, ("query",), ("recording", "air")) as (texts, files):
             missing = "query" if "query" not in texts else "recording" if "recording" not in files else ""
             if missing:
-                raise Problem(422, f"the form has no {missing}", [{"field": missing, "found": "nothing", "allowed": "a part of this name"}])
+                raise Problem(
+                    422, f"the form has no part named {missing}", [{"field": missing, "found": "nothing", "allowed": "a part of this name"}]
+                )
             upload = body_of(ForceUpload, texts["query"])
             machine, tooling, question, sensors = await run_in_threadpool(_of_upload, components, caller.group, upload)
             async with _read(components, caller.group, files, sensors, upload.sampling_rate_hz) as source:
@@ -94,12 +101,12 @@ def _of_upload(
 async def _read(
     components: Components, group: str, files: Mapping[str, tuple[str, Received]], sensors: tuple[Sensor, ...], rate: float | None
 ) -> AsyncIterator[ReadPair]:
-    """What reads the samples of a form's files, which the reader process has taken from them; nothing is kept."""
+    """Function that reads the samples of a form's files, normalised by the reader process and deleted at the end of the context."""
     targets: dict[str, Path] = {}
     try:
         for name, (file, received) in files.items():
             if not file.lower().endswith(FORMATS):
-                raise InputError(name, file[-80:], f"a file that ends in one of {', '.join(FORMATS)}")
+                raise InputError(name, file[-80:], f"a file name that ends in one of {', '.join(FORMATS)}")
             targets[name] = await run_in_threadpool(components.files.spare, group)
             await components.reader.run(reader_tasks.read_alone, Upload(received.path, file, targets[name]), sensors, rate)
         yield pair_reader(targets["recording"], targets.get("air"))

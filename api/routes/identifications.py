@@ -24,7 +24,7 @@ from rcsa_ident.errors import InputError
 
 router = APIRouter(prefix="/identifications", tags=["identifications"], route_class=Guarded)
 KIND = "identification"
-#: Opened as a page of its own a report runs nothing and loads nothing.
+#: A report opened as a page of its own runs and loads nothing.
 _ALONE = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; img-src data:"}
 _Of = Annotated[str | None, Query(pattern=ID_PATTERN)]
 
@@ -33,7 +33,7 @@ _Of = Annotated[str | None, Query(pattern=ID_PATTERN)]
     "",
     status_code=202,
     summary="Identify a machine from a campaign",
-    description="A job. What has been uploaded by its start belongs to it.",
+    description="The identification is a job; it uses the recordings that have been uploaded when it starts.",
     openapi_extra=guard("run"),
     response_model=JobAnswer,
     responses={202: ACCEPTED, **problems(404, 409, *BODY)},
@@ -76,7 +76,7 @@ def list_jobs(
 
 @router.get(
     "/{id}",
-    summary="How far an identification is",
+    summary="State of an identification",
     openapi_extra=guard("read"),
     responses={200: {"description": "The job.", "headers": RETRY}, **problems(404, 422)},
 )
@@ -94,7 +94,7 @@ def cancel(id: JobId, components: ThisService, caller: WhoAsks, response: Respon
 
 @router.get(
     "/{id}/events",
-    summary="What an identification tells on its way",
+    summary="Events of an identification",
     openapi_extra=guard("read"),
     response_class=StreamingResponse,
     responses={200: STREAM, **problems(404, 422)},
@@ -108,7 +108,12 @@ def modes(id: JobId, components: ThisService, caller: WhoAsks) -> Modes:
     return Modes.model_validate(tasks.modes(jobs.finished(components, caller.group, id, KIND, "result")))
 
 
-@router.get("/{id}/frf", summary="Measured lines beside the model's", openapi_extra=guard("read"), responses=problems(404, 409, 422))
+@router.get(
+    "/{id}/frf",
+    summary="Measured lines of the cross FRF, and those of the model",
+    openapi_extra=guard("read"),
+    responses=problems(404, 409, 422),
+)
 def frf(id: JobId, components: ThisService, caller: WhoAsks) -> FittedLines:
     return FittedLines.model_validate_json(jobs.finished(components, caller.group, id, KIND, "frf"))
 
@@ -118,7 +123,7 @@ def frf(id: JobId, components: ThisService, caller: WhoAsks) -> FittedLines:
     summary="RESULT.json",
     openapi_extra=guard("read"),
     response_class=Response,
-    responses={200: {"model": Identification, "description": "To be used with the commands, too."}, **problems(404, 409, 422)},
+    responses={200: {"model": Identification, "description": "For use with the commands, too."}, **problems(404, 409, 422)},
 )
 def result(id: JobId, components: ThisService, caller: WhoAsks) -> Response:
     return Response(jobs.finished(components, caller.group, id, KIND, "result").encode(), media_type="application/json")
@@ -126,7 +131,7 @@ def result(id: JobId, components: ThisService, caller: WhoAsks) -> Response:
 
 @router.get(
     "/{id}/report",
-    summary="Report as a page without scripts",
+    summary="Report as HTML without scripts",
     openapi_extra=guard("read"),
     response_class=Response,
     responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}, "description": "A page."}, **problems(404, 409, 422)},

@@ -1,4 +1,4 @@
-"""Machines, and what is known of their dynamics."""
+"""Machines and their identifications."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from api.components import Components, ThisService
-from api.conventions import BODY, After, Limit, MachineId, Repeat, expected, guard, page, problems, tagged, unchanged, utf8
+from api.conventions import BODY, After, Limit, MachineId, Repeat, expected, guard, in_use, page, problems, tagged, unchanged, utf8
 from api.lookups import identification_of, known_machine, machine_of
 from api.problems import Problem
 from api.schemas.common import Page
@@ -35,9 +35,7 @@ def make(body: NewMachine, components: ThisService, caller: WhoAsks, response: R
     try:
         kept = components.store.machines.add(machine, None if repeat is None else (repeat, digest))
     except Taken as taken:
-        what = str(taken)
-        found = body.name if what == "name" else str(repeat)
-        raise Problem(409, f"the {what} is in use", [{"field": what, "found": found, "allowed": f"a {what} of its own"}]) from None
+        raise in_use(taken, body.name, repeat) from None
     response.headers["Location"] = f"/v1/machines/{kept.id}"
     return _answer(components, kept)
 
@@ -56,7 +54,7 @@ def get(id: MachineId, components: ThisService, caller: WhoAsks) -> MachineAnswe
 @router.delete(
     "/{id}",
     status_code=204,
-    summary="Forget a machine, its identification and its campaigns",
+    summary="Delete a machine, its identification and its campaigns",
     openapi_extra=guard("upload"),
     responses=problems(404, 422),
 )
@@ -68,10 +66,10 @@ def forget(id: MachineId, components: ThisService, caller: WhoAsks) -> Response:
 
 @router.put(
     "/{id}/identification",
-    summary="Say how a machine vibrates: RESULT.json of `rcsa-ident identify`, or FLANGE.csv of a measured or decoupled flange",
-    description="If-Match or If-None-Match: * keep what somebody else has written meanwhile.",
+    summary="Write the dynamics of a machine: RESULT.json of `rcsa-ident identify`, or FLANGE.csv of a measured or decoupled flange",
+    description="If-Match or If-None-Match: * protect against overwriting concurrent changes.",
     openapi_extra=guard("upload", requestBody=_RESULT, **{"x-content-types": (JSON, CSV)}),
-    responses={201: {"model": IdentificationSummary, "description": "There was none before."}, **problems(404, 412, *BODY)},
+    responses={201: {"model": IdentificationSummary, "description": "The machine had none before."}, **problems(404, 412, *BODY)},
 )
 async def identify(id: MachineId, request: Request, response: Response, components: ThisService, caller: WhoAsks) -> IdentificationSummary:
     await run_in_threadpool(machine_of, components, caller.group, id)
@@ -86,19 +84,19 @@ async def identify(id: MachineId, request: Request, response: Response, componen
     try:
         response.status_code = 201 if await run_in_threadpool(write) else 200
     except Stale:
-        raise Problem(412, "the identification is not the one that the query expects") from None
+        raise Problem(412, "the stored identification does not match If-Match or If-None-Match") from None
     response.headers.update(tagged(document.digest))
     return _summary(document)
 
 
 @router.get(
     "/{id}/identification",
-    summary="RESULT.json or FLANGE.csv, as it was written",
+    summary="The dynamics of a machine: RESULT.json or FLANGE.csv, as written",
     openapi_extra=guard("read"),
     response_class=Response,
     responses={
-        200: {"model": Identification, "description": "To be used with the commands, too."},
-        304: {"description": "If-None-Match names it."},
+        200: {"model": Identification, "description": "For use with the commands, too."},
+        304: {"description": "The content matches If-None-Match."},
         **problems(404, 422),
     },
 )

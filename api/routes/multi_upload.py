@@ -1,4 +1,4 @@
-"""Several recordings in one body, as browsers send forms: each is kept, or refused, on its own."""
+"""Several recordings in one form: each is stored or refused on its own."""
 
 from __future__ import annotations
 
@@ -38,8 +38,7 @@ _FORM = {
 @router.post(
     "",
     summary="Upload several recordings",
-    description="Each file is a part, whose file name's last part is a name of the campaign. A file that is refused does not "
-    "hold up the others.",
+    description="Each file is a part of the form, whose file name is named by the campaign. A refused file does not affect the others.",
     openapi_extra=guard("upload", requestBody=_FORM, **{"x-content-types": (FORM,)}),
     responses=problems(404, 408, *BODY),
 )
@@ -72,10 +71,10 @@ async def post(id: CampaignId, request: Request, components: ThisService, caller
 
 
 async def _item(components: Components, campaign: Campaign, name: str, part: Part | None, replacing: bool) -> UploadItem:
-    """Keep one file, or say why not."""
+    """Store one file, or return the reason why not."""
     try:
         if part is None:
-            raise Problem(404, "the campaign names no such recording")
+            raise Problem(404, "the campaign does not name this recording")
         status, kept = await take(components, campaign, name, await complete(part), replacing)
         return UploadItem(name=name, status=status, recording=answer(campaign, kept), problem=None)
     except Problem as error:
@@ -83,6 +82,6 @@ async def _item(components: Components, campaign: Campaign, name: str, part: Par
     except InputError as error:
         problem = of_input(error)
     except Busy:
-        problem = Problem(503, "too many uploads wait to be read")
+        problem = Problem(503, "too many uploads are waiting to be read")
     faults = [Fault.model_validate(each) for each in problem.errors] or None
     return UploadItem(name=name[:200], status=problem.status, recording=None, problem=ItemProblem(detail=problem.detail, errors=faults))

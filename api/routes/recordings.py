@@ -1,4 +1,4 @@
-"""Recordings of a campaign: uploaded at once, in parts or several together; read, judged, drawn, and given back as they came."""
+"""Recordings of a campaign: upload in one request, description, spectrum, envelope, original file and deletion."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ from api.transfer.body_stream import (
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
 BINARY = "application/octet-stream"
 _NAME = r"^[^\x00-\x1f\x7f/\\]{1,128}$"
-RecordingName = Annotated[str, Path(pattern=_NAME, description="As the campaign names it.")]
-AfterName = Annotated[str, Query(pattern=r"^[^\x00-\x1f\x7f/\\]{0,128}$", description="`next` of the part before.")]
-Replace = Annotated[bool, Query(description="Take the place of another content under the name.")]
-Points = Annotated[int, Query(ge=10, le=10_000, description="At most so many.")]
+RecordingName = Annotated[str, Path(pattern=_NAME, description="Name of the recording in the campaign.")]
+AfterName = Annotated[str, Query(pattern=r"^[^\x00-\x1f\x7f/\\]{0,128}$", description="`next` of the previous page.")]
+Replace = Annotated[bool, Query(description="Replace a recording of this name that has other content.")]
+Points = Annotated[int, Query(ge=10, le=10_000, description="Largest number of points.")]
 _FILE = {"required": True, "content": {BINARY: {"schema": {"type": "string", "format": "binary"}}}}
 _DIGESTS = [
     {"name": name, "in": "header", "schema": {"type": "string"}, "description": "sha-256=:BASE64: of the file, checked (RFC 9530)."}
@@ -54,10 +54,10 @@ _STREAM = 1 << 20
 @router.put(
     "/{name}",
     summary="Upload a recording",
-    description="Any format of the commands; the suffix of the name says which. The answer comes when the file is on the disk, "
+    description="Any format of the commands, by the suffix of the name. The answer comes when the file is on the disk, "
     "read and judged. The same content again changes nothing.",
     openapi_extra=guard("upload", requestBody=_FILE, parameters=_DIGESTS, **{"x-content-types": (BINARY,)}),
-    responses={201: {"model": RecordingAnswer, "description": "It is kept."}, **problems(404, 408, 409, *BODY)},
+    responses={201: {"model": RecordingAnswer, "description": "The recording is stored."}, **problems(404, 408, 409, *BODY)},
 )
 async def put(
     id: CampaignId,
@@ -83,12 +83,12 @@ async def put(
 
 
 async def take(components: Components, campaign: Campaign, name: str, received: Received, replacing: bool) -> tuple[int, Recording]:
-    """Keep what has come, or say why not."""
+    """Store a received file, or raise a problem with the reason."""
     try:
         return await components.uploads.take(campaign, name, received, replacing)
     except Taken:
         fault = {"field": "name", "found": name[:120], "allowed": "the same content, or ?replace=true"}
-        raise Problem(409, "another content is there under this name", [fault]) from None
+        raise Problem(409, "a recording with other content exists under this name", [fault]) from None
     except KeyError:
         raise Problem(404, "there is no such campaign") from None
 
@@ -103,7 +103,7 @@ def list_recordings(
     return Page(items=[_answer(known[row.name], row) for row in rows], next=following)
 
 
-@router.get("/{name}", summary="What was found in a recording", openapi_extra=guard("read"), responses=problems(404, 422))
+@router.get("/{name}", summary="Description of a recording with its verdict", openapi_extra=guard("read"), responses=problems(404, 422))
 def get(id: CampaignId, name: RecordingName, response: Response, components: ThisService, caller: WhoAsks) -> RecordingAnswer:
     campaign, row = _kept(components, caller.group, id, name)
     response.headers.update(tagged(row.sha256))
@@ -112,12 +112,12 @@ def get(id: CampaignId, name: RecordingName, response: Response, components: Thi
 
 @router.get(
     "/{name}/file",
-    summary="The file as it came",
+    summary="The original file",
     openapi_extra=guard("read"),
     response_class=StreamingResponse,
     responses={
         200: {"description": "Its entity tag is its SHA-256.", "content": {BINARY: {"schema": {"type": "string", "format": "binary"}}}},
-        304: {"description": "If-None-Match names it."},
+        304: {"description": "The content matches If-None-Match."},
         **problems(404, 422),
     },
 )
@@ -125,7 +125,7 @@ def file(id: CampaignId, name: RecordingName, request: Request, components: This
     _, row = _kept(components, caller.group, id, name)
     if unchanged(request, row.sha256):
         return Response(status_code=304, headers=tagged(row.sha256))
-    # what comes from a client is never shown as a page
+    # a browser must never show an uploaded file as a page
     headers = {
         "Content-Disposition": "attachment",
         "Content-Length": str(row.size),
@@ -141,7 +141,7 @@ def _read(path: FilePath) -> Iterator[bytes]:
             yield block
 
 
-@router.get("/{name}/spectrum", summary="Amplitudes over frequency", openapi_extra=guard("read"), responses=problems(404, 422))
+@router.get("/{name}/spectrum", summary="Amplitude spectrum", openapi_extra=guard("read"), responses=problems(404, 422))
 async def spectrum(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks, points: Points = 2000) -> SpectrumAnswer:
     _, row = await run_in_threadpool(_kept, components, caller.group, id, name)
     path = components.files.path(caller.group, NORMALISED, row.normalised)
@@ -149,7 +149,7 @@ async def spectrum(id: CampaignId, name: RecordingName, components: ThisService,
     return SpectrumAnswer.model_validate(await components.work.run(reader_tasks.spectrum, path, speed, points))
 
 
-@router.get("/{name}/signal", summary="The outline over time", openapi_extra=guard("read"), responses=problems(404, 422))
+@router.get("/{name}/signal", summary="Envelope over time", openapi_extra=guard("read"), responses=problems(404, 422))
 async def signal(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks, points: Points = 1000) -> SignalAnswer:
     _, row = await run_in_threadpool(_kept, components, caller.group, id, name)
     path = components.files.path(caller.group, NORMALISED, row.normalised)
@@ -159,7 +159,7 @@ async def signal(id: CampaignId, name: RecordingName, components: ThisService, c
 @router.delete(
     "/{name}",
     status_code=204,
-    summary="Forget a recording, or what has come of one",
+    summary="Delete a recording or its unfinished upload",
     openapi_extra=guard("upload"),
     responses=problems(404, 422),
 )
@@ -179,7 +179,7 @@ def named(components: Components, group: str, id: str, name: str) -> tuple[Campa
     campaign = known_campaign(components, group, id)
     found = files_of(campaign.text).get(_form(name))
     if found is None:
-        raise Problem(404, "the campaign names no such recording")
+        raise Problem(404, "the campaign does not name this recording")
     return campaign, _form(name), found
 
 
@@ -189,7 +189,7 @@ def _kept(components: Components, group: str, id: str, name: str) -> tuple[Campa
 
 
 def answer(campaign: Campaign, row: Recording) -> RecordingAnswer:
-    """Return what is told of a recording."""
+    """Return the description of a recording."""
     return _answer(files_of(campaign.text)[row.name], row)
 
 

@@ -1,4 +1,4 @@
-"""Uploads in parts: what has come stays through lost connections and restarts, and the client goes on from there."""
+"""Resumable uploads: received bytes survive lost connections and restarts, and the client continues from there."""
 
 from __future__ import annotations
 
@@ -38,24 +38,26 @@ _DIGESTS = [
     {"name": name, "in": "header", "schema": {"type": "string"}, "description": f"sha-256=:BASE64: of {what}, checked (RFC 9530)."}
     for name, what in (("Repr-Digest", "the whole file"), ("Content-Digest", "this part"))
 ]
-_OFFSET: dict[str, Any] = {"Upload-Offset": {"description": "So many bytes are kept.", "schema": {"type": "string"}}}
-_LENGTH: dict[str, Any] = {"Upload-Length": {"description": "Of the whole file.", "schema": {"type": "string"}}}
-Offset = Annotated[int, Header(alias="Upload-Offset", ge=0, lt=10**15, description="Where this part begins.")]
-Length = Annotated[int | None, Header(alias="Upload-Length", ge=0, lt=10**15, description="Of the whole file; needed with the first part.")]
+_OFFSET: dict[str, Any] = {"Upload-Offset": {"description": "Number of bytes received.", "schema": {"type": "string"}}}
+_LENGTH: dict[str, Any] = {"Upload-Length": {"description": "Length of the whole file.", "schema": {"type": "string"}}}
+Offset = Annotated[int, Header(alias="Upload-Offset", ge=0, lt=10**15, description="Offset of this part.")]
+Length = Annotated[
+    int | None, Header(alias="Upload-Length", ge=0, lt=10**15, description="Length of the whole file; required with the first part.")
+]
 
 
 @router.head(
     "/{name}",
     status_code=204,
-    summary="How far an upload is",
+    summary="State of an upload",
     openapi_extra=guard("upload"),
-    responses={204: {"description": "So far.", "headers": _OFFSET | _LENGTH}, **problems(404, 422)},
+    responses={204: {"description": "The state of the upload.", "headers": _OFFSET | _LENGTH}, **problems(404, 422)},
 )
 def head(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks) -> Response:
     campaign, name, _ = named(components, caller.group, id, name)
     state = _state(components, campaign, name)
     if state is None:
-        raise Problem(404, "nothing has come of it")
+        raise Problem(404, "no part of this recording has been uploaded")
     return Response(
         status_code=204, headers={"Upload-Offset": str(state.offset), "Upload-Length": str(state.length), "Cache-Control": "no-store"}
     )
@@ -65,12 +67,12 @@ def head(id: CampaignId, name: RecordingName, components: ThisService, caller: W
     "/{name}",
     summary="Upload a part of a recording",
     response_model=RecordingAnswer,
-    description="Parts follow each other; HEAD tells where to go on. What has come is kept when the connection breaks, and through "
+    description="Parts follow each other; HEAD returns where to continue. Received bytes survive lost connections and "
     "restarts, for a day. The last part answers as an upload at once does.",
     openapi_extra=guard("upload", requestBody=_PART, parameters=_DIGESTS, **{"x-content-types": (BINARY,)}),
     responses={
-        201: {"model": RecordingAnswer, "description": "It is complete and kept."},
-        204: {"description": "The part is kept, more is to come.", "headers": _OFFSET},
+        201: {"model": RecordingAnswer, "description": "The upload is complete and stored."},
+        204: {"description": "The part is stored; more parts follow.", "headers": _OFFSET},
         **problems(404, 408, 409, *BODY),
     },
 )
@@ -90,8 +92,8 @@ async def patch(
     refuse_encoded(request)
     key = (campaign.id, name)
     if key in components.uploads.writing:
-        # perhaps the same client's, whose connection is not yet known to be lost
-        raise Problem(503, "another query is writing this recording", headers={"Retry-After": "2"})
+        # perhaps by the same client, whose lost connection has not been noticed yet
+        raise Problem(503, "another request is writing this recording", headers={"Retry-After": "2"})
     components.uploads.writing.add(key)
     try:
         with components.uploads.admitted():
@@ -105,7 +107,7 @@ async def patch(
                 check_digest(whole, received.sha256)
                 response.status_code, kept = await take(components, campaign, name, received, replace)
             except (InputError, Problem) as error:
-                # another content under the name may still be replaced by this one
+                # kept on a conflict: the client may still replace the other content
                 if not (isinstance(error, Problem) and error.status == 409):
                     await run_in_threadpool(components.files.forget, path)
                 raise
@@ -119,14 +121,14 @@ async def patch(
 
 
 def _state(components: Components, campaign: Campaign, name: str) -> Partial | None:
-    """How far an upload is; a recording that is kept is complete."""
+    """State of an upload; a stored recording is complete."""
     state = components.files.partial(campaign.group, partial_name(campaign.id, name))[1]
     row = None if state is not None else components.store.recordings.get(campaign.group, campaign.id, name)
     return state if row is None else Partial(row.size, row.size)
 
 
 async def _go_on(components: Components, campaign: Campaign, name: str, offset: int, length: int | None) -> Partial:
-    """Return where a part begins, if it begins where the parts before it end; offset 0 with another length begins anew."""
+    """Return the state of an upload if the part continues it; offset 0 with another length starts a new one."""
     path, state = await run_in_threadpool(components.files.partial, campaign.group, partial_name(campaign.id, name))
     if offset == 0 and (state is None or (length is not None and length != state.length)):
         if length is None:
@@ -139,18 +141,20 @@ async def _go_on(components: Components, campaign: Campaign, name: str, offset: 
         there = await run_in_threadpool(_state, components, campaign, name)
         found = 0 if there is None else there.offset
         fault = {"field": "Upload-Offset", "found": str(offset), "allowed": f"{found}, of {there.length if there else 'nothing'} bytes"}
-        raise Problem(409, f"the upload goes on at {found}", [fault], {"Upload-Offset": str(found)})
+        raise Problem(409, f"the upload continues at byte {found}", [fault], {"Upload-Offset": str(found)})
     return state
 
 
 async def _append(request: Request, components: Components, group: str, path: Path, state: Partial, content: str | None) -> Part:
-    """Write what comes behind the parts before, and note how far it is, also where it breaks off."""
+    """Append a part and record the state, also where the part breaks off."""
     part, digest = await run_in_threadpool(Part, path, state.offset), hashlib.sha256()
     noted = 0
     try:
         async for block in blocks(request, components):
             if part.size + len(block) > state.length:
-                raise InputError("body", "more than Upload-Length", f"at most {state.length - state.offset} bytes from {state.offset}")
+                raise InputError(
+                    "body", "more bytes than Upload-Length", f"at most {state.length - state.offset} bytes from {state.offset}"
+                )
             with storage_problems():
                 await write(components, group, part, block, part.size - state.offset + len(block))
             digest.update(block)
@@ -159,7 +163,7 @@ async def _append(request: Request, components: Components, group: str, path: Pa
                 await run_in_threadpool(_note, components, part, part.size, state.length)
         check_digest(content, digest.hexdigest(), "Content-Digest")
     except (Problem, InputError, HTTPException) as error:
-        # of a part whose digest would have to be checked only the whole counts
+        # a part with a digest counts only when it is complete
         kept = state.offset if content is not None or isinstance(error, InputError) else part.size
         await run_in_threadpool(_note, components, part, kept, state.length)
         part.close()

@@ -1,4 +1,4 @@
-"""Live forces over a WebSocket: samples in, forces out, and others who watch."""
+"""Live forces over a WebSocket: samples in, forces out, also to viewers."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ from api.streams.session import End, Session
 
 router = APIRouter(tags=["forces"], route_class=Guarded)
 log = logging.getLogger("rcsa_ident.service")
-#: Time for the first message [s].
+#: Time limit for the first message [s].
 HELLO = 10.0
-#: Bytes of a first message.
+#: Largest first message [characters].
 MOST_HELLO = 300_000
 
 
@@ -90,10 +90,10 @@ async def stream(websocket: WebSocket) -> None:
 
 
 async def _admit(websocket: HTTPConnection, components: Components) -> Caller | None:
-    """Return who asks, None where the first message is to tell; a page from elsewhere is not let in, whatever the browser would send."""
+    """Return the caller, None where the first message has the key; pages of other origins are refused, whatever the browser would send."""
     origin, host = websocket.headers.get("origin"), websocket.headers.get("host", "")
     if origin is not None and (urlsplit(origin).scheme not in ("http", "https") or urlsplit(origin).netloc.lower() != host.lower()):
-        raise Problem(403, "a page of another origin can not open a stream")
+        raise Problem(403, "a page of another origin cannot open a stream")
     where = websocket.client.host if websocket.client is not None else "nobody"
     _check_rate(components, f"open {where}")
     if components.settings.asks_for_keys and not websocket.headers.get(HEADER):
@@ -104,11 +104,11 @@ async def _admit(websocket: HTTPConnection, components: Components) -> Caller | 
 def _check_rate(components: Components, who: str) -> None:
     seconds = components.rates.wait(who)
     if seconds > 0.0:
-        raise Problem(429, "too many streams are opened", headers={"Retry-After": str(math.ceil(seconds))})
+        raise Problem(429, "streams are opened too often", headers={"Retry-After": str(math.ceil(seconds))})
 
 
 async def _serve(websocket: WebSocket, components: Components, caller: Caller | None, id: str) -> End:
-    """Read the first message, do what it says, and return how it ended."""
+    """Read the first message, serve the stream, and return its end."""
     raw = await _hello(websocket)
     data = object_of(raw)
     kind: type[Hello] = WatchHello if "watch" in data else ReplayHello if "replay" in data else StreamHello
@@ -118,7 +118,7 @@ async def _serve(websocket: WebSocket, components: Components, caller: Caller | 
     _check_rate(components, caller.id)
     scope = "read" if isinstance(hello, WatchHello) and not caller.may("run") else "run"
     if not caller.may(scope):
-        raise Problem(403, f"the key has not the scope {scope}")
+        raise Problem(403, f"the API key does not have the scope {scope}")
     log.info("stream", extra={"fields": {"request_id": id, "kind": kind.__name__, "key": caller.id, "group": caller.group}})
     hub = components.streams
     if isinstance(hello, WatchHello):
@@ -139,7 +139,7 @@ async def _serve(websocket: WebSocket, components: Components, caller: Caller | 
         hub.close(session, End())
         raise
     except BaseException as error:
-        hub.close(session, end_of(error) if isinstance(error, Exception) else End(1001, 503, "the service ends"))
+        hub.close(session, end_of(error) if isinstance(error, Exception) else End(1001, 503, "the service is shutting down"))
         raise
 
 
@@ -147,7 +147,7 @@ async def _hello(websocket: WebSocket) -> str:
     try:
         message = await asyncio.wait_for(websocket.receive(), HELLO)
     except TimeoutError:
-        raise Problem(408, f"no first message in {HELLO:g} s") from None
+        raise Problem(408, f"no first message within {HELLO:g} s") from None
     if message["type"] == "websocket.disconnect":
         raise WebSocketDisconnect(message.get("code", 1006))
     text = message.get("text")
@@ -159,7 +159,7 @@ async def _hello(websocket: WebSocket) -> str:
 
 
 async def _farewell(websocket: WebSocket, end: End, id: str) -> None:
-    """Tell why, and close."""
+    """Send the reason and close the WebSocket."""
     if websocket.client_state is WebSocketState.DISCONNECTED or websocket.application_state is WebSocketState.DISCONNECTED:
         return
     if end.status:

@@ -1,4 +1,4 @@
-"""Campaigns, as in campaign.toml, and the recordings that are uploaded for them."""
+"""Campaigns as in campaign.toml, and their recordings."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class HeadKeys(Body):
     """[campaign]"""
 
     name: Line | None = None
-    sampling_rate_hz: float | None = Field(None, description="For files that carry none.")
+    sampling_rate_hz: float | None = Field(None, description="For files without a sampling rate.")
 
 
 class SensorKeys(Body):
@@ -106,8 +106,8 @@ class CutKeys(Body):
     entry_angle_deg: float
     exit_angle_deg: float
     feed_direction: str | float = Field(description="+X, -X, +Y, -Y, or an angle from +X in degrees.")
-    cut: FileName = Field(description="The recording; of a path the last part counts, and its suffix says the format.")
-    air: FileName | None = Field(None, description="The same speed without cutting; may serve several cuts.")
+    cut: FileName = Field(description="Recording of the cut; only the last part of a path counts, and its suffix is the format.")
+    air: FileName | None = Field(None, description="Recording at the same speed without cutting; may serve several cuts.")
 
 
 class NewCampaign(Body):
@@ -130,9 +130,9 @@ class VerdictAnswer(Answer):
     """Whether a recording is used."""
 
     usable: bool
-    reasons: list[str] = Field(description="Why it is not.")
-    notes: list[str] = Field(description="What one should know though it is.")
-    spindle_speed_rpm: float | None = Field(description="From the record, of a usable cut.")
+    reasons: list[str] = Field(description="Why the recording is not usable.")
+    notes: list[str] = Field(description="Remarks on a usable recording.")
+    spindle_speed_rpm: float | None = Field(description="Measured speed of a usable cut.")
     lines: int = Field(description="Points of the cross FRF, all axes together.")
     signal_to_noise_db: dict[str, float] = Field(description="Median over the lines, for each axis.")
 
@@ -157,7 +157,7 @@ class CutAnswer(Answer):
     feed_direction: str | float
     cut: FileState
     air: FileState | None
-    verdict: VerdictAnswer | None = Field(description="With what is there so far; null until the cut's recording is.")
+    verdict: VerdictAnswer | None = Field(description="With the recordings uploaded so far; null without the cut's recording.")
 
 
 class CampaignAnswer(Answer):
@@ -171,59 +171,59 @@ class CampaignAnswer(Answer):
     sensors: dict[str, dict[str, Any]]
     workpiece: dict[str, Any]
     toolings: list[str]
-    usable: int = Field(description="Cuts that an identification would use.")
+    usable: int = Field(description="Number of cuts that an identification would use.")
     cuts: list[CutAnswer]
 
 
 class CampaignSummary(Answer):
-    """A campaign in short."""
+    """Summary of a campaign."""
 
     id: str
     machine: str
     name: str
     created: str
     cuts: int
-    uploaded: int = Field(description="Cuts whose recording is there.")
+    uploaded: int = Field(description="Number of cuts with a recording.")
     usable: int
 
 
 class RecordingAnswer(Answer):
-    """An uploaded recording, and what was found in it."""
+    """An uploaded recording and its description."""
 
     name: str
     role: Literal["cut", "air"]
     cuts: list[str]
     size_bytes: int
-    sha256: str = Field(description="Of the file as it came.")
+    sha256: str = Field(description="SHA-256 of the original file.")
     sampling_rate_hz: float
     duration_s: float
     channels: list[str]
-    spindle_speed_rpm: float | None = Field(description="As the record itself tells.")
+    spindle_speed_rpm: float | None = Field(description="Measured speed.")
     harmonics_above_noise: dict[str, int] = Field(
-        description="For each axis: multiples of the tooth-passing frequency, of an air cut of the spindle's, that stand above the noise."
+        description="Number of harmonics above the noise for each axis: of the tooth-passing frequency, of an air cut of the spindle's."
     )
     verdict: VerdictAnswer
     created: str
 
 
 class ItemProblem(Answer):
-    """Why a part of an upload was not kept."""
+    """Why a file of an upload was not stored."""
 
     detail: str
     errors: list[Fault] | None
 
 
 class UploadItem(Answer):
-    """One file of an upload of several."""
+    """One file of a common upload."""
 
     name: str
-    status: int = Field(description="201 kept, 200 was there already, or the status that the same upload alone would have met.")
+    status: int = Field(description="201 where it is stored, 200 where it existed already, or the status of the same upload on its own.")
     recording: RecordingAnswer | None
     problem: ItemProblem | None
 
 
 class UploadAnswer(Answer):
-    """What has become of each file."""
+    """Outcome of each file."""
 
     items: list[UploadItem]
 
@@ -240,11 +240,11 @@ class SpectrumAnswer(Answer):
 
     frequency_hz: list[float]
     channels: dict[str, ChannelSpectrum]
-    harmonics_hz: list[float] = Field(description="Multiples of the spindle's frequency.")
+    harmonics_hz: list[float] = Field(description="Harmonics of the spindle frequency.")
 
 
 class ChannelOutline(Answer):
-    """Extremes of a channel; null where all samples of a stretch were lost."""
+    """Minima and maxima of a channel; null where all samples of an interval were lost."""
 
     unit: str
     low: list[float | None]
@@ -252,7 +252,7 @@ class ChannelOutline(Answer):
 
 
 class SignalAnswer(Answer):
-    """A recording's outline over time."""
+    """Envelope of a recording over time."""
 
     time_s: list[float]
     channels: dict[str, ChannelOutline]

@@ -18,30 +18,30 @@ from rcsa_ident.io.setups import FEED_DIRECTIONS
 from rcsa_ident.units import from_rpm
 
 MOST_CHANNELS = 32
-#: Rates that a stream may have [Hz]; a file's own may be higher.
+#: Sampling rates of a stream [Hz]; those of a file may be higher.
 LEAST_RATE, MOST_RATE = 1000.0, 500_000.0
 Rate = Annotated[float, Field(ge=LEAST_RATE, le=10_000_000.0)]
-Speed = Annotated[float | None, Field(ge=100.0, le=200_000.0, description="As programmed, to 1 %; null: from the trigger.")]
+Speed = Annotated[float | None, Field(ge=100.0, le=200_000.0, description="Programmed speed, accurate to 1 %; null: from the trigger.")]
 Method = Literal["resonators", "paper"]
-#: Last part of a path, as campaigns name their recordings; no control characters.
+#: Name of a recording in its campaign: the last part of a path, without control characters.
 FileName = Annotated[str, StringConstraints(min_length=1, max_length=255, pattern=r"^[^\x00-\x1f\x7f/\\]+$")]
 Axis = Literal["X", "Y"]
 
 
 Sensors = Annotated[
     dict[Line, SensorKeys] | None,
-    Field(min_length=1, max_length=MOST_CHANNELS, description="By channel; null: those of the machine's identification."),
+    Field(min_length=1, max_length=MOST_CHANNELS, description="Sensors by channel; null: those of the machine's identification."),
 ]
 
 
 class WornCut(Body):
-    """The cut whose cutting coefficients are asked, revolution by revolution."""
+    """The cut whose cutting coefficients are estimated revolution by revolution."""
 
     axial_depth_mm: Depth
     feed_per_tooth_mm: Annotated[float, Field(gt=0.0, le=10.0)]
     immersion: Annotated[float, Field(ge=0.001, le=1.0)] = 0.5
     strategy: Literal["up", "down"] = "down"
-    entry_deg: Annotated[Angle | None, Field(description="With exit_deg in place of immersion.")] = None
+    entry_deg: Annotated[Angle | None, Field(description="Together with exit_deg, instead of immersion.")] = None
     exit_deg: Angle | None = None
     feed_direction: Literal["+X", "-X", "+Y", "-Y"] | Turn = "+X"
 
@@ -60,14 +60,21 @@ class WornCut(Body):
 
 
 class ForceKeys(Body):
-    """What both forms of the query share."""
+    """Keys of both forms of the query."""
 
     machine: Id
     spindle_speed_rpm: Speed = None
-    method: Annotated[Method, Field(description="Oscillators at the spindle's orders, or the paper's random walk.")] = "resonators"
-    smooth: Annotated[bool, Field(description="Each sample given the whole record, instead of as it would be live.")] = False
+    method: Annotated[
+        Method,
+        Field(
+            description="Force model of the Kalman filter: resonators at the spindle harmonics, or the random walk of the published method."
+        ),
+    ] = "resonators"
+    smooth: Annotated[bool, Field(description="Smoothed estimate from the whole record, instead of the filtered one of a live stream.")] = (
+        False
+    )
     idle_percent: Annotated[
-        Percent | None, Field(gt=0.0, description="Share of the time in which no tooth cuts, at least: it gives the mean force away.")
+        Percent | None, Field(gt=0.0, description="Least share of the time in which no tooth cuts, from which the mean force is estimated.")
     ] = None
     cut: Annotated[WornCut | None, Field(description="For cutting coefficients over time.")] = None
 
@@ -79,7 +86,7 @@ class ForceKeys(Body):
 
 
 class ForceUpload(ForceKeys):
-    """Beside a file: the part `query` of a form."""
+    """Query for an uploaded file: the part `query` of a form."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"machine": "m1", "tooling": EXAMPLE, "spindle_speed_rpm": 12000.0, "smooth": True}]}
@@ -87,7 +94,7 @@ class ForceUpload(ForceKeys):
 
     tooling: Tooling
     sensors: Sensors = None
-    sampling_rate_hz: Annotated[Rate | None, Field(description="Of a recording that carries none.")] = None
+    sampling_rate_hz: Annotated[Rate | None, Field(description="For a recording without a sampling rate.")] = None
 
 
 class ForceQuery(ForceKeys):
@@ -97,24 +104,24 @@ class ForceQuery(ForceKeys):
 
     campaign: Id
     recording: FileName
-    tooling: Annotated[Tooling | None, Field(description="null: the cut's own.")] = None
+    tooling: Annotated[Tooling | None, Field(description="null: the tooling of the cut.")] = None
 
 
 class AxisForces(Answer):
     """Forces along an axis [N]."""
 
     std_n: float = Field(description="Standard deviation of a sample of the estimate.")
-    mean_n: float | None = Field(description="null: the sensors do not show it.")
-    rms_n: float = Field(description="Without the mean.")
+    mean_n: float | None = Field(description="Mean force; null where the sensors do not show it.")
+    rms_n: float = Field(description="Root mean square without the mean.")
     peak_n: float
-    low: list[float] = Field(description="Lowest of each bucket.")
+    low: list[float] = Field(description="Minimum of each bucket.")
     high: list[float]
 
 
 class Harmonic(Answer):
-    """A line of the force."""
+    """A harmonic of the force."""
 
-    order: int = Field(description="Multiple of the spindle's frequency.")
+    order: int = Field(description="Order of the harmonic of the spindle frequency.")
     frequency_hz: float
     amplitude_n: float
 
@@ -133,25 +140,25 @@ class Wear(Answer):
     """Cutting coefficients."""
 
     coefficients: dict[str, Coefficient]
-    separable: bool = Field(description="Whether the harmonics in the band tell them from each other.")
+    separable: bool = Field(description="Whether the harmonics in the band separate the coefficients.")
     misfit: float
 
 
 class ForceAnswer(Answer):
-    """Forces of a recording, as a picture of at most 2000 buckets; every sample with Accept: text/csv."""
+    """Forces of a recording as an envelope of at most 2000 buckets; every sample with Accept: text/csv."""
 
     spindle_speed_rpm: float
     sampling_rate_hz: float
     band_hz: list[float]
     notes: list[str]
     axes: dict[str, AxisForces]
-    time_s: list[float] = Field(description="Of each bucket's first sample.")
+    time_s: list[float] = Field(description="Time of each bucket's first sample.")
     harmonics: dict[str, list[Harmonic]]
     wear: Wear | None
 
 
 class StreamSummary(Answer):
-    """A stream that is open."""
+    """An open stream."""
 
     session: str
     name: str
@@ -180,13 +187,13 @@ class AirCut(Body):
 
 
 class Replay(AirCut):
-    """An uploaded recording, played."""
+    """Replay of an uploaded recording."""
 
-    rate: Annotated[float, Field(ge=0.1, le=100.0, description="So many times as fast as it was recorded.")] = 1.0
+    rate: Annotated[float, Field(ge=0.1, le=100.0, description="Replay speed as a multiple of the recorded one.")] = 1.0
 
 
 class Hello(Body):
-    """The first message of every stream: what it brings, or what it wants to see."""
+    """Keys of the first message of every stream."""
 
     key: Annotated[str, StringConstraints(max_length=300)] | None = None
     format: Literal["float32", "json"] = "float32"
@@ -194,7 +201,7 @@ class Hello(Body):
 
 
 class StreamHello(Hello):
-    """A data logger."""
+    """First message of a data logger."""
 
     machine: Id
     tooling: Tooling
@@ -211,7 +218,7 @@ class StreamHello(Hello):
 
 
 class ReplayHello(Hello):
-    """A recording in the place of a data logger."""
+    """First message of a replay."""
 
     replay: Replay
     machine: Id | None = None
@@ -221,6 +228,6 @@ class ReplayHello(Hello):
 
 
 class WatchHello(Hello):
-    """A viewer of another client's stream."""
+    """First message of a viewer of another client's stream."""
 
     watch: Id

@@ -149,7 +149,10 @@ class Milled(Body):
     cut: Cut = Field(default_factory=Cut)
     speeds: Speeds = Field(default_factory=Speeds)
     max_depth_mm: Depth = 10.0
-    method: Annotated[MethodName, Field(description="Methods other than zero-order answer for few speeds only.")] = MethodName.ZERO_ORDER
+    # not strict: JSON has no names of its own, only their text
+    method: Annotated[MethodName, Field(strict=False, description="Methods other than zero-order answer for few speeds only.")] = (
+        MethodName.ZERO_ORDER
+    )
     bands: bool = True
     stiffness_spread_percent: Spread = 0.05
 

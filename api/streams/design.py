@@ -1,4 +1,4 @@
-"""The observer of a stream, made by a worker from the stream's first second, or from the recording that is replayed."""
+"""Design of a stream's observer in a worker, from the first second of the stream or from the replayed recording."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rcsa_ident.units import to_hz, to_rpm
 
 @dataclass(frozen=True, slots=True)
 class StreamQuestion:
-    """What a stream brings.
+    """Properties of a stream.
 
     Parameters
     ----------
@@ -30,9 +30,9 @@ class StreamQuestion:
     sensors : tuple of Sensor
         Of the channels, in their order.
     axes : tuple of str
-        In the order of the answer's columns.
+        In the order of the columns of the forces.
     begins : str
-        air: the spindle turns in air at first, which shows its run-out; cut: it does not.
+        air: the spindle first turns in air, which shows its run-out; cut: the stream begins in the cut.
     method : str
     """
 
@@ -47,14 +47,14 @@ class StreamQuestion:
 def design(
     machine: MachineText, tooling: ToolingSource, question: StreamQuestion, first: int, raw: bytes, air: ReadPair | None
 ) -> tuple[bytes, dict[str, Any]]:
-    """Return the plan of a stream, pickled for the process of the streams, and what its client is told.
+    """Return the pickled plan of a stream for the stream process, and the content of the client's event `ready`.
 
     Parameters
     ----------
     first : int
         Index of the first sample.
     raw : bytes
-        float64[samples, channels], as they came.
+        float64[samples, channels], as received.
     air : callable or None
         Reads an uploaded air cut.
     """
@@ -65,7 +65,7 @@ def design(
 
 
 def design_replay(machine: MachineText, tooling: ToolingSource, question: StreamQuestion, source: ReadPair) -> tuple[bytes, dict[str, Any]]:
-    """Return the same for a recording: its forces are those of the recording as a whole, to the last digit.
+    """Return the same for a recording, whose streamed forces equal those of the whole recording to the last digit.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def _planned(
     kinds = [(sensor.quantity, None if sensor.axis is None else sensor.axis.upper()) for sensor in question.sensors]
 
     def column(quantity: Quantity, axis: str) -> Column | None:
-        # a replay's samples are in SI already
+        # the samples of a replay are already in SI
         place = next((i for i, kind in enumerate(kinds) if kind == (quantity, axis)), None)
         return None if place is None else Column(place, question.sensors[place].sensitivity if follow else 1.0)
 

@@ -1,4 +1,4 @@
-"""The process of the streams: spawned, at the priority of the service, warm before it is asked."""
+"""The stream process: spawned, at the priority of the service, with its kernels compiled before the first session."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ AT_ONCE, FAREWELL = 4, 5.0
 
 
 class Host(Protocol):
-    """Where sessions are computed."""
+    """Where the observers of sessions run."""
 
     async def start(self, deliver: Callable[[Message], None], anew: Callable[[], None]) -> None:
-        """Begin; `deliver` takes every answer, `anew` is called where all sessions have been lost and must be opened again."""
+        """Start; `deliver` takes every answer, `anew` is called after a restart, when all sessions must be opened again."""
 
     def post(self, message: Message) -> None:
         """Send a message."""
@@ -31,11 +31,11 @@ class Host(Protocol):
 
     @property
     def ready(self) -> bool:
-        """Whether it answers."""
+        """Whether the process answers."""
 
 
 class StreamProcess:
-    """A spawned process behind a pair of sockets; where it dies it is started again."""
+    """A spawned process behind a socket pair, restarted when it dies."""
 
     def __init__(self) -> None:
         self.process: Child | None = None
@@ -86,7 +86,7 @@ class StreamProcess:
             with contextlib.suppress(asyncio.CancelledError):
                 await self.task
         if self.writer is not None:
-            # its end of the connection is where the process learns of it
+            # the process ends at the end of its input
             self.writer.close()
             self.writer = None
         if self.process is not None:
@@ -102,7 +102,7 @@ async def _received(reader: asyncio.StreamReader) -> Message:
 def serve(connection: socket.socket) -> None:
     """Answer messages until the service closes its end."""
     with contextlib.suppress(OSError), open("/proc/self/comm", "w") as name:
-        # what a list of processes calls it
+        # its name in `ps` and `top`
         name.write("rcsa-streams")
     from rcsa_ident.workflows.compile_kernels import STEPS
 

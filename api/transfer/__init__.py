@@ -1,1 +1,1 @@
-"""Bodies on their way in and out: streamed to the disk, taken apart into parts, packed into archives."""
+"""Transfer of bodies: streamed to the disk, split into parts, packed into archives."""

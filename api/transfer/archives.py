@@ -1,4 +1,4 @@
-"""ZIP archives that are sent while they are made: measured signals hardly shrink, so nothing is packed."""
+"""ZIP archives, sent while they are made; stored without compression, since measured signals hardly shrink."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 _BLOCK = 1 << 20
-#: For each member a header with room for long files, what says how long it was, and an entry in the list; the list's end.
+#: Bytes per member (local header, ZIP64 extra, data descriptor, directory entry) and of the end of the directory.
 _PER_MEMBER, _END = 30 + 20 + 24 + 46, 22
 
 
 def zipped(members: Iterable[tuple[str, bytes | Path]]) -> Iterator[bytes]:
-    """Yield an archive of files, by their names in it."""
+    """Yield an archive of files under the given names."""
     sink = _Sink()
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_STORED) as archive:  # type: ignore[call-overload]
         for name, content in members:
@@ -27,12 +27,12 @@ def zipped(members: Iterable[tuple[str, bytes | Path]]) -> Iterator[bytes]:
 
 
 def zipped_bytes(members: Sequence[tuple[str, Path]]) -> int:
-    """Return how long the archive of these files is."""
+    """Return the size of the archive of these files [bytes]."""
     return sum(path.stat().st_size + _PER_MEMBER + 2 * len(name.encode()) for name, path in members) + _END
 
 
 class _Sink:
-    """Takes what an archive is made of until somebody fetches it."""
+    """Write-only file that collects the bytes of an archive until they are taken."""
 
     def __init__(self) -> None:
         self.parts: list[bytes] = []
@@ -42,9 +42,9 @@ class _Sink:
         return len(data)
 
     def flush(self) -> None:
-        """Nothing waits."""
+        """Do nothing: there is no buffer."""
 
     def taken(self) -> bytes:
-        """Return what has come since."""
+        """Return the bytes written since the last call."""
         found, self.parts = b"".join(self.parts), []
         return found

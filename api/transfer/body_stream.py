@@ -1,4 +1,4 @@
-"""Bodies that are files: streamed to the disk in blocks, counted, hashed, and given up where they are too large or too slow."""
+"""Bodies that are files: streamed to the disk in blocks, counted, hashed, and refused where they are too large or too slow."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from api.files import Full, Part, TooLarge
 from api.problems import Problem
 from api.reading.uploads import Received
 
-#: Of a write, and of what is written between two looks at the free space.
+#: Size of a block, and amount written between two checks of the free space [bytes].
 BLOCK, LOOK = 1 << 20, 64 << 20
 _DIGEST = re.compile(r"(?:^|,)\s*sha-256=:([A-Za-z0-9+/=]*):")
 
 
 async def blocks(request: Request, components: Components) -> AsyncIterator[bytearray]:
-    """Yield the body in blocks; what arrives too slowly, or not at all, ends it.
+    """Yield the body in blocks, within the time limits of uploads.
 
     Raises
     ------
     Problem
-        408 where the client is too slow, 400 where it has gone.
+        408 where the client is too slow, 400 where it has disconnected.
     HTTPException
         413 where the body is larger than an upload may be.
     """
@@ -44,17 +44,17 @@ async def blocks(request: Request, components: Components) -> AsyncIterator[byte
             async with asyncio.timeout(settings.upload_idle_seconds):
                 chunk = await anext(stream, b"")
         except TimeoutError:
-            raise Problem(408, f"nothing has come for {settings.upload_idle_seconds:g} s") from None
+            raise Problem(408, f"no data has arrived for {settings.upload_idle_seconds:g} s") from None
         except ClientDisconnect:
             if buffer:
                 yield buffer
-            raise Problem(400, "the client has gone") from None
+            raise Problem(400, "the client has disconnected") from None
         if not chunk:
             break
-        # the time that writing takes is not the client's
+        # the time spent writing does not count
         waited, seen = waited + time.monotonic() - start, seen + len(chunk)
         if waited > settings.upload_seconds or seen < (waited - settings.upload_idle_seconds) * settings.upload_bytes_per_second:
-            raise Problem(408, f"{seen} bytes have come in {waited:.0f} s, which is too slow")
+            raise Problem(408, f"the upload is too slow: {seen} bytes in {waited:.0f} s")
         buffer += chunk
         if len(buffer) >= BLOCK:
             yield buffer
@@ -64,7 +64,7 @@ async def blocks(request: Request, components: Components) -> AsyncIterator[byte
 
 
 async def append(request: Request, components: Components, group: str, part: Part) -> None:
-    """Write a body behind a part; the disk keeps what it has to keep."""
+    """Append a body to a part, within quota and free space."""
     seen = 0
     async for block in blocks(request, components):
         seen += len(block)
@@ -72,7 +72,7 @@ async def append(request: Request, components: Components, group: str, part: Par
 
 
 async def write(components: Components, group: str, part: Part, block: bytes | bytearray, seen: int) -> None:
-    """Write a block, `seen` being the bytes of this request so far."""
+    """Write a block; `seen` counts the bytes of this request so far."""
     with storage_problems():
         if seen // LOOK != (seen - len(block)) // LOOK:
             await run_in_threadpool(components.files.check_space, group)
@@ -80,7 +80,7 @@ async def write(components: Components, group: str, part: Part, block: bytes | b
 
 
 async def check_room(components: Components, group: str, announced: int) -> None:
-    """Refuse an upload of so many bytes that has no place."""
+    """Refuse an upload whose announced size exceeds the limits."""
     if announced > components.settings.max_upload_bytes:
         raise Problem(413, f"the body is too large: at most {components.settings.max_upload_bytes} bytes")
     with storage_problems():
@@ -89,13 +89,13 @@ async def check_room(components: Components, group: str, announced: int) -> None
 
 @contextmanager
 def storage_problems() -> Iterator[None]:
-    """Tell in words that there is no more room."""
+    """Turn exhausted quota or disk space into problems."""
     try:
         yield
     except TooLarge as error:
         raise Problem(413, str(error)) from None
     except Full:
-        raise Problem(503, "the disk has to keep the little space that it has left", headers={"Retry-After": "600"}) from None
+        raise Problem(503, "the disk has too little free space left", headers={"Retry-After": "600"}) from None
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
@@ -104,7 +104,7 @@ def storage_problems() -> Iterator[None]:
 
 @asynccontextmanager
 async def new_part(components: Components, group: str) -> AsyncIterator[Part]:
-    """A new part, which is gone afterwards unless it has become something else."""
+    """A new part, removed at the end unless it has been renamed."""
     with storage_problems():
         part = await run_in_threadpool(components.files.part, group)
     try:
@@ -114,7 +114,7 @@ async def new_part(components: Components, group: str) -> AsyncIterator[Part]:
 
 
 async def complete(part: Part) -> Received:
-    """Return a part that is written to its end: on the disk, with its hash."""
+    """Return a complete part, synced to the disk, with its hash."""
 
     def finish() -> Received:
         part.sync()
@@ -125,20 +125,20 @@ async def complete(part: Part) -> Received:
 
 
 def refuse_encoded(request: Request) -> None:
-    """Refuse what would have to be unpacked."""
+    """Refuse a body with a content encoding."""
     coding = request.headers.get("content-encoding", "identity").strip().lower()
     if coding not in ("", "identity"):
         raise Problem(415, f"found content encoding {coding[:80]}, allowed is none: send the file as it is")
 
 
 def announced_length(request: Request) -> int:
-    """Return the length that a request tells, 0 where it does not."""
+    """Return the Content-Length of a request, 0 where it has none."""
     text = request.headers.get("content-length", "")
     return int(text[:20]) if text.isdecimal() and text.isascii() else 0
 
 
 def announced_digest(request: Request, *headers: str) -> str | None:
-    """Return the SHA-256, hexadecimal, that one of the headers tells (RFC 9530); other hashes are left alone."""
+    """Return the hexadecimal SHA-256 of one of the headers (RFC 9530); other hashes are ignored."""
     for header in headers:
         text = request.headers.get(header, "")
         found = _DIGEST.search(text)
@@ -157,11 +157,11 @@ def announced_digest(request: Request, *headers: str) -> str | None:
 
 def _digest_fault(header: str, text: str) -> Problem:
     fault = {"field": header, "found": text[:120], "allowed": "sha-256=:BASE64:, of 32 bytes"}
-    return Problem(422, f"{header} is not understood", [fault])
+    return Problem(422, f"{header} cannot be parsed", [fault])
 
 
 def check_digest(announced: str | None, found: str, header: str = "Repr-Digest") -> None:
-    """Refuse a content that is not the one that was told of."""
+    """Refuse content that does not match the announced digest."""
     if announced is not None and announced != found:
         fault = {"field": header, "found": f"content with the SHA-256 {found}", "allowed": announced}
-        raise Problem(422, "the content is not the one that the digest tells: it was damaged on its way", [fault])
+        raise Problem(422, "the content does not match the digest: it was damaged in transit", [fault])

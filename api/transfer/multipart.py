@@ -1,4 +1,4 @@
-"""Bodies of several parts (multipart/form-data), taken apart while they come: no part of a file stays in memory."""
+"""Parser of multipart/form-data that works on the stream: files never stay in memory."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ MOST_PARTS, LARGEST_TEXT = 1000, 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """What a part says of itself.
+    """Header of a part.
 
     Parameters
     ----------
     field : str
     name : str or None
-        The last part of the file's name, None where the part is no file.
+        Last part of the file name; None where the part is not a file.
     """
 
     field: str
@@ -37,12 +37,12 @@ class Head:
 
 
 async def events(request: Request, components: Components) -> AsyncIterator[Head | bytes | None]:
-    """Yield of each part its head, its content in pieces, and None at its end.
+    """Yield the head of each part, its content in pieces, and None at its end.
 
     Raises
     ------
     Problem
-        400 for a body that is no form, 408 and 413 as `blocks`.
+        400 where the body is not a complete form, 408 and 413 as from `blocks`.
     """
     options = parse_options_header(request.headers.get("content-type", ""))[1]
     found: list[Head | bytes | None] = []
@@ -88,10 +88,10 @@ async def events(request: Request, components: Components) -> AsyncIterator[Head
             found.clear()
         parser.finalize()
         if not whole:
-            # the last part may be cut off, which the parser does not mind
+            # the parser accepts a truncated last part
             raise FormParserError
     except FormParserError:
-        raise Problem(400, "the body can not be read: it is no complete multipart/form-data") from None
+        raise Problem(400, "the body cannot be read: it is not complete multipart/form-data") from None
 
 
 def _head(heads: dict[bytes, bytes]) -> Head:
@@ -105,12 +105,12 @@ def _head(heads: dict[bytes, bytes]) -> Head:
 async def form(
     request: Request, components: Components, group: str, texts: Collection[str], files: Collection[str]
 ) -> AsyncIterator[tuple[dict[str, bytes], dict[str, tuple[str, Received]]]]:
-    """The named texts and files of a form; files, by name and content, are on the disk until the end of the block.
+    """Texts and files of a form by field; files are on the disk until the end of the context.
 
     Raises
     ------
     Problem
-        422 for a part of another name, one that comes twice, and a text that is too long.
+        422 for an unknown or repeated field, 413 for a text that is too long.
     """
     found: dict[str, bytes] = {}
     received: dict[str, tuple[str, Received]] = {}

@@ -1,4 +1,4 @@
-"""What a worker answers of forces: those of a recording, and the observer that a stream begins with."""
+"""Tasks about forces: those of a recording, and the observer of a stream."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rcsa_ident.machine.machine import Machine
 from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.units import to_hz, to_rpm
 
-#: Buckets of an answer's picture, and samples that one answer may take.
+#: Buckets of an answer's envelope, and most samples of one answer.
 BUCKETS, MOST_SAMPLES = 2000, 8_000_000
 
 ReadPair = Callable[[], tuple[Recording, Recording | None]]
@@ -27,7 +27,7 @@ ReadPair = Callable[[], tuple[Recording, Recording | None]]
 
 @dataclass(frozen=True, slots=True)
 class WornQuestion:
-    """Of which cut the cutting coefficients are asked, revolution by revolution: depth and feed [m], angles [rad]."""
+    """Cut whose cutting coefficients are estimated revolution by revolution: depth and feed [m], angles [rad]."""
 
     axial_depth: float
     feed_per_tooth: float
@@ -37,7 +37,7 @@ class WornQuestion:
 
 @dataclass(frozen=True, slots=True)
 class ForceQuestion:
-    """Forces of a recording.
+    """Query for the forces of a recording.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class ForceQuestion:
         resonators or paper.
     smooth : bool
     idle : float or None
-        Share of the time in which no tooth cuts, at least.
+        Least share of the time in which no tooth cuts.
     wear : WornQuestion or None
     """
 
@@ -59,7 +59,7 @@ class ForceQuestion:
 
 
 def sensors_of(text: str) -> tuple[Sensor, ...]:
-    """Return the sensors that a RESULT.json remembers."""
+    """Return the sensors of a RESULT.json."""
     import json
 
     from rcsa_ident.io.forces import sensors_of_result
@@ -130,7 +130,7 @@ def forces(machine: MachineText, tooling: ToolingSource, question: ForceQuestion
 def observed(
     machine: Machine, tool: Any, cut: Recording, air: Recording | None, speed: float | None, method: str, smooth: bool = False
 ) -> Any:
-    """Return a `MonitoredCut`."""
+    """Return the estimated forces of a cut, a `MonitoredCut`."""
     from rcsa_ident.observer.tuning import PaperWalk, Resonators
     from rcsa_ident.workflows.estimate_forces import observe
 
@@ -144,7 +144,7 @@ def observed(
 
 
 def _harmonics(force: Any, rate: float, speed: float, band: tuple[float, float]) -> list[dict[str, Any]]:
-    """Amplitudes at the spindle's orders in the band."""
+    """Amplitudes at the harmonics of the spindle frequency in the band."""
     from rcsa_ident.signals.spectra import line_spectrum
 
     if force.size < 4.0 * 2.0 * np.pi / speed * rate:
@@ -161,7 +161,7 @@ def _wear(found: Any, tool: Any, question: WornQuestion) -> dict[str, Any]:
     from rcsa_ident.workflows.estimate_forces import wear_of
 
     if set(found.estimate.axes) != {Dof.X, Dof.Y}:
-        raise InputError("cut", f"forces of axis {', '.join(found.estimate.axes)} alone", "wear from forces of both axes, X and Y")
+        raise InputError("cut", f"forces of axis {', '.join(found.estimate.axes)} only", "forces of both axes, X and Y")
     cut = CuttingConditions(found.spindle_speed, question.axial_depth, question.feed_per_tooth, question.engagement, question.feed_angle)
     worn = wear_of(found, tool.cutter, cut)
     slope, slope_std = worn.trend()

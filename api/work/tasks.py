@@ -109,7 +109,7 @@ def lobes(machine: MachineText, tooling: ToolingSource, request: LobeRequest) ->
     """Return the stability lobes of a tooling, and what is recommended within them."""
     change = _change(machine, tooling, request)
     advice = advise(change, tested=request.tested_cuts)
-    return {"tooling": advice.tooling, "warnings": list(advice.remarks)} | lobes_summary(advice) | lobes_curves(advice.lobes)
+    return {"tooling": advice.tooling, "warnings": list(advice.remarks)} | lobes_summary(advice) | lobes_curves(advice)
 
 
 def advice(machine: MachineText, tooling: ToolingSource, request: AdviceRequest) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,12 +12,9 @@ from rcsa_ident.cli.conditions import change_of, cut_of, drive_of, numbers, shar
 from rcsa_ident.cli.lobes import Plot, check_plot
 from rcsa_ident.cli.options import Bands, CutOptions, DriveOptions, SpeedOptions, StiffnessSpread, TipOptions, takes_groups
 from rcsa_ident.errors import InputError
-from rcsa_ident.units import from_rpm, to_cm3_per_min, to_rpm
+from rcsa_ident.units import from_rpm
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rcsa_ident.arrays import FloatArray
     from rcsa_ident.stability.advice import Advice
 
 #: Toolings and stickouts that are compared at once.
@@ -40,14 +37,14 @@ def advise(
     speeds: SpeedOptions,
     drive: DriveOptions,
     depth_mm: Annotated[
-        float | None, typer.Option(help="At which speeds may one cut so deep? mm", show_default=False, rich_help_panel="Questions")
+        float | None, typer.Option(help="Axial depth to find speeds for, mm.", show_default=False, rich_help_panel="Questions")
     ] = None,
     planned: Annotated[
         list[str] | None,
         typer.Option(
             "--cut",
             metavar="RPM:MM",
-            help="How far is this cut from chatter? Spindle speed and depth; again for more.",
+            help="Planned cut whose distance to chatter is computed: spindle speed and depth; may be repeated.",
             show_default=False,
             rich_help_panel="Questions",
         ),
@@ -57,19 +54,20 @@ def advise(
         typer.Option(metavar="A,B,...", help="Compare the tool at these stickouts, mm.", show_default=False, rich_help_panel="Questions"),
     ] = None,
     tolerance: Annotated[
-        float, typer.Option(help="The limit shall hold for speeds so much slower or faster, %.", rich_help_panel="Questions")
+        float, typer.Option(help="Tolerance of the spindle speed within which a cut stays stable, %.", rich_help_panel="Questions")
     ] = 1.0,
     probability: Annotated[
         float,
         typer.Option(
-            help="That a cut is stable, %, where a posterior tells it; 100: on every machine that it allows.", rich_help_panel="Questions"
+            help="Probability that a recommended cut is stable, %, where there is a posterior; 100: on every machine drawn from it.",
+            rich_help_panel="Questions",
         ),
     ] = 95.0,
     reserve: Annotated[
         float, typer.Option(help="Share of the stable depth that is kept in reserve, %.", rich_help_panel="Questions")
     ] = 10.0,
     out: Annotated[
-        Path | None, typer.Option(help="ADVICE.csv to write: what is usable over speed, of each tooling.", show_default=False)
+        Path | None, typer.Option(help="ADVICE.csv to write: recommended depth over speed for each tooling.", show_default=False)
     ] = None,
     plot: Plot = None,
     bands: Bands = True,
@@ -77,6 +75,7 @@ def advise(
     json_: Json = False,
 ) -> None:
     """Tell the best speeds for a depth, the highest removal rate within power and torque, and the margin of planned cuts."""
+    from rcsa_ident.io.lobes import write_advice
     from rcsa_ident.workflows.tool_change import advise as ask
 
     check_plot(plot)
@@ -100,9 +99,12 @@ def advise(
             change = change_of(machine, tooling, asked, speeds, bands, stiffness_spread)
             answered.append(ask(change, has, *shares, depth=depth, planned=cuts))
     if out is not None:
-        _write(out, answered)
+        write_advice(out, answered)
     if plot is not None:
-        _draw(plot, answered)
+        from rcsa_ident.report.advice import advice_figure
+        from rcsa_ident.report.lobes import save_figure
+
+        save_figure(advice_figure(answered), str(plot))
     remarks = list(dict.fromkeys(remark for answer in answered for remark in answer.remarks))
     if json_:
         from rcsa_ident.report.summaries import advice_summary
@@ -136,46 +138,3 @@ def _planned(text: str, max_depth_mm: float) -> tuple[float, float]:
     if parts[1] > max_depth_mm:
         raise InputError("--cut", text, f"a depth up to --max-depth-mm, {max_depth_mm:g}")
     return from_rpm(parts[0]), parts[1] * 1e-3
-
-
-def _write(path: Path, answers_: Sequence[Advice]) -> None:
-    """Write what is recommended over speed, the columns of further toolings with their number behind the name."""
-    import numpy as np
-
-    from rcsa_ident.io.curves import write_speed_csv
-
-    columns: dict[str, FloatArray] = {}
-    for i, answer in enumerate(answers_):
-        u, end, most = answer.usable, "" if len(answers_) == 1 else f"_{i + 1}", answer.lobes.max_depth
-        columns |= {
-            f"limit_depth_mm{end}": answer.lobes.limit_depth * 1e3,
-            f"stable_depth_mm{end}": u.stable * 1e3,
-            f"power_depth_mm{end}": np.where(u.by_power >= most, np.inf, u.by_power) * 1e3,
-            f"torque_depth_mm{end}": np.where(u.by_torque >= most, np.inf, u.by_torque) * 1e3,
-            f"usable_depth_mm{end}": u.depth * 1e3,
-            f"removal_rate_cm3_per_min{end}": to_cm3_per_min(u.removal),
-        }
-        if answer.common is not None:
-            columns[f"common_depth_mm{end}"] = answer.common * 1e3
-    write_speed_csv(path, to_rpm(answers_[0].usable.spindle_speed, 9), columns)
-
-
-def _draw(path: Path, answers_: Sequence[Advice]) -> None:
-    from rcsa_ident.report.lobes import Mark, comparison_figure, save_figure, usable_figure
-
-    def mark(point: Any) -> Mark:
-        cut = f"{to_rpm(point.spindle_speed):.0f} rev/min, {1e3 * point.depth:.2f} mm"
-        text = f"{cut}\n{to_cm3_per_min(point.removal_rate):.0f} cm³/min, {1e-3 * point.power:.2g} kW"
-        return Mark(point.spindle_speed, point.depth, point.removal_rate, text)
-
-    if len(answers_) == 1:
-        (answer,) = answers_
-        figure = usable_figure(answer.usable, [mark(p) for p in answer.recommended], [mark(c) for c in answer.planned], answer.common)
-    else:
-        best = {}
-        for answer in answers_:
-            if answer.recommended:
-                point = answer.recommended[0]
-                best[answer.tooling] = mark(point)._replace(text=f"{to_cm3_per_min(point.removal_rate or 0.0):.0f} cm³/min")
-        figure = comparison_figure({answer.tooling: answer.usable for answer in answers_}, best)
-    save_figure(figure, str(path))

@@ -55,9 +55,7 @@ def answers(command: Command) -> Command:
         except RcsaIdentError as error:
             _refuse(str(error), FAILED, kwargs.get("json_"), {})
         except BrokenProcessPool:
-            _refuse(
-                "a worker process was ended from outside (out of memory?); fewer --processes need less", FAILED, kwargs.get("json_"), {}
-            )
+            _refuse("a worker process was killed (out of memory?); use fewer --processes", FAILED, kwargs.get("json_"), {})
         except KeyboardInterrupt:
             _refuse("interrupted: nothing was written", INTERRUPTED, kwargs.get("json_"), {})
 

@@ -32,7 +32,7 @@ def compare(
         list[str],
         typer.Option(
             help="FRF file of a hammer test (CSV, UFF 58, text columns), or PLACE=FILE with PLACE tip (default), cross (force at the tip, "
-            "response at the spindle's flange), spindle (at the flange, tooling clamped) or flange (no tooling). May be given again.",
+            "response at the spindle's flange), spindle (at the flange, tooling clamped) or flange (no tooling). May be repeated.",
             show_default=False,
         ),
     ],

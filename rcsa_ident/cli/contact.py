@@ -26,7 +26,7 @@ def contact(
         list[str],
         typer.Option(
             help="FRF file of a tap test at the tip (CSV, UFF 58, text columns), or OTHER.toml=FILE for another stickout of the same "
-            "holder. May be given again: several stickouts tell more.",
+            "holder. May be repeated: several stickouts determine the contact better.",
             show_default=False,
         ),
     ],
@@ -40,8 +40,10 @@ def contact(
         float | None,
         typer.Option("--to", help="Highest frequency that is used, Hz; default: all, or the identified band.", show_default=False),
     ] = None,
-    modulus_spread: Annotated[float, typer.Option(help="How well the moduli of tool and holder are known, %; one factor for all.")] = 1.0,
-    gain_spread: Annotated[float, typer.Option(help="How well hammer and sensor are calibrated, %.")] = 2.0,
+    modulus_spread: Annotated[
+        float, typer.Option(help="Standard deviation of the moduli of tool and holder, %; one factor for all.")
+    ] = 1.0,
+    gain_spread: Annotated[float, typer.Option(help="Standard deviation of the calibration of hammer and sensor, %.")] = 2.0,
     plot: Annotated[Path | None, typer.Option(help="Figure of taps and model (png, svg, pdf).", show_default=False)] = None,
     json_: Json = False,
 ) -> None:

@@ -30,13 +30,14 @@ def decouple(
         list[str],
         typer.Option(
             help="TOOLING.toml=FRF of a hammer test at the tip, or PLACE:TOOLING.toml=FRF with PLACE tip, cross (force at the tip, "
-            "response at the spindle's flange) or spindle. Three toolings at least; those at the spindle tell most.",
+            "response at the spindle's flange) or spindle. At least three toolings; tests at the spindle contribute most.",
             show_default=False,
         ),
     ],
     out: Annotated[Path, typer.Option(help="FLANGE.csv to write.", show_default=False)],
     beside: Annotated[
-        Path | None, typer.Option(help="RESULT.json whose joint is taken out, too, and whose flange is drawn beside.", show_default=False)
+        Path | None,
+        typer.Option(help="RESULT.json whose joint is removed as well, and whose flange is drawn for comparison.", show_default=False),
     ] = None,
     from_: Annotated[float, typer.Option("--from", help="Lowest frequency that is used, Hz.")] = 200.0,
     to: Annotated[float | None, typer.Option("--to", help="Highest frequency that is used, Hz; default: all.", show_default=False)] = None,
@@ -68,7 +69,7 @@ def decouple(
         found = {axis: flange_from_taps(own, axis, machine[axis].joint if axis in machine else None, share) for axis, own in taps.items()}
     omega = next(iter(found.values())).receptance.omega
     if any(not np.array_equal(f.receptance.omega, omega) for f in found.values()):
-        raise InputError("frequencies", "other ones for X than for Y", "the same for both axes")
+        raise InputError("frequencies", "different ones for X and Y", "the same for both axes")
     write_flange_csv(out, to_hz(omega), {a: f.receptance.values for a, f in found.items()}, {a: f.std for a, f in found.items()})
     if plot is not None:
         _draw(found, machine, plot)
@@ -79,9 +80,9 @@ def decouple(
             row = _summary(each)
             known = ", ".join(f"{100 * share:.2g} %" for share in row["relative_std"])
             conditions = (
-                f"condition number {row['condition_median']:.3g} in the median, {100 * row['regularised']:.0f} % lean on neighbours"
+                f"median condition number {row['condition_median']:.3g}, {100 * row['regularised']:.0f} % regularised by neighbours"
             )
-            say(f"{axis.upper()}: {row['frequencies']} frequencies, {conditions}; tF, tM, rM known to {known}")
+            say(f"{axis.upper()}: {row['frequencies']} frequencies, {conditions}; standard deviations of tF, tM, rM {known}")
             for note in each.notes:
                 warn(f"{axis.upper()}: {note}")
         say(f"written: {out}" + (f", {plot}" if plot is not None else ""))

@@ -10,7 +10,6 @@ import typer
 
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn
 from rcsa_ident.cli.identify import Method, leave, read_and_judge, result_of, search, warn_left_out
-from rcsa_ident.cli.lobes import write_lobes
 from rcsa_ident.cli.processes import Processes, workers
 from rcsa_ident.errors import InputError
 from rcsa_ident.units import from_rpm, to_hz, to_rpm
@@ -34,7 +33,7 @@ MAX_DEPTH = 0.01
 @answers
 def demo(
     data: Annotated[Path, typer.Option(help="Campaign folder.")] = Path("data/sample_runs"),
-    out: Annotated[Path, typer.Option(help="Folder for the results; it is made if need be.")] = Path("report"),
+    out: Annotated[Path, typer.Option(help="Folder for the results; created if it is missing.")] = Path("report"),
     tooling: Annotated[
         list[Path] | None, typer.Option(help="Further TOOLING.toml; default: those in DATA/../machines/toolings.", show_default=False)
     ] = None,
@@ -90,7 +89,7 @@ def _folder(out: Path) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError("--out", error.strerror or "an error", "a folder that can be made", str(out)) from None
+        raise InputError("--out", error.strerror or "an error", "a folder that can be created", str(out)) from None
 
 
 def _further_toolings(campaign: Campaign, data: Path, given: list[Path] | None) -> dict[str, Tooling]:
@@ -113,6 +112,7 @@ def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out
 
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.io.curves import write_tip_csv
+    from rcsa_ident.io.lobes import write_lobes
     from rcsa_ident.machine.known_tip import measured_tip
     from rcsa_ident.machining_setup import CutSpec
     from rcsa_ident.report.html import ToolingPage
@@ -127,7 +127,7 @@ def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out
     advice = advise(change)
     safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
     write_tip_csv(out / f"FRF_{safe}.csv", response)
-    write_lobes(out / f"LOBES_{safe}.csv", advice.lobes)
+    write_lobes(out / f"LOBES_{safe}.csv", advice.lobes, recommended=advice.usable.stable)
     tip = {c.dof.upper(): response.between(str(c), str(c)) for c in response.rows}
     deviation = {row.dof.upper(): each for (row, col), each in response.deviation().items() if row == col}
     true, error, coverage = _truth(truth / "tip" / f"{name}.csv", frequency, tip, deviation)

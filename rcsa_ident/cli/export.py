@@ -70,7 +70,7 @@ def export(
     writable(out)
     what = (Part.flange if tooling is None else Part.tip) if what is None else what
     if (what is Part.tip) != (tooling is not None):
-        raise InputError("--tooling", "nothing" if tooling is None else str(tooling), "a TOOLING.toml with --what tip, and only there")
+        raise InputError("--tooling", "nothing" if tooling is None else str(tooling), "a TOOLING.toml with --what tip, and only then")
     if what is Part.modes and to not in (Format.csv, Format.json):
         raise InputError("--to", str(to), "csv or json for modes")
     omega = None if speed is None else units.from_rpm(positive("--speed", speed, "rev/min"))

@@ -34,28 +34,32 @@ def forces(
     result: Annotated[
         Path, typer.Argument(help="RESULT.json of an identification, or FLANGE.csv of a measured flange.", show_default=False)
     ],
-    tooling: Annotated[Path, typer.Argument(help="TOOLING.toml that was cut with.", show_default=False)],
+    tooling: Annotated[Path, typer.Argument(help="TOOLING.toml of the tool that was cutting.", show_default=False)],
     recording: Annotated[Path, typer.Argument(help="Recording of the cut; channels as in the campaign.", show_default=False)],
     out: Annotated[Path, typer.Option(help="FORCES.csv to write, N.", show_default=False)],
     air: Annotated[
-        Path | None, typer.Option(help="Recording of an air cut at the same speed: its run-out is taken out.", show_default=False)
+        Path | None, typer.Option(help="Recording of an air cut at the same speed: its run-out is subtracted.", show_default=False)
     ] = None,
     speed_rpm: Annotated[
         float | None, typer.Option(help="Programmed spindle speed, rev/min; default: from the trigger.", show_default=False)
     ] = None,
     observer: Annotated[
-        ObserverName, typer.Option(help="Oscillators at the harmonics of the teeth, or the paper's random walk.")
+        ObserverName, typer.Option(help="Force model: oscillators at the spindle's orders, or the published random walk.")
     ] = ObserverName.resonators,
     bandwidth_hz: Annotated[
         float | None,
-        typer.Option(help="Up to where the observer follows the force, Hz; default: end of the identified band.", show_default=False),
+        typer.Option(help="Bandwidth of the observer, Hz; default: upper end of the identified band.", show_default=False),
     ] = None,
-    smooth: Annotated[bool, typer.Option(help="Each sample given the whole record, instead of as it would be live.")] = False,
-    plot: Annotated[Path | None, typer.Option(help="Picture of the forces and of the observer's response.", show_default=False)] = None,
+    smooth: Annotated[
+        bool, typer.Option(help="Estimate each sample from the whole recording, not only from the samples before it.")
+    ] = False,
+    plot: Annotated[
+        Path | None, typer.Option(help="Figure of the forces and of the observer's frequency response.", show_default=False)
+    ] = None,
     idle_percent: Annotated[
         float | None,
         typer.Option(
-            help="Share of the time in which no tooth cuts, at least, %: there the force is zero, which gives the mean. "
+            help="Least share of the time in which no tooth cuts, %: the force is zero then, which gives its mean. "
             "Default: forces without their mean.",
             show_default=False,
         ),
@@ -64,7 +68,9 @@ def forces(
         Path | None,
         typer.Option(metavar="CAMPAIGN", help="Folder of a campaign whose sensors recorded it; default: the result's.", show_default=False),
     ] = None,
-    sampling_rate_hz: Annotated[float | None, typer.Option(help="Of a recording that carries no rate, Hz.", show_default=False)] = None,
+    sampling_rate_hz: Annotated[
+        float | None, typer.Option(help="Sampling rate of a recording that does not state it, Hz.", show_default=False)
+    ] = None,
     wear: Annotated[
         Path | None,
         typer.Option(help="Cutting coefficients of each revolution; needs --axial-depth-mm and --feed-mm.", show_default=False),
@@ -78,7 +84,7 @@ def forces(
 ) -> None:
     """Estimate the cutting forces of a recording from the flange's vibration."""
     from rcsa_ident.cli.results import read_machine, tell
-    from rcsa_ident.io.forces import write_forces_csv
+    from rcsa_ident.io.forces import write_forces
     from rcsa_ident.io.recordings import read_recording
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.observer.force import restore_mean_force
@@ -114,12 +120,7 @@ def forces(
         raised, level = restore_mean_force(found.estimate, idle_percent / 100.0, min(settled, found.estimate.force.shape[0] // 2))
         found = replace(found, estimate=raised)
     estimate = found.estimate
-    write_forces_csv(
-        out,
-        estimate.time,
-        {axis.upper(): estimate.force[:, i] for i, axis in enumerate(estimate.axes)},
-        {axis.upper(): estimate.standard_deviation[:, i] for i, axis in enumerate(estimate.axes)},
-    )
+    write_forces(out, estimate)
     if plot is not None:
         _draw(plot, found)
     worn = None
@@ -149,7 +150,7 @@ def forces(
         trend = f"{row['trend_per_s']:+.2g} ± {row['trend_std_per_s']:.1g} a second"
         say(f"{name}: {row['mean']:.4g} ± {row['std']:.2g} {row['unit']}, {trend}")
     if worn and not worn["separable"]:
-        warn("the harmonics in the band do not tell the coefficients from each other: only their sum means something")
+        warn("the harmonics in the band do not separate the coefficients: only their sum is meaningful")
     say(f"written: {out} ({estimate.force.shape[0]} samples, {stages.seconds['forces']:.2f} s)")
 
 
@@ -181,7 +182,7 @@ def _summary(found: MonitoredCut, observer: str, smooth: bool) -> dict[str, Any]
             "highest_n": float(force.max()),
             "std_n": float(np.median(estimate.standard_deviation[settled, i])),
             "model_std_n": found.model_error[axis],
-            "innovation_over_expected": float(estimate.consistency[i]),
+            "innovation_over_expected": None if estimate.consistency is None else float(estimate.consistency[i]),
             "usable_at_lines_hz": hz,
             "usable_hz": anywhere,
             "delay_s": response.delay_at_lines,

@@ -81,10 +81,12 @@ def identify(
     dask: Dask = None,
     start: Annotated[
         Path | None,
-        typer.Option(help="RESULT.json of the same machine: its modes are refined with this campaign's cuts.", show_default=False),
+        typer.Option(
+            help="RESULT.json of the same machine to start from: its modes are refined with this campaign's cuts.", show_default=False
+        ),
     ] = None,
     speed_bands: Annotated[
-        int, typer.Option(min=1, max=50, help="More than 1: also a model for each of so many equal ranges of spindle speed.")
+        int, typer.Option(min=1, max=50, help="Number of equal spindle speed ranges that also get a model of their own, if above 1.")
     ] = 1,
     report: Annotated[Path | None, typer.Option(help="Also write an HTML report.", show_default=False)] = None,
     json_: Json = False,

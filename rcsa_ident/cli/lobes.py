@@ -14,7 +14,7 @@ from rcsa_ident.cli.conditions import change_of, cut_of, share_of, subjects_of
 from rcsa_ident.cli.options import Bands, CutOptions, SpeedOptions, StiffnessSpread, TipOptions, takes_groups
 from rcsa_ident.cli.results import read_machine
 from rcsa_ident.errors import InputError
-from rcsa_ident.units import from_hz, from_rpm, to_hz, to_rpm
+from rcsa_ident.units import from_hz, from_rpm, to_hz
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,16 +22,13 @@ if TYPE_CHECKING:
     from rcsa_ident.arrays import FloatArray
     from rcsa_ident.dynamics.coordinates import Coordinate, Dof
     from rcsa_ident.dynamics.uncertain import UncertainReceptance
-    from rcsa_ident.stability.result import StabilityLobes
-    from rcsa_ident.stability.stability_map import StabilityMap
-    from rcsa_ident.stability.surface_error import SurfaceError
 
     Deviation = Mapping[tuple[Coordinate, Coordinate], tuple[FloatArray, FloatArray]]
 
 ResultFile = Annotated[
     Path, typer.Argument(help="RESULT.json of an identification, or FLANGE.csv of a measured flange.", show_default=False)
 ]
-ToolingFile = Annotated[Path, typer.Argument(help="TOOLING.toml; it need not have been cut with.", show_default=False)]
+ToolingFile = Annotated[Path, typer.Argument(help="TOOLING.toml of any tool, also of one that has never cut.", show_default=False)]
 Plot = Annotated[Path | None, typer.Option(metavar="FILE.png|svg", help="Draw a figure.", show_default=False)]
 
 
@@ -123,6 +120,7 @@ def lobes(
     json_: Json = False,
 ) -> None:
     """Compute stability lobes of a tooling: on an identified machine, from a modal model or from tap tests."""
+    from rcsa_ident.io.lobes import write_lobes, write_map
     from rcsa_ident.io.tested_cuts import read_tested_cuts
     from rcsa_ident.report.lobes import Judged
     from rcsa_ident.workflows.tool_change import advise, map_of, surface_of
@@ -146,12 +144,14 @@ def lobes(
         with stages.stage("map"):
             chart = map_of(change, map_depths, map_full)
         write_map(map_, chart)
-    write_lobes(out, found, surface)
+    write_lobes(out, found, surface, advice.usable.stable)
     if plot is not None:
         from rcsa_ident.report.lobes import save_figure, stability_figure
 
         tested = None if cuts is None or advice.tested is None else Judged(cuts, advice.tested)
-        save_figure(stability_figure(found, advice.recommended, tested=tested, surface=surface, chart=chart), str(plot))
+        save_figure(
+            stability_figure(found, advice.recommended, tested=tested, surface=surface, chart=chart, usable=advice.usable), str(plot)
+        )
     if json_:
         from rcsa_ident.report.summaries import lobes_summary
 
@@ -201,31 +201,3 @@ def peaks_of(frequency: FloatArray, tip: UncertainReceptance, deviation: Deviati
             band = 2.0 * math.hypot(real * unit.real, imaginary * unit.imag)
         peaks[coordinate.dof] = (peak_row(frequency, values), band)
     return peaks
-
-
-def write_map(path: Path, chart: StabilityMap) -> None:
-    """Write MAP.csv."""
-    import numpy as np
-
-    from rcsa_ident.io.curves import write_map_csv
-
-    write_map_csv(path, to_rpm(chart.spindle_speed, 9), np.round(chart.depth * 1e3, 9), chart.growth)
-
-
-def write_lobes(path: Path, found: StabilityLobes, surface: SurfaceError | None = None) -> None:
-    """Write LOBES.csv; the band's columns are empty where even its edge is beyond the largest depth."""
-    import numpy as np
-
-    from rcsa_ident.io.curves import write_lobes_csv
-
-    band = found.band
-    extra = {} if band is None else {"limit_depth_low_mm": band[0] * 1e3, "limit_depth_high_mm": band[1] * 1e3}
-    extra["recommended_depth_mm"] = found.recommended_depth() * 1e3
-    extra["flip"] = np.where(found.stable, np.nan, found.flip.astype(float))
-    if surface is not None:
-        extra |= {"surface_error_um": surface.largest * 1e6, "surface_error_mean_um": surface.mean * 1e6}
-    lobe = np.where(found.lobe < 0, np.nan, found.lobe.astype(float))
-    # rad/s and back leaves a last digit that nobody asked for
-    write_lobes_csv(
-        path, to_rpm(found.spindle_speed, 9), found.limit_depth * 1e3, to_hz(found.chatter_frequency), lobe, extra, whole=("flip",)
-    )

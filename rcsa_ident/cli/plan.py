@@ -40,13 +40,17 @@ def plan(
     toolings: Annotated[list[Path], typer.Option(help="TOOLING.toml to cut with; once each.", show_default=False)],
     target: Annotated[list[Path], typer.Option(help="TOOLING.toml whose tooltip is wanted; once each.", show_default=False)],
     out: Annotated[Path, typer.Option(help="PLAN.toml to write: [[cuts]] for a campaign.toml.", show_default=False)],
-    depths_mm: Annotated[str, typer.Option(help="Axial depths to choose from, mm, with commas between them.")] = "0.4",
-    cuts: Annotated[int, typer.Option(min=1, max=500, help="Most cuts.")] = 16,
+    depths_mm: Annotated[str, typer.Option(help="Axial depths to choose from, mm, separated by commas.")] = "0.4",
+    cuts: Annotated[int, typer.Option(min=1, max=500, help="Largest number of cuts.")] = 16,
     band: Annotated[
         float | None,
-        typer.Option(help="Wanted standard deviation of the tooltip FRF, percent: the fewest cuts that reach it.", show_default=False),
+        typer.Option(
+            help="Standard deviation of the tooltip FRF that is wanted, %: plans the fewest cuts that reach it.", show_default=False
+        ),
     ] = None,
-    goal: Annotated[GoalName, typer.Option(help="Narrow bands of the targets, or most information on all unknowns.")] = GoalName.tooltip,
+    goal: Annotated[
+        GoalName, typer.Option(help="Smallest variance of the targets' tooltip FRFs, or most information on all unknowns.")
+    ] = GoalName.tooltip,
     speed_from: Annotated[
         float | None, typer.Option(help="Lowest spindle speed, rev/min; default: the campaign's.", show_default=False)
     ] = None,
@@ -59,14 +63,17 @@ def plan(
     exit_deg: Annotated[float | None, typer.Option(help="Exit angle.", show_default=False)] = None,
     feed_direction: Annotated[str, typer.Option(help="+X -X +Y -Y, or degrees from +X.")] = "+X",
     feed_per_tooth_mm: Annotated[float, typer.Option(help="Feed per tooth, mm.")] = 0.1,
-    margin: Annotated[float, typer.Option(help="The stability limit is at least so many times the depth.")] = 1.5,
+    margin: Annotated[float, typer.Option(help="Least ratio of the stability limit to the depth.")] = 1.5,
     from_: Annotated[
-        float | None, typer.Option("--from", help="Where the tooltip is wanted, Hz; default: the identified band.", show_default=False)
+        float | None,
+        typer.Option(
+            "--from", help="Lowest frequency of the tooltip FRF that is wanted, Hz; default: the identified band.", show_default=False
+        ),
     ] = None,
     to: Annotated[float | None, typer.Option("--to", help="Highest frequency, Hz.", show_default=False)] = None,
     noise_nm: Annotated[float, typer.Option(help="Standard deviation of a displacement line's real and imaginary part, nm.")] = 0.1,
     campaign: Annotated[
-        Path | None, typer.Option(help="Campaign to learn the noise from, instead of --noise-nm.", show_default=False)
+        Path | None, typer.Option(help="Campaign whose recordings give the noise, instead of --noise-nm.", show_default=False)
     ] = None,
     json_: Json = False,
 ) -> None:
@@ -159,7 +166,7 @@ def _depths(text: str) -> tuple[float, ...]:
     except ValueError as error:
         if isinstance(error, InputError):
             raise
-        raise InputError("--depths-mm", text, "numbers with commas between them [mm]") from None
+        raise InputError("--depths-mm", text, "numbers separated by commas [mm]") from None
 
 
 def _speeds(machine: IdentifiedMachine, lowest: float | None, highest: float | None) -> tuple[float, float]:

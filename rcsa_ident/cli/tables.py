@@ -105,7 +105,7 @@ def _limit(depth: float, most: float) -> str:
 
 
 def show_tally(tally: Tally) -> None:
-    """Print how many tested cuts the lobes tell right: the four cases, and the marginal ones apart."""
+    """Print how many tested cuts the lobes classify correctly: the four cases, and the marginal ones apart."""
     table = Table("predicted", "seen\nstable", "seen\nchatter", "marginal", title="tested cuts", title_justify="left")
     for column in table.columns[1:]:
         column.justify = "right"
@@ -114,12 +114,12 @@ def show_tally(tally: Tally) -> None:
     out = console()
     out.print(table)
     if tally.decided:
-        out.print(f"told right: {tally.stable_stable + tally.chatter_chatter} of {tally.decided}, {100.0 * tally.share_right:.1f} %")
+        out.print(f"classified correctly: {_right(tally)}, {100.0 * tally.share_right:.1f} %")
 
 
 def show_cases(rows: Sequence[tuple[str, Tally | None, Tally | None]]) -> None:
-    """Print how many cuts of each case are told right, in process and, where there are tap tests, at standstill."""
-    columns = ("case", "told right", "unexpected\nchatter", "stable above\nthe limit", "marginal", "told right\nby tap tests")
+    """Print how many cuts of each case are classified correctly, in process and, where there are tap tests, at standstill."""
+    columns = ("case", "correct", "unexpected\nchatter", "stable above\nthe limit", "marginal", "correct\nby tap tests")
     table = _table(*columns, title="tested cuts")
     table.columns[0].justify = "left"
     for name, own, idle in rows:
@@ -151,7 +151,7 @@ def show_points(advice: Advice) -> None:
         "removal\ncm³/min",
         "power\nkW",
         "torque\nN m",
-        "more is\nended by",
+        "limited\nby",
     )
     table = _table(*heads, title="recommended cuts: highest removal rate")
     for p in advice.recommended:
@@ -166,9 +166,9 @@ def show_windows(windows: Sequence[SpeedWindow], depth_mm: float, name: str) -> 
     out = console()
     about = f"{escape(name)}: " if name else ""
     if not windows:
-        out.print(f"{about}{depth_mm:g} mm is recommended at no speed of the range")
+        out.print(f"{about}a depth of {depth_mm:g} mm is not recommended at any speed of the range")
         return
-    heads = ("best at\nrev/min", "from\nrev/min", "to\nrev/min", "recommended\nthere mm")
+    heads = ("best at\nrev/min", "from\nrev/min", "to\nrev/min", "recommended\ndepth mm")
     table = _table(*heads, title=f"{about}speeds for a depth of {depth_mm:g} mm")
     for w in windows[:8]:
         table.add_row(*(f"{to_rpm(speed):.0f}" for speed in (w.best, w.low, w.high)), f"{1e3 * w.allowed:.2f}")
@@ -181,11 +181,11 @@ def show_planned(cuts: Sequence[PlannedCut], name: str) -> None:
     for cut in cuts:
         about = f"{escape(name)}: " if name else ""
         verdict = "[green]stable[/]" if cut.stable else "[red]chatter[/]"
-        limit = f"limit {1e3 * cut.limit:.2f} mm, margin {100.0 * cut.margin:+.0f} %" if cut.limit < float("inf") else "no limit in reach"
+        limit = f"limit {1e3 * cut.limit:.2f} mm, margin {100.0 * cut.margin:+.0f} %" if cut.limit < float("inf") else "no limit found"
         words = [f"{about}{to_rpm(cut.spindle_speed):.0f} rev/min, {1e3 * cut.depth:.2f} mm: {verdict}, {limit}"]
         if cut.probability is not None:
             words.append(f"stable with a probability of {100.0 * cut.probability:.0f} %")
-        words.append(f"{1e3 * cut.robust_limit:.2f} mm with tolerance and probability")
+        words.append(f"limit with tolerance and probability {1e3 * cut.robust_limit:.2f} mm")
         near = [f"{to_rpm(speed):.0f} rev/min" for speed in (cut.slower, cut.faster) if speed is not None]
         if near:
             words.append(f"{'chatter begins at' if cut.stable else 'the nearest stable speeds are'} {' and '.join(near)}")
@@ -197,7 +197,7 @@ def show_planned(cuts: Sequence[PlannedCut], name: str) -> None:
 
 def show_comparison(answers: Sequence[Advice]) -> None:
     """Print the lowest limit and the first recommended cut of several toolings."""
-    heads = ("tooling", "lowest limit\nmm", "recommended\nrev/min", "recommended\ndepth mm", "removal\ncm³/min", "more is\nended by")
+    heads = ("tooling", "lowest limit\nmm", "recommended\nrev/min", "recommended\ndepth mm", "removal\ncm³/min", "limited\nby")
     table = _table(*heads, title="comparison")
     table.columns[0].justify = "left"
     for answer in answers:

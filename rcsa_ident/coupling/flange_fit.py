@@ -123,17 +123,17 @@ def least_squares_flange(
     and of several solutions the one with the best misfit, then a passive one, then the one nearest to its neighbour is taken.
     """
     if len(observations) < 3:
-        raise InputError("observations", len(observations), "three at least: the flange has three independent entries")
+        raise InputError("observations", len(observations), "at least three: the flange has three independent entries")
     omega = observations[0].tool_holder.omega
     flange = tuple(c for c in observations[0].tool_holder.rows if c.point == "flange")
     for each in observations:
         if not np.array_equal(each.tool_holder.omega, omega):
             raise InputError("tool-holders", f"{each.tool_holder.omega.size} frequencies", f"the same {omega.size} frequencies for all")
         if tuple(c for c in each.tool_holder.rows if c.point == "flange") != flange or len(flange) != 2:
-            raise InputError("tool-holders", "other directions", "one bending plane, the same for all")
+            raise InputError("tool-holders", "different directions", "one bending plane, the same for all")
     model = _Assemblies.of(observations, joint)
     if sum(o.row == o.col == "tip" for o in observations) < 3:
-        raise InputError("observations", "fewer than three at the tip", "three tip receptances at least, from which the solution starts")
+        raise InputError("observations", "fewer than three at the tip", "at least three tip receptances, from which the solution starts")
     starts = [_tamed(start) for start in model.starts()]
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         solved = [_tamed(model.polish(start)) for start in starts]
@@ -383,15 +383,19 @@ def _notes(
     notes = []
     if regularised.any():
         worst = f"condition number up to {condition[regularised].max():.2g}"
-        notes.append(f"{np.mean(regularised) * 100.0:.0f} % of the frequencies are ill-conditioned ({worst}) and lean on their neighbours")
+        notes.append(
+            f"{np.mean(regularised) * 100.0:.0f} % of the frequencies are ill-conditioned ({worst}) and regularised by their neighbours"
+        )
     if np.median(condition) > POOR_CONDITION:
         notes.append(
             f"half of the frequencies have a condition number above {np.median(condition):.0f}: receptances measured at the spindle "
-            "with the same toolings tell more than further tips"
+            "with the same toolings contribute more than further tip receptances"
         )
     if ambiguous.any():
         share = np.mean(ambiguous) * 100.0
-        notes.append(f"at {share:.0f} % of the frequencies two passive flanges explain the measurements: a fourth tooling would tell")
+        notes.append(
+            f"at {share:.0f} % of the frequencies two passive flanges explain the measurements: a fourth tooling would decide between them"
+        )
     active = loss < -1e-3
     if active.any():
         notes.append(
@@ -399,6 +403,6 @@ def _notes(
         )
     if freedom > 0 and np.median(chi2) > 3.0 * freedom:
         notes.append(
-            f"misfit {np.median(chi2):.3g} where {freedom} is expected: tool-holders or joint are not as modelled, or noise is larger"
+            f"misfit {np.median(chi2):.3g} where {freedom} is expected: tool-holders or joint differ from their models, or noise is larger"
         )
     return tuple(notes)

@@ -138,7 +138,7 @@ def calibrate_mean_force(
     """
     force = np.asarray(force, dtype=float)
     if len(cuts) < LEAST_CUTS:
-        raise InputError("cuts", len(cuts), f"at least {LEAST_CUTS}, so that their scatter can be told")
+        raise InputError("cuts", len(cuts), f"at least {LEAST_CUTS}, so that their scatter can be estimated")
     count = force.shape[1]
     names = NAMES if count == 3 else NAMES[:4]
     design = np.concatenate([mean_force_matrix(*cut)[:count, : len(names)] for cut in cuts])
@@ -149,7 +149,9 @@ def calibrate_mean_force(
         scale = np.linalg.norm(design[:, kept], axis=0)
         if not np.all(scale > 0.0) or np.linalg.cond(design[:, kept] / scale) > _WORST_CONDITION:
             found = ", ".join(f"{1e3 * f:g}" for f in sorted({c.feed_per_tooth for _, c in cuts}))
-            raise InputError("feed_per_tooth_mm of the cuts", found, "two or more different feeds per tooth, so that edges can be told")
+            raise InputError(
+                "feed_per_tooth_mm of the cuts", found, "two or more different feeds per tooth, so that edge forces can be separated"
+            )
         solution = np.linalg.lstsq(design[:, kept] / scale, observed)[0] / scale
         negative = [i for i, k in enumerate(kept) if names[k].endswith("e") and solution[i] < 0.0]
         if not negative:
@@ -200,7 +202,7 @@ def plausible(names: Sequence[str], value: FloatArray, half_width: FloatArray) -
     if tangential <= 0.0:
         reasons.append("K_tc is below zero: the force is not the one on the tool in the machine's axes (sign or axes of the sensors?)")
     elif width > 0.5 * tangential:
-        reasons.append(f"K_tc is known to {100.0 * width / tangential:.0f} % only: more feeds, or feeds farther apart")
+        reasons.append(f"K_tc is known only to {100.0 * width / tangential:.0f} %: use more feeds, or feeds farther apart")
     if tangential > 0.0 and not -0.2 <= known["K_rc"][0] / tangential <= 2.0:
         reasons.append(f"K_rc / K_tc is {known['K_rc'][0] / tangential:.2g}: unusual; are axes or engagement as the campaign says?")
     return tuple(reasons)

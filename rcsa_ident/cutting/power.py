@@ -11,6 +11,8 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.shown import Shown
+from rcsa_ident.units import to_rpm
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +57,8 @@ def spindle_load(cutter: Cutter, conditions: CuttingConditions, coefficients: Cu
     return SpindleLoad(torque, torque * conditions.spindle_speed, conditions.axial_depth * radial_depth(cutter, engagement) * per_second)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SpindleDrive:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SpindleDrive(Shown):
     """What a spindle's motor has at each speed; between the given speeds straight lines, outside the nearest of them.
 
     Parameters
@@ -80,7 +82,7 @@ class SpindleDrive:
             if getattr(self, name).shape != self.speed.shape or not np.all(getattr(self, name) > 0.0):
                 raise InputError(name, getattr(self, name).tolist(), f"{self.speed.size} numbers above 0")
         if not np.all(np.isfinite(self.speed)) or np.any(np.diff(self.speed) <= 0.0):
-            raise InputError("speed", self.speed.tolist(), "finite speeds that rise [rad/s]")
+            raise InputError("speed", self.speed.tolist(), "finite, increasing speeds [rad/s]")
         if not self.max_speed > 0.0:
             raise InputError("max_speed", self.max_speed, "a speed above 0 [rad/s]")
 
@@ -120,6 +122,10 @@ class SpindleDrive:
     def torque_at(self, speed: FloatArray) -> FloatArray:
         """Return the torque at some speeds [N m], 0 beyond the highest speed."""
         return np.where(np.asarray(speed) <= self.max_speed * (1.0 + 1e-12), _between(speed, self.speed, self.torque), 0.0)
+
+    def __str__(self) -> str:
+        parts = ((1e-3 * float(self.power.max()), "kW"), (float(self.torque.max()), "N m"), (to_rpm(self.max_speed), "rev/min"))
+        return ", ".join(f"up to {value:.5g} {unit}" for value, unit in parts if np.isfinite(value)) or "no limit"
 
 
 def _between(at: FloatArray, speed: FloatArray, values: FloatArray) -> FloatArray:

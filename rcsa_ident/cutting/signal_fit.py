@@ -430,13 +430,16 @@ def _answer(problem: _Problem, theta: FloatArray, notes: list[str]) -> SignalCal
         cut_width = student_quantile(dof) * np.sqrt(np.diag(between)) * scale
         covariance = between
     else:
-        notes = [*notes, f"{len(problem.records)} cuts do not tell how cuts differ: the intervals hold for these records' noise only"]
+        notes = [
+            *notes,
+            f"{len(problem.records)} cuts are too few to estimate their scatter: the intervals contain these recordings' noise only",
+        ]
     covariance = (covariance * scale[:, None] * scale)[:4, :4]
     width = np.maximum(noise_width, np.where(np.isfinite(cut_width), cut_width, 0.0))[:4]
     value = theta[:4] * problem.scale
     for i in (2, 3):
         if value[i] < 0.0 and -value[i] > width[i]:
-            notes = [*notes, f"{NAMES[i]} is below zero, {value[i] * 1e-3:.2g} N/mm: the model misses something; taken as 0"]
+            notes = [*notes, f"{NAMES[i]} is below zero, {value[i] * 1e-3:.2g} N/mm: the model is incomplete; set to 0"]
     data = slice(0, edges[-1])
     weight = np.concatenate([np.tile(problem.weights(k).ravel(), 2) for k in range(len(count))])
     force = np.sqrt(sum(np.sum(np.abs(r.lines[o]) ** 2) for r, o in zip(problem.records, problem.orders, strict=True)))
@@ -444,7 +447,7 @@ def _answer(problem: _Problem, theta: FloatArray, notes: list[str]) -> SignalCal
     reasons = plausible(NAMES[:4], value, width)
     if misfit > WORST_MISFIT:
         more = "a dynamometer that does not follow (its resonance can be an unknown)? vibration?"
-        reasons = (*reasons, f"{100.0 * misfit:.0f} % of the force over time stays unexplained: {more}")
+        reasons = (*reasons, f"{100.0 * misfit:.0f} % of the force over time remains unexplained: {more}")
     forces = ForceCalibration("signal", NAMES[:4], value, covariance, width, misfit, reasons, tuple(notes))
     runout = {
         name: eccentric(next(r.cutter for r in problem.records if r.clamping == name), theta[problem.ecc][2 * i : 2 * i + 2])

@@ -14,6 +14,8 @@ from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.poles import PoleResidue, pair_sum
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.shown import Shown
+from rcsa_ident.units import to_hz
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,8 +61,8 @@ class PoleModel:
         return found
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ModalModel:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ModalModel(Shown):
     """Complex modes and a residual compliance ([inprocess], eq. 13, plus the modes above the band).
 
     h_pq = sum_n phi_pn phi_qn / (i omega - lambda_n) + conj(phi_pn phi_qn) / (i omega - conj(lambda_n)) + R_pq,
@@ -124,6 +126,10 @@ class ModalModel:
         """Return the model as python-control's ``StateSpace``: forces in, displacements out, both named after the coordinates."""
         names = [str(each) for each in self.coordinates]
         return self.pole_residue().to_control(names, names)
+
+    def __str__(self) -> str:
+        low, high = (float(to_hz(w)) for w in (self.omega_n.min(initial=np.inf), self.omega_n.max(initial=-np.inf)))
+        return f"{self.omega_n.size} modes, {low:.0f} to {high:.0f} Hz, at {', '.join(str(c) for c in self.coordinates)}"
 
 
 def normal_modes(

@@ -11,10 +11,11 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.errors import InputError
+from rcsa_ident.shown import Drawn
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Receptance:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Receptance(Drawn):
     """Displacements of `rows` per unit force on `cols`.
 
     Parameters
@@ -93,10 +94,10 @@ class Receptance:
             row, col = row + len(part.rows), col + len(part.cols)
         return cls(omega, values, rows, cols)
 
-    def __repr__(self) -> str:
+    def __str__(self) -> str:
         low, high = (w / (2.0 * np.pi) for w in (self.omega.min(initial=np.inf), self.omega.max(initial=-np.inf)))
         between = ", ".join(str(c) for c in self.rows) + ("" if self.rows == self.cols else " over " + ", ".join(str(c) for c in self.cols))
-        return f"<{type(self).__name__} {between}: {self.omega.size} frequencies, {low:.0f} to {high:.0f} Hz>"
+        return f"{between}: {self.omega.size} frequencies, {low:.0f} to {high:.0f} Hz"
 
     def to_control(self, tolerance: float = 1e-3) -> Any:
         """Return a rational fit as python-control's ``StateSpace``: forces in, displacements out, both named after the coordinates.

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.errors import InputError, positive
+from rcsa_ident.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,8 +28,8 @@ class StateSpace:
     Examples
     --------
     >>> lag = StateSpace([[-2.0]], [[2.0]], [[1.0]], [[0.0]])
-    >>> lag.sampled(0.1).pole.real.round(4).tolist()
-    [0.8187]
+    >>> abs(lag.response([2.0])).round(4).item()
+    0.7071
     """
 
     A: FloatArray
@@ -72,33 +71,6 @@ class StateSpace:
         omega = np.asarray(omega, dtype=float)
         point = np.exp(1j * omega * self.step) if self.step else 1j * omega
         return self.C @ np.linalg.solve(point[:, None, None] * np.eye(self.order) - self.A, self.B) + self.D
-
-    def sampled(self, step: float, hold: str = "first-order") -> StateSpace:
-        """Return the system between samples, exact for an input that is constant or linear between them.
-
-        Parameters
-        ----------
-        step : float [s]
-            Time between samples.
-        hold : str
-            ``zero-order``: the input keeps its last sample. ``first-order``: it runs straight from one sample to the next; the
-            state is then x[k] less the part that the sample u[k] itself has caused, and D is not 0 even where the system's is.
-        """
-        if self.step:
-            raise InputError("step", f"{self.step:g} s", "0: a system in continuous time")
-        step = positive("step", step, "s")
-        n, inputs = self.B.shape
-        # e^{M} of the chained system u' = v / step, v' = 0 holds the integrals of both holds
-        chain = np.zeros((n + 2 * inputs,) * 2)
-        chain[:n, :n], chain[:n, n : n + inputs] = self.A * step, self.B * step
-        chain[n : n + inputs, n + inputs :] = np.eye(inputs)
-        moved = scipy.linalg.expm(chain)
-        decay, kept, ramp = moved[:n, :n], moved[:n, n : n + inputs], moved[:n, n + inputs :]
-        if hold == "zero-order":
-            return StateSpace(decay, kept, self.C, self.D, step)
-        if hold == "first-order":
-            return StateSpace(decay, decay @ ramp + kept - ramp, self.C, self.D + self.C @ ramp, step)
-        raise InputError("hold", hold, "zero-order or first-order")
 
     @classmethod
     def from_control(cls, system: Any) -> StateSpace:

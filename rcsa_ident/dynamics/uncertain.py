@@ -53,7 +53,7 @@ class Spread(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class UncertainReceptance(Receptance):
     """A receptance and its spread; sums of variations with independent standard normal weights are draws of it.
 
@@ -126,9 +126,8 @@ class UncertainReceptance(Receptance):
     def _variations(self) -> tuple[Variation, ...]:
         return () if self.variation is None else self.variation.at(np.arange(self.omega.size))
 
-    def __repr__(self) -> str:
-        known = "" if self.variation is None else ", with its spread"
-        return f"{Receptance.__repr__(self)[:-1]}{known}>"
+    def __str__(self) -> str:
+        return f"{Receptance.__str__(self)}{'' if self.variation is None else ', with its spread'}"
 
 
 @dataclass(frozen=True, slots=True)

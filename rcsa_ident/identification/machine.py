@@ -20,12 +20,13 @@ from rcsa_ident.machine.machine import Machine
 from rcsa_ident.machine.tip import Side
 from rcsa_ident.machining_setup import Workpiece
 from rcsa_ident.signals.recording import Sensor
+from rcsa_ident.units import to_hz
 
 #: Unknowns times frequencies up to which the machine's side of the coupling is kept: 100 bytes each.
 MOST_KEPT = 1_000_000
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class IdentifiedMachine(Machine):
     """A machine as its cuts have shown it.
 
@@ -170,3 +171,9 @@ class IdentifiedMachine(Machine):
 
     def _model(self, speed: float) -> IdentifiedMachine:
         return self._single(self._number(speed)) if self.speed_models else self
+
+    def __str__(self) -> str:
+        modes = [f"{axis.upper()} {part.spindle.modes.omega_n.size} modes" for axis, part in self.identified.items()]
+        low, high = (to_hz(w) for w in self.identified_band)
+        changes = "" if self.speed_range is None else ", changes with speed"
+        return f"{self.name or 'machine'}: {', '.join(modes)}, {low:.0f} to {high:.0f} Hz, {self.status}{changes}"

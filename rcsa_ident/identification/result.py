@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,6 +17,7 @@ from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machining_setup import Workpiece
+from rcsa_ident.shown import Shown
 from rcsa_ident.signals.measurement import MAX_FREQUENCY
 from rcsa_ident.signals.recording import Sensor
 
@@ -59,8 +60,8 @@ class AxisResult:
         return MachineAxis(Spindle(self.modes), self.joint, self.posterior)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Identification:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Identification(Shown):
     """Modes of machine and spindle, joint, delays; with status, statistics, seed.
 
     Parameters
@@ -134,3 +135,25 @@ class Identification:
             sensors=self.sensors,
             name=self.campaign,
         )
+
+    def __str__(self) -> str:
+        modes = {str(axis): part.modes.omega_n.size for axis, part in self.axes.items()}
+        return in_words(str(self.status), len(self.cut_ids), modes, self.reasons)
+
+
+def in_words(status: str, cuts: int, modes: Mapping[str, int], reasons: Sequence[str]) -> str:
+    """Return what an identification has come to: a line, and a second one where something speaks against it.
+
+    Parameters
+    ----------
+    status : str
+    cuts : int
+        That were used.
+    modes : mapping of axis to int
+        How many each has.
+    reasons : sequence of str
+        Why it is not simply converged.
+    """
+    line = ", ".join([status, f"{cuts} cuts", *(f"{axis.upper()} {count} modes" for axis, count in modes.items())])
+    further = f" (and {len(reasons) - 1} more)" if len(reasons) > 1 else ""
+    return f"{line}\n{reasons[0]}{further}" if reasons else line

@@ -35,7 +35,7 @@ def existing_file(path: str | Path, field: str, largest: int) -> Path:
     if size > largest:
         raise InputError(field, f"{size / MEGABYTE:.0f} MB", f"at most {largest / MEGABYTE:.0f} MB", str(path))
     if size == 0:
-        raise InputError(field, "an empty file", "a file with content", str(path))
+        raise InputError(field, "an empty file", "a file that is not empty", str(path))
     return path
 
 

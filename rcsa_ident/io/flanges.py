@@ -13,9 +13,9 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import TextTable, read_table, table_of
-from rcsa_ident.machine.machine import FlangeMachine
+from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.measured import MeasuredFlange
-from rcsa_ident.units import from_hz
+from rcsa_ident.units import from_hz, to_hz
 
 #: Entries of [[tF, tM], [rF, rM]]; a flange is reciprocal, so rF is tM.
 _ENTRIES = {"tF": (0, 0), "tM": (0, 1), "rM": (1, 1)}
@@ -45,6 +45,22 @@ def write_flange_csv(
     if not np.all(np.isfinite(table)):
         raise InputError("flange receptance", "not finite", "finite numbers", str(path))
     write_text(path, "\n".join([",".join(columns), *(",".join(str(v) for v in row) for row in table.tolist())]) + "\n")
+
+
+def write_flange_machine(path: str | Path, machine: FlangeMachine) -> None:
+    """Write the flange of a machine, the joint's compliance with it, as what is decoupled from clamped tool-holders holds it.
+
+    Raises
+    ------
+    InputError
+        If its bending planes feel each other: the file has no columns for that.
+    """
+    omega, values = machine.lines(), {}
+    for part in machine.parts:
+        if len(part.coordinates) > 2:
+            raise InputError("flange", "bending planes that feel each other", "planes apart from each other", str(path))
+        values[part.coordinates[0].dof] = part.believed.interface(omega)
+    write_flange_csv(path, np.round(to_hz(omega), 9), values)
 
 
 def read_flange_csv(path: str | Path) -> dict[Dof, MeasuredFlange]:

@@ -156,7 +156,7 @@ def _plain(text: str) -> str:
 def _receptance(frequency: FloatArray, values: ComplexArray, scale: tuple[float, int], where: str) -> tuple[FloatArray, ComplexArray]:
     """Receptance of a mobility or an accelerance; at 0 Hz those say nothing of it, so the line goes."""
     if np.any(np.diff(frequency) <= 0.0) or frequency[0] < 0.0:
-        raise InputError("frequencies", "frequencies that do not rise", "frequencies from 0 that rise [Hz]", where)
+        raise InputError("frequencies", "frequencies that do not increase", "increasing frequencies of 0 or more [Hz]", where)
     if not scale[1]:
         return frequency, values * scale[0]
     kept = frequency > 0.0

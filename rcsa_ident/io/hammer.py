@@ -74,11 +74,11 @@ def read_hammer(path: str | Path, label: str = "tip") -> HammerFile:
         if test.response != test.force or axis not in _AXES:
             continue
         if axis in found:
-            raise InputError("FRF", f"two functions {axis} over {axis}", "one for each axis", str(path))
+            raise InputError("FRF", f"two FRFs with response and force in {axis}", "one for each axis", str(path))
         found[axis] = (test.frequency, test.values)
     if not found:
         names = listed([f"{t.response or '?'}/{t.force or '?'}" for t in tests])
-        raise InputError("FRF", names, "X over X, Y over Y, or one function in a file whose name ends in x or y", str(path))
+        raise InputError("FRF", names, "response/force X/X or Y/Y, or a single FRF in a file whose name ends in x or y", str(path))
     return HammerFile(label, path, found)
 
 
@@ -132,4 +132,4 @@ def write_calibrated_tooling(source: str | Path, target: str | Path, contact: Co
             Path(target).unlink(missing_ok=True)
         else:
             Path(target).write_bytes(before)
-        raise InputError("contact", "a table written in another way", "a table [contact] with one key a line, or none", str(source))
+        raise InputError("contact", "a table in another form", "a table [contact] with one key per line, or no such table", str(source))

@@ -141,7 +141,7 @@ def _hard_links(file: h5py.File, where: str) -> list[str]:
     """Names on the root; a link that is not to an object of this very file is refused, read or not."""
     links = file.id.links
     if len(file.id) > MOST_OBJECTS:
-        raise InputError("recording", f"{len(file.id)} objects", f"at most {MOST_OBJECTS} objects on the root", where)
+        raise InputError("recording", f"{len(file.id)} objects", f"at most {MOST_OBJECTS} objects in the root group", where)
     names = []
     for raw in file.id:
         kind = links.get_info(raw).type
@@ -174,7 +174,7 @@ def _dataset(file: h5py.File, name: str, present: list[str], where: str, vectors
     unknown = [f for f in filters if f not in FILTERS]
     if unknown or len(set(filters)) < len(filters):
         found = f"filter number {unknown[0]}" if unknown else "a filter applied twice"
-        raise InputError(field, found, "none of or each once: " + ", ".join(FILTERS.values()), where)
+        raise InputError(field, found, "none, or at most one each of: " + ", ".join(FILTERS.values()), where)
     if dataset.chunks is not None and (size := math.prod(dataset.chunks) * dataset.dtype.itemsize) > LARGEST_CHUNK:
         raise InputError(field, f"chunks of {size / MEGABYTE:.0f} MB", f"chunks of at most {LARGEST_CHUNK / MEGABYTE:.0f} MB", where)
     return dataset

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident import __version__
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.force import REFERENCE_RUNOUT, SLOPES
 from rcsa_ident.dynamics.coordinates import Dof
@@ -25,6 +24,7 @@ from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machining_setup import Campaign
 from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.units import from_hz, to_hz, to_rpm
+from rcsa_ident.version import __version__
 
 _MOST_MODES = 200
 #: Standard deviations of natural frequencies [rad/s] and damping ratios, per axis.

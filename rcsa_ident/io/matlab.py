@@ -172,7 +172,7 @@ def _header(head: bytes, order: str, start: int, size: int, packed: bool, where:
     shape = struct.unpack_from(f"{order}{count // 4}i", head, place)
     _, place, count, after = _tag(head, order, after)
     if place + count > len(head):
-        raise InputError("recording", "a variable with a name without end", COMPLETE, where)
+        raise InputError("recording", "a variable whose name is not terminated", COMPLETE, where)
     name = head[place : place + count].rstrip(b"\0").decode("utf-8", "replace")
     return _Variable(name, kind, shape, bool(flags & _COMPLEX), start, size, packed, length + 8, after)
 

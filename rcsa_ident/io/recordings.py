@@ -14,7 +14,7 @@ from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 
-__all__ = ["READERS", "in_si", "read_cut", "read_recording", "read_signals", "write_hdf5"]
+__all__ = ["READERS", "in_si", "read_cut", "read_recording", "read_signals", "write_hdf5", "write_recording"]
 
 Reader = Callable[[Path, Sequence[str], float | None], tuple[float, list[FloatArray]]]
 
@@ -122,3 +122,10 @@ def read_cut(sensors: tuple[Sensor, ...], default_rate: float | None, cut: Cut) 
     """
     recording = read_recording(cut.recording, sensors, default_rate)
     return recording, None if cut.air is None else read_recording(cut.air, sensors, default_rate)
+
+
+def write_recording(path: str | Path, recording: Recording) -> None:
+    """Write a recording's channels as its sensors gave them; `read_recording` with the same sensors reads it back."""
+    gains = [1.0 if s.quantity is Quantity.TRIGGER else s.sensitivity for s in recording.sensors]
+    channels = zip(recording.sensors, recording.samples.T, gains, strict=True)
+    write_hdf5(path, recording.rate, {sensor.name: samples * gain for sensor, samples, gain in channels})

@@ -122,9 +122,9 @@ def read_json(path: str | Path, field: str) -> Any:
     except json.JSONDecodeError as error:
         raise InputError(field, f"a JSON error ({error.msg})", "JSON", f"{where} line {error.lineno}") from None
     except UnicodeDecodeError:
-        raise InputError(field, "bytes that are no text", "JSON in UTF-8", where) from None
+        raise InputError(field, "bytes that are not text", "JSON in UTF-8", where) from None
     except RecursionError:
-        raise InputError(field, "lists in lists without end", "JSON", where) from None
+        raise InputError(field, "lists nested too deeply", "JSON", where) from None
     except InputError:
         raise
     except ValueError as error:

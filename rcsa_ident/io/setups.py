@@ -51,7 +51,7 @@ def read_toml(path: str | Path, field: str) -> dict[str, Any]:
         line = raw.count(b"\n", 0, error.start) + 1
         raise InputError(field, "a character that is not UTF-8", "text in UTF-8", f"{path} line {line}") from None
     except RecursionError:
-        raise InputError(field, "lists in lists without end", "TOML", str(path)) from None
+        raise InputError(field, "lists nested too deeply", "TOML", str(path)) from None
     except ValueError as error:
         text = str(error)
         line_found = re.search(r"\(at line (\d+), column \d+\)", text)
@@ -304,7 +304,7 @@ def _inside(folder: Path, table: Table, key: str) -> Path:
     except (OSError, RuntimeError, ValueError):
         table.refuse(key, describe(text), allowed)
     if not inside:
-        table.refuse(key, f"{describe(text)}, a link out of the folder", allowed)
+        table.refuse(key, f"{describe(text)}, a link that leads out of the folder", allowed)
     if not exists:
         table.refuse(key, f"{describe(text)}, {'no file' if path.exists() else 'which does not exist'}", "an existing file")
     return path

@@ -37,7 +37,7 @@ def read_spindle_drive(path: str | Path) -> SpindleDrive:
             raise InputError(f"column {name}", f"{values[wrong[0]]:g}", "a finite number above 0", table.at(int(wrong[0])))
     falls = np.flatnonzero(np.diff(speed) <= 0.0)
     if falls.size:
-        raise InputError(f"column {SPEED}", f"{speed[falls[0] + 1]:g}", "speeds that rise [rev/min]", table.at(int(falls[0]) + 1))
+        raise InputError(f"column {SPEED}", f"{speed[falls[0] + 1]:g}", "increasing speeds [rev/min]", table.at(int(falls[0]) + 1))
     columns = dict(zip(names, found, strict=True))
     unknown = np.full(speed.size, np.inf)
     power = 1e3 * columns[POWER] if POWER in columns else unknown

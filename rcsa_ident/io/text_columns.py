@@ -158,7 +158,7 @@ def _text(raw: bytes, field: str, where: str) -> str:
             return raw.decode(encoding)
         except UnicodeDecodeError:
             continue
-    raise InputError(field, "bytes that are no text", "a text table in UTF-8", where)
+    raise InputError(field, "bytes that are not text", "a text table in UTF-8", where)
 
 
 def _is_number(text: str) -> bool:

@@ -20,7 +20,7 @@ from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.units import from_hz
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class KnownTip(TipSource):
     """The tip of one tooling, from tap tests or from a modal model; whatever tooling is named, it answers for that one.
 
@@ -54,6 +54,9 @@ class KnownTip(TipSource):
         if isinstance(self.known, TipModes):
             return self.known
         return UncertainReceptance(self.known.omega, self.known.values, self.known.rows, self.known.cols)
+
+    def __str__(self) -> str:
+        return f"of one tooling: {self.known}"
 
 
 def measured_tip(

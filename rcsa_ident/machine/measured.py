@@ -38,7 +38,7 @@ class MeasuredFlange:
             found = ", ".join(str(c) for c in (*self.measured.rows, *self.measured.cols))
             raise InputError("flange coordinates", found, "coordinates of the point flange, rows as columns")
         if self.measured.omega.size < 4 or not np.all(np.diff(self.measured.omega) > 0.0):
-            raise InputError("flange frequencies", self.measured.omega.size, "at least four that rise [rad/s]")
+            raise InputError("flange frequencies", self.measured.omega.size, "at least four, increasing [rad/s]")
         if not np.all(np.isfinite(self.measured.values)):
             raise InputError("flange receptance", "not finite", "finite numbers")
 

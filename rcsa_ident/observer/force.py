@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.observer.force_model import ForceModel, augmented
 from rcsa_ident.observer.kalman import FilterState, KalmanFilter, kalman_filter
 from rcsa_ident.observer.transfer_function import CORNER, SampledModes, TransferFunction, acceleration_filter, high_pass
+from rcsa_ident.shown import Saved
 
 #: What a spindle order below the band may change in a second, in displacement [m]: run-out that is not believed.
 _ORDER_WANDER = 1e-7
@@ -87,6 +89,19 @@ class AxisObserver:
     kalman: KalmanFilter
     run_out: RunOut | None = None
 
+    def to_control(self) -> Any:
+        """Return the observer in the steady state as python-control's sampled ``StateSpace``.
+
+        Inputs are ``gap`` [m] and, with an accelerometer, ``acceleration`` [m/s^2], run-out taken out of both; outputs ``force`` [N]
+        and ``innovation`` [m].
+        """
+        import control
+
+        filters = [each.state_space().to_control() for each in (self.gap_filter, self.acceleration_filter) if each is not None]
+        added = control.ss([], [], [], np.ones((1, len(filters))), self.transfer.step)
+        whole = self.kalman.state_space().to_control() * added * control.append(*filters)
+        return control.ss(whole, inputs=["gap", "acceleration"][: len(filters)], outputs=["force", "innovation"])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisState:
@@ -132,8 +147,8 @@ class ForceBlock:
     innovation: FloatArray
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ForceEstimate:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ForceEstimate(Saved):
     """Forces of a whole record.
 
     Parameters
@@ -143,21 +158,27 @@ class ForceEstimate:
     force : array, shape (n, a) [N]
     standard_deviation : array, shape (n, a) [N]
         What follows from sensor noise and the force model, raised where the innovations scatter more than they should.
-    consistency : array, shape (a,) [-]
+    consistency : array, shape (a,) [-], or None
         Scatter of the innovations in the band over the expected; 1 where model, noise and force agree, more where they are too
-        sure of themselves.
+        sure of themselves. None of forces from a file.
     """
 
     axes: tuple[Dof, ...]
     step: float
     force: FloatArray
     standard_deviation: FloatArray
-    consistency: FloatArray
+    consistency: FloatArray | None = None
 
     @property
     def time(self) -> FloatArray:
         """Time from the first sample, shape (n,) [s]."""
         return np.arange(self.force.shape[0]) * self.step
+
+    def __str__(self) -> str:
+        later = slice(self.force.shape[0] // 2, None)
+        size, std = np.std(self.force[later], axis=0), np.median(self.standard_deviation[later], axis=0)
+        rows = [f"{axis.upper()} {a:.3g} N rms (± {b:.2g} N)" for axis, a, b in zip(self.axes, size, std, strict=True)]
+        return f"{', '.join(rows)} over {self.force.shape[0] * self.step:.3g} s"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

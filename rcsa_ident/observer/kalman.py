@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.errors import InputError
 from rcsa_ident.observer._kernels import kalman_steps, lagged_force, smoothed_force
 from rcsa_ident.observer.force_model import AugmentedModel
@@ -163,9 +164,7 @@ class KalmanFilter:
         complex arrays, shape (n,)
             Displacement to force, displacement to innovation.
         """
-        a, seen, row, _ = self.model.matrices()
-        gain = self.gain[-1].T.ravel()[self.model.live]
-        seen = seen * self.model.noise
+        a, seen, row, gain = self._steady()
         back = np.exp(-1j * np.asarray(omega, dtype=float) * self.model.step)
         closed = a - np.outer(gain, seen @ a)
         states = np.linalg.solve(np.eye(row.size) - back[:, None, None] * closed, np.broadcast_to(gain[:, None], (back.size, row.size, 1)))
@@ -176,12 +175,28 @@ class KalmanFilter:
             force = force + innovation * (ahead @ self.lag_weights(lag))
         return force, innovation
 
-    @property
-    def error_poles(self) -> ComplexArray:
-        """Poles of the estimate's error in the steady state, shape (n,): inside the unit circle."""
-        a, seen, _, _ = self.model.matrices()
-        gain = self.gain[-1].T.ravel()[self.model.live] * self.model.noise
-        return np.linalg.eigvals(a - np.outer(gain, seen @ a)).astype(complex)
+    def state_space(self) -> StateSpace:
+        """Return the filter in the steady state: measured displacement [m] in, force [N] and innovation [m] out.
+
+        Its poles are those of the estimate's error.
+        """
+        a, seen, row, gain = self._steady()
+        closed = a - np.outer(gain, seen @ a)
+        outputs = np.stack([row @ closed, -(seen @ a)])
+        return StateSpace(closed, gain[:, None], outputs, np.array([[row @ gain], [1.0]]), self.model.step)
+
+    def loop(self) -> StateSpace:
+        """Return the innovation loop, cut open: innovation [m] in, the displacement predicted from past corrections [m] out.
+
+        L(z) = H (z I - A)^-1 A K; the innovation is S = 1 / (1 + L) times the measured displacement.
+        """
+        a, seen, _, gain = self._steady()
+        return StateSpace(a, (a @ gain)[:, None], seen[None], np.zeros((1, 1)), self.model.step)
+
+    def _steady(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """A, H, the force's row and the gain of the live real states, in metres and newtons."""
+        a, seen, row, _ = self.model.matrices()
+        return a, seen * self.model.noise, row, self.gain[-1].T.ravel()[self.model.live]
 
     def _arrays(self) -> tuple[FloatArray, FloatArray, int, int, float]:
         model = self.model

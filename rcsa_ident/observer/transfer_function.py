@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.rational import RationalFit, rational_fit
+from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.observer._kernels import modal_filter
 
@@ -51,6 +53,11 @@ class SampledModes:
         z = np.exp(1j * np.asarray(omega, dtype=float) * self.step)[:, None]
         pairs = self.gain / (z - self.decay) + self.gain.conj() / (z - self.decay.conj())
         return np.sum(pairs, axis=1) + self.through
+
+    def state_space(self) -> StateSpace:
+        """Return the filter as a real state space in modal form."""
+        poles = PoleResidue(self.decay, self.gain[None], np.ones((self.decay.size, 1)), np.array([[self.through]]))
+        return replace(poles.state_space(), step=self.step)
 
     def init(self) -> FloatArray:
         """Return the state of a filter at rest, shape (2, m)."""

@@ -27,10 +27,10 @@ STAGES = {
     "search": ("genetic search", "#9aa5b1"),
     "refine": ("refined candidates", "#0072B2"),
     "learn noise": ("noise learned from the data", "#009E73"),
-    "exchange": ("modes exchanged", "#CC79A7"),
+    "exchange": ("modes added, merged or removed", "#CC79A7"),
     "from the other axis": ("started from the other axis", "#E69F00"),
-    "polish": ("both axes polished", "#C8501A"),
-    "grow": ("a mode beyond the evidence", "#56B4E9"),
+    "polish": ("joint fit of both axes", "#C8501A"),
+    "grow": ("one mode more than the evidence supports", "#56B4E9"),
     "generation": ("best of each generation", "#0072B2"),
 }
 _TRUTH = "#1f2933"

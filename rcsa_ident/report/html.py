@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident import __version__
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.parameters import JOINT
@@ -21,6 +20,7 @@ from rcsa_ident.report.summaries import coefficient_rows, lobes_summary, mode_ro
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.advice import Advice
 from rcsa_ident.units import to_hz
+from rcsa_ident.version import __version__
 
 #: A logarithm that the data leave open by more than this is not told by them.
 UNTOLD = 0.5
@@ -172,7 +172,9 @@ def _tooling(number: int, page: ToolingPage) -> dict[str, Any]:
         "tip": figures.svg(figures.tooltip_frf(page.frequency, page.tip, page.deviation, page.truth, page.band_hz), f"tip{number}"),
         "lobes": ""
         if page.advice is None
-        else figures.svg(stability_figure(page.advice.lobes, page.advice.recommended, page.true_limit), f"lobes{number}"),
+        else figures.svg(
+            stability_figure(page.advice.lobes, page.advice.recommended, page.true_limit, usable=page.advice.usable), f"lobes{number}"
+        ),
         "recommended": [] if found is None else found["recommended"],
         "anywhere": None if found is None else found["absolute_limit_mm"],
         "critical": None if found is None else found["absolute_frequency_hz"],

@@ -165,7 +165,7 @@ def lobes_summary(advice: Advice) -> dict[str, Any]:
                 "limit_depth_mm": finite(pocket.limit_depth, 1e3),
                 "recommended_depth_mm": 1e3 * pocket.recommended_depth,
             }
-            for pocket in lobes.best_speeds()
+            for pocket in lobes.best_speeds(recommended=advice.usable.stable)
         ],
         "recommended": [_recommended(point, lobes) for point in advice.recommended],
         "flip_speeds": int(lobes.flip.sum()),
@@ -173,15 +173,15 @@ def lobes_summary(advice: Advice) -> dict[str, Any]:
     }
 
 
-def lobes_curves(lobes: StabilityLobes) -> dict[str, Any]:
+def lobes_curves(advice: Advice) -> dict[str, Any]:
     """Return stability limits over speed; None belongs to a cut that is stable up to the depth that was asked for."""
-    band = lobes.band
+    lobes, band = advice.lobes, advice.lobes.band
     return {
         "spindle_speed_rpm": to_rpm(lobes.spindle_speed, 6).tolist(),
         "limit_depth_mm": _finite_list(lobes.limit_depth * 1e3),
         "limit_depth_low_mm": None if band is None else _finite_list(band[0] * 1e3),
         "limit_depth_high_mm": None if band is None else _finite_list(band[1] * 1e3),
-        "recommended_depth_mm": (1e3 * lobes.recommended_depth()).tolist(),
+        "recommended_depth_mm": (1e3 * advice.usable.stable).tolist(),
         "chatter_frequency_hz": _finite_list(to_hz(lobes.chatter_frequency)),
         "lobe": [None if n < 0 else n for n in lobes.lobe.tolist()],
         "flip": lobes.flip.tolist(),

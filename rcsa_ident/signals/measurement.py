@@ -13,6 +13,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
+from rcsa_ident.shown import Shown
 from rcsa_ident.signals.alignment import angle_to_air, trigger_delay
 from rcsa_ident.signals.frf import AxisLines, Estimator, LineEstimator, turned_air
 from rcsa_ident.signals.recording import Recording
@@ -58,8 +59,8 @@ class CutMeasurement:
     tooth_angle_known: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
+@dataclass(frozen=True, slots=True, repr=False)
+class Reading(Shown):
     """A cut whose recordings were read: their verdict and, where they are usable, the measurement.
 
     Parameters
@@ -81,6 +82,10 @@ class Reading:
     measurement: CutMeasurement | None = None
     spindle_speed: float | None = None
     harmonics: Mapping[Dof, int] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        lines = 0 if self.measurement is None else sum(each.omega.size for each in self.measurement.axes.values())
+        return f"{self.cut_id}: {self.verdict}" + (f", {lines} lines" if self.verdict.usable else "")
 
 
 def measure_cut(

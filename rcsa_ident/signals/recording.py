@@ -10,6 +10,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.shown import Drawn
 
 
 class Quantity(StrEnum):
@@ -79,8 +80,8 @@ class Sensor:
         return value
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Recording:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Recording(Drawn):
     """Samples of all channels.
 
     Parameters
@@ -119,3 +120,7 @@ class Recording:
             if sensor.quantity is quantity and (axis is None or sensor.axis is axis):
                 return sensor, self.samples[:, i]
         return None
+
+    def __str__(self) -> str:
+        seconds = self.samples.shape[0] / self.rate
+        return f"{seconds:.3g} s at {self.rate:.6g} Hz: {', '.join(sensor.name for sensor in self.sensors)}"

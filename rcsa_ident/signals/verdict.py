@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.shown import Shown
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, follow_speed, line_spectrum, refine_speed
 from rcsa_ident.signals.steady_part import hann
@@ -32,8 +33,8 @@ VISIBLE = 40.0
 DRIFT_PHASE = 0.5
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
+@dataclass(frozen=True, slots=True, repr=False)
+class Verdict(Shown):
     """What was found in a record.
 
     Parameters
@@ -51,6 +52,9 @@ class Verdict:
     def usable(self) -> bool:
         """True where nothing speaks against the record."""
         return not self.reasons
+
+    def __str__(self) -> str:
+        return "usable" if self.usable else f"left out: {'; '.join(self.reasons)}"
 
 
 def raw_faults(recording: Recording) -> tuple[str, ...]:

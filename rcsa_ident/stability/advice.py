@@ -11,9 +11,11 @@ from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.power import SpindleDrive, spindle_load
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.shown import Drawn, Shown
 from rcsa_ident.stability.pockets import least_within_tolerance, peaks
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally
+from rcsa_ident.units import to_cm3_per_min, to_rpm
 
 
 class Bound(StrEnum):
@@ -26,8 +28,8 @@ class Bound(StrEnum):
     DEPTH = "depth"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class UsableDepths:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class UsableDepths(Shown):
     """How deep one may cut at each speed, and what stands against more.
 
     Parameters
@@ -84,6 +86,12 @@ class UsableDepths:
         arrays = {"removal_rate": None} | {name: getattr(self, name)[inside] for name in self._arrays}
         return UsableDepths(**arrays, bound=tuple(b for b, there in zip(self.bound, inside, strict=True) if there))
 
+    def __str__(self) -> str:
+        if self.spindle_speed.size == 0:
+            return "no speeds"
+        speed, depth = to_rpm(self.spindle_speed), 1e3 * self.depth
+        return f"{speed[0]:.0f} to {speed[-1]:.0f} rev/min: recommended depth {depth.min():.2f} to {depth.max():.2f} mm"
+
 
 def usable_depths(
     lobes: StabilityLobes,
@@ -129,8 +137,8 @@ def usable_depths(
     return UsableDepths(speed, lobes.nominal, stable, by_power, by_torque, depth, tuple(bound), removal_rate)
 
 
-@dataclass(frozen=True, slots=True)
-class OperatingPoint:
+@dataclass(frozen=True, slots=True, repr=False)
+class OperatingPoint(Shown):
     """A cut that is recommended.
 
     Parameters
@@ -155,6 +163,13 @@ class OperatingPoint:
     power: float | None
     torque: float | None
 
+    def __str__(self) -> str:
+        depths = f"stability limit {1e3 * self.limit:.2f} mm, recommended {1e3 * self.depth:.2f} mm"
+        ended = "" if self.bound is Bound.CHATTER else f" (ended by {self.bound})"
+        removed = "" if self.removal_rate is None else f", {to_cm3_per_min(self.removal_rate):.0f} cm³/min"
+        taken = "" if self.power is None else f", {1e-3 * self.power:.2g} kW"
+        return f"{to_rpm(self.spindle_speed):.0f} rev/min: {depths}{ended}{removed}{taken}"
+
 
 def highest_removal(usable: UsableDepths, process: MillingProcess, count: int = 3) -> list[OperatingPoint]:
     """Return the cuts that remove most, one for each pocket, the best first."""
@@ -174,8 +189,8 @@ def highest_removal(usable: UsableDepths, process: MillingProcess, count: int = 
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class SpeedWindow:
+@dataclass(frozen=True, slots=True, repr=False)
+class SpeedWindow(Shown):
     """Speeds at which a depth is allowed.
 
     Parameters
@@ -196,6 +211,10 @@ class SpeedWindow:
     def width(self) -> float:
         """Width over the middle."""
         return (self.high - self.low) / (0.5 * (self.high + self.low))
+
+    def __str__(self) -> str:
+        best = f"up to {1e3 * self.allowed:.2f} mm at {to_rpm(self.best):.0f} rev/min"
+        return f"{to_rpm(self.low):.0f} to {to_rpm(self.high):.0f} rev/min, {best}"
 
 
 def speed_windows(usable: UsableDepths, depth: float) -> list[SpeedWindow]:
@@ -220,8 +239,8 @@ def _crossing(speed: FloatArray, level: FloatArray, place: int, value: float) ->
     return float(speed[place] + (value - a) / (b - a) * (speed[place + 1] - speed[place]))
 
 
-@dataclass(frozen=True, slots=True)
-class PlannedCut:
+@dataclass(frozen=True, slots=True, repr=False)
+class PlannedCut(Shown):
     """How a cut stands that somebody wants to make.
 
     Parameters
@@ -268,6 +287,12 @@ class PlannedCut:
         """Share of the cut's depth by which the limit lies above it; negative above the limit."""
         return self.limit / self.depth - 1.0
 
+    def __str__(self) -> str:
+        limit = "no stability limit in the depths asked for" if self.limit == np.inf else f"stability limit {1e3 * self.limit:.2f} mm"
+        sure = "" if self.probability is None else f", stable with {100.0 * self.probability:.0f} % probability"
+        state = "stable" if self.stable else "chatter"
+        return f"{to_rpm(self.spindle_speed):.0f} rev/min, {1e3 * self.depth:.2f} mm: {state}, {limit}{sure}"
+
 
 def planned_cut(
     lobes: StabilityLobes,
@@ -310,8 +335,8 @@ def planned_cut(
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Advice:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Advice(Drawn):
     """Which cuts a tooling can make, and which of them is recommended.
 
     Parameters
@@ -348,3 +373,6 @@ class Advice:
     def common(self) -> FloatArray | None:
         """What is stable on all machines that were drawn, shape (n,) [m]; None where none were."""
         return None if self.lobes.drawn is None else self.lobes.limit_quantile(1.0)
+
+    def __str__(self) -> str:
+        return f"{self.tooling}: {self.recommended[0]}" if self.recommended else f"{self.tooling}: no cut is recommended"

@@ -10,7 +10,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.methods import MethodName
-from rcsa_ident.stability.monodromy import EngagementProfile, MonodromyOperator
+from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import check_resolution, marched_lobes
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import TipModes, modes_of
@@ -25,7 +25,8 @@ class FullDiscretisation:
     with the degree's order even in interrupted cuts. The map of a period is applied, never written down: its cost is linear in steps
     and modes, and Arnoldi's method [arnoldi1951] finds its largest multiplier.
 
-    Takes unequal pitch, run-out (with the feed per tooth), helix, a varying speed, process damping, modes with a shape along the edge.
+    Takes unequal pitch, run-out (with the feed per tooth), helix, a varying speed, process damping, modes with a shape and an
+    engagement that changes along the edge.
 
     Parameters
     ----------
@@ -34,8 +35,6 @@ class FullDiscretisation:
     degree : int, default 6
     tolerance : float, default 3e-3
         Of the limit depth, relative, where `intervals` is None.
-    engagements : callable or None
-        Engagement along the edge by speed and depth, as a deflected tool has it: `deformation.deflected_engagement`.
     """
 
     name: ClassVar[str] = MethodName.FULL_DISCRETISATION.value
@@ -46,7 +45,6 @@ class FullDiscretisation:
     intervals: int | None = None
     degree: int = 6
     tolerance: float = 3e-3
-    engagements: EngagementProfile | None = None
 
     def __post_init__(self) -> None:
         check_resolution(self.intervals, self.tolerance)
@@ -55,7 +53,7 @@ class FullDiscretisation:
 
     def monodromy(self, tip: Receptance | TipModes, process: MillingProcess) -> MonodromyOperator:
         """Return the cut's monodromy operator."""
-        return MonodromyOperator(modes_of(tip, self.name), process, self.degree, engagements=self.engagements)
+        return MonodromyOperator(modes_of(tip, self.name), process, self.degree)
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""

@@ -59,6 +59,9 @@ class MultiFrequency:
         cutter = process.cutter
         if process.speed_variation is not None:
             raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
+        if process.engagement_profile is not None:
+            allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
+            raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
         if np.ptp(cutter.pitch) > 1e-9:
             raise InputError("pitch", np.degrees(cutter.pitch).tolist(), "equal pitch: zero-order and full-discretisation take any")
         motion = TipMotion.of(receptance_of(tip, wide=True))

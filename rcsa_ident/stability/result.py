@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.errors import InputError
+from rcsa_ident.shown import Drawn, Shown
 from rcsa_ident.stability.pockets import least_within_tolerance, peaks
+from rcsa_ident.units import to_rpm
 
 _ARRAYS = ("spindle_speed", "limit_depth", "chatter_frequency", "lobe", "flip")
 #: What a recommendation holds back: speed right within this share, stable on this share of the machines that the records allow, and so
@@ -18,8 +20,8 @@ _ARRAYS = ("spindle_speed", "limit_depth", "chatter_frequency", "lobe", "flip")
 TOLERANCE, PROBABILITY, RESERVE = 0.01, 0.95, 0.1
 
 
-@dataclass(frozen=True, slots=True)
-class Pocket:
+@dataclass(frozen=True, slots=True, repr=False)
+class Pocket(Shown):
     """A spindle speed that allows more depth than its neighbours.
 
     Parameters
@@ -35,9 +37,17 @@ class Pocket:
     limit_depth: float
     recommended_depth: float
 
+    def __str__(self) -> str:
+        limit = (
+            "no stability limit in the depths asked for"
+            if self.limit_depth == np.inf
+            else f"stability limit {1e3 * self.limit_depth:.2f} mm"
+        )
+        return f"{to_rpm(self.spindle_speed):.0f} rev/min: {limit}, recommended {1e3 * self.recommended_depth:.2f} mm"
 
-@dataclass(frozen=True, slots=True, eq=False)
-class StabilityLobes:
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class StabilityLobes(Drawn):
     """The smallest depth at which a cut loses stability, over spindle speed.
 
     Parameters
@@ -152,16 +162,18 @@ class StabilityLobes:
             raise InputError("reserve", reserve, "a share from 0 to below 1")
         return (1.0 - reserve) * least_within_tolerance(self.spindle_speed, self.limit_quantile(probability), tolerance)
 
-    def best_speeds(self, count: int = 3) -> list[Pocket]:
+    def best_speeds(self, count: int = 3, recommended: FloatArray | None = None) -> list[Pocket]:
         """Return the speeds with the highest limits, one for each pocket of the lobes, the highest first.
 
         Parameters
         ----------
         count : int
             At most so many. The middle of a range that is stable up to `max_depth` stands for it.
+        recommended : array, shape (n,) [m], default `recommended_depth`
+            At rising speeds.
         """
         lobes = self.ordered()
-        recommended = lobes.recommended_depth()
+        recommended = lobes.recommended_depth() if recommended is None else recommended
         found = []
         for speed, limit in peaks(lobes.spindle_speed, lobes.limit_depth, count):
             found.append(Pocket(speed, limit, float(np.interp(speed, lobes.spindle_speed, recommended))))
@@ -198,3 +210,12 @@ class StabilityLobes:
             warnings=tuple(dict.fromkeys(warning for part in parts for warning in part.warnings)),
             drawn=np.concatenate(drawn, axis=1)[:, back] if len(drawn) == len(parts) else None,
         )
+
+    def __str__(self) -> str:
+        if self.spindle_speed.size == 0:
+            return f"{self.method}, no speeds"
+        low, high = (to_rpm(float(speed)) for speed in (self.spindle_speed.min(), self.spindle_speed.max()))
+        known = self.absolute_limit is not None and np.isfinite(self.absolute_limit)
+        anywhere = f", stable below {1e3 * (self.absolute_limit or 0.0):.2f} mm at any speed" if known else ""
+        best = self.best_speeds(1)
+        return f"{self.method}, {low:.0f} to {high:.0f} rev/min{anywhere}" + (f"; best {best[0]}" if best else "")

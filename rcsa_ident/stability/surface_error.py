@@ -13,7 +13,9 @@ from rcsa_ident.cutting.force import force_lines, runout_force_lines
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.shown import Drawn
 from rcsa_ident.stability.tip_modes import TIP, TipModes
+from rcsa_ident.units import to_rpm
 
 #: Most multiples of the spindle frequency; where the band holds more of them, the rest is left out.
 MOST_ORDERS = 4000
@@ -28,8 +30,8 @@ class Wall(StrEnum):
     EXIT = "exit"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SurfaceError:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SurfaceError(Drawn):
     """How far the wall lies from where a rigid tool would leave it; positive where material is left, negative where too much is gone.
 
     Parameters
@@ -64,6 +66,12 @@ class SurfaceError:
     def mean(self) -> FloatArray:
         """Mean over the height, shape (n,) [m]."""
         return self.error.mean(axis=1)
+
+    def __str__(self) -> str:
+        speed, error = to_rpm(self.spindle_speed), 1e6 * self.error
+        speeds, depth = f"{speed.min():.0f} to {speed.max():.0f} rev/min", f"{1e3 * float(self.height[-1]):.3g} mm deep"
+        side = "enter" if self.wall is Wall.ENTRY else "leave"
+        return f"{speeds}, {depth}: {error.min():.2g} to {error.max():.2g} µm at the wall where teeth {side}"
 
 
 def surface_location_error(

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.rational import fitted_poles
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.shown import Shown
+from rcsa_ident.units import to_hz
 
 #: Lines per half-power bandwidth of the least damped mode, and the most there may be.
 LINES_PER_BANDWIDTH = 10.0
@@ -27,8 +30,8 @@ FIT_TOLERANCE = 2e-3
 DAMPED_OUTSIDE = 0.1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TipModes(PoleResidue):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TipModes(PoleResidue, Shown):
     """The tip's 2 x 2 receptance in machine axes X and Y as damped modes; along the edge they may have a shape.
 
     Parameters
@@ -117,6 +120,25 @@ class TipModes(PoleResidue):
         places = np.abs(self.pole.imag)[:, None] - self.pole.real[:, None] * np.linspace(-1.5, 1.5, 13)
         places = np.concatenate([places.ravel(), [0.0]])
         return float(np.max(np.linalg.norm(self.response(np.maximum(places, 0.0)), 2, axis=(1, 2))))
+
+    def __str__(self) -> str:
+        frequency = np.sort(to_hz(np.abs(self.pole)))
+        return f"{self.pole.size} modes of the tip, {frequency[0]:.0f} to {frequency[-1]:.0f} Hz"
+
+
+class ModeArrays(NamedTuple):
+    """What kernels take of modes, p' = pole p + inputs F, y = 2 Re(outputs p) + constant F, with m modes and r displacements.
+
+    The order is that in which the kernels unpack it. They are compiled anew for read-only arrays: these are not.
+    """
+
+    #: Complex, shape (m,).
+    pole: ComplexArray
+    #: Complex, shapes (r, m), (m, r).
+    outputs: ComplexArray
+    inputs: ComplexArray
+    #: Shape (r, r).
+    constant: FloatArray
 
 
 def fitted_modes(tip: Receptance) -> tuple[TipModes, float]:

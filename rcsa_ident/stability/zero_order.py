@@ -115,6 +115,9 @@ def _directions(process: MillingProcess) -> FloatArray:
     """[alpha0] of a cut at constant speed."""
     if process.speed_variation is not None:
         raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
+    if process.engagement_profile is not None:
+        allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
+        raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
     return mean_directional_matrix(process.cutter.teeth, process.engagement, process.coefficients, process.feed_angle)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.shown import Shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,8 +130,8 @@ class Contact:
             non_negative(name, getattr(self, name))
 
 
-@dataclass(frozen=True, slots=True)
-class ToolAssembly:
+@dataclass(frozen=True, slots=True, repr=False)
+class ToolAssembly(Shown):
     """A tool clamped in a holder; all segments run from the tip's end to the flange.
 
     Parameters
@@ -184,6 +185,10 @@ class ToolAssembly:
     def stickout(self) -> float:
         """Length of tool in front of the holder [m]."""
         return self.tool_length - self.insertion
+
+    def __str__(self) -> str:
+        lengths = {"stickout": self.stickout, "insertion": self.insertion, "holder": self.holder_length}
+        return ", ".join(f"{name} {1e3 * length:.4g} mm" for name, length in lengths.items())
 
 
 def clamped(

@@ -69,7 +69,9 @@ class TapTest:
     def __post_init__(self) -> None:
         omega, values = frozen(self.omega), frozen(self.values, np.complex128)
         if omega.ndim != 1 or omega.shape != values.shape or not np.all(np.diff(omega, prepend=0.0) > 0.0):
-            raise InputError("tap test", f"{omega.shape} and {values.shape}", "values at frequencies above 0 that rise", self.name)
+            raise InputError(
+                "tap test", f"{omega.shape} and {values.shape}", "one value for each of increasing frequencies above 0", self.name
+            )
         if not np.all(np.isfinite(values)) or np.any(values == 0.0):
             raise InputError("tap test", "zero or no number", "a receptance above 0 at every frequency [m/N]", self.name)
         std = neighbour_noise(values) if self.std is None else frozen(np.broadcast_to(self.std, values.shape))

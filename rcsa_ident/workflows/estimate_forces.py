@@ -20,6 +20,7 @@ from rcsa_ident.observer.response import ObserverFRF, observer_response
 from rcsa_ident.observer.transfer_function import HIGHEST, transfer_function
 from rcsa_ident.observer.tuning import ObserverMethod, Resonators, Tuning, harmonics
 from rcsa_ident.observer.wear import WearIndicators, wear_indicators
+from rcsa_ident.shown import Drawn
 from rcsa_ident.signals.alignment import angle_to_air
 from rcsa_ident.signals.measurement import NO_AIR
 from rcsa_ident.signals.recording import Quantity, Recording
@@ -42,8 +43,8 @@ UNRELATED, PERIODIC = 0.5, 0.9
 METHOD = Resonators()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MonitoredCut:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class MonitoredCut(Drawn):
     """Forces of a recording and what they rest on.
 
     Parameters
@@ -75,6 +76,10 @@ class MonitoredCut:
     model_error: Mapping[Dof, float]
     noise: Mapping[Dof, float]
     notes: tuple[str, ...] = field(default=())
+
+    def __str__(self) -> str:
+        low, high = (to_hz(w) for w in self.band)
+        return f"{self.estimate}, {to_rpm(self.spindle_speed):.0f} rev/min, {low:.0f} to {high:.0f} Hz"
 
 
 def observe(

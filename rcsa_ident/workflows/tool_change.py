@@ -33,7 +33,7 @@ from rcsa_ident.units import to_hz, to_rpm
 #: How far beyond the identified band receptances are computed where a method fits modes to them: those above it are the tool's own.
 BEYOND = 1.5
 #: Seconds for a line and an unknown of the posterior, and further seconds for a speed with bands.
-_SPREAD_SECONDS, _BAND_SECONDS = 1e-5, 2e-4
+_SPREAD_SECONDS, _BAND_SECONDS = 1e-6, 2e-4
 #: Unequal pitch costs the zero-order method so many times as much; a machine that changes with speed so many further seconds.
 _PITCH_FACTOR, _CHANGING_SECONDS = 30.0, 4.0
 _UNLIMITED = SpindleDrive.flat(None, None, None)
@@ -271,4 +271,6 @@ def _outside(machine: TipSource, speeds: FloatArray) -> list[str]:
     if known is None or (speeds.min() >= known[0] * (1.0 - 1e-9) and speeds.max() <= known[1] * (1.0 + 1e-9)):
         return []
     low, high = (to_rpm(speed) for speed in known)
-    return [f"the machine was identified from {low:.0f} to {high:.0f} rev/min; outside it stays what it is at the nearest of them"]
+    return [
+        f"the machine was identified from {low:.0f} to {high:.0f} rev/min; outside this range its dynamics at the nearest speed are used"
+    ]

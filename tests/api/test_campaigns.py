@@ -309,7 +309,7 @@ def test_a_campaign_that_can_not_be_loaded_says_why(client, machine, store):
     with pytest.raises(InputError, match="no recording of a cut"):
         load_campaign(store, files, "local", made.id)
     for group, id in (("local", "none"), ("other", made.id)):
-        with pytest.raises(InputError, match="a campaign that is there"):
+        with pytest.raises(InputError, match="an existing campaign"):
             load_campaign(store, files, group, id)
 
 

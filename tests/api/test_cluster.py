@@ -37,7 +37,7 @@ def test_without_a_cluster_it_is_done_here(monkeypatch, caplog):
     monkeypatch.setattr("api.jobs.cluster.cluster_map", lambda address: away(address, 0.3))
     found = list(over_cluster("tcp://127.0.0.1:1")(tasks.late, [5.0, 4.0]))
     assert found == [(5.0, os.getpid()), (4.0, os.getpid())]
-    assert [record.getMessage() for record in caplog.records] == ["the cluster is away: working here"]
+    assert [record.getMessage() for record in caplog.records] == ["the cluster cannot be reached: the tasks are done here"]
 
 
 def away(address, timeout):

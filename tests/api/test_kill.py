@@ -27,6 +27,7 @@ from tests.api.identifying import uploaded
 from tests.api.in_process import POSTGRESQL, SQLITE, database
 from tests.fixtures import by_hand
 from tests.fixtures.service import command, example, serving
+from tests.fixtures.waiting import PATIENCE, until
 
 pytestmark = pytest.mark.skipif(os.name != "posix" or not Path("/proc/self/stat").exists(), reason="processes are looked up in /proc")
 
@@ -47,9 +48,7 @@ def kill(pids: list[int]) -> None:
     for pid in pids:
         with suppress(ProcessLookupError):
             os.kill(pid, signal.SIGKILL)
-    for each in told:
-        while not each.endswith(":") and not gone(each):
-            time.sleep(0.02)
+    until(lambda: all(each.endswith(":") or gone(each) for each in told))
 
 
 def workers(store: Store) -> list[int]:
@@ -85,7 +84,7 @@ def test_an_identification_survives_everything(request, tmp_path, kind):
         machine = client.make_machine("M").id
         campaign = uploaded(client, machine)
         undisturbed = client.identify_campaign(campaign, seed=7)
-        assert client.wait(undisturbed.id, 120.0).state == "done"
+        assert client.wait(undisturbed.id, PATIENCE).state == "done"
         expected = client.result(undisturbed.id)
         job = client.identify_campaign(campaign, seed=7, apply=False).id
         store = open_store(url)
@@ -102,7 +101,7 @@ def test_an_identification_survives_everything(request, tmp_path, kind):
         after(client, job, rng.randrange(1, 4))
         kill([*workers(store), service.pid])
     with started(folder, url) as (client, _):
-        found = client.wait(job, 120.0)
+        found = client.wait(job, PATIENCE)
         assert (found.state, found.problem) == ("done", None)
         assert client.result(job) == expected
         assert [kind for kind, _ in client.events(job)].count("end") == 1
@@ -126,13 +125,6 @@ def working(folder: Path, url: str, name: str) -> Iterator[subprocess.Popen]:
             yield running
         finally:
             kill([*descendants(running.pid), running.pid])
-
-
-def until(condition, seconds: float = 90.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "it did not come to pass"
-        time.sleep(0.05)
 
 
 def test_several_workers_share_jobs_and_take_over(request, tmp_path, result):
@@ -179,7 +171,7 @@ def test_a_worker_that_is_not_free_or_not_there(tmp_path, result):
         following = client.lobes_later(machine, example(), speeds={"step_rpm": 2000}).id
         until(lambda: client.lobe_job(following).job.state == "done")
         # the search through all those speeds takes an hour
-        assert time.monotonic() - start < 90.0
+        assert time.monotonic() - start < PATIENCE
         assert client.lobe_job(job).job.state == "cancelled"
         # the engine's tables are no database any more
         store = open_store(url)

@@ -17,6 +17,7 @@ from rcsa_ident.errors import InputError
 from tests.api.in_process import refused
 from tests.fixtures import by_hand
 from tests.fixtures.service import command, serving
+from tests.fixtures.waiting import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -85,7 +86,7 @@ def test_a_service_with_keys_killed_and_started_again(tmp_path, result):
         # the same numbers to the last digit
         assert client.lobes(id, "T1") == first
         served.process.terminate()
-        assert served.process.wait(20) in (0, -15)
+        assert served.process.wait(PATIENCE) in (0, -15)
     lines = [json.loads(line) for line in served.log.read_text().splitlines()]
     (line,) = [line for line in lines if line.get("route", "").endswith("/lobes")]
     assert line["status"] == 200
@@ -102,7 +103,7 @@ def test_a_service_without_keys_says_so(tmp_path):
 def test_a_body_without_an_end_is_cut_off(tmp_path):
     """In chunks, whose sum nobody tells before; the connection ends when the limit is passed."""
     with serving(tmp_path / "data", RCSA_IDENT_MAX_BODY_BYTES="100000") as served:
-        with socket.create_connection(("127.0.0.1", served.port), timeout=20) as link:
+        with socket.create_connection(("127.0.0.1", served.port), timeout=PATIENCE) as link:
             head = "POST /v1/machines HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
             link.sendall(head.encode())
             sent = 0

@@ -14,7 +14,7 @@ from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.errors import InputError
-from tests.dynamics.test_state_space import OSCILLATOR, random_system
+from tests.dynamics.test_state_space import OSCILLATOR, random_system, sampled
 
 #: A pair, and a real pole with half its residue.
 POLE = np.array([-20.0 + 300.0j, -150.0])
@@ -115,7 +115,7 @@ def test_a_measured_receptance_goes_to_python_control():
         (lambda: PoleResidue(POLE, SYSTEM.outputs[:, :1], SYSTEM.inputs, SYSTEM.constant), "outputs"),
         (lambda: PoleResidue(POLE, SYSTEM.outputs, np.full((2, 1), np.nan), SYSTEM.constant), "inputs"),
         (lambda: PoleResidue(POLE, SYSTEM.outputs, SYSTEM.inputs, np.zeros(2)), "constant"),
-        (lambda: PoleResidue.from_state_space(OSCILLATOR.sampled(0.1)), "step"),
+        (lambda: PoleResidue.from_state_space(sampled(OSCILLATOR, 0.1, "zoh")), "step"),
         (lambda: PoleResidue.from_state_space(StateSpace([[0.0, 1.0], [0.0, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]])), "poles"),
     ],
 )

@@ -14,7 +14,8 @@ from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.structure import Structure
 from rcsa_ident.errors import InputError
-from rcsa_ident.machine.machine import LOWEST, FlangeMachine
+from rcsa_ident.machine.flange_machine import FlangeMachine
+from rcsa_ident.machine.machine import LOWEST
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.tool_holder.model import tool_holder_receptance, tool_holder_structure
 from tests.coupling.test_rcsa import TOOL, spindle_structure

@@ -148,7 +148,7 @@ def test_the_page_is_whole_and_self_contained(found, campaign, readings):
 def test_what_the_records_do_not_tell_is_marked(found, campaign, readings):
     text = report_html(found, campaign, readings)
     rows = {
-        row.split("</td>")[0]: "hardly tell" in row
+        row.split("</td>")[0]: "hardly determined" in row
         for row in re.findall(r"<tr><td>((?:translational|rotational).*?)</tr>", text, re.DOTALL)
     }
     assert rows == {

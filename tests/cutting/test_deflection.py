@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -12,16 +13,11 @@ import scipy.optimize
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.deflection import ToolDeflection, deflected_edge, deflected_process
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping
-from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.errors import InputError
-from rcsa_ident.stability.deformation import ToolDeflection, deflected_edge, deflected_engagement
-from rcsa_ident.stability.full_discretisation import FullDiscretisation
-from rcsa_ident.stability.lobes import stability_lobes
-from rcsa_ident.stability.tip_modes import TipModes
-from tests.oracles.literature import DEFORMED_LIMIT_MM, DEFORMED_LIMIT_WITH_SHAPES_MM, DEFORMED_TOOL, TIP_DEFLECTION_MM
-from tests.stability.mills import RPM, SKEWED, mill, tip
+from tests.oracles.literature import DEFORMED_TOOL, TIP_DEFLECTION_MM
+from tests.stability.mills import RPM
 
 T = DEFORMED_TOOL
 EI = T["youngs_modulus"] * np.pi / 64.0 * T["diameter"] ** 4
@@ -37,43 +33,9 @@ TOOL = ToolDeflection(T["length"], EI, T["machine_yy"], feed_rate=T["feed_rate"]
 PLATEAU = 0.5 * T["diameter"] * np.arccos(1.0 - 2.0 * T["radial_depth"] / T["diameter"])
 
 
-def modes(shapes: bool) -> TipModes:
-    models = {}
-    for axis, name in ((Dof.X, "x"), (Dof.Y, "y")):
-        frequency, zeta, shape = T[name]
-        models[axis] = normal_modes(np.array([2.0 * np.pi * frequency]), np.array([zeta]), shape[:1, None], (Coordinate("tip", axis),))
-    found = TipModes.of(models)
-    if not shapes:
-        return found
-    along = np.stack([T[name][2] / T[name][2][0] for name in ("x", "y")], axis=1)
-    return TipModes(found.pole, found.outputs, found.inputs, found.constant, T["heights"], along)
-
-
 def at_the_tip(edge) -> float:
     """Points stand in the middle of slices: half a slice on."""
     return float(1.5 * edge.deflection[0] - 0.5 * edge.deflection[1])
-
-
-def limits(tip_modes, rpm):
-    speeds = np.asarray(rpm) * RPM
-    columns = []
-    for process in (BARE, WORN):
-        for engagements in (None, deflected_engagement(process, TOOL)):
-            columns.append(stability_lobes(tip_modes, process, speeds, 20e-3, FullDiscretisation(engagements=engagements)).limit_depth)
-    return np.array(columns).T * 1e3
-
-
-def test_published_limits():
-    """Without anything, deformation, damping, both; deformation and damping lift the limit by a quarter at 8200 rev/min."""
-    found = limits(modes(shapes=False), list(DEFORMED_LIMIT_MM))
-    np.testing.assert_allclose(found, list(DEFORMED_LIMIT_MM.values()), rtol=1e-2)
-    gain = found[list(DEFORMED_LIMIT_MM).index(8200.0)]
-    assert gain[3] / gain[0] - 1.0 == pytest.approx(0.25, abs=0.03)
-
-
-def test_published_limits_with_measured_shapes():
-    found = limits(modes(shapes=True), list(DEFORMED_LIMIT_WITH_SHAPES_MM))
-    np.testing.assert_allclose(found, list(DEFORMED_LIMIT_WITH_SHAPES_MM.values()), rtol=1e-2)
 
 
 @pytest.mark.parametrize("depth", TIP_DEFLECTION_MM)
@@ -135,7 +97,7 @@ def _slow_deflection(tool: ToolDeflection, height: float, depth: float, down: bo
 
 def test_bending_is_a_cantilever():
     """A force at the tip: P (L - z)^2 (2 L + z) / 6 E I; at a height: nothing but rotation below it; the same both ways."""
-    from rcsa_ident.stability.deformation import _bending
+    from rcsa_ident.cutting.deflection import _bending
 
     z = np.array([0.0, 0.004, 0.011, 0.03])
     found = _bending(z, TOOL)
@@ -192,16 +154,17 @@ def test_feed_rate_and_feed_per_tooth():
     np.testing.assert_allclose(a, b, rtol=1e-9)
 
 
-def test_no_deflection_is_the_plain_cut():
-    """Slices of a tool that does not bend are the whole edge: with helix, damping and rotated feed."""
-    process = mill(3, 0.3, helix=0.6, feed_angle=0.4, damping=ProcessDamping(2e13, 6e-5), feed_per_tooth=5e-5)
-    stiff = ToolDeflection(0.06, 1e12)
-    speeds = np.array([6000.0, 11_000.0]) * RPM
-    plain = stability_lobes(tip(SKEWED), process, speeds, 20e-3, FullDiscretisation(tolerance=1e-5)).limit_depth
-    sliced = stability_lobes(
-        tip(SKEWED), process, speeds, 20e-3, FullDiscretisation(tolerance=1e-5, engagements=deflected_engagement(process, stiff))
-    ).limit_depth
-    np.testing.assert_allclose(sliced, plain, rtol=3e-5)
+def test_the_profile_is_the_edge_in_slices():
+    """Slices of equal height, angles at their middle; it travels between processes, and a second tool replaces the first."""
+    cut = deflected_process(BARE, TOOL)
+    rows, edge = cut.engagement_profile(1000.0, 3e-3), deflected_edge(BARE, TOOL, 1000.0, 3e-3)
+    assert rows.shape == (18, 4)
+    np.testing.assert_allclose(rows[:, 1] - rows[:, 0], 1.0 / 18.0, rtol=1e-12)
+    np.testing.assert_allclose(rows[:, 2], np.interp(1.5e-3 * (rows[:, 0] + rows[:, 1]), edge.height, edge.start), rtol=1e-12)
+    np.testing.assert_array_equal(rows[:, 3], np.pi)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(cut)).engagement_profile(1000.0, 3e-3), rows)
+    again = deflected_process(cut, replace(TOOL, length=0.05))
+    assert again.engagement_profile.process.engagement_profile is None
 
 
 @pytest.mark.parametrize(

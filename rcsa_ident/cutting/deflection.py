@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError, non_negative, positive
-from rcsa_ident.stability.monodromy import EngagementProfile
 
 #: Nodes per metre of depth, and at least so many.
 _NODES, _FEWEST = 20_000.0, 12
@@ -171,16 +170,39 @@ def _bending(height: FloatArray, deflection: ToolDeflection) -> FloatArray:
     return short**2 * (3.0 * long - short) / (6.0 * deflection.bending_stiffness)
 
 
-def deflected_engagement(process: MillingProcess, deflection: ToolDeflection, slices_per_metre: float = 6000.0) -> EngagementProfile:
-    """Return the engagement along the edge of a deflected tool, for `FullDiscretisation(engagements=...)`."""
+@dataclass(frozen=True, slots=True)
+class DeflectedEngagement:
+    """The `EngagementProfile` of a deflected tool.
 
-    @lru_cache(maxsize=4096)
-    def rows(speed: float, depth: float) -> FloatArray:
-        edge = deflected_edge(process, deflection, speed, depth)
-        count = max(4, int(np.ceil(depth * slices_per_metre)))
-        shares = np.linspace(0.0, 1.0, count + 1)
-        middle = 0.5 * (shares[1:] + shares[:-1]) * depth
-        start, end = (np.interp(middle, edge.height, each) for each in (edge.start, edge.end))
-        return np.stack([shares[:-1], shares[1:], start, end], axis=1)
+    Parameters
+    ----------
+    process : MillingProcess
+        As it would be without deflection.
+    deflection : ToolDeflection
+    slices_per_metre : float [1/m]
+        Parts of the edge, at least four.
+    """
 
-    return rows
+    process: MillingProcess
+    deflection: ToolDeflection
+    slices_per_metre: float = 6000.0
+
+    def __call__(self, speed: float, depth: float) -> FloatArray:
+        """Return the rows at a spindle speed [rad/s] and a depth [m], shape (k, 4)."""
+        return _rows(self, speed, depth)
+
+
+@lru_cache(maxsize=4096)
+def _rows(profile: DeflectedEngagement, speed: float, depth: float) -> FloatArray:
+    edge = deflected_edge(profile.process, profile.deflection, speed, depth)
+    count = max(4, int(np.ceil(depth * profile.slices_per_metre)))
+    shares = np.linspace(0.0, 1.0, count + 1)
+    middle = 0.5 * (shares[1:] + shares[:-1]) * depth
+    start, end = (np.interp(middle, edge.height, each) for each in (edge.start, edge.end))
+    return frozen(np.stack([shares[:-1], shares[1:], start, end], axis=1))
+
+
+def deflected_process(process: MillingProcess, deflection: ToolDeflection) -> MillingProcess:
+    """Return the cut with the engagement that a deflected tool has along its edge."""
+    bare = replace(process, engagement_profile=None)
+    return replace(bare, engagement_profile=DeflectedEngagement(bare, deflection))
