@@ -1,4 +1,4 @@
-"""The study of the identification: drawn machines, with trigger, without, and at three times the noise, beside the paper's method.
+"""The study of the identification: drawn machines, with trigger, without, and at three times the noise, beside [inprocess].
 
 ``python -m benchmarks study``. Everything goes through files: a machine file is drawn, its cuts are simulated, written, read, judged
 and identified, the result is written and read; its tooltip FRFs are compared with the virtual machine's own full equations.
@@ -43,9 +43,10 @@ from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.io.results import read_result, write_result
 from rcsa_ident.io.setups import read_campaign, read_tooling
 from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.workflows.compile_kernels import STEPS
-from rcsa_ident.workflows.identify import JudgedCut, Method, data_of, judge
+from rcsa_ident.workflows.identify import Method, data_of, judge, left_out
 from rcsa_ident.workflows.tip import tooltip
 
 MACHINES = Path(__file__).resolve().parent.parent / "data" / "machines"
@@ -141,11 +142,11 @@ def read_cut(campaign: Campaign, cut: Cut) -> tuple[Recording, Recording | None]
     return read(cut.recording), None if cut.air is None else read(cut.air)
 
 
-def read_data(folder: Path) -> tuple[Campaign, list[JudgedCut], IdentificationData]:
+def read_data(folder: Path) -> tuple[Campaign, list[Reading], IdentificationData]:
     """Return a campaign with its verdicts and its lines."""
     campaign = read_campaign(folder)
-    judged = judge(campaign, partial(read_cut, campaign))
-    return campaign, judged, data_of(campaign, judged)
+    readings = judge(campaign, partial(read_cut, campaign))
+    return campaign, readings, data_of(campaign, readings)
 
 
 def compared(machine: dict[Dof, MachineAxis], setup: MachineFile, truth: Path) -> dict[str, dict[str, Any]]:
@@ -182,14 +183,13 @@ def perform(scratch: Path, run: Run) -> dict[str, Any]:
     folder = campaign_folder(scratch, run.machine, run.condition)
     setup = machine_of(scratch, run.machine)
     begin = time.perf_counter()
-    campaign, judged, data = read_data(folder)
+    campaign, readings, data = read_data(folder)
     read = time.perf_counter()
     found = METHODS[run.method].run(data, run.seed, map)
     done = time.perf_counter()
     path = scratch / "results" / f"{run.name}.json"
     path.parent.mkdir(exist_ok=True)
-    left_out = [(j.cut.id, "; ".join(j.reading.verdict.reasons)) for j in judged if j.reading.measurement is None]
-    write_result(path, identification_to_json(found, campaign, left_out))
+    write_result(path, identification_to_json(found, campaign, left_out(readings)))
     return {
         "machine": run.machine,
         "condition": run.condition,
@@ -206,7 +206,7 @@ def perform(scratch: Path, run: Run) -> dict[str, Any]:
 
 
 def planned(machines: Sequence[str], conditions: Sequence[str], methods: Sequence[str], seeds: Sequence[int]) -> list[Run]:
-    """Return the default method's runs under all conditions, the paper's on campaigns without trigger and on the `INSIDE` machine."""
+    """Return the default method's runs under all conditions, the published one's on those without trigger and on the `INSIDE` machine."""
     runs = []
     for machine in machines:
         for condition in conditions if machine != INSIDE else ["no-trigger"]:

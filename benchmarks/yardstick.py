@@ -49,7 +49,7 @@ def lines_misfit(data: IdentificationData, modes: ModalModel, joint: LumpedJoint
     weight = 1.0 / (axis.noise + 0.5 * SHARE**2 * np.abs(measured) ** 2)
     model = cross_receptance(modes, joint, axis.omega, axis.flange, axis.tip)
     cuts = len(data.cut_ids)
-    period = data.cut_prior[:, 3]
+    period = data.cut_prior.tooth_period
     best, width, reach = 0.5 * period, 0.5 * period, 64
     for _ in range(4):
         trial = best[:, None] + width[:, None] * np.linspace(-1.0, 1.0, reach + 1)

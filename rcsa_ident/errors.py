@@ -36,7 +36,11 @@ class InputError(RcsaIdentError, ValueError):
 
     def at(self, where: str) -> InputError:
         """Return the same error with the file named in which it stood."""
-        return InputError(self.field, self.found, self.allowed, where)
+        return type(self)(self.field, self.found, self.allowed, where)
+
+
+class Unsteady(InputError):
+    """A recording shows no steady cut at a known speed; another stretch of the same signal may show one."""
 
 
 def _short(found: object) -> str:

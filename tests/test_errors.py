@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
-from rcsa_ident.errors import InputError, RcsaIdentError, non_negative, positive
+from rcsa_ident.errors import InputError, RcsaIdentError, Unsteady, non_negative, positive
 
 
 def test_the_message_names_field_found_and_allowed():
@@ -19,10 +19,13 @@ def test_the_message_names_field_found_and_allowed():
     assert len(str(InputError("pitch", list(range(1000)), "fewer"))) < 200
 
 
-def test_errors_cross_processes():
-    error = InputError("stickout", 7, "a length [mm]", "S1.toml")
+@pytest.mark.parametrize("kind", [InputError, Unsteady])
+def test_errors_cross_processes(kind):
+    error = kind("stickout", 7, "a length [mm]", "S1.toml")
     again = pickle.loads(pickle.dumps(error))
     assert str(again) == str(error)
+    # what is done about an error depends on its kind, which neither a process nor a file's name changes
+    assert type(again) is type(again.at("S2.toml")) is kind
     assert (again.field, again.found, again.allowed, again.where) == ("stickout", 7, "a length [mm]", "S1.toml")
 
 

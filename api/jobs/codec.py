@@ -17,7 +17,7 @@ import numpy as np
 NOUNS = (
     "rcsa_ident.dynamics.coordinates.Dof",
     "rcsa_ident.signals.verdict.Verdict",
-    "rcsa_ident.signals.measurement.AxisLines",
+    "rcsa_ident.signals.frf.AxisLines",
     "rcsa_ident.signals.measurement.CutMeasurement",
     "rcsa_ident.signals.measurement.Reading",
     "rcsa_ident.identification.parameters.AxisLayout",
@@ -30,9 +30,9 @@ NOUNS = (
     "rcsa_ident.cutting.conditions.Engagement",
     "rcsa_ident.cutting.process.ProcessDamping",
     "api.work.requests.MachineText",
-    "api.work.requests.ToolingText",
-    "api.work.requests.CutQuestion",
-    "api.work.requests.LobeQuestion",
+    "rcsa_ident.machining_setup.CutSpec",
+    "api.work.requests.ToolingSource",
+    "api.work.requests.LobeRequest",
 )
 _PLACES = {place.rpartition(".")[2]: place for place in NOUNS}
 
@@ -90,7 +90,7 @@ def _plain(value: Any) -> Any:
         return {"~table": [[_plain(key), _plain(each)] for key, each in value.items()]}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {f"~{_name(type(value))}": {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}}
-    raise Unknown(f"a {type(value).__name__} can not be told")
+    raise Unknown(f"a {type(value).__name__} cannot be encoded")
 
 
 def _value(plain: Any) -> Any:

@@ -31,8 +31,9 @@ from rcsa_ident.io.results import check_result, layout, plain
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.recording import Recording
+from rcsa_ident.units import to_hz
 from rcsa_ident.workflows import identify as workflow
-from rcsa_ident.workflows.identify import JudgedCut, Method, ReadCut, judge_cut, mode_deviations
+from rcsa_ident.workflows.identify import Method, ReadCut, judge_cut, left_out, mode_deviations
 
 #: Returns a campaign of a group and what reads its cuts.
 Load = Callable[[str, str], tuple[Campaign, ReadCut]]
@@ -62,17 +63,16 @@ def carry(load: Load, job: Job, desk: JobContext, spread: Spread = map) -> Outco
     campaign, read = load(job.group, str(job.campaign))
     plan = desk.remember("plan", lambda: [_files(cut) for cut in campaign.cuts])
     campaign = _planned(campaign, plan)
-    judged = _judged(campaign, read, desk)
-    found = workflow.identify(campaign, judged, _method(request["method"], start, desk, job), request["seed"], _Steps(desk, spread))
+    readings = _readings(campaign, read, desk)
+    found = workflow.identify(campaign, readings, _method(request["method"], start, desk, job), request["seed"], _Steps(desk, spread))
     desk.progress("result", 0, 1)
     deviations = mode_deviations(found)
-    left_out = [(j.cut.id, "; ".join(j.reading.verdict.reasons)) for j in judged if not j.reading.verdict.usable]
-    data = plain(identification_to_json(found, campaign, left_out, deviations))
+    data = plain(identification_to_json(found, campaign, left_out(readings), deviations))
     if start is not None:
         data["started_from"] = digest_of(start)
     check_result(data, "")
     text = layout(data) + "\n"
-    texts = {"result": text, "frf": json.dumps(_lines(found, campaign)), "report": _report(found, campaign, judged, deviations)}
+    texts = {"result": text, "frf": json.dumps(_lines(found, campaign)), "report": _report(found, campaign, readings, deviations)}
     applied, problem = _applied(text) if request["apply"] else (None, None)
     desk.progress("result", 1, 1)
     return Outcome("done", "", status=str(found.status), texts=texts, applied=applied, problem=problem)
@@ -96,7 +96,7 @@ def _planned(campaign: Campaign, plan: list[list[str]]) -> Campaign:
     return replace(campaign, cuts=tuple(cuts))
 
 
-def _judged(campaign: Campaign, read: ReadCut, desk: JobContext) -> list[JudgedCut]:
+def _readings(campaign: Campaign, read: ReadCut, desk: JobContext) -> list[Reading]:
     def reading(cut: Cut) -> Reading:
         desk.check()
         return judge_cut(campaign, anonymous, cut)
@@ -114,7 +114,7 @@ def _judged(campaign: Campaign, read: ReadCut, desk: JobContext) -> list[JudgedC
         desk.progress("recordings", first, len(campaign.cuts))
         readings += desk.remember(f"recordings.{first}", partial(_all, reading, cuts))
     desk.progress("recordings", len(campaign.cuts), len(campaign.cuts))
-    return [JudgedCut(cut, each) for cut, each in zip(campaign.cuts, readings, strict=True)]
+    return readings
 
 
 def _all(reading: Callable[[Cut], Reading], cuts: Iterable[Cut]) -> list[Reading]:
@@ -124,7 +124,7 @@ def _all(reading: Callable[[Cut], Reading], cuts: Iterable[Cut]) -> list[Reading
 def _method(name: str, start: str | None, desk: JobContext, job: Job) -> Method:
     if name == "paper":
         return PaperGeneticAlgorithm()
-    known = None if start is None else posteriors(json.loads(start))
+    known = None if start is None else posteriors(start)
     return _Telling(EvidenceSelection(start=known), desk, datetime.fromisoformat(str(job.started)))
 
 
@@ -189,7 +189,7 @@ class _Story:
         order = np.argsort(part.omega, kind="stable")
         order = order[np.linspace(0, order.size - 1, min(order.size, POINTS)).round().astype(int)]
         curves = {
-            "frequency_hz": part.omega / (2.0 * np.pi),
+            "frequency_hz": to_hz(part.omega),
             "measured_abs": np.abs(part.measured),
             "model_abs": np.abs(np.sum(found.models[i], axis=1)),
         }
@@ -216,7 +216,7 @@ def _lines(found: Identification, campaign: Campaign) -> dict[str, Any]:
         order = np.argsort(lines["omega"], kind="stable")
         value, model = (np.asarray(lines[name], dtype=complex)[order] for name in ("value", "model"))
         axes[axis.upper()] = {
-            "frequency_hz": (lines["omega"][order] / (2.0 * np.pi)).tolist(),
+            "frequency_hz": to_hz(lines["omega"][order]).tolist(),
             "measured_re": value.real.tolist(),
             "measured_im": value.imag.tolist(),
             "model_re": model.real.tolist(),
@@ -227,14 +227,14 @@ def _lines(found: Identification, campaign: Campaign) -> dict[str, Any]:
     return {"axes": axes}
 
 
-def _report(found: Identification, campaign: Campaign, judged: list[JudgedCut], deviations: Any) -> str:
+def _report(found: Identification, campaign: Campaign, readings: list[Reading], deviations: Any) -> str:
     from rcsa_ident.report.html import report_html
 
-    return report_html(found, campaign, [(j.cut, j.reading) for j in judged], deviations=deviations)
+    return report_html(found, campaign, readings, deviations=deviations)
 
 
 def _applied(text: str) -> tuple[Applied | None, str | None]:
-    """What becomes the machine's identification, or why it can not."""
+    """What becomes the machine's identification, or why it cannot."""
     try:
         summary = tasks.check(text)
     except InputError as error:

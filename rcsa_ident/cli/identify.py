@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from functools import partial
@@ -25,6 +24,7 @@ from rcsa_ident.cli.common import (
 )
 from rcsa_ident.cli.processes import Dask, Processes, Workers, tell, workers_or_cluster
 from rcsa_ident.errors import InputError
+from rcsa_ident.units import to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -36,7 +36,8 @@ if TYPE_CHECKING:
     from rcsa_ident.identification.posterior import Posterior
     from rcsa_ident.identification.result import Identification
     from rcsa_ident.machining_setup import Campaign
-    from rcsa_ident.workflows.identify import JudgedCut, Map
+    from rcsa_ident.signals.measurement import Reading
+    from rcsa_ident.workflows.identify import Map
     from rcsa_ident.workflows.speed_bands import SpeedBand
 
 CampaignFolder = Annotated[Path, typer.Argument(help="Folder with campaign.toml, toolings and recordings.", show_default=False)]
@@ -56,8 +57,8 @@ def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask 
 
     stages = Stages(quiet=json_)
     with workers_or_cluster(processes, dask) as pool:
-        campaign, judged = read_and_judge(campaign_dir, pool, stages)
-    rows = recording_rows((j.cut, j.reading) for j in judged)
+        campaign, readings = read_and_judge(campaign_dir, pool, stages)
+    rows = recording_rows(readings)
     usable = sum(row.usable for row in rows)
     if json_:
         emit({"campaign": campaign.name, "cuts": len(rows), "usable": usable, "recordings": [asdict(row) for row in rows]})
@@ -80,10 +81,12 @@ def identify(
     dask: Dask = None,
     start: Annotated[
         Path | None,
-        typer.Option(help="RESULT.json of the same machine: its modes are refined with this campaign's cuts.", show_default=False),
+        typer.Option(
+            help="RESULT.json of the same machine to start from: its modes are refined with this campaign's cuts.", show_default=False
+        ),
     ] = None,
     speed_bands: Annotated[
-        int, typer.Option(min=1, max=50, help="More than 1: also a model for each of so many equal ranges of spindle speed.")
+        int, typer.Option(min=1, max=50, help="Number of equal spindle speed ranges that also get a model of their own, if above 1.")
     ] = 1,
     report: Annotated[Path | None, typer.Option(help="Also write an HTML report.", show_default=False)] = None,
     json_: Json = False,
@@ -104,24 +107,24 @@ def identify(
     stages = Stages(quiet=json_)
     with workers_or_cluster(processes, dask) as pool:
         known = None if start is None else read_start(start)
-        campaign, judged = read_and_judge(campaign_dir, pool, stages)
+        campaign, readings = read_and_judge(campaign_dir, pool, stages)
         if speed_bands > 1:
             from rcsa_ident.workflows.speed_bands import divided
 
-            divided(judged, speed_bands)
-        found = search(campaign, judged, method, seed, pool, stages, known)
-        bands = search_bands(campaign, judged, speed_bands, found, seed, pool, stages)
+            divided(readings, speed_bands)
+        found = search(campaign, readings, method, seed, pool, stages, known)
+        bands = search_bands(campaign, readings, speed_bands, found, seed, pool, stages)
     from rcsa_ident.workflows.identify import mode_deviations
 
     deviations = mode_deviations(found)
-    data = result_of(found, campaign, judged, deviations, bands)
+    data = result_of(found, campaign, readings, deviations, bands)
     if start is not None:
         data["started_from"] = start.name
     write_result(out, data)
     if report is not None:
         from rcsa_ident.report.html import report_html
 
-        write_text(report, report_html(found, campaign, [(j.cut, j.reading) for j in judged], deviations=deviations))
+        write_text(report, report_html(found, campaign, readings, deviations=deviations))
     if json_:
         summary = {key: data[key] for key in ("status", "reasons", "seed", "method", "campaign", "band_hz")}
         summary |= {key: data[key] for key in ("notes", "coefficients")}
@@ -132,7 +135,7 @@ def identify(
 
         show_identification(found, deviations)
         for band in bands:
-            low, high = (speed * 30.0 / math.pi for speed in band.speeds)
+            low, high = (to_rpm(speed) for speed in band.speeds)
             say(f"{low:.0f} to {high:.0f} rev/min: {band.found.status}, {len(band.found.cut_ids)} cuts")
         warn_left_out(data)
         say(", ".join(f"{name} {seconds:.1f} s" for name, seconds in stages.seconds.items()))
@@ -140,7 +143,7 @@ def identify(
     leave(found)
 
 
-def read_and_judge(folder: Path, pool: Workers, stages: Stages) -> tuple[Campaign, list[JudgedCut]]:
+def read_and_judge(folder: Path, pool: Workers, stages: Stages) -> tuple[Campaign, list[Reading]]:
     """Return a campaign with the verdict on each of its recordings."""
     from rcsa_ident.io.recordings import read_cut
     from rcsa_ident.io.setups import read_campaign
@@ -149,8 +152,8 @@ def read_and_judge(folder: Path, pool: Workers, stages: Stages) -> tuple[Campaig
     # a worker elsewhere stands in another folder
     campaign = read_campaign(folder if pool.cluster is None else folder.resolve())
     with stages.stage("recordings") as progress:
-        judged = judge(campaign, partial(read_cut, campaign.sensors, campaign.sampling_rate), pool.map_many, progress)
-    return campaign, judged
+        readings = judge(campaign, partial(read_cut, campaign.sensors, campaign.sampling_rate), pool.map_many, progress)
+    return campaign, readings
 
 
 def read_start(path: Path) -> Mapping[Dof, Posterior]:
@@ -164,14 +167,10 @@ def read_start(path: Path) -> Mapping[Dof, Posterior]:
     from rcsa_ident.io.identifications import machine_from_json
     from rcsa_ident.io.results import read_result
 
-    data = read_result(path)
-    machine = machine_from_json(data, str(path))
-    found = {axis: part.posterior for axis, part in machine.items() if part.posterior is not None}
-    if len(found) < len(machine):
-        missing = next(axis.upper() for axis in machine if axis not in found)
-        allowed = "a result of the default method, with unknowns and covariance of each axis"
-        raise InputError(f"axes.{missing}", f"no covariance (method {data['method']})", allowed, str(path))
-    return found
+    try:
+        return machine_from_json(read_result(path), str(path)).posteriors()
+    except InputError as error:
+        raise error if error.where else error.at(str(path)) from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +185,7 @@ class _Telling:
 
 def search(
     campaign: Campaign,
-    judged: list[JudgedCut],
+    readings: list[Reading],
     method: Method,
     seed: int,
     pool: Workers,
@@ -206,11 +205,11 @@ def search(
 
         chosen = _Telling(EvidenceSelection(start=start)) if stages.visible else EvidenceSelection(start=start)
     with stages.stage("identification") as line, pool.listening(line.tell):
-        return workflow.identify(campaign, judged, chosen, seed, pool.map)
+        return workflow.identify(campaign, readings, chosen, seed, pool.map)
 
 
 def search_bands(
-    campaign: Campaign, judged: list[JudgedCut], count: int, whole: Identification, seed: int, pool: Workers, stages: Stages
+    campaign: Campaign, readings: list[Reading], count: int, whole: Identification, seed: int, pool: Workers, stages: Stages
 ) -> list[SpeedBand]:
     """Return a model for each of `count` ranges of spindle speed, from the whole campaign's on; none where only one is wanted."""
     from rcsa_ident.identification.evidence import EvidenceSelection
@@ -220,22 +219,21 @@ def search_bands(
     if count == 1 or not start:
         return []
     with stages.stage("speed bands"):
-        return speed_bands(campaign, judged, count, EvidenceSelection(start=start), seed, pool.map)
+        return speed_bands(campaign, readings, count, EvidenceSelection(start=start), seed, pool.map)
 
 
 def result_of(
     found: Identification,
     campaign: Campaign,
-    judged: list[JudgedCut],
+    readings: list[Reading],
     deviations: Mapping[Dof, tuple[FloatArray, FloatArray]],
     bands: Sequence[SpeedBand] = (),
 ) -> dict[str, Any]:
     """Return the content of RESULT.json."""
     from rcsa_ident.io.identifications import identification_to_json, speed_band_to_json
-    from rcsa_ident.workflows.identify import mode_deviations
+    from rcsa_ident.workflows.identify import left_out, mode_deviations
 
-    left_out = [(j.cut.id, "; ".join(j.reading.verdict.reasons)) for j in judged if not j.reading.verdict.usable]
-    data = identification_to_json(found, campaign, left_out, deviations)
+    data = identification_to_json(found, campaign, left_out(readings), deviations)
     if bands:
         data["speed_bands"] = [speed_band_to_json(band.speeds, band.found, mode_deviations(band.found)) for band in bands]
     return data

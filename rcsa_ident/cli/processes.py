@@ -29,8 +29,10 @@ EARLY = ("rcsa_ident.io.recordings", "rcsa_ident.workflows.identify", "rcsa_iden
 #: Seconds between two words of one process.
 PAUSE = 0.1
 
-Processes = Annotated[int | None, typer.Option(min=1, max=64, help="Processes; by default one a core, at most 8.", show_default=False)]
-DASK_HELP = "Scheduler of a Dask cluster that works instead of processes here (tcp://host:8786); it sees the campaign under the same path."
+Processes = Annotated[
+    int | None, typer.Option(min=1, max=64, help="Number of processes; default: one per core, at most 8.", show_default=False)
+]
+DASK_HELP = "Dask scheduler (tcp://host:8786) to use instead of local processes; its workers find the campaign under the same path."
 Dask = Annotated[str | None, typer.Option(metavar="ADDRESS", help=DASK_HELP, show_default=False)]
 #: Takes axis, stage and cost of a search.
 Show = Callable[[str, str, float], None]
@@ -165,7 +167,7 @@ def workers_or_cluster(processes: int | None, dask: str | None) -> Iterator[Work
             yield pool
         return
     if processes is not None:
-        raise InputError("--dask", f"--processes {processes} beside it", "one of both: the cluster has its own")
+        raise InputError("--dask", f"given together with --processes {processes}", "one of the two: a cluster has its own processes")
     with cluster_map(dask) as cluster:
         yield Workers(cluster=cluster)
 

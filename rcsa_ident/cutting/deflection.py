@@ -20,7 +20,7 @@ _SETTLED, _RELAXATION, _ROUNDS = 1e-9, 0.5, 200
 
 @dataclass(frozen=True, slots=True)
 class ToolDeflection:
-    """Static deflection of a cantilever tool on a compliant machine, and what it does to the engagement (Du et al., Metals 13 (2023) 974).
+    """Static deflection of a cantilever tool on a compliant machine, and what it does to the engagement [du2023].
 
     While a point of the edge generates the wall, the forces on the points of the edge that cut at that instant bend the tool; the
     point moves by Y off the wall, and its radial depth is a_e - Y. That changes the angle at which it enters and so the force:
@@ -38,10 +38,10 @@ class ToolDeflection:
     feed_rate : float or None [m/s]
         Kept at all speeds; without it the process's feed per tooth is.
     chip_reduction : {"none", "literal"}
-        "literal" also takes the shift of the entry off the chip, as the paper prints it; each tooth finds the same deflection,
+        "literal" also takes the shift of the entry off the chip, as [du2023] prints it; each tooth finds the same deflection,
         so that in a steady cut the mean chip is what it was.
     all_teeth : bool
-        Forces of all teeth in the cut at that instant; the paper counts one tooth.
+        Forces of all teeth in the cut at that instant; [du2023] counts one tooth.
     """
 
     length: float

@@ -33,7 +33,7 @@ class RationalFit:
     pole : complex array, shape (m,) [rad/s]
         Imaginary parts not negative, real parts negative.
     residue : complex array, shape (m, r, c)
-        Of H(s) = sum_k residue[k] / (s - pole[k]) + conj(residue[k]) / (s - conj(pole[k])) + constant; a real pole's is half.
+        In H(s) = sum_k residue[k] / (s - pole[k]) + conj(residue[k]) / (s - conj(pole[k])) + constant; a real pole's is half.
     constant : array, shape (r, c)
         Residual compliance; 0 where the fit is strictly proper.
     error : float [-]
@@ -117,7 +117,7 @@ def rational_fit(
     weight : array of the values' shape (or broadcast to it), optional
         Further factor on each misfit.
     constant : bool
-        With a real constant (the modes above the band), else strictly proper.
+        Whether a real constant (the modes above the band) is fitted too; without it the function is strictly proper.
     highest_order : int
         Where the search ends. If no order is good enough, Bayes's information criterion chooses, and the status says so.
 
@@ -129,8 +129,8 @@ def rational_fit(
     Notes
     -----
     With sigma(s) = sum_k c~_k phi_k(s) + d~ and the poles of the last step, sigma h = sum_k c_k phi_k + d is solved by linear
-    least squares; zeros of sigma are the next poles (Gustavsen and Semlyen 1999; relaxed: Gustavsen 2006; each entry
-    condensed by its own QR: Deschrijver et al. 2008). An unstable pole is mirrored. The next higher order starts from the poles
+    least squares; zeros of sigma are the next poles ([gustavsen1999]; relaxed: [gustavsen2006]; each entry
+    condensed by its own QR: [deschrijver2008]). An unstable pole is mirrored. The next higher order starts from the poles
     of the last and a pair where the misfit is largest, and from evenly spaced poles.
     """
     problem = Problem.of(omega, values, tolerance, noise, weight, constant)

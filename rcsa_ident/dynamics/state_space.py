@@ -23,7 +23,7 @@ class StateSpace:
     C : array, shape (o, n)
     D : array, shape (o, i)
     step : float [s]
-        Of the samples; 0 in continuous time.
+        Time between samples; 0 in continuous time.
 
     Examples
     --------

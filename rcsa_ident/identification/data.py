@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -12,7 +12,8 @@ from rcsa_ident.cutting.force import SLOPES
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.signals.measurement import AxisLines, CutMeasurement
+from rcsa_ident.signals.frf import AxisLines
+from rcsa_ident.signals.measurement import CutMeasurement
 
 #: Slopes are multiplied and moments divided by it, so that all receptances have one unit and size [m].
 LEVER = 0.1
@@ -26,10 +27,11 @@ class AxisData:
 
     Parameters
     ----------
-    omega, order : arrays, shape (n,)
-        [rad/s], [-].
+    axis : Dof
+    omega, order : arrays, shape (n,) [rad/s], [-]
+        Frequency of each point, and that over the spindle's.
     variance : array, shape (n, o) [m^2/N^2]
-        Of the real and imaginary part each.
+        Variance of the real and imaginary part each.
     lines : complex array, shape (n, o, 2) [m/N]
         Cut and turned air cut over the simulated force.
     cut : array of int, shape (n,)
@@ -60,7 +62,7 @@ class AxisData:
 
     @property
     def outputs(self) -> int:
-        """1 or 2."""
+        """Number of outputs of each point: 1 or 2."""
         return self.variance.shape[1]
 
     @property
@@ -86,6 +88,42 @@ class AxisData:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class CutPrior:
+    """What is known beforehand of each cut's delay and of the angle to its air cut; arrays of shape (k,).
+
+    Parameters
+    ----------
+    delay : array [s]
+        From a trigger of known tooth angle.
+    delay_weight : array [1/s^2]
+        Inverse variance of it; 0 without such a trigger.
+    angle_weight : array [1/rad^2]
+        Inverse variance of the angle between cut and air cut, whose mean is 0.
+    tooth_period : array [s]
+        In which the delay may lie anywhere where nothing is known of it.
+    """
+
+    delay: FloatArray
+    delay_weight: FloatArray
+    angle_weight: FloatArray
+    tooth_period: FloatArray
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            object.__setattr__(self, each.name, frozen(getattr(self, each.name)))
+
+    @property
+    def weights(self) -> FloatArray:
+        """Weights of delay and angle, shape (k, 2)."""
+        return np.stack([self.delay_weight, self.angle_weight], axis=1)
+
+    @property
+    def rows(self) -> FloatArray:
+        """All four side by side, as the kernel takes them, shape (k, 4)."""
+        return np.stack([self.delay, self.delay_weight, self.angle_weight, self.tooth_period], axis=1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class IdentificationData:
     """All cuts of a campaign.
 
@@ -96,9 +134,7 @@ class IdentificationData:
     toolings : tuple of str
     axes : tuple of AxisData
     spindle_speed : array, shape (k,) [rad/s]
-    cut_prior : array, shape (k, 4)
-        Delay's mean [s] and weight [1/s^2] (0 without a trigger of known tooth angle), weight of the angle between cut and air
-        cut [1/rad^2], tooth-passing period [s].
+    cut_prior : CutPrior
     clamping : array of int, shape (k,)
         Which unknown tooth angle stands between the cut's trigger and its delay; -1 where there is none.
     edge : array, shape (k, 2)
@@ -106,7 +142,7 @@ class IdentificationData:
     coefficient_names : tuple of str, length c
         What is uncertain about the forces: logarithms of cutting coefficients, run-out of each tooling.
     coefficient_spread : tuple of float, length c
-        Their standard deviations.
+        Standard deviations of these before any cut.
     """
 
     cut_ids: tuple[str, ...]
@@ -114,7 +150,7 @@ class IdentificationData:
     toolings: tuple[str, ...]
     axes: tuple[AxisData, ...]
     spindle_speed: FloatArray
-    cut_prior: FloatArray
+    cut_prior: CutPrior
     clamping: np.ndarray
     edge: FloatArray
     coefficient_names: tuple[str, ...] = ()
@@ -133,7 +169,7 @@ class IdentificationData:
 
     @property
     def relative_speed(self) -> FloatArray:
-        """Of each cut, from -1 at the lowest to 1 at the highest, shape (k,)."""
+        """Spindle speed of each cut, from -1 at the lowest to 1 at the highest, shape (k,) [-]."""
         middle, half = self.speed_range
         return (self.spindle_speed - middle) / half if half > 0.0 else np.zeros(self.spindle_speed.size)
 
@@ -244,7 +280,7 @@ def prepare(
         toolings=toolings,
         axes=tuple(data),
         spindle_speed=frozen(speed),
-        cut_prior=frozen(prior),
+        cut_prior=prior,
         clamping=frozen(clamping, np.intp),
         edge=frozen(edge),
         coefficient_names=tuple(names),
@@ -263,19 +299,20 @@ def _slopes(lines: AxisLines, uncertain: Sequence[int], tooling: int, count: int
 
 def _cut_priors(
     measurements: Sequence[CutMeasurement], speed: FloatArray, teeth: Mapping[str, int]
-) -> tuple[FloatArray, np.ndarray, FloatArray]:
-    """What is known of each cut's delay and air-cut angle: the three last fields of the data but one."""
-    prior, edge = np.zeros((len(measurements), 4)), np.zeros((len(measurements), 2))
-    clamping = np.full(len(measurements), -1)
+) -> tuple[CutPrior, np.ndarray, FloatArray]:
+    """What is known of each cut's delay and air-cut angle; which clamping its trigger belongs to, and that trigger's edge."""
+    count = len(measurements)
+    delay, delay_weight, edge = np.zeros(count), np.zeros(count), np.zeros((count, 2))
+    angle_weight = np.array([1.0 / max(m.alignment_std, 1e-4) ** 2 for m in measurements])
+    tooth_period = np.array([2.0 * np.pi / speed[k] / teeth[m.tooling] for k, m in enumerate(measurements)])
+    clamping = np.full(count, -1)
     names: dict[str, int] = {}
     for k, m in enumerate(measurements):
-        prior[k, 2] = 1.0 / max(m.alignment_std, 1e-4) ** 2
-        prior[k, 3] = 2.0 * np.pi / speed[k] / teeth[m.tooling]
         if m.delay is None or m.delay_std is None:
             continue
         if m.tooth_angle_known:
-            prior[k, :2] = m.delay, 1.0 / m.delay_std**2
+            delay[k], delay_weight[k] = m.delay, 1.0 / m.delay_std**2
         else:
             clamping[k] = names.setdefault(m.tooling, len(names))
             edge[k] = m.delay, 1.0 / m.delay_std**2
-    return prior, clamping, edge
+    return CutPrior(delay, delay_weight, angle_weight, tooth_period), clamping, edge

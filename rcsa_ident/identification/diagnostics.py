@@ -7,16 +7,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.cutting.force import SLOPES
-from rcsa_ident.dynamics.coordinates import plane
-from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import JOINT
-from rcsa_ident.identification.posterior import Posterior, spread
+from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.machine.flange_part import Candidate
 
 #: Above this share of unexplained signal the force model or the recordings are wrong.
 WORST_MODEL_ERROR = 0.02
@@ -37,58 +35,83 @@ _JOINT = ("translational stiffness", "rotational stiffness", "translational damp
 def diagnose(
     data: IdentificationData, searched: list[AxisSearch], solution: Solution, misfit: Misfit, posteriors: Sequence[Posterior]
 ) -> list[str]:
-    """Return the reasons for `suspect`; `posteriors` are those of the axes."""
+    """Return the reasons for `suspect`.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    searched : list of AxisSearch
+        One for each axis.
+    solution : Solution
+        All axes together.
+    misfit : Misfit
+        The one whose minimum it is.
+    posteriors : sequence of Posterior
+        One for each axis.
+    """
     reasons = []
     if not solution.converged:
-        reasons.append(f"not converged: the polish still gained after {solution.steps} steps")
+        reasons.append(f"not converged: the joint fit was still improving after {solution.steps} steps")
     for axis in data.axes:
         noise = np.sqrt(2.0 * axis.noise)
         signal = float(np.median(np.abs(axis.measured) / np.where(noise > 0.0, noise, 1e-300)))
         if signal < LEAST_SIGNAL:
-            reasons.append(f"{str(axis.axis).upper()}: half of the lines are below {signal:.2g} times their noise")
+            reasons.append(
+                f"{str(axis.axis).upper()}: the median signal-to-noise ratio of the lines is {signal:.2g} (at least {LEAST_SIGNAL:g})"
+            )
     for axis, share in zip(data.axes, misfit.model_error, strict=True):
         if share > WORST_MODEL_ERROR:
             reasons.append(
-                f"{str(axis.axis).upper()}: {100 * share:.1f} % of each line stay unexplained (at most {100 * WORST_MODEL_ERROR:g} %): "
-                "cutting coefficients, toolings, tooth count or sensor signs may be wrong, or the dynamics change with speed"
+                f"{str(axis.axis).upper()}: the model leaves {100 * share:.1f} % of each line unexplained "
+                f"(limit {100 * WORST_MODEL_ERROR:g} %): cutting coefficients, toolings, tooth count or sensor signs may be wrong, "
+                "or the dynamics change with speed"
             )
     bad = misfit.cut_weight < 1.0
     if np.mean(bad) > MOST_BAD_CUTS:
-        reasons.append(f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, {_named(data, bad, misfit)}")
+        reasons.append(f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, namely {_named(data, bad, misfit)}")
     for axis, found in zip(data.axes, searched, strict=True):
         if len(found.solutions) > 1 and found.evidences[1] - found.evidences[0] < EVIDENCE_TIE:
             difference, band = _difference(axis, *found.solutions[:2])
             if difference > max(LARGEST_DIFFERENCE, 3.0 * band):
                 reasons.append(
-                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.1f} % in what a tooltip "
-                    f"feels of the machine, more than their deviation of {100 * band:.1f} %"
+                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.1f} % in the machine's "
+                    f"contribution to the tooltip FRF, more than its standard deviation of {100 * band:.1f} % explains"
                 )
     for axis, posterior in zip(data.axes, posteriors, strict=True):
         band = _band(posterior, axis)
         if band > LARGEST_BAND:
             reasons.append(
-                f"{str(axis.axis).upper()}: what a tooltip feels of the machine is known to {100 * band:.1f} % only (at most "
-                f"{100 * LARGEST_BAND:g} %), and with tools that were never cut to several times that: more or quieter cuts are wanted"
+                f"{str(axis.axis).upper()}: the machine's contribution to the tooltip FRF has a standard deviation of {100 * band:.1f} % "
+                f"(limit {100 * LARGEST_BAND:g} %), several times that with tools that were never cut: more or quieter cuts are needed"
             )
     if len(data.toolings) < 2:
-        reasons.append("one tooling only: flange translation and slope can't be told apart; cut with a second, different holder")
+        reasons.append("only one tooling: translation and slope of the flange cannot be separated; cut with a second, different holder")
     for t, name in enumerate(data.toolings):
         count = int(np.sum(data.cut_tooling == t))
         if count < FEWEST_CUTS:
-            reasons.append(f"few cuts: {count} with {name}, at least {FEWEST_CUTS} are wanted")
+            reasons.append(f"too few cuts: {count} with {name}, at least {FEWEST_CUTS} are needed")
     return reasons
 
 
 def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covariance: FloatArray) -> list[str]:
-    """Return what the data cannot tell, and what was done about single cuts."""
+    """Return what the data cannot tell, and what was done about single cuts.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    solution : Solution
+    misfit : Misfit
+    covariance : array, shape (p, p)
+        Covariance of all unknowns.
+    """
     words = []
     layout, priors = solution.layout, misfit.priors
     deviation = np.sqrt(np.diag(covariance))
     for name, std in zip(_JOINT, deviation[layout.joint], strict=True):
         if std > TOLD * priors.joint_spread:
             words.append(
-                f"joint: its {name} cannot be told from the flange's own compliance (known to a factor of {np.exp(std):.1f}); "
-                "both together are what the tooltip feels"
+                f"joint: the {name} cannot be separated from the flange's own compliance (known to within a factor of {np.exp(std):.1f}); "
+                "the tooltip FRF depends on both together"
             )
     for i, axis in enumerate(data.axes):
         natural = np.exp(solution.theta[layout.axis(i)][: layout.axes[i].modes]) / (2.0 * np.pi)
@@ -98,15 +121,17 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
             listed = ", ".join(f"{f:.0f}" for f in outside)
             words.append(
                 f"{str(axis.axis).upper()}: modes at {listed} Hz lie outside the excited band of {low:.0f} to {high:.0f} Hz: "
-                "they stand for all that the machine does there"
+                "they represent all dynamics of the machine outside it"
             )
     for c, name in enumerate(data.coefficient_names):
         std, before = deviation[layout.force][c], data.coefficient_spread[c]
         if std > TOLD * before and name.split(" of ")[0] != SLOPES[-1]:
-            words.append(f"{name}: the cuts say little about it; it is known to {100.0 * min(std, before):.1f} %, nearly as before")
+            words.append(
+                f"{name}: hardly determined by the cuts; its standard deviation is {100.0 * min(std, before):.1f} %, close to the prior's"
+            )
     bad = misfit.cut_weight < 1.0
     if 0.0 < np.mean(bad) <= MOST_BAD_CUTS:
-        words.append(f"cuts that contradict the others and count less: {_named(data, bad, misfit)}")
+        words.append(f"cuts that contradict the others and were given less weight: {_named(data, bad, misfit)}")
     return words
 
 
@@ -116,32 +141,30 @@ def _named(data: IdentificationData, bad: np.ndarray, misfit: Misfit) -> str:
     return ", ".join(f"{data.cut_ids[k]} ({1.0 / misfit.cut_weight[k]:.0f} times its variance)" for k in worst[:5]) + rest
 
 
-def _machine_contribution(axis: AxisData) -> Callable[[ModalModel, LumpedJoint], ComplexArray]:
+def _machine_contribution(axis: AxisData) -> Callable[[Candidate], ComplexArray]:
     """What a tooltip feels of the machine, a^T (A22 + K^-1 + B)^-1 a with a = A21 of the cut toolings, at the axis' lines."""
     lever = np.array([[1.0, LEVER], [LEVER, LEVER**2]])
     flange = axis.flange[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
-    directions = tuple(c.dof for c in plane("flange", axis.axis))
 
-    def felt(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
-        soft = joint.compliance_along(axis.omega, directions)[:, :, None] * np.eye(2)
-        together = flange + lever * (soft + modes.receptance(axis.omega).values)
+    def contribution(machine: Candidate) -> ComplexArray:
+        together = flange + lever * machine.interface(axis.omega)
         return np.einsum("ni,ni->n", axis.tip, np.linalg.solve(together, axis.tip[:, :, None])[:, :, 0])
 
-    return felt
+    return contribution
 
 
 def _band(posterior: Posterior, axis: AxisData) -> float:
     """Relative standard deviation of what a tooltip feels of the machine."""
-    felt = _machine_contribution(axis)
-    value = felt(*posterior.machine(axis.axis))
-    return float(np.linalg.norm(spread(posterior, axis.axis, felt)) / max(float(np.linalg.norm(value)), 1e-300))
+    value, changes = posterior.part(axis.axis).response(_machine_contribution(axis))
+    assert changes is not None
+    return float(np.linalg.norm(changes) / max(float(np.linalg.norm(value)), 1e-300))
 
 
 def _difference(axis: AxisData, one: Solution, two: Solution) -> tuple[float, float]:
     """Relative difference of two solutions in what a tooltip feels, and the first one's deviation."""
-    felt = _machine_contribution(axis)
+    contribution = _machine_contribution(axis)
     first, second = (_flange_posterior(s) for s in (one, two))
-    value, other = felt(*first.machine(axis.axis)), felt(*second.machine(axis.axis))
+    value, other = (contribution(each.candidate(axis.axis)) for each in (first, second))
     size = np.linalg.norm(value)
     if size == 0.0:
         return 0.0, 0.0

@@ -18,8 +18,9 @@ from rcsa_ident.identification.model_order import GIVE_UP_SOON, Report, cut_weig
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, parameter_names, unpack
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.priors import Priors
-from rcsa_ident.identification.result import AxisResult, Identification, Status
+from rcsa_ident.identification.result import AxisResult, Identification
 from rcsa_ident.identification.search import SearchSettings, explore
+from rcsa_ident.identification.status import Status
 
 #: Told of axis, stage, cost, unknowns and their layout.
 Progress = Callable[[str, str, float, FloatArray, Layout], None]
@@ -58,7 +59,7 @@ class EvidenceSelection:
 
     @property
     def name(self) -> str:
-        """As in a result file."""
+        """Name of the method in a result file."""
         return "default"
 
     def run(self, data: IdentificationData, seed: int, map: Map = map, progress: Progress | None = None) -> Identification:
@@ -72,7 +73,7 @@ class EvidenceSelection:
         map : callable
             The builtin, or a pool's: axes are searched side by side.
         progress : callable of (axis, stage, cost, theta, layout), optional
-            Told of every step; with a pool's map it has to be picklable.
+            Called at every step; with a pool's map it has to be picklable.
         """
         sequence = np.random.SeedSequence(seed)
         summed = data.summed()

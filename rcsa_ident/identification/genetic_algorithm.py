@@ -1,6 +1,6 @@
-"""The main paper's method: a genetic algorithm over boxes, with its printed search space and cost (Table 2, eq. 14).
+"""The published identification: a genetic algorithm over boxes, with its printed search space and cost ([inprocess], Table 2, eq. 14).
 
-64 variables a direction: ten complex modes (p1..p6) and the joint (p7..p10). What the paper does not say is how the simulated
+64 variables a direction: ten complex modes (p1..p6) and the joint (p7..p10). What [inprocess] does not say is how the simulated
 force's phase is tied to the record; here each cut is granted its best delay on a grid, for every candidate.
 """
 
@@ -19,7 +19,8 @@ from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification._kernels import best_grid_misfit, modal_cross_frf
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
-from rcsa_ident.identification.result import AxisResult, Identification, Status
+from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.status import Status
 
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 GRID = 64
@@ -29,7 +30,7 @@ WORST_MISFIT = 4.0
 
 @dataclass(frozen=True, slots=True)
 class SearchSpace:
-    """Boxes of the variables; the defaults are the paper's Table 2.
+    """Boxes of the variables; the defaults are those of [inprocess], Table 2.
 
     Parameters
     ----------
@@ -57,23 +58,34 @@ class SearchSpace:
     c_r: float = 100.0
 
 
-#: Boxes that hold spindles with low, lightly damped modes and real joints, which Table 2 leaves out.
+#: Boxes that hold spindles with low, lightly damped modes and real joints, which Table 2 of [inprocess] leaves out.
 WIDE = SearchSpace((50.0, 5000.0), (0.003, 0.30), 0.02, 1.0, (0.0, 40.0), (8.0, 12.0), (5.0, 9.0), 1e5, 1e3)
 
 
 @dataclass(frozen=True, slots=True)
 class LiteralCost:
-    """kappa sum_j ||E_j|| + nu sum_n |p3,n|, E_j in m/N over the lines of tooling j: the paper's, with its constants."""
+    """kappa sum_j ||E_j|| + nu sum_n |p3,n|, E_j in m/N over the lines of tooling j, with the constants of [inprocess], eq. 14."""
 
     kappa: float = 1.0e6
     nu: float = 700.0
 
     def weights(self, data: AxisData) -> FloatArray:
-        """All lines count alike."""
+        """Return the lines' weights, shape (n,): all count alike."""
         return np.ones(data.omega.size)
 
     def value(self, misfit: FloatArray, points: FloatArray, p3: FloatArray, space: SearchSpace) -> FloatArray:
-        """Return the cost, shape (k,), of misfits (k, toolings) and shapes p3 (k, modes)."""
+        """Return the cost of k candidates, shape (k,).
+
+        Parameters
+        ----------
+        misfit : array, shape (k, toolings)
+            Weighted sum of squares of each tooling's lines.
+        points : array, shape (toolings,)
+            Number of lines of each tooling.
+        p3 : array, shape (k, modes) [sqrt(s/kg)]
+            Real parts of the translational shapes.
+        space : SearchSpace
+        """
         return self.kappa * np.sqrt(misfit).sum(axis=1) + self.nu * np.abs(p3).sum(axis=1)
 
 
@@ -93,17 +105,17 @@ class NoiseWeightedCost:
     strength: float = 0.01
 
     def weights(self, data: AxisData) -> FloatArray:
-        """Inverse variances."""
+        """Return the lines' weights, shape (n,): inverse variances."""
         return 1.0 / (data.noise + 0.5 * self.model_error**2 * np.abs(data.measured) ** 2)
 
     def value(self, misfit: FloatArray, points: FloatArray, p3: FloatArray, space: SearchSpace) -> FloatArray:
-        """Return the cost, shape (k,)."""
+        """Return the cost of k candidates, shape (k,); parameters as in `LiteralCost`."""
         return np.sqrt(misfit / (2.0 * points)).sum(axis=1) + self.strength * np.abs(p3).sum(axis=1) / space.phi_t
 
 
 @dataclass(frozen=True, slots=True)
 class PaperGeneticAlgorithm:
-    """pymoo's genetic algorithm as the paper sets it: population 20, 5000 iterations, each direction for itself.
+    """pymoo's genetic algorithm [blank2020] as [inprocess] sets it: population 20, 5000 iterations, each direction for itself.
 
     Parameters
     ----------
@@ -120,11 +132,20 @@ class PaperGeneticAlgorithm:
 
     @property
     def name(self) -> str:
-        """As in a result file."""
+        """Name of the method in a result file."""
         return "paper"
 
     def run(self, data: IdentificationData, seed: int, map: Map = map) -> Identification:
-        """Return the identification; each axis gets a seed of its own."""
+        """Return the identification; each axis gets a seed of its own.
+
+        Parameters
+        ----------
+        data : IdentificationData
+        seed : int
+            Same seed, same answer, whatever `map` is.
+        map : callable
+            The builtin, or a pool's.
+        """
         sequences = np.random.SeedSequence(seed).spawn(len(data.axes))
         jobs = [(self, data.only(a.axis), int(s.generate_state(1)[0])) for a, s in zip(data.axes, sequences, strict=True)]
         found = list(map(_search, jobs))
@@ -137,12 +158,12 @@ class PaperGeneticAlgorithm:
             name, misfit = str(axis.axis).upper(), axes[axis.axis].chi2_per_point
             if misfit > WORST_MISFIT:
                 reasons.append(
-                    f"{name}: the modes miss the lines, chi2 per point {misfit:.0f} at 2 % of each line (at most {WORST_MISFIT:g})"
+                    f"{name}: the modes do not fit the lines, chi² per point is {misfit:.0f} at an error of 2 % (limit {WORST_MISFIT:g})"
                 )
             omega = np.linspace(axis.omega.min(), axis.omega.max(), 400)
             worst = float(dissipation(omega, axes[axis.axis].modes.receptance(omega).values).min())
             if worst < -1e-9:
-                reasons.append(f"{name}: the modes are not passive, they feed energy in (down to {worst:.2f} of the mobility)")
+                reasons.append(f"{name}: the modes are not passive, the real part of the mobility falls to {worst:.2f} of its magnitude")
         assert problem is not None
         delays = problem.delays(axes[data.axes[-1].axis])
         return Identification(
@@ -153,7 +174,7 @@ class PaperGeneticAlgorithm:
             axes=axes,
             cut_ids=data.cut_ids,
             delay=delays,
-            delay_std=data.cut_prior[:, 3] / GRID,
+            delay_std=data.cut_prior.tooth_period / GRID,
             spindle_speed=data.spindle_speed,
             trace=tuple(trace),
         )
@@ -167,7 +188,7 @@ class _Problem:
         axis = self.axis
         self.start = np.searchsorted(axis.cut, np.arange(len(data.cut_ids) + 1))
         self.weight = method.cost.weights(axis)
-        period = data.cut_prior[axis.cut, 3]
+        period = data.cut_prior.tooth_period[axis.cut]
         delay = np.arange(GRID)[:, None] / GRID * period[None, :]
         turned = axis.measured * np.exp(1j * axis.omega * delay)
         self.table = np.ascontiguousarray(np.stack([turned.real, turned.imag], axis=1))
@@ -178,7 +199,7 @@ class _Problem:
         self.model = np.empty((2, axis.omega.size))
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper bounds, shape (6 modes + 4,)."""
+        """Return the lower and the upper bounds of the variables, shape (6 modes + 4,) each."""
         s = self.method.space
         reach = s.slope_ratio[1] - s.slope_ratio[0]
         low = [s.natural_frequency_hz[0], s.damping_ratio[0], -s.phi_t, -s.phase, -reach, -s.phase]
@@ -197,7 +218,7 @@ class _Problem:
         return 2.0 * np.pi * p1, p2, p3 * (1.0 + 1j * p4), p3 * p5 * (1.0 + 1j * p6), joint
 
     def costs(self, x: FloatArray) -> FloatArray:
-        """Return the cost of each candidate, shape (k,)."""
+        """Return the cost of each candidate, shape (k,), of vectors (k, variables)."""
         omega_n, zeta, phi_t, phi_r, joint = self.decode(x)
         fractions = modal_fractions(omega_n, zeta, phi_t, LEVER * phi_r)
         joint = joint / np.array([1.0, LEVER**2, 1.0, LEVER**2])
@@ -251,7 +272,7 @@ class _Problem:
         for cut in range(best.size):
             first, last = self.start[cut], self.start[cut + 1]
             if last > first:
-                best[cut] = np.argmax(overlap[:, first:last].sum(axis=1)) / GRID * self.data.cut_prior[cut, 3]
+                best[cut] = np.argmax(overlap[:, first:last].sum(axis=1)) / GRID * self.data.cut_prior.tooth_period[cut]
         return best
 
 
@@ -259,6 +280,12 @@ def modal_fractions(omega_n: FloatArray, zeta: FloatArray, phi_t: np.ndarray, ph
     """Return conjugate pairs as real fractions (a + i w b) / (w_n^2 - w^2 + 2 i zeta w_n w), shape (..., modes, 8).
 
     a = -2 Re(r conj(lambda)) and b = 2 Re(r) with the residue r = phi_p phi_q, for tt, tr, rr.
+
+    Parameters
+    ----------
+    omega_n, zeta : arrays, shape (..., modes) [rad/s], [-]
+    phi_t, phi_r : complex arrays, shape (..., modes) [sqrt(s/kg)]
+        Shapes: translation, and slope times the lever.
     """
     conjugate = -zeta * omega_n - 1j * omega_n * np.sqrt(1.0 - zeta**2)
     columns = [omega_n**2, 2.0 * zeta * omega_n]

@@ -36,10 +36,12 @@ class AxisSearch:
     Parameters
     ----------
     solutions : list of Solution
-        By evidence, best first.
+        In the order of their evidence, best first.
     evidences : list of float
-    model_error : float
+    model_error : float [-]
+        Share of each line that stays unexplained.
     cut_weight : array, shape (k,)
+        Factor on each cut's weights.
     trace : list of (axis, stage, cost)
     """
 
@@ -64,7 +66,15 @@ class AxisSearch:
 
 
 def ranked(solutions: list[Solution], misfit: Misfit, trace: list[tuple[str, str, float]]) -> AxisSearch:
-    """Return solutions of one axis by their evidence."""
+    """Return solutions of one axis in the order of their evidence.
+
+    Parameters
+    ----------
+    solutions : list of Solution
+    misfit : Misfit
+        The one in which all were refined.
+    trace : list of (axis, stage, cost)
+    """
     values = [evidence(s, misfit) for s in solutions]
     order = sorted(range(len(solutions)), key=values.__getitem__)
     return AxisSearch([solutions[i] for i in order], [values[i] for i in order], misfit.model_error[0], misfit.cut_weight, trace)
@@ -78,10 +88,11 @@ def fit_jointly(
     Parameters
     ----------
     data : IdentificationData
-        With both outputs, where they were recorded.
+        All axes, with both outputs where they were recorded.
+    priors : Priors
     searched : list of AxisSearch
         One for each axis.
-    report : callable
+    report : callable of (stage, cost, solution)
     map : callable
         The builtin, or a pool's.
     """
@@ -179,7 +190,7 @@ def _start(data: IdentificationData, found: Solution, softening: bool) -> tuple[
 def _tooth_angles(data: IdentificationData, nuisance: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return each clamping's tooth angle from delays fitted without it, and the delays in the tooth-passing period that it means."""
     angles, nuisance = np.zeros(data.clampings), nuisance.copy()
-    period = data.cut_prior[:, 3]
+    period = data.cut_prior.tooth_period
     for c in range(data.clampings):
         of = data.clamping == c
         turned = (nuisance[of, 0] - data.edge[of, 0]) / period[of]

@@ -8,7 +8,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification._kernels import cross_frf, fit_cuts, mix_cuts, whiten
-from rcsa_ident.identification.data import AxisData, IdentificationData
+from rcsa_ident.identification.data import AxisData, CutPrior, IdentificationData
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, AxisParameters, Layout, chain, residual_turn, scaled_joint, unpack
 from rcsa_ident.identification.priors import Priors, prior_rows
 
@@ -23,11 +23,11 @@ class Residual:
     Parameters
     ----------
     lines : tuple of arrays, shape (2 n,)
-        Of each axis: real parts of all lines, then imaginary parts.
+        Residuals of each axis: real parts of all lines, then imaginary parts.
     own : array, shape (p,)
-        Of the parameters' priors.
+        Residuals of the parameters' priors.
     cuts : array, shape (k, 2)
-        Of the cuts' priors: delay, angle.
+        Residuals of the cuts' priors: delay, angle.
     """
 
     lines: tuple[FloatArray, ...]
@@ -45,12 +45,12 @@ class Residual:
 
     @property
     def chi2(self) -> tuple[float, ...]:
-        """Of each axis' lines."""
+        """Sum of squares of each axis' lines, in standard deviations."""
         return tuple(float(r @ r) for r in self.lines)
 
     @property
     def cost(self) -> float:
-        """Sum of all squares."""
+        """Sum of all squares, those of the priors too."""
         return sum(self.chi2) + float(self.own @ self.own) + float(np.sum(self.cuts**2))
 
 
@@ -67,7 +67,7 @@ class Evaluation:
     models : tuple of complex arrays, shape (n, o) [m/N]
         The model's cross FRFs on the lines of each axis.
     residual : Residual
-        Whose squares add up to the cost.
+        Its squares add up to the cost.
     linear : Linearisation or None
         Gradient and Gauss-Newton matrix of half the cost, where asked for.
     """
@@ -80,7 +80,7 @@ class Evaluation:
 
     @property
     def chi2(self) -> tuple[float, ...]:
-        """Of each axis' lines."""
+        """Sum of squares of each axis' lines, in standard deviations."""
         return self.residual.chi2
 
     @property
@@ -98,10 +98,11 @@ class Linearisation:
     ----------
     layout : Layout
     jacobians : tuple of arrays, shape (2 n, q + c)
-        Of each axis: the lines' change with its own parameters, the joint's and the coefficients'.
+        Change of each axis' lines with its own parameters, the joint's and the coefficients'.
     columns : tuple of complex arrays, shape (n, 2)
         The lines' change with their cut's delay (in `DELAY_UNIT`) and angle.
     cut : tuple of int arrays, shape (n,)
+        The cut that each line belongs to.
     own : array, shape (p, p)
         The priors' change.
     cut_prior : array, shape (k, 2)
@@ -109,10 +110,13 @@ class Linearisation:
     clamping : (array of int, array), shape (k,) each
         Place in the vector of the tooth angle that a cut's prior depends on, and by how much (0 where by none).
     gradient, hessian : arrays, shapes (p,), (p, p)
+        Of half the cost, the cuts' unknowns eliminated.
     inner : array, shape (k, 2, 2)
+        Normal equations of each cut's delay and angle.
     mixed : array, shape (k, 2, p)
+        What couples them to the parameters.
     compliance : tuple of complex arrays, shape (n, o, 3)
-        Of each axis: the model's change with the flange's receptance tt, tr, rr at its lines, for what may be added to it.
+        Change of each axis' model with the flange's receptance tt, tr, rr at its lines, for what may be added to it.
     """
 
     layout: Layout
@@ -165,6 +169,8 @@ class Linearisation:
 
         Parameters
         ----------
+        i : int
+            Number of the axis.
         rows : array, shape (2 n, 3 q)
             Change of the axis' lines with them.
         residual : Residual
@@ -207,7 +213,7 @@ class Linearisation:
         Parameters
         ----------
         covariance : array, shape (p, p)
-            Of the parameters.
+            Covariance of the parameters.
         """
         follow = np.linalg.solve(self.inner, self.mixed)[:, 0]
         own = np.linalg.inv(self.inner)[:, 0, 0]
@@ -222,7 +228,7 @@ class Misfit:
     data : IdentificationData
     priors : Priors
     model_error : tuple of float [-]
-        Of each axis: standard deviation of what the force model leaves out, as a share of each line.
+        Standard deviation of what the force model leaves out, as a share of each line, for each axis.
     cut_weight : array, shape (k,), optional
         Factor on the weights of each cut's lines: below 1 for one that contradicts the others.
     """
@@ -257,20 +263,31 @@ class Misfit:
             See `parameters`.
         layout : Layout
         nuisance : array, shape (k, 2)
-            Where each cut's fit starts; not changed.
+            Delay [s] and angle [rad] at which each cut's fit starts; not changed.
         grid : int
             Delays tried over a tooth-passing period; 0 stays near `nuisance`.
+        normal : bool
+            Whether gradient and Gauss-Newton matrix are made, too.
         """
         models, gradients, axes = self._models(theta, layout, normal)
         nuisance = nuisance.copy()
         prior = self._cut_prior(theta, layout)
-        fit_cuts(self._lines, self._weights, np.concatenate([m.ravel() for m in models])[self._order], self._start, prior, nuisance, grid)
+        at_lines = np.concatenate([m.ravel() for m in models])[self._order]
+        fit_cuts(self._lines, self._weights, at_lines, self._start, prior.rows, nuisance, grid)
         residual = self._residual(theta, layout, models, nuisance, prior)
         linear = self._linearise(theta, layout, axes, models, gradients, residual, nuisance, prior) if normal else None
         return Evaluation(residual.cost, nuisance, tuple(models), residual, linear)
 
     def residual_at(self, theta: FloatArray, layout: Layout, nuisance: FloatArray) -> Residual:
-        """Return the residual with the cuts' delays and angles as they are given."""
+        """Return the residual with the cuts' delays and angles as they are given.
+
+        Parameters
+        ----------
+        theta : array, shape (p,)
+        layout : Layout
+        nuisance : array, shape (k, 2)
+            Delay [s] and angle [rad] of each cut.
+        """
         models = self._models(theta, layout, False)[0]
         return self._residual(theta, layout, models, nuisance, self._cut_prior(theta, layout))
 
@@ -306,22 +323,23 @@ class Misfit:
             gradients.append(gradient)
         return models, gradients, axes
 
-    def _cut_prior(self, theta: FloatArray, layout: Layout) -> FloatArray:
-        """What is known of each cut, with the triggers of unknown tooth angle where that is an unknown of the layout, shape (k, 4)."""
+    def _cut_prior(self, theta: FloatArray, layout: Layout) -> CutPrior:
+        """What is known of each cut, with the triggers of unknown tooth angle where that is an unknown of the layout."""
+        prior = self.data.cut_prior
         if not layout.clampings:
-            return self.data.cut_prior
-        prior = self.data.cut_prior.copy()
+            return prior
+        delay, weight = prior.delay.copy(), prior.delay_weight.copy()
         known = self.data.clamping >= 0
         angle = theta[layout.clamping][self.data.clamping[known]]
-        prior[known, 0] = self.data.edge[known, 0] + angle / self.data.spindle_speed[known]
-        prior[known, 1] = self.data.edge[known, 1]
-        return prior
+        delay[known] = self.data.edge[known, 0] + angle / self.data.spindle_speed[known]
+        weight[known] = self.data.edge[known, 1]
+        return replace(prior, delay=delay, delay_weight=weight)
 
-    def _residual(self, theta: FloatArray, layout: Layout, models: list[ComplexArray], nuisance: FloatArray, prior: FloatArray) -> Residual:
+    def _residual(self, theta: FloatArray, layout: Layout, models: list[ComplexArray], nuisance: FloatArray, prior: CutPrior) -> Residual:
         lines = tuple(axis.rest(model, nuisance) for axis, model in zip(self._axes, models, strict=True))
         own = prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients]).residual(theta)
-        cuts = np.sqrt(prior[:, 1:3]) * nuisance
-        cuts[:, 0] -= np.sqrt(prior[:, 1]) * prior[:, 0]
+        cuts = np.sqrt(prior.weights) * nuisance
+        cuts[:, 0] -= np.sqrt(prior.delay_weight) * prior.delay
         return Residual(lines, own, cuts)
 
     def _linearise(
@@ -333,13 +351,13 @@ class Misfit:
         gradients: list[ComplexArray],
         residual: Residual,
         nuisance: FloatArray,
-        prior: FloatArray,
+        prior: CutPrior,
     ) -> Linearisation:
         """Gauss-Newton matrices of the parameters after eliminating two unknowns per cut (Schur complement)."""
         size, cuts = layout.size, len(self.data.cut_ids)
         own = prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients]).jacobian
         hessian = own.T @ own
-        cut_prior = np.sqrt(prior[:, 1:3]) * np.array([DELAY_UNIT, 1.0])
+        cut_prior = np.sqrt(prior.weights) * np.array([DELAY_UNIT, 1.0])
         mixed = np.zeros((cuts, 2, size))
         inner = np.zeros((cuts, 2, 2))
         inner[:, 0, 0], inner[:, 1, 1] = cut_prior[:, 0] ** 2, cut_prior[:, 1] ** 2
@@ -361,7 +379,7 @@ class Misfit:
         if layout.clampings:
             np.add.at(hessian, (clamping[0], clamping[0]), clamping[1] ** 2)
             mixed[np.arange(cuts), 0, clamping[0]] += cut_prior[:, 0] * clamping[1]
-        _without_information(inner, prior[:, 3])
+        _without_information(inner, prior.tooth_period)
         # inner = L L^T, cut by cut: hessian - mixed^T inner^-1 mixed = hessian - half^T half
         first = np.sqrt(inner[:, 0, 0])
         low = inner[:, 1, 0] / first
@@ -386,14 +404,14 @@ class Misfit:
         )
         return replace(linear, gradient=linear.pull(residual))
 
-    def _clamping(self, layout: Layout, prior: FloatArray) -> tuple[np.ndarray, FloatArray]:
+    def _clamping(self, layout: Layout, prior: CutPrior) -> tuple[np.ndarray, FloatArray]:
         """Place of the tooth angle that each cut's prior depends on, and the prior's change with it."""
         cuts = len(self.data.cut_ids)
         if not layout.clampings:
             return np.zeros(cuts, dtype=np.intp), np.zeros(cuts)
-        told = self.data.clamping >= 0
+        known = self.data.clamping >= 0
         place = layout.clamping.start + np.maximum(self.data.clamping, 0)
-        return place, np.where(told, -np.sqrt(prior[:, 1]) / self.data.spindle_speed, 0.0)
+        return place, np.where(known, -np.sqrt(prior.delay_weight) / self.data.spindle_speed, 0.0)
 
 
 class _AxisLines:

@@ -1,49 +1,93 @@
-"""Cross FRF estimators: tip force to flange displacement."""
+"""Lines of the cross FRF, tip force to flange displacement, and their estimators: H1, H2 and coherence are those of [bendat2010]."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Protocol
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.steady import SteadyRecord
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HarmonicPoints:
-    """Absolute flange displacement over the force at the tooth-passing harmonics of a cut, every axis on its own force.
+class AxisLines:
+    """Lines of one axis at the tooth-passing harmonics of one cut.
 
     Parameters
     ----------
-    cut, air : complex arrays, shape (n, axes, o) [m/N]
-        The receptance is cut - air; the air cut's line is turned by the angle between both records. Outputs are gap and
-        fixture, whose sum is the flange's motion, or that alone.
-    variance : array, shape (n, axes, o) [m^2/N^2]
+    order : array of int, shape (n,)
+        Multiples of the spindle frequency.
+    omega : array, shape (n,) [rad/s]
+    cut, air : complex arrays, shape (n, o) [m/N]
+        Displacement over the simulated force with tooth 1 at immersion 0 at the record's start; the air cut's line is turned
+        by the best estimate of the angle between both records. Outputs are gap and fixture, whose sum is the flange's absolute
+        motion, or that alone.
+    variance : array, shape (n, o) [m^2/N^2]
         Of the real and of the imaginary part of cut - air each.
-    coherence : array, shape (n, axes) [-]
+    coherence : array, shape (n,) [-]
+        Of the flange's motion.
+    force : complex array, shape (n,) [N]
+    force_slope : complex array, shape (n, 5) [-]
+        Change of the force's logarithm with `cutting.force.SLOPES`.
     """
 
+    order: np.ndarray
+    omega: FloatArray
     cut: ComplexArray
     air: ComplexArray
     variance: FloatArray
     coherence: FloatArray
+    force: ComplexArray
+    force_slope: ComplexArray
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs of each line: 1 or 2."""
+        return self.cut.shape[1]
+
+    @property
+    def receptance(self) -> ComplexArray:
+        """Flange displacement per tip force, up to the cut's delay, shape (n,): true value times e^{-i omega delay}."""
+        return np.sum(self.cut - self.air, axis=1)
+
+    def summed(self) -> AxisLines:
+        """Return the lines with the flange's motion as the only output."""
+        cut, air, variance = (np.sum(each, axis=1, keepdims=True) for each in (self.cut, self.air, self.variance))
+        return replace(self, cut=cut, air=air, variance=variance)
+
+    def of(self, keep: np.ndarray) -> AxisLines:
+        """Return some of the lines: a mask or indices, shape (n,)."""
+        return AxisLines(*(getattr(self, each.name)[keep] for each in fields(self)))
 
 
 class Estimator(Protocol):
-    """How points of the cross FRF come out of a cut and its air cut: an object that carries its settings."""
+    """How lines of the cross FRF come out of a cut and its air cut: an object that carries its settings."""
 
-    def points(self, cut: SteadyRecord, air: SteadyRecord | None, angle: float, order: np.ndarray, force: ComplexArray) -> HarmonicPoints:
-        """Return the points at the given orders.
+    def lines(
+        self,
+        cut: SteadyRecord,
+        air: SteadyRecord | None,
+        angle: float,
+        order: np.ndarray,
+        force: ComplexArray,
+        force_slope: ComplexArray,
+    ) -> dict[Dof, AxisLines]:
+        """Return the lines of each axis of the cut at the given orders.
 
         Parameters
         ----------
+        cut : SteadyRecord
+        air : SteadyRecord or None
+            The air cut, where there is one.
         angle : float [rad]
-            By which the air cut must be turned to lie under the cut.
+            Angle by which the air cut must be turned to lie under the cut.
         order : array of int, shape (n,)
         force : complex array, shape (n, axes) [N]
             Without zeros.
+        force_slope : complex array, shape (n, axes, 5) [-]
         """
         ...
 
@@ -52,8 +96,16 @@ class Estimator(Protocol):
 class LineEstimator:
     """Least-squares lines over the whole record, the air cut's subtracted as complex numbers."""
 
-    def points(self, cut: SteadyRecord, air: SteadyRecord | None, angle: float, order: np.ndarray, force: ComplexArray) -> HarmonicPoints:
-        """Return the points; the variance is that of both lines, from the noise beside them and their scatter."""
+    def lines(
+        self,
+        cut: SteadyRecord,
+        air: SteadyRecord | None,
+        angle: float,
+        order: np.ndarray,
+        force: ComplexArray,
+        force_slope: ComplexArray,
+    ) -> dict[Dof, AxisLines]:
+        """Return the lines; the variance is that of cut and air cut, from the noise beside them and their scatter."""
         amplitude, noise = cut.outputs[order], cut.output_variance[order]
         still = np.zeros_like(amplitude)
         if air is not None:
@@ -63,12 +115,19 @@ class LineEstimator:
         power = np.abs(np.sum(amplitude - still, axis=2) / force) ** 2
         # the noise is in the power, too
         coherence = np.clip(1.0 - 2.0 * np.sum(variance, axis=2) / np.maximum(power, 1e-300), 0.0, 1.0)
-        return HarmonicPoints(amplitude / force[:, :, None], still / force[:, :, None], variance, coherence)
+        points = amplitude / force[:, :, None], still / force[:, :, None], variance
+        found = {}
+        for i, axis in enumerate(cut.axes):
+            # an axis without the fixture's acceleration has the gap alone
+            moved, unmoved, spread = (each[:, i] if cut.has_fixture(axis) else each[:, i, :1] for each in points)
+            omega = order * cut.spindle_speed
+            found[axis] = AxisLines(order, omega, moved, unmoved, spread, coherence[:, i], force[:, i], force_slope[:, i])
+        return found
 
 
 @dataclass(frozen=True, slots=True)
 class AirCorrectedSpectra:
-    """The paper's estimator: spectra averaged over segments, those of the air cut subtracted (eqs. 8 and 16).
+    """Spectra averaged over segments [welch1967], those of the air cut subtracted ([inprocess], eqs. 8 and 16).
 
     What cut and air cut share at an order goes only as far as it is uncorrelated with what the force does there; at the
     few harmonics where the flange's roundness reaches them this leaves a bias that `LineEstimator` does not have.
@@ -81,8 +140,16 @@ class AirCorrectedSpectra:
 
     segments: int = 8
 
-    def points(self, cut: SteadyRecord, air: SteadyRecord | None, angle: float, order: np.ndarray, force: ComplexArray) -> HarmonicPoints:
-        """Return the points, nothing left to subtract; the variance is the jackknife's over the segments."""
+    def lines(
+        self,
+        cut: SteadyRecord,
+        air: SteadyRecord | None,
+        angle: float,
+        order: np.ndarray,
+        force: ComplexArray,
+        force_slope: ComplexArray,
+    ) -> dict[Dof, AxisLines]:
+        """Return the lines, nothing left to subtract; the variance is the jackknife's over the segments."""
         displacement = cut.segments(order, self.segments)
         still = np.zeros_like(displacement)
         if air is not None:
@@ -93,16 +160,38 @@ class AirCorrectedSpectra:
         spread = (self.segments - 1) / self.segments * np.sum(np.abs(left - left.mean(axis=0)) ** 2, axis=0)
         variance = 0.5 * spread * _overlap_factor(self.segments)
         shared = coherence(displacement - still.mean(axis=0), same)
-        return HarmonicPoints(values[:, :, None], np.zeros_like(values)[:, :, None], variance[:, :, None], shared)
+        found = {}
+        for i, axis in enumerate(cut.axes):
+            value, omega = values[:, i, None], order * cut.spindle_speed
+            nothing, spread = np.zeros_like(value), variance[:, i, None]
+            found[axis] = AxisLines(order, omega, value, nothing, spread, shared[:, i], force[:, i], force_slope[:, i])
+        return found
 
 
 def turned_air(air: SteadyRecord, angle: float, highest: int) -> tuple[ComplexArray, FloatArray]:
-    """Return an air cut's lines turned by an angle and their variance, orders 0..highest; 0 where the record has no such order."""
+    """Return an air cut's lines turned by an angle and their variance, orders 0..highest; 0 where there is no such order.
+
+    Parameters
+    ----------
+    air : SteadyRecord
+    angle : float [rad]
+    highest : int
+        Highest order that is returned.
+    """
     return turned(air.flange, air.variance, angle, highest)
 
 
 def turned(lines: ComplexArray, noise: FloatArray, angle: float, highest: int) -> tuple[ComplexArray, FloatArray]:
-    """Return lines (orders, ...) turned by an angle, and their variance, orders 0..highest; 0 where there is no such order."""
+    """Return lines turned by an angle, and their variance, orders 0..highest; 0 where there is no such order.
+
+    Parameters
+    ----------
+    lines : complex array, shape (orders, ...)
+    noise : array of the same shape
+        Their variance.
+    angle : float [rad]
+    highest : int
+    """
     rest = [(0, 0)] * (lines.ndim - 1)
     missing = max(highest + 1 - lines.shape[0], 0)
     amplitude = np.pad(lines, [(0, missing), *rest])[: highest + 1]
@@ -134,10 +223,15 @@ def hv(displacement: ComplexArray, force: ComplexArray) -> ComplexArray:
 
 
 def air_corrected(displacement: ComplexArray, force: ComplexArray, air: ComplexArray) -> ComplexArray:
-    """Return (S_dd - S_aa) / (S_fd - S_fa), the paper's eqs. 8 and 16, with S_fd = E[F D*].
+    """Return (S_dd - S_aa) / (S_fd - S_fa) with S_fd = E[F D*] ([inprocess], eqs. 8 and 16).
 
     Spectra are subtracted, not lines: what the air cut shares with the cut is only taken out in the mean, which is
     exact where both are uncorrelated.
+
+    Parameters
+    ----------
+    displacement, force, air : complex arrays, shape (segments, ...) [m], [N], [m]
+        Spectra of the segments of a cut, of its force and of its air cut.
     """
     return (_mean(displacement, displacement) - _mean(air, air)) / (_mean(force, displacement) - _mean(force, air))
 

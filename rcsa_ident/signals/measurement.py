@@ -7,15 +7,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.errors import InputError
+from rcsa_ident.errors import InputError, Unsteady
+from rcsa_ident.shown import Shown
 from rcsa_ident.signals.alignment import angle_to_air, trigger_delay
-from rcsa_ident.signals.frf import Estimator, LineEstimator, turned_air
+from rcsa_ident.signals.frf import AxisLines, Estimator, LineEstimator, turned_air
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
 from rcsa_ident.signals.verdict import Verdict, chatter, implausible, raw_faults, silence, speed_faults, tooth_count_fault
@@ -28,54 +28,7 @@ WEAKEST_FORCE = 1e-3
 _AIR_BEYOND = 1.02
 DEFAULT_ESTIMATOR = LineEstimator()
 #: Note on a cut without an air cut.
-NO_AIR = "no air cut: run-out and roundness of the flange are left in the lines that the teeth share with them"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class AxisLines:
-    """Lines of one axis at the tooth-passing harmonics of one cut.
-
-    Parameters
-    ----------
-    order : array of int, shape (n,)
-        Multiples of the spindle frequency.
-    omega : array, shape (n,) [rad/s]
-    cut, air : complex arrays, shape (n, o) [m/N]
-        Displacement over the simulated force with tooth 1 at immersion 0 at the record's start; the air cut's line is turned
-        by the best estimate of the angle between both records. Outputs are gap and fixture, whose sum is the flange's absolute
-        motion, or that alone.
-    variance : array, shape (n, o) [m^2/N^2]
-        Of the real and of the imaginary part of cut - air each.
-    coherence : array, shape (n,) [-]
-        Of the flange's motion.
-    force : complex array, shape (n,) [N]
-    force_slope : complex array, shape (n, 5) [-]
-        Change of the force's logarithm with `cutting.force.SLOPES`.
-    """
-
-    order: np.ndarray
-    omega: FloatArray
-    cut: ComplexArray
-    air: ComplexArray
-    variance: FloatArray
-    coherence: FloatArray
-    force: ComplexArray
-    force_slope: ComplexArray
-
-    @property
-    def outputs(self) -> int:
-        """1 or 2."""
-        return self.cut.shape[1]
-
-    @property
-    def receptance(self) -> ComplexArray:
-        """Flange displacement per tip force, up to the cut's delay, shape (n,): true value times e^{-i omega delay}."""
-        return np.sum(self.cut - self.air, axis=1)
-
-    def summed(self) -> AxisLines:
-        """Return the lines with the flange's motion as the only output."""
-        cut, air, variance = (np.sum(each, axis=1, keepdims=True) for each in (self.cut, self.air, self.variance))
-        return replace(self, cut=cut, air=air, variance=variance)
+NO_AIR = "no air cut: run-out and roundness of the flange remain in the lines at the tooth-passing harmonics"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,8 +38,9 @@ class CutMeasurement:
     Parameters
     ----------
     cut_id, tooling : str
+        Name of the cut and of its tooling.
     spindle_speed : float [rad/s]
-        From the record.
+        As found in the record.
     axes : mapping of Dof to AxisLines
     alignment_std : float [rad]
         Standard deviation of the angle between cut and air cut; 0 without an air cut.
@@ -105,22 +59,33 @@ class CutMeasurement:
     tooth_angle_known: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """A record's verdict and, where it is usable, its measurement.
+@dataclass(frozen=True, slots=True, repr=False)
+class Reading(Shown):
+    """A cut whose recordings were read: their verdict and, where they are usable, the measurement.
 
     Parameters
     ----------
+    cut_id, tooling : str
+    programmed_speed : float [rad/s]
+    verdict : Verdict
+    measurement : CutMeasurement or None
     spindle_speed : float or None [rad/s]
-        From the record, also of one that is not usable, unless nothing can be told of it.
+        As found in the record, also in one that is not usable, unless nothing can be told of it.
     harmonics : mapping of Dof to int
         Multiples of the tooth-passing frequency, of an air cut of the spindle's, that stand above the noise beside them.
     """
 
+    cut_id: str
+    tooling: str
+    programmed_speed: float
     verdict: Verdict
     measurement: CutMeasurement | None = None
     spindle_speed: float | None = None
     harmonics: Mapping[Dof, int] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        lines = 0 if self.measurement is None else sum(each.omega.size for each in self.measurement.axes.values())
+        return f"{self.cut_id}: {self.verdict}" + (f", {lines} lines" if self.verdict.usable else "")
 
 
 def measure_cut(
@@ -138,13 +103,20 @@ def measure_cut(
 
     Parameters
     ----------
-    cut, air : Recording
+    cut_id, tooling : str
+        Name of the cut and of its tooling, for the result and for messages.
+    cut : Recording
         Displacement channels for X and/or Y, accelerometers of the fixture where there are some.
+    air : Recording or None
+        The same in the air, where it was recorded.
+    cutter : Cutter
     conditions : CuttingConditions
-        As programmed; forces are simulated at the speed found in the record.
+        The cut as programmed; forces are simulated at the speed found in the record.
+    coefficients : CuttingCoefficients
     max_frequency : float [Hz]
+        Highest line.
     estimator : Estimator
-        `LineEstimator`, or `AirCorrectedSpectra` for the paper's.
+        `LineEstimator`, or `AirCorrectedSpectra` for that of [inprocess].
 
     Raises
     ------
@@ -155,69 +127,78 @@ def measure_cut(
     if not axes:
         raise InputError("sensors", "no displacement", "a displacement sensor for X or Y", cut_id)
     programmed, notes = conditions.spindle_speed, implausible(cut)
+
+    def left_out(reasons: tuple[str, ...], speed: float | None = None, harmonics: Mapping[Dof, int] | None = None) -> Reading:
+        return Reading(cut_id, tooling, programmed, Verdict(reasons, notes), None, speed, harmonics or {})
+
     faults = raw_faults(cut) + tuple(f"air cut: {fault}" for fault in (raw_faults(air) if air is not None else ()))
     if faults:
-        return Reading(Verdict(faults, notes))
-    steady = steady_record(cut, axes, programmed, max_frequency, cutter.teeth)
-    if isinstance(steady, str):
-        return Reading(Verdict((steady,), notes))
+        return left_out(faults)
+    try:
+        steady = steady_record(cut, axes, programmed, max_frequency, cutter.teeth)
+    except Unsteady as error:
+        return left_out((str(error.found),))
     found = steady.spindle_speed, _harmonics(steady)
     faults = _speed_faults(steady, programmed)
     if faults:
-        return Reading(Verdict(faults, notes), None, *found)
-    still = None if air is None else steady_record(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
-    if still is not None:
-        faults = (still,) if isinstance(still, str) else _speed_faults(still, programmed)
-        if faults:
-            return Reading(Verdict((f"air cut: {faults[0]}",), notes), None, *found)
-    assert not isinstance(still, str)
+        return left_out(faults, *found)
+    try:
+        still = None if air is None else steady_record(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
+        faults = () if still is None else _speed_faults(still, programmed)
+    except Unsteady as error:
+        faults = (str(error.found),)
+    if faults:
+        return left_out((f"air cut: {faults[0]}",), *found)
     harmonic = np.arange(cutter.teeth, steady.highest_order + 1, cutter.teeth)
     if harmonic.size == 0:
-        return Reading(Verdict((f"no tooth-passing line below {max_frequency:.0f} Hz",), notes), None, *found)
+        return left_out((f"no tooth-passing line below {max_frequency:.0f} Hz",), *found)
     angle, alignment_std = 0.0, 0.0
     if still is not None:
         angle, alignment_std = angle_to_air(steady, still, cutter.teeth)
     reasons = _cut_faults(steady, still, angle, harmonic, cutter, max_frequency)
     if reasons:
-        return Reading(Verdict(reasons, notes), None, *found)
+        return left_out(reasons, *found)
     speed = steady.spindle_speed
     force, slope = force_and_slope(cutter, replace(conditions, spindle_speed=speed), coefficients, harmonic)
-    strong = WEAKEST_FORCE * np.abs(force).max()
-    seen = [0 if axis is Dof.X else 1 for axis in axes]
-    keep = np.abs(force[:, seen]) > strong
-    points = estimator.points(steady, still, angle, harmonic, np.where(keep, force[:, seen], max(strong, 1e-300)))
-    result = {}
-    for i, (axis, k) in enumerate(zip(axes, keep.T, strict=True)):
-        # an axis without the fixture's acceleration has the gap alone
-        outputs = slice(None) if steady.has_fixture(axis) else slice(0, 1)
-        if k.any():
-            cut_points, air_points, variance = (each[k, i, outputs] for each in (points.cut, points.air, points.variance))
-            force_k, slope_k = force[k, seen[i]], slope[k, seen[i]]
-            result[axis] = AxisLines(
-                harmonic[k], harmonic[k] * speed, cut_points, air_points, variance, points.coherence[k, i], force_k, slope_k
-            )
-    measurement = CutMeasurement(cut_id, tooling, speed, result, alignment_std, *trigger_delay(cut, speed, cutter.teeth))
-    return Reading(Verdict((), notes if air is not None else (*notes, NO_AIR)), measurement, *found)
+    weakest = WEAKEST_FORCE * np.abs(force).max()
+    measured = [0 if axis is Dof.X else 1 for axis in axes]
+    force, slope = force[:, measured], slope[:, measured]
+    strong = np.abs(force) > weakest
+    lines = estimator.lines(steady, still, angle, harmonic, np.where(strong, force, max(weakest, 1e-300)), slope)
+    kept = {axis: lines[axis].of(k) for axis, k in zip(axes, strong.T, strict=True) if k.any()}
+    measurement = CutMeasurement(cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth))
+    verdict = Verdict((), notes if air is not None else (*notes, NO_AIR))
+    return Reading(cut_id, tooling, programmed, verdict, measurement, *found)
 
 
-def judge_air(air: Recording, conditions: CuttingConditions, max_frequency: float = MAX_FREQUENCY) -> Reading:
+def judge_air(cut_id: str, tooling: str, air: Recording, conditions: CuttingConditions, max_frequency: float = MAX_FREQUENCY) -> Reading:
     """Return the verdict on an air cut alone, as `measure_cut` judges it beside a cut.
+
+    Parameters
+    ----------
+    air : Recording
+    conditions : CuttingConditions
+        The cut as programmed: its speed counts.
+    max_frequency : float [Hz]
+        Highest line.
 
     Raises
     ------
     InputError
         If no displacement channel is there.
     """
-    axes, notes = measured_axes(air), implausible(air)
+    axes, notes, programmed = measured_axes(air), implausible(air), conditions.spindle_speed
     if not axes:
         raise InputError("sensors", "no displacement", "a displacement sensor for X or Y")
     faults = raw_faults(air)
     if faults:
-        return Reading(Verdict(faults, notes))
-    still = steady_record(air, axes, conditions.spindle_speed, _AIR_BEYOND * max_frequency, 1)
-    if isinstance(still, str):
-        return Reading(Verdict((still,), notes))
-    return Reading(Verdict(_speed_faults(still, conditions.spindle_speed), notes), None, still.spindle_speed, _harmonics(still))
+        return Reading(cut_id, tooling, programmed, Verdict(faults, notes))
+    try:
+        still = steady_record(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
+    except Unsteady as error:
+        return Reading(cut_id, tooling, programmed, Verdict((str(error.found),), notes))
+    verdict = Verdict(_speed_faults(still, programmed), notes)
+    return Reading(cut_id, tooling, programmed, verdict, None, still.spindle_speed, _harmonics(still))
 
 
 def _speed_faults(steady: SteadyRecord, programmed: float) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.errors import InputError
+from rcsa_ident.errors import InputError, Unsteady
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum, refine_speed, segment_lines
 from rcsa_ident.signals.steady_part import steady_part
@@ -26,18 +26,18 @@ class SteadyRecord:
     ----------
     recording : Recording
     axes : tuple of Dof
-        With a displacement sensor.
+        Machine axes with a displacement sensor.
     columns : tuple of int
         Channels of the recording that matter: the axes' displacements, then the fixture's accelerations.
     part : slice
     teeth : int
         1 for an air cut.
     lines : LineSpectrum
-        Of these channels; phases from the recording's first sample.
+        Lines of these channels; phases from the recording's first sample.
     outputs : complex array, shape (orders, axes, o) [m]
         Displacement at each order: gap and fixture, or the gap alone where no axis has the fixture's acceleration.
     output_variance : array, shape (orders, axes, o) [m^2]
-        Of the real and of the imaginary part each.
+        Variance of the real and of the imaginary part each.
     """
 
     recording: Recording
@@ -56,7 +56,7 @@ class SteadyRecord:
 
     @property
     def variance(self) -> FloatArray:
-        """Of its real and of its imaginary part each, shape (orders, axes) [m^2]."""
+        """Variance of its real and of its imaginary part each, shape (orders, axes) [m^2]."""
         return np.sum(self.output_variance, axis=2)
 
     def has_fixture(self, axis: Dof) -> bool:
@@ -65,12 +65,12 @@ class SteadyRecord:
 
     @property
     def spindle_speed(self) -> float:
-        """From the record itself [rad/s]."""
+        """Spindle speed, found in the record itself [rad/s]."""
         return self.lines.spindle_speed
 
     @property
     def highest_order(self) -> int:
-        """Of the lines."""
+        """Highest multiple of the spindle's frequency among the lines."""
         return self.lines.amplitude.shape[0] - 1
 
     @property
@@ -92,15 +92,18 @@ def measured_axes(recording: Recording) -> tuple[Dof, ...]:
     return tuple(axis for axis in (Dof.X, Dof.Y) if recording.channel(Quantity.DISPLACEMENT, axis) is not None)
 
 
-def steady_record(recording: Recording, axes: Sequence[Dof], programmed: float, max_frequency: float, teeth: int) -> SteadyRecord | str:
-    """Return the steady part of a recording with its speed and lines, or why there is none.
+def steady_record(recording: Recording, axes: Sequence[Dof], programmed: float, max_frequency: float, teeth: int) -> SteadyRecord:
+    """Return the steady part of a recording with its speed and lines.
 
     Parameters
     ----------
+    recording : Recording
     axes : sequence of Dof
         Each with a displacement sensor in the recording.
     programmed : float [rad/s]
+        The spindle speed that was set; the true one is looked for near it.
     max_frequency : float [Hz]
+        Highest line.
     teeth : int
         1 for an air cut.
 
@@ -108,17 +111,19 @@ def steady_record(recording: Recording, axes: Sequence[Dof], programmed: float, 
     ------
     InputError
         If the displacement of an axis is missing.
+    Unsteady
+        If there is no steady part; what was found says why.
     """
     rate, n = recording.rate, recording.samples.shape[0]
     least = LEAST_REVOLUTIONS * 2.0 * np.pi / programmed * rate
     if n < least:
-        return f"too short: {n / rate:.3g} s hold fewer than {LEAST_REVOLUTIONS:.0f} revolutions"
+        raise _no_steady_part(f"too short: {n / rate:.3g} s hold fewer than {LEAST_REVOLUTIONS:.0f} revolutions")
     columns = _columns(recording, axes)
     displacement = recording.samples[:, columns[: len(axes)]]
     rough = refine_speed(displacement, rate, programmed)
     part = steady_part(displacement, rate, rough, teeth)
     if part.stop - part.start < least:
-        return f"no steady part of at least {LEAST_REVOLUTIONS:.0f} revolutions"
+        raise _no_steady_part(f"no steady part of at least {LEAST_REVOLUTIONS:.0f} revolutions")
     whole = part == slice(0, n)
     speed = rough if whole else refine_speed(displacement[part], rate, rough)
     lines = line_spectrum(recording.samples[part][:, columns], rate, speed, max_frequency)
@@ -131,6 +136,10 @@ def steady_record(recording: Recording, axes: Sequence[Dof], programmed: float, 
     outputs = np.stack([np.einsum("mc,mca->ma", lines.amplitude[:, k], weight[:, k]) for k in kinds], axis=2)
     variance = np.stack([np.einsum("mc,mca->ma", noise[:, k], np.abs(weight[:, k]) ** 2) for k in kinds], axis=2)
     return SteadyRecord(recording, tuple(axes), columns, part, teeth, lines, outputs, variance)
+
+
+def _no_steady_part(found: str) -> Unsteady:
+    return Unsteady("recording", found, "a steady record of the programmed speed")
 
 
 def _columns(recording: Recording, axes: Sequence[Dof]) -> tuple[int, ...]:

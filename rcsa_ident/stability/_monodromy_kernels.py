@@ -420,7 +420,7 @@ def _unpack(vector, state, motion, kept):
 
 @numba.njit(cache=True)
 def multiplier(modes, layout, table, frozen, tolerance, waves, start):
-    """The period map's eigenvalue of largest magnitude by Arnoldi's method without restarts.
+    """The period map's eigenvalue of largest magnitude by Arnoldi's method [arnoldi1951] without restarts.
 
     Parameters
     ----------

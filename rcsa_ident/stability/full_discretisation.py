@@ -18,12 +18,12 @@ from rcsa_ident.stability.tip_modes import TipModes, require_modes
 
 @dataclass(frozen=True, slots=True)
 class FullDiscretisation:
-    """Full discretisation of the periodic delay equation (Ding, Zhu, Zhang & Ding, Int. J. Mach. Tools Manuf. 50 (2010) 502).
+    """Full discretisation of the periodic delay equation [ding2010].
 
     p' = pole p + inputs F moves exactly, F = K(t) (y - y(t - T)) + C(t) y' is a polynomial within each step: a straight line in the
     published method (degree 1), through Gauss-Lobatto nodes here. Steps begin and end where teeth enter and leave, so the error falls
     with the degree's order even in interrupted cuts. The map of a period is applied, never written down: its cost is linear in steps
-    and modes, and Arnoldi's method finds its largest multiplier.
+    and modes, and Arnoldi's method [arnoldi1951] finds its largest multiplier.
 
     Takes unequal pitch, run-out (with the feed per tooth), helix, a varying speed, process damping, modes with a shape and an
     engagement that changes along the edge.

@@ -22,7 +22,7 @@ _LEFT = 0.2
 
 @dataclass(frozen=True, slots=True)
 class MultiFrequency:
-    """Truncated Hill determinant of the periodic delay equation (Merdol & Altintas, J. Manuf. Sci. Eng. 126 (2004) 459).
+    """Truncated Hill determinant of the periodic delay equation [merdol2004].
 
     With [alpha(t)] = sum_r [alpha_r] e^{i r w_T t}, w_T the tooth-passing frequency, a force with the harmonics
     F_k e^{i (w + k w_T) t} repeats itself for
@@ -86,7 +86,7 @@ class MultiFrequency:
             doubts.append(f"at {lost} of {speeds.size} speeds the limit is not converged: it may be percents off")
         # a flip vibrates at an odd multiple of half the tooth-passing frequency, and nothing else does to the last digit
         flip = np.abs(chatter / (cutter.teeth * speeds) % 1.0 - 0.5) < 1e-9
-        return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), self.name, tuple(doubts), flip)
+        return StabilityLobes(speeds, limit, chatter, lobe, max_depth, self.name, warnings=tuple(doubts), flip=flip)
 
 
 def _doubts(tip: TipMotion, chatter: FloatArray) -> list[str]:

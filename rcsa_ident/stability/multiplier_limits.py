@@ -88,7 +88,7 @@ def marched_lobes(
         # a quasi-periodic vibration may pass -1, too, but as one of a pair
         flip[i] = found.value.real < 0.0 and abs(found.value.imag) < 1e-6 * abs(found.value)
     doubts = [f"at {lost} of {speeds.size} speeds the limit is not converged to {100.0 * tolerance:g} %"] if lost else []
-    return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), method, tuple(doubts), flip)
+    return StabilityLobes(speeds, limit, chatter, lobe, max_depth, method, warnings=tuple(doubts), flip=flip)
 
 
 def dominant(found: Multiplier) -> float:

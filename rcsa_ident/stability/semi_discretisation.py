@@ -20,10 +20,10 @@ _DEGREE = 3
 
 @dataclass(frozen=True, slots=True)
 class SemiDiscretisation:
-    """First-order semi-discretisation (Insperger & Stepan, Int. J. Numer. Meth. Eng. 61 (2004) 117).
+    """First-order semi-discretisation of the periodic delay equation [insperger2004].
 
     On each step K(t) and C(t) are replaced by their means and y(t - T) by the straight line between its ends; what is left has
-    constant coefficients and is solved exactly. The error falls with the square of the step. As Bachrathy & Stepan (2013) the map of
+    constant coefficients and is solved exactly. The error falls with the square of the step. As in [bachrathy2013] the map of
     a period is applied step by step, never multiplied out: its cost is linear in steps and modes.
 
     Takes what `FullDiscretisation` takes; that one needs far fewer steps.

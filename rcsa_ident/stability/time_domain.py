@@ -63,7 +63,7 @@ class MillingHistory:
 
 @dataclass(frozen=True, slots=True)
 class TimeDomain:
-    """Regenerative time-domain simulation with a Poincare test, the method that decides disputes.
+    """Regenerative time-domain simulation [tlusty1981] with a Poincare test, the method that decides disputes.
 
     Two cuts run side by side, one of them a little pushed, and are looked at once per period (a tooth's, a revolution's where teeth
     differ, a swing's of a varying speed): what their states differ by grows or dies away. The limit is where it does neither. Teeth
@@ -112,7 +112,7 @@ class TimeDomain:
             limit[i] = depth
             chatter[i], flip[i] = cut.vibration(depth, self.periods)
             lobe[i] = int(chatter[i] / (speed * process.cutter.teeth))
-        return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), self.name, (), flip)
+        return StabilityLobes(speeds, limit, chatter, lobe, max_depth, self.name, flip=flip)
 
 
 def milling_history(

@@ -15,6 +15,8 @@ from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.rational import fitted_poles
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.shown import Shown
+from rcsa_ident.units import to_hz
 
 #: Lines per half-power bandwidth of the least damped mode, and the most there may be.
 LINES_PER_BANDWIDTH = 10.0
@@ -28,8 +30,8 @@ FIT_TOLERANCE = 2e-3
 DAMPED_OUTSIDE = 0.1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TipModes(PoleResidue):
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TipModes(PoleResidue, Shown):
     """The tip's 2 x 2 receptance in machine axes X and Y as damped modes; along the edge they may have a shape.
 
     Parameters
@@ -118,6 +120,10 @@ class TipModes(PoleResidue):
         places = np.abs(self.pole.imag)[:, None] - self.pole.real[:, None] * np.linspace(-1.5, 1.5, 13)
         places = np.concatenate([places.ravel(), [0.0]])
         return float(np.max(np.linalg.norm(self.response(np.maximum(places, 0.0)), 2, axis=(1, 2))))
+
+    def __str__(self) -> str:
+        frequency = np.sort(to_hz(np.abs(self.pole)))
+        return f"{self.pole.size} modes of the tip, {frequency[0]:.0f} to {frequency[-1]:.0f} Hz"
 
 
 class ModeArrays(NamedTuple):

@@ -24,12 +24,12 @@ FEWEST_TEETH_IN_CUT = 1.0
 
 @dataclass(frozen=True, slots=True)
 class ZeroOrder:
-    """Altintas & Budak's closed form (CIRP Annals 44 (1995) 357), with cross receptances.
+    """The closed form of Altintas and Budak [altintas1995], with cross receptances.
 
     F = a K_tc [alpha0] (1 - e^{-i w tau}) G(w) F with the mean directional matrix [alpha0]: at each frequency the two
     eigenvalues mu of [alpha0] G give the boundary a = 1 / (2 K_tc Re mu) at w tau = pi + 2 arg mu + 2 pi l. Between the
     given frequencies trace and determinant of [alpha0] G are interpolated by quintics. Unequal pitch replaces
-    1 - e^{-i w tau} by its mean over the teeth (Altintas, Engin & Budak, J. Manuf. Sci. Eng. 121 (1999) 173) and costs
+    1 - e^{-i w tau} by its mean over the teeth [altintas1999] and costs
     speeds times frequencies.
     """
 
@@ -63,21 +63,20 @@ class ZeroOrder:
             limit,
             chatter,
             lobe,
+            max_depth,
+            self.name,
             absolute_limit=1.0 / (2.0 * coefficients.tangential * strongest) if exists else float("inf"),
-            absolute_frequency=place if exists else float("nan"),
-            method=self.name,
+            absolute_frequency=place if exists else None,
             warnings=tuple(_doubts(process, receptance, place if exists else None)),
         )
 
-    def depths(
-        self, omega: FloatArray, tips: tuple[ComplexArray, ComplexArray], process: MillingProcess, speeds: FloatArray, max_depth: float
-    ) -> FloatArray:
-        """Return the limits of many tips whose bending planes do not feel each other, as `lobes` does for each of them.
+    def depths(self, omega: FloatArray, tips: ComplexArray, process: MillingProcess, speeds: FloatArray, max_depth: float) -> FloatArray:
+        """Return the limits of many tips, as `lobes` does for each of them.
 
         Parameters
         ----------
         omega : array, shape (n,) [rad/s]
-        tips : (array, array), shape (d, n) each [m/N]
+        tips : complex array, shape (d, n, 2, 2) [m/N]
             The receptances in X and Y; a rigid direction is zero.
         speeds : array, shape (m,) [rad/s]
             In any order.
@@ -90,16 +89,22 @@ class ZeroOrder:
         alpha = _directions(process)
         kept = _above_rest(omega)
         omega = np.ascontiguousarray(omega[kept])
-        x, y = (tip if kept.size == tip.shape[1] else np.ascontiguousarray(tip[:, kept]) for tip in tips)
+        x, y = (np.ascontiguousarray(tips[:, kept, i, i]) for i in range(2))
+        xy, yx = tips[:, kept, 0, 1], tips[:, kept, 1, 0]
         order = np.argsort(speeds, kind="stable")
         ascending, stiffness = np.ascontiguousarray(speeds[order]), process.coefficients.tangential
-        if _equal_pitch(process):
-            found = envelopes(omega, x, y, alpha, stiffness, process.cutter.teeth, ascending)
+        teeth, pitch = process.cutter.teeth, process.cutter.pitch
+        if _equal_pitch(process) and not np.any(xy) and not np.any(yx):
+            found = envelopes(omega, x, y, alpha, stiffness, teeth, ascending)
         else:
-            traces, determinants = alpha[0, 0] * x + alpha[1, 1] * y, _determinant(alpha) * (x * y)
+            traces = alpha[0, 0] * x + alpha[0, 1] * yx + alpha[1, 0] * xy + alpha[1, 1] * y
+            determinants = _determinant(alpha) * (x * y - xy * yx)
             _finite(traces, determinants)
             each = zip(traces, determinants, strict=True)
-            found = np.array([pitch_envelope(omega, t, d, stiffness, process.cutter.pitch, ascending)[0] for t, d in each])
+            if _equal_pitch(process):
+                found = np.array([envelope(omega, t, d, stiffness, teeth, ascending)[0] for t, d in each])
+            else:
+                found = np.array([pitch_envelope(omega, t, d, stiffness, pitch, ascending)[0] for t, d in each])
         _finite(np.where(np.isinf(found), 0.0, found))
         limits = np.empty(found.shape)
         limits[:, order] = np.where(found <= max_depth, found, np.inf)

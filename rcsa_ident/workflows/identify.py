@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 from typing import Any, Protocol
 
@@ -37,16 +37,8 @@ class Method(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class JudgedCut:
-    """A cut with its verdict and, where it is usable, its measurement."""
-
-    cut: Cut
-    reading: Reading
-
-
-def judge(campaign: Campaign, read: ReadCut, map: Map = map, progress: Callable[[int, int], None] | None = None) -> list[JudgedCut]:
-    """Return the verdict on every cut of a campaign, in its order.
+def judge(campaign: Campaign, read: ReadCut, map: Map = map, progress: Callable[[int, int], None] | None = None) -> list[Reading]:
+    """Return the reading of every cut of a campaign, in its order.
 
     Parameters
     ----------
@@ -57,13 +49,12 @@ def judge(campaign: Campaign, read: ReadCut, map: Map = map, progress: Callable[
         Cuts are independent of each other.
     progress : callable of (done, total)
     """
-    judged = []
-    readings = map(partial(judge_cut, campaign, read), campaign.cuts)
-    for done, (cut, reading) in enumerate(zip(campaign.cuts, readings, strict=True), start=1):
-        judged.append(JudgedCut(cut, reading))
+    readings = []
+    for reading in map(partial(judge_cut, campaign, read), campaign.cuts):
+        readings.append(reading)
         if progress is not None:
-            progress(done, len(campaign.cuts))
-    return judged
+            progress(len(readings), len(campaign.cuts))
+    return readings
 
 
 def judge_cut(campaign: Campaign, read: ReadCut, cut: Cut) -> Reading:
@@ -73,10 +64,15 @@ def judge_cut(campaign: Campaign, read: ReadCut, cut: Cut) -> Reading:
         cutter = campaign.toolings[cut.tooling].cutter
         return measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, campaign.workpiece.coefficients)
     except InputError as error:
-        return Reading(Verdict((f"unreadable: {error}",)))
+        return Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((f"unreadable: {error}",)))
 
 
-def identify(campaign: Campaign, judged: Sequence[JudgedCut], method: Method, seed: int, map: Map = map) -> Identification:
+def left_out(readings: Iterable[Reading]) -> list[tuple[str, str]]:
+    """Return (cut id, reasons) of each cut that is not used."""
+    return [(each.cut_id, "; ".join(each.verdict.reasons)) for each in readings if not each.verdict.usable]
+
+
+def identify(campaign: Campaign, readings: Sequence[Reading], method: Method, seed: int, map: Map = map) -> Identification:
     """Return modes and joint from the usable cuts.
 
     Raises
@@ -84,7 +80,8 @@ def identify(campaign: Campaign, judged: Sequence[JudgedCut], method: Method, se
     InputError
         If no cut is usable.
     """
-    return method.run(data_of(campaign, judged), seed, map)
+    found = method.run(data_of(campaign, readings), seed, map)
+    return replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors)
 
 
 def mode_deviations(found: Identification) -> dict[Dof, tuple[FloatArray, FloatArray]]:
@@ -115,12 +112,12 @@ def _mode_deviation(axis: Dof, posterior: Posterior) -> tuple[FloatArray, FloatA
     return deviation(frequency), deviation(damping)
 
 
-def data_of(campaign: Campaign, judged: Sequence[JudgedCut]) -> IdentificationData:
+def data_of(campaign: Campaign, readings: Sequence[Reading]) -> IdentificationData:
     """Return the usable cuts' lines beside their tool-holders' receptances."""
-    measurements = [j.reading.measurement for j in judged if j.reading.measurement is not None]
+    measurements = [each.measurement for each in readings if each.measurement is not None]
     if not measurements:
-        reasons = "; ".join(dict.fromkeys(r for j in judged for r in j.reading.verdict.reasons))
-        raise InputError("cuts", f"none of {len(judged)} usable ({reasons})", "at least one usable cut")
+        reasons = "; ".join(dict.fromkeys(reason for each in readings for reason in each.verdict.reasons))
+        raise InputError("cuts", f"none of {len(readings)} usable ({reasons})", "at least one usable cut")
     receptances = {name: partial(_receptance, campaign, name) for name in campaign.toolings}
     teeth = {name: t.cutter.teeth for name, t in campaign.toolings.items()}
     known = campaign.workpiece.coefficients

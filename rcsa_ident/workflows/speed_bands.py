@@ -12,9 +12,9 @@ from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.diagnostics import FEWEST_CUTS
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.machining_setup import Campaign
-from rcsa_ident.workflows.identify import JudgedCut, Map, Method, data_of
-
-_RPM = 30.0 / np.pi
+from rcsa_ident.signals.measurement import Reading
+from rcsa_ident.units import to_rpm
+from rcsa_ident.workflows.identify import Map, Method, data_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +32,7 @@ class SpeedBand:
     found: Identification
 
 
-def speed_bands(campaign: Campaign, judged: Sequence[JudgedCut], count: int, method: Method, seed: int, map: Map = map) -> list[SpeedBand]:
+def speed_bands(campaign: Campaign, readings: Sequence[Reading], count: int, method: Method, seed: int, map: Map = map) -> list[SpeedBand]:
     """Return one identification for each of `count` equal ranges of the usable cuts' spindle speeds.
 
     Parameters
@@ -48,11 +48,11 @@ def speed_bands(campaign: Campaign, judged: Sequence[JudgedCut], count: int, met
     InputError
         If a band has too few cuts with one of the toolings.
     """
-    jobs = [_BandJob(method, speeds, data_of(campaign, cuts), seed) for speeds, cuts in divided(judged, count)]
+    jobs = [_BandJob(method, speeds, data_of(campaign, cuts), seed) for speeds, cuts in divided(readings, count)]
     return list(map(_identify_band, jobs))
 
 
-def divided(judged: Sequence[JudgedCut], count: int) -> list[tuple[tuple[float, float], list[JudgedCut]]]:
+def divided(readings: Sequence[Reading], count: int) -> list[tuple[tuple[float, float], list[Reading]]]:
     """Return `count` equal ranges of speed [rad/s], each with its usable cuts.
 
     Raises
@@ -60,22 +60,22 @@ def divided(judged: Sequence[JudgedCut], count: int) -> list[tuple[tuple[float, 
     InputError
         If a range has too few cuts with one of the toolings.
     """
-    usable = [(j, j.reading.measurement.spindle_speed) for j in judged if j.reading.measurement is not None]
+    usable = [(each, each.measurement.spindle_speed) for each in readings if each.measurement is not None]
     if not usable:
-        raise InputError("cuts", f"none of {len(judged)} usable", "at least one usable cut")
+        raise InputError("cuts", f"none of {len(readings)} usable", "at least one usable cut")
     speeds = [speed for _, speed in usable]
     edges = np.linspace(min(speeds), max(speeds), count + 1)
     band_of = np.clip(np.searchsorted(edges, speeds, side="right") - 1, 0, count - 1)
     found = []
     for b in range(count):
-        cuts = [j for (j, _), own in zip(usable, band_of, strict=True) if own == b]
+        cuts = [each for (each, _), own in zip(usable, band_of, strict=True) if own == b]
         low, high = float(edges[b]), float(edges[b + 1])
-        for name in dict.fromkeys(j.cut.tooling for j, _ in usable):
-            number = sum(j.cut.tooling == name for j in cuts)
+        for name in dict.fromkeys(each.tooling for each, _ in usable):
+            number = sum(each.tooling == name for each in cuts)
             if number < FEWEST_CUTS:
                 raise InputError(
-                    "--speed-bands",
-                    f"{number} cuts with {name} from {low * _RPM:.0f} to {high * _RPM:.0f} rev/min",
+                    "speed_bands",
+                    f"{number} cuts with {name} from {to_rpm(low):.0f} to {to_rpm(high):.0f} rev/min",
                     f"at least {FEWEST_CUTS} cuts with each tooling in each of {count} bands: fewer bands, or more cuts",
                 )
         found.append(((low, high), cuts))

@@ -14,13 +14,14 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from api.jobs.codec import NOUNS, Unknown, _noun, decode, encode
-from api.work.requests import CutQuestion, LobeQuestion
+from api.work.requests import LobeRequest
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Evaluation, Residual
 from rcsa_ident.identification.parameters import AxisLayout, Layout
+from rcsa_ident.machining_setup import CutSpec
 from rcsa_ident.signals.verdict import Verdict
 
 DTYPES = st.sampled_from(["<f8", ">f8", "<c16", "<i8", "<i4", "<u2", "?", "<f4"])
@@ -96,8 +97,8 @@ def test_a_solution_of_a_search():
 
 
 def test_a_question():
-    cut = CutQuestion(Engagement(0.5, 3.0), 0.25, None, "steel", (("tangential", 9.02e8),), (1e-6, 0.0), ProcessDamping(1e14, 1e-4, 0.3))
-    question = LobeQuestion(cut, (418.87902047863909, 500.0), 0.01, "semi-discretisation", True, 0.0005, 20.0)
+    cut = CutSpec(Engagement(0.5, 3.0), 0.25, None, "steel", {"tangential": 9.02e8}, (1e-6, 0.0), ProcessDamping(1e14, 1e-4, 0.3))
+    question = LobeRequest(cut, (418.87902047863909, 500.0), 0.01, "semi-discretisation", True, 0.0005, 20.0)
     assert same(question, decode(encode(question)))
 
 

@@ -27,9 +27,9 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import read_cut
 from rcsa_ident.io.setups import read_campaign
 from tests.api import identifying
-from tests.api.conftest import URL, embedded, service
 from tests.api.identifying import Steps, carried, declared, uploaded
-from tests.api.test_machines import refused
+from tests.api.in_process import URL, embedded, refused, service
+from tests.fixtures.waiting import until
 
 KINDS = {"progress", "trace", "fit", "end"}
 
@@ -347,8 +347,8 @@ def test_many_watch_at_the_cost_of_one(store):
             asked.append("events")
             return store.jobs.events(*arguments)
 
-    async def watch(feeds):
-        after, seen = 0, []
+    async def watch(feeds, seen):
+        after = 0
         while not seen or seen[-1].kind != "end":
             found = await feeds.events(id, after)
             seen += found
@@ -359,10 +359,11 @@ def test_many_watch_at_the_cost_of_one(store):
 
     async def main():
         feeds = EventFeeds(Counted(), 3)
-        watching = [asyncio.create_task(watch(feeds)) for _ in range(100)]
+        seen = [[] for _ in range(100)]
+        watching = [asyncio.create_task(watch(feeds, each)) for each in seen]
         for k in range(4):
-            await asyncio.sleep(0.4)
             store.jobs.tell(id, "w", [Event(0, "trace", f"{k}")])
+            await asyncio.to_thread(until, lambda k=k: all(each and each[-1].data == f"{k}" for each in seen))
         store.jobs.finish(id, "w", Outcome("done", now()))
         return await asyncio.gather(*watching)
 
@@ -407,7 +408,7 @@ def test_a_job_reads_what_was_there_when_it_began(tmp_path, store):
         plan = desk.remember("plan", lambda: [work._files(cut) for cut in found.cuts])
         planned = work._planned(found, plan)
         read = partial(read_cut, sensors, campaign.sampling_rate)
-        return [each.cut.id for each in work._judged(planned, read, desk)]
+        return [each.cut_id for each in work._readings(planned, read, desk)]
 
     assert judged(there[0]) == judged(there[1]) == [cut.id for cut in cuts[:2]]
     with pytest.raises(InputError, match="since the job began"):

@@ -20,9 +20,10 @@ from api.schemas.queries import AdviceQuery, LobeQuery, TipQuery
 from api.schemas.toolings import ToolingKeys
 from api.security import new_id, now
 from api.stores.jobs import Event, Job, Outcome
-from tests.api.conftest import embedded, example, service
 from tests.api.identifying import carried
+from tests.api.in_process import embedded, service
 from tests.api.recordings import recording
+from tests.fixtures.service import example
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

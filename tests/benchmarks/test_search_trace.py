@@ -39,7 +39,7 @@ def lines(machine):
     delay = rng.uniform(0.0, 1.0, 5) * period
     measured = model * np.exp(-1j * omega * delay[cut])
     axis = SimpleNamespace(omega=omega, measured=measured, noise=np.zeros(omega.size), cut=cut, flange=flange, tip=tip)
-    prior = np.column_stack([np.zeros((5, 3)), period])
+    prior = SimpleNamespace(tooth_period=period)
     return model, SimpleNamespace(axes=(axis,), cut_ids=tuple("abcde"), cut_prior=prior)
 
 

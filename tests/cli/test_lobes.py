@@ -15,7 +15,7 @@ from rcsa_ident.cli import advice, cases, export, lobes
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.curves import read_lobes_csv, write_frf_csv
 from rcsa_ident.io.frf_files import Source, read_tap_tests
-from tests.cli import by_hand
+from tests.fixtures import by_hand
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 APP = typer.Typer(pretty_exceptions_enable=False)
@@ -106,10 +106,14 @@ def test_tested_cuts_are_counted_at_their_own_speeds(shop):
         "share_right": 0.6,
     }  # fmt: skip
     drawing = (shop / "L.svg").read_text(encoding="utf-8")
-    for words in ("tested: chatter", "tested: marginal", "3 of 5 tested cuts told right (1 unexpected chatter, 1 stable above the limit)"):
+    for words in (
+        "tested: chatter",
+        "tested: marginal",
+        "3 of 5 tested cuts classified correctly (1 unexpected chatter, 1 stable above the limit)",
+    ):
         assert words in drawing
     table = run("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, *SPEEDS, *out).stdout
-    assert "told right: 3 of 5, 60.0 %" in table
+    assert "classified correctly: 3 of 5, 60.0 %" in table
 
 
 def test_surface_error_stands_beside_the_lobes(shop):
@@ -325,7 +329,7 @@ def test_the_face_mill_of_the_shared_files(tmp_path):
 
 
 def test_cases_in_process_and_at_standstill(result_file, tmp_path):
-    """Cuts at 0.9 and 1.1 of the machine's own limit are told right by it, and not by tap tests of a machine twice as soft."""
+    """Cuts at 0.9 and 1.1 of the machine's own limit are classified correctly by it, and not by tap tests of a machine twice as soft."""
     folder, speeds = result_file.parent, ("--speed-from", 9000, "--speed-to", 15000, "--speed-step", 500)
     run(
         "lobes", result_file, folder / "T1.toml", *speeds, "--no-bands", "--immersion", 0.7, "--strategy", "up", "--out", tmp_path / "L.csv"

@@ -14,12 +14,10 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.rational import FitStatus, fitted_poles, rational_fit
 from rcsa_ident.errors import InputError
-from rcsa_ident.identification.posterior import MachineAxis
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.machine.spindle import Spindle
+from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.virtual.rotor import frequency_response, rotor
-from rcsa_ident.workflows.tip import tooltip
 
 MACHINES = Path(__file__).parents[2] / "data" / "machines"
 OMEGA = 2.0 * np.pi * np.arange(100.0, 4301.0, 5.0)
@@ -162,13 +160,10 @@ def test_poles_of_the_coupling_chain():
     natural = 2.0 * np.pi * np.array([180.0, 998.0, 1820.0, 2330.0, 3970.0])
     psi = np.array([[0.08, 0.4], [0.15, 1.5], [0.25, 3.0], [0.2, 4.0], [0.15, 8.0]])
     joint = LumpedJoint(3e9, 6e6, 2e3, 10.0)
-    machine = {
-        axis: MachineAxis(Spindle(normal_modes(shift * natural, np.full(5, 0.05), psi, plane("flange", axis))), joint)
-        for axis, shift in ((Dof.X, 1.0), (Dof.Y, 0.95))
-    }
-    response = tooltip(machine, tooling.assembly, omega, bands=False)
-    values = np.zeros((omega.size, 2, 2), dtype=complex)
-    values[:, 0, 0], values[:, 1, 1] = response.tip(Dof.X), response.tip(Dof.Y)
+    flanges = tuple(
+        normal_modes(shift * natural, np.full(5, 0.05), psi, plane("flange", axis)) for axis, shift in ((Dof.X, 1.0), (Dof.Y, 0.95))
+    )
+    values = FlangeMachine(flanges, (omega[0], omega[-1]), joint).tip(tooling, omega).values
     modes, error = fitted_poles(omega, values)
     found = modes.response(omega)
     assert error < 1e-3

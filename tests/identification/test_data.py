@@ -11,7 +11,8 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.data import LEVER, RUNOUT_SPREAD, prepare
-from rcsa_ident.signals.measurement import AxisLines, CutMeasurement
+from rcsa_ident.signals.frf import AxisLines
+from rcsa_ident.signals.measurement import CutMeasurement
 
 TEETH = {"a": 2, "b": 3}
 
@@ -189,17 +190,20 @@ def test_triggers():
     cuts = [measurement(f"{k}", tooling, rng, **options) for k, (tooling, options) in enumerate(given)]
     data = prepared(cuts)
     period = [2.0 * np.pi / c.spindle_speed / TEETH[c.tooling] for c in cuts]
-    np.testing.assert_allclose(data.cut_prior[:, 3], period)
-    np.testing.assert_allclose(data.cut_prior[:, 2], 1e4)
+    np.testing.assert_allclose(data.cut_prior.tooth_period, period)
+    np.testing.assert_allclose(data.cut_prior.angle_weight, 1e4)
     # a known tooth angle is a prior of the delay; an unknown one makes a clamping, one for each tooling
-    np.testing.assert_allclose(data.cut_prior[:, 0], [1e-3, 0.0, 0.0, 0.0, 0.0])
-    np.testing.assert_allclose(data.cut_prior[:, 1], [1e12, 0.0, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(data.cut_prior.delay, [1e-3, 0.0, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(data.cut_prior.delay_weight, [1e12, 0.0, 0.0, 0.0, 0.0])
     assert data.clamping[0] == data.clamping[1] == -1
     assert data.clamping[2] == data.clamping[4] != data.clamping[3]
     assert data.clampings == 2
     np.testing.assert_allclose(data.edge[2:], [[2e-3, 2.5e11], [3e-3, 1e12], [4e-3, 6.25e10]])
     assert data.summed().clampings == 0
-    np.testing.assert_array_equal(data.summed().cut_prior, data.cut_prior)
+    assert data.summed().cut_prior is data.cut_prior
+    rows = data.cut_prior.rows
+    np.testing.assert_array_equal(rows[:, 1:3], data.cut_prior.weights)
+    np.testing.assert_array_equal(rows[:, [0, 3]].T, [data.cut_prior.delay, data.cut_prior.tooth_period])
 
 
 def test_relative_speed_is_that_of_the_campaign():

@@ -11,7 +11,7 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.data import LEVER
 from rcsa_ident.identification.genetic_algorithm import WIDE, LiteralCost, NoiseWeightedCost, PaperGeneticAlgorithm, SearchSpace, _Problem
-from rcsa_ident.identification.result import Status
+from rcsa_ident.identification.status import Status
 from rcsa_ident.tool_holder.geometry import BeamSegment, Material, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from tests.oracles.literature import NOMINAL_MATERIALS, NOMINAL_TOOLINGS, PUBLISHED_JOINT, PUBLISHED_MODES
@@ -67,7 +67,7 @@ def test_cost_of_a_candidate_is_that_of_its_coupled_modes(few, problem, shop):
     modes = ModalModel(omega_n, zeta, np.stack([phi_t, phi_r], axis=1), np.zeros((2, 2)), plane("flange"))
     axis = few.axes[0]
     value = np.empty(axis.omega.size, dtype=complex)
-    delays = np.random.default_rng(2).integers(0, 64, len(few.cut_ids)) / 64 * few.cut_prior[:, 3]
+    delays = np.random.default_rng(2).integers(0, 64, len(few.cut_ids)) / 64 * few.cut_prior.tooth_period
     for k in range(len(few.cut_ids)):
         mine = axis.cut == k
         holder = tool_holder_receptance(shop.toolings[few.toolings[few.cut_tooling[k]]].assembly, axis.omega[mine])
@@ -155,7 +155,7 @@ def test_modes_that_feed_energy_in_are_named(found):
 
 
 def test_two_outputs_are_taken_as_their_sum(rich):
-    """The paper knows the flange's motion only."""
+    """The published method knows the flange's motion only."""
     low, high = _Problem(PaperGeneticAlgorithm(), rich.only(Dof.X)).bounds()
     x = low + np.random.default_rng(1).uniform(size=(3, low.size)) * (high - low)
     for cost in (LiteralCost(), NoiseWeightedCost()):

@@ -8,7 +8,7 @@ from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import AxisLayout, Layout, plain
 from rcsa_ident.identification.priors import Priors
-from tests.identification.conftest import machine_vector, remade, vector_of
+from tests.identification.models import machine_vector, remade, vector_of
 
 LAYOUT = plain(3)
 
@@ -44,7 +44,7 @@ def test_finds_the_minimum_to_rounding(misfit, planted, theta, start):
     assert np.abs(found.evaluation.linear.gradient / np.sqrt(np.diag(found.evaluation.hessian))).max() < 1e-2
     assert found.cost <= misfit.evaluate(theta, LAYOUT, np.stack([delay, 0.0 * delay], axis=1)).cost
     miss = found.evaluation.nuisance[:, 0] - delay
-    period = data.cut_prior[:, 3]
+    period = data.cut_prior.tooth_period
     assert np.abs(miss - period * np.round(miss / period)).max() < 1e-3 * period.min()
 
 

@@ -7,7 +7,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.misfit import DELAY_UNIT, Misfit, Residual
 from rcsa_ident.identification.parameters import AxisLayout, Layout, plain
 from rcsa_ident.identification.priors import Priors
-from tests.identification.conftest import vector_of
+from tests.identification.models import vector_of
 
 FREQUENCIES = ((600.0, 1400.0, 2500.0), (900.0, 2100.0))
 SHARES = (0.02, 0.05)
@@ -94,7 +94,7 @@ def test_residual_from_its_definition(case):
                 np.testing.assert_allclose(found[:, f, o], [expected.real, expected.imag], rtol=1e-7, atol=1e-9 * abs(expected))
     for k in range(len(data.cut_ids)):
         delay, angle = here.nuisance[k]
-        assert here.residual.cuts[k, 1] == pytest.approx(np.sqrt(data.cut_prior[k, 2]) * angle, rel=1e-9)
+        assert here.residual.cuts[k, 1] == pytest.approx(np.sqrt(data.cut_prior.angle_weight[k]) * angle, rel=1e-9)
         expected = 0.0
         if case.kind == "all":
             tooth = case.theta[case.layout.clamping][data.clamping[k]]
@@ -265,7 +265,7 @@ def test_a_cut_that_one_axis_did_not_see(few):
     np.testing.assert_array_equal(found.linear.follow(np.ones(vector.size))[2], 0.0)
     # nothing is known of its delay but the period
     std = found.linear.delay_std(np.linalg.inv(found.hessian))
-    assert std[2] == pytest.approx(data.cut_prior[2, 3] / np.sqrt(12.0))
+    assert std[2] == pytest.approx(data.cut_prior.tooth_period[2] / np.sqrt(12.0))
     rows = np.random.default_rng(1).standard_normal((found.residual.lines[0].size, 3))
     assert all(np.all(np.isfinite(part)) for part in found.linear.border(0, rows, found.residual))
     both = Misfit(data, Priors(), SHARES).evaluate(theta, plain(3, 2), np.zeros((len(data.cut_ids), 2)), grid=16, normal=True)

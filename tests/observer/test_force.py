@@ -8,13 +8,13 @@ import control
 import numpy as np
 import pytest
 
-from benchmarks.observer import relative_error, true_response
 from rcsa_ident.errors import InputError
 from rcsa_ident.observer.force import RunOut, force_observer, restore_mean_force
 from rcsa_ident.observer.kalman import kalman_filter
 from rcsa_ident.observer.tuning import PaperWalk, Resonators, Tuning, harmonics
 from rcsa_ident.workflows.estimate_forces import observe
-from tests.observer.flange_machine import BAND, flange_machine, paper_cut
+from tests.fixtures.flange_machine import BAND, flange_machine, paper_cut
+from tests.fixtures.virtual_cut import relative_error, true_response
 
 RATE = 25600.0
 PROGRAMMED = 12000.0 * np.pi / 30.0
@@ -23,7 +23,7 @@ PROGRAMMED = 12000.0 * np.pi / 30.0
 def monitored(method, smooth=False, air=True, cut=None):
     made = paper_cut()
     record, still = cut or made.cut, made.air if air else None
-    return observe(flange_machine(), made.tooling.assembly, 2, record, still, BAND, PROGRAMMED, method, None, smooth)
+    return observe(flange_machine(), made.tooling.assembly, 2, record, still, PROGRAMMED, method, None, smooth)
 
 
 @pytest.fixture(scope="module")

@@ -40,7 +40,12 @@ def depths(scale=1.0):
 
 def test_tested_cuts_are_drawn_and_counted():
     text = svg(stability_figure(LOBES, 10e-3, tested=JUDGED), "t")
-    for words in ("2 of 3 tested cuts told right (1 stable above the limit)", "tested: stable", "tested: chatter", "tested: marginal"):
+    for words in (
+        "2 of 3 tested cuts classified correctly (1 stable above the limit)",
+        "tested: stable",
+        "tested: chatter",
+        "tested: marginal",
+    ):
         assert words in text
     axes = stability_figure(LOBES, 10e-3, tested=JUDGED).axes
     # the deepest cut is inside the picture
@@ -75,7 +80,7 @@ def test_cases_stand_side_by_side(count):
     assert len(seen) == count
     assert all(ax.get_xlabel() == "spindle speed [rev/min]" for ax in figure.axes[-min(2, count) :])
     text = svg(figure, "c")
-    assert text.count("told right") == count - 1
+    assert text.count("classified correctly") == count - 1
     assert "idle" in text
     assert "$A_b &amp; &lt;up&gt;" in text
 
@@ -83,16 +88,16 @@ def test_cases_stand_side_by_side(count):
 def test_what_ends_the_depth_is_drawn():
     text = svg(usable_figure(depths(), [Mark(1000.0, 1e-3, 2e-6, "best")], [Mark(1500.0, 3e-3, 1e-6, "wish")], 0.8 * LIMIT), "u")
     for words in (
-        "power ends here",
+        "limited by power",
         "highest removal",
         "planned",
         "best",
         "wish",
-        "all machines that the records allow",
-        "removal [cm³/min]",
+        "all machines consistent with the recordings",
+        "removal rate [cm³/min]",
     ):
         assert words in text
-    assert "torque ends here" not in text
+    assert "limited by torque" not in text
     assert "planned" not in svg(usable_figure(depths()), "u")
 
 

@@ -16,12 +16,14 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.parameters import AxisLayout, parameter_names
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.identification.result import AxisResult, Identification, Status
+from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.status import Status
 from rcsa_ident.machining_setup import Campaign, Cut, Tooling, Workpiece
 from rcsa_ident.report.figures import svg, tooltip_frf
 from rcsa_ident.report.html import ToolingPage, report_html
 from rcsa_ident.report.summaries import coefficient_rows, mode_rows, recording_rows, two_digits
-from rcsa_ident.signals.measurement import AxisLines, CutMeasurement, Reading
+from rcsa_ident.signals.frf import AxisLines
+from rcsa_ident.signals.measurement import CutMeasurement, Reading
 from rcsa_ident.signals.verdict import Verdict
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
@@ -48,8 +50,9 @@ def readings(campaign):
     force = np.ones(2, dtype=complex)
     slope = np.zeros((2, 5), dtype=complex)
     lines = AxisLines(np.array([4, 8]), np.array([4e3, 8e3]), value, 0.0 * value, variance, np.ones(2), force, slope)
-    good = Reading(Verdict((), ("no air cut",)), CutMeasurement("cut-0", NAME, 1001.0, {Dof.X: lines}, 0.0))
-    return [(campaign.cuts[0], good), (campaign.cuts[1], good), (campaign.cuts[2], Reading(Verdict(("chatter: 3 µm at 1500 Hz",))))]
+    measurement = CutMeasurement("cut-0", NAME, 1001.0, {Dof.X: lines}, 0.0)
+    good = [Reading(cut.id, NAME, 1000.0, Verdict((), ("no air cut",)), measurement) for cut in campaign.cuts[:2]]
+    return [*good, Reading(campaign.cuts[2].id, NAME, 1000.0, Verdict(("chatter: 3 µm at 1500 Hz",)))]
 
 
 @pytest.fixture
@@ -145,7 +148,7 @@ def test_the_page_is_whole_and_self_contained(found, campaign, readings):
 def test_what_the_records_do_not_tell_is_marked(found, campaign, readings):
     text = report_html(found, campaign, readings)
     rows = {
-        row.split("</td>")[0]: "hardly tell" in row
+        row.split("</td>")[0]: "hardly determined" in row
         for row in re.findall(r"<tr><td>((?:translational|rotational).*?)</tr>", text, re.DOTALL)
     }
     assert rows == {

@@ -28,7 +28,8 @@ from rcsa_ident.workflows.limits import Limits, least_within_tolerance, machine_
 from rcsa_ident.workflows.lobes import LobeConditions, lobe_bands, tooling_lobes
 from rcsa_ident.workflows.speeds import MachineOverSpeed, lobes_over_speed
 from rcsa_ident.workflows.tip import MachineAxis, tooltip
-from tests.cli import by_hand
+from rcsa_ident.workflows.tip_fit import fitted_modes
+from tests.fixtures import by_hand
 
 PROCESS = MillingProcess(Cutter(4, 12e-3), CuttingCoefficients(900e6, 0.3), Engagement(0.0, np.pi), feed_per_tooth=1e-4)
 FREE = SpindleDrive.flat()

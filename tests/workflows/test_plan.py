@@ -19,7 +19,7 @@ from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.workflows.lobes import LobeConditions, tooling_lobes
 from rcsa_ident.workflows.plan import CutConstraints, line_noise, plan_cuts
 from rcsa_ident.workflows.tip import tooltip
-from tests.identification.conftest import open_shop
+from tests.fixtures.virtual_shop import open_shop
 
 TOOLINGS = Path(__file__).parents[2] / "data" / "machines" / "toolings"
 RPM = np.pi / 30.0
@@ -141,7 +141,7 @@ def test_a_wanted_band_takes_no_more_cuts_than_it_must(planned, toolings, target
 def test_a_band_out_of_reach_is_said_with_how_far_it_goes(toolings, targets):
     found = plan(toolings, targets, 3, wanted=1e-5)
     assert len(found.cuts) == 3
-    assert "0.001 % is not reached: 3 cuts come to" in found.warnings[0]
+    assert "0.001 % is not reached: 3 cuts give" in found.warnings[0]
 
 
 def test_fewer_cuts_than_asked_for_are_said(toolings, targets):

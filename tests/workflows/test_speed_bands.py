@@ -7,28 +7,25 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.machining_setup import Cut
-from rcsa_ident.signals.measurement import AxisLines, CutMeasurement, Reading
+from rcsa_ident.signals.frf import AxisLines
+from rcsa_ident.signals.measurement import CutMeasurement, Reading
 from rcsa_ident.signals.verdict import Verdict
-from rcsa_ident.workflows.identify import JudgedCut
 from rcsa_ident.workflows.speed_bands import divided, speed_bands
-from tests.cli import by_hand
+from tests.fixtures import by_hand
 
 
-def judged_cut(folder, number, speed, tooling="T1", usable=True):
-    conditions = CuttingConditions(speed, 4e-4, 1e-4, Engagement(0.5 * np.pi, np.pi))
-    cut = Cut(f"{tooling}-{number}", tooling, conditions, folder / "none.h5")
+def reading(number, speed, tooling="T1", usable=True):
+    id = f"{tooling}-{number}"
     if not usable:
-        return JudgedCut(cut, Reading(Verdict(("chatter",))))
+        return Reading(id, tooling, speed, Verdict(("chatter",)))
     order = np.array([4, 8])
     value = np.full((2, 1), 1e-8 + 1e-9j)
     lines = AxisLines(
         order, order * speed, value, 0.0 * value, np.full((2, 1), 1e-20), np.ones(2), np.full(2, 10.0 + 0j), np.zeros((2, 5), dtype=complex)
     )
-    return JudgedCut(cut, Reading(Verdict(()), CutMeasurement(cut.id, tooling, speed, {Dof.X: lines}, 0.01)))
+    return Reading(id, tooling, speed, Verdict(()), CutMeasurement(id, tooling, speed, {Dof.X: lines}, 0.01))
 
 
 @dataclass(frozen=True)
@@ -39,35 +36,35 @@ class Echo:
         return data.cut_ids, seed
 
 
-def test_bands_are_equal_ranges_and_every_usable_cut_is_in_one(tmp_path):
-    judged = [judged_cut(tmp_path, k, speed) for k, speed in enumerate(np.linspace(800.0, 2000.0, 30))]
-    judged.append(judged_cut(tmp_path, 99, 1500.0, usable=False))
-    bands = divided(judged, 3)
+def test_bands_are_equal_ranges_and_every_usable_cut_is_in_one():
+    readings = [reading(k, speed) for k, speed in enumerate(np.linspace(800.0, 2000.0, 30))]
+    readings.append(reading(99, 1500.0, usable=False))
+    bands = divided(readings, 3)
     assert [speeds for speeds, _ in bands] == [pytest.approx(p) for p in ((800.0, 1200.0), (1200.0, 1600.0), (1600.0, 2000.0))]
     for (low, high), cuts in bands:
-        speeds = [j.reading.measurement.spindle_speed for j in cuts]
+        speeds = [each.measurement.spindle_speed for each in cuts]
         assert low <= min(speeds) <= max(speeds) <= high
-    assert sorted(j.cut.id for _, cuts in bands for j in cuts) == sorted(j.cut.id for j in judged[:-1])
+    assert sorted(each.cut_id for _, cuts in bands for each in cuts) == sorted(each.cut_id for each in readings[:-1])
 
 
-def test_a_band_with_too_few_cuts_of_a_tooling_is_refused_with_the_number(tmp_path):
-    judged = [judged_cut(tmp_path, k, speed) for k, speed in enumerate(np.linspace(800.0, 2000.0, 40))]
-    judged += [judged_cut(tmp_path, k, speed, "T2") for k, speed in enumerate(np.linspace(800.0, 1500.0, 20))]
+def test_a_band_with_too_few_cuts_of_a_tooling_is_refused_with_the_number():
+    readings = [reading(k, speed) for k, speed in enumerate(np.linspace(800.0, 2000.0, 40))]
+    readings += [reading(k, speed, "T2") for k, speed in enumerate(np.linspace(800.0, 1500.0, 20))]
     with pytest.raises(InputError) as error:
-        divided(judged, 2)
+        divided(readings, 2)
     for word in ("--speed-bands", "3 cuts with T2", "13369 to 19099 rev/min", "at least 8 cuts", "2 bands"):
         assert word in str(error.value)
 
 
-def test_no_usable_cut_is_said(tmp_path):
+def test_no_usable_cut_is_said():
     with pytest.raises(InputError, match="none of 1 usable"):
-        divided([judged_cut(tmp_path, 0, 900.0, usable=False)], 2)
+        divided([reading(0, 900.0, usable=False)], 2)
 
 
 def test_each_band_is_identified_from_its_own_cuts(tmp_path):
     campaign = by_hand.campaign(tmp_path)
-    judged = [judged_cut(tmp_path, k, speed) for k, speed in enumerate(np.linspace(800.0, 2000.0, 20))]
-    found = speed_bands(campaign, judged, 2, Echo(), 11)
+    readings = [reading(k, speed) for k, speed in enumerate(np.linspace(800.0, 2000.0, 20))]
+    found = speed_bands(campaign, readings, 2, Echo(), 11)
     assert [band.found[0] for band in found] == [tuple(f"T1-{k}" for k in range(10)), tuple(f"T1-{k}" for k in range(10, 20))]
     assert {band.found[1] for band in found} == {11}
     assert found[0].speeds[1] == found[1].speeds[0]

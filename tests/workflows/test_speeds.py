@@ -17,7 +17,7 @@ from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.workflows.lobes import LobeConditions, lobe_bands, tooling_lobes
 from rcsa_ident.workflows.speeds import BLOCK, MachineOverSpeed, lobes_over_speed
 from rcsa_ident.workflows.tip import tooltip
-from tests.cli import by_hand
+from tests.fixtures import by_hand
 
 OMEGA = 2.0 * np.pi * np.arange(300.0, 3000.0, 10.0)
 LOW, HIGH = 600.0, 1400.0
