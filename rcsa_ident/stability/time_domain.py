@@ -17,7 +17,7 @@ from rcsa_ident.stability.first_instability import first_loss
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.monodromy import common_period, stable_depth_bound
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tip_modes import ModeArrays, TipModes, modes_of
+from rcsa_ident.stability.tip_modes import ModeArrays, TipModes, require_modes
 
 #: Steps per wave of the highest mode that counts, and per tooth period at least.
 _STEPS, _FEWEST = 40.0, 60
@@ -67,8 +67,8 @@ class TimeDomain:
 
     Two cuts run side by side, one of them a little pushed, and are looked at once per period (a tooth's, a revolution's where teeth
     differ, a swing's of a varying speed): what their states differ by grows or dies away. The limit is where it does neither. Teeth
-    leave the cut, with run-out for longer; a worn flank rubs only while it moves into the material, twice as much as the equivalent
-    viscous force of the other methods, half of the time.
+    leave the cut, with run-out for longer, and the engagement may change along the edge; a worn flank rubs only while it moves into
+    the material, twice as much as the equivalent viscous force of the other methods, half of the time.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class TimeDomain:
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""
-        modes = modes_of(tip, self.name)
+        modes = require_modes(tip, self.name)
         limit = np.full(speeds.size, np.inf)
         chatter, lobe = np.full(speeds.size, np.nan), np.full(speeds.size, -1, dtype=np.intp)
         flip = np.zeros(speeds.size, dtype=bool)
@@ -133,7 +133,7 @@ def milling_history(
     """
     if process.feed_per_tooth is None:
         raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m] of the cut to simulate")
-    cut = _Cut(modes_of(tip, TimeDomain.name), process, positive("speed", speed, "rad/s"), leaves=True)
+    cut = _Cut(require_modes(tip, TimeDomain.name), process, positive("speed", speed, "rad/s"), leaves=True)
     run = cut.begin(positive("depth", depth, "m")).pushed(push)
     samples = run.march(int(np.ceil(positive("revolutions", revolutions) * cut.per_turn)))
     back = process.machine_from_feed.T
@@ -217,9 +217,6 @@ class _Cut:
         self.feed = process.feed_per_tooth or _FEED
         if process.feed_per_tooth is None and np.ptp(process.cutter.runout) > 0.0:
             raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: with run-out it decides which teeth cut")
-        if process.engagement_profile is not None:
-            allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
-            raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
         turn = process.machine_from_feed
         outputs, inputs = turn.T @ modes.outputs, modes.inputs @ turn
         cutter, teeth = process.cutter, process.cutter.teeth
@@ -269,8 +266,6 @@ class _Cut:
         """Return a cut in the steady state of equal teeth, where nothing regenerates."""
         process = self.process
         c, d, v = process.coefficients, process.damping, process.speed_variation
-        whole = 2.0 * depth * np.tan(process.cutter.helix) / process.cutter.diameter
-        slices = max(1, int(np.ceil(_SLICES * whole)))
         plan = kernels.TimePlan(
             step=float(self.step),
             speed=float(self.speed),
@@ -286,11 +281,8 @@ class _Cut:
             leaves=self.leaves,
             regenerate=False,
         )
-        lag = whole * (np.arange(slices) + 0.5) / slices
-        entry, leave = process.engagement.entry, process.engagement.exit
-        edge = np.stack([lag, np.full(slices, entry), np.full(slices, leave), np.full(slices, depth / slices)], axis=1)
         memory = kernels.Memory(np.zeros_like(self.arrays.pole), np.zeros(2), np.zeros((self.per_turn + 2, 2)))
-        run = _Run(self, plan, edge, memory, 0)
+        run = _Run(self, plan, self._slices(depth), memory, 0)
         # from rest through one period of a force that knows no vibration: what is left decides on the state that repeats itself;
         # a period before that one, for a tooth may be in the cut where it begins
         turns = int(np.ceil(memory.past.shape[0] / self.per_period))
@@ -302,6 +294,23 @@ class _Cut:
         run.march(turns * self.per_period)
         run.plan = plan._replace(regenerate=True)
         return run
+
+    def _slices(self, depth: float) -> FloatArray:
+        """Slices of the edge as the kernel wants them, shape (s, 4)."""
+        process = self.process
+        whole = 2.0 * depth * np.tan(process.cutter.helix) / process.cutter.diameter
+        count = max(1, int(np.ceil(_SLICES * whole)))
+        if process.engagement_profile is None:
+            rows = np.array([[0.0, 1.0, process.engagement.entry, process.engagement.exit]])
+        else:
+            rows = process.engagement_profile(self.speed, depth)
+        each = int(np.ceil(count / len(rows)))
+        parts = [
+            [whole * upper + whole * (lower - upper) * (k + 0.5) / each, start, end, depth * (lower - upper) / each]
+            for upper, lower, start, end in rows
+            for k in range(each)
+        ]
+        return np.array(parts)
 
     def growth(self, depth: float, periods: int) -> float:
         """Return the logarithm of the growth of a disturbance per tooth period."""

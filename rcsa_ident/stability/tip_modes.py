@@ -147,8 +147,8 @@ def fitted_modes(tip: Receptance) -> tuple[TipModes, float]:
     return TipModes.joined([found]), error
 
 
-def modes_of(tip: Receptance | TipModes, method: str) -> TipModes:
-    """Return the modes that a method marches with."""
+def require_modes(tip: Receptance | TipModes, method: str) -> TipModes:
+    """Return the modes that a method marches with, or say what it needs."""
     if isinstance(tip, TipModes):
         return tip
     raise InputError(
