@@ -13,9 +13,13 @@ from typing import Any, Literal
 
 import numpy as np
 
+from rcsa_ident.remarks import Remark
+
 #: Module and name of every noun that may be told; a later release may read what an earlier one wrote as long as its fields stay.
 NOUNS = (
     "rcsa_ident.dynamics.coordinates.Dof",
+    "rcsa_ident.remarks.Remark",
+    "rcsa_ident.signals.verdict.RecordCode",
     "rcsa_ident.signals.verdict.Verdict",
     "rcsa_ident.signals.frf.AxisLines",
     "rcsa_ident.signals.measurement.CutMeasurement",
@@ -71,6 +75,8 @@ def decode(text: str) -> Any:
 def _plain(value: Any) -> Any:
     if isinstance(value, Enum):
         return {"~enum": [_name(type(value)), value.value]}
+    if isinstance(value, Remark):
+        return {f"~{_name(Remark)}": {"code": _plain(value.code), "sentence": str(value)}}
     if value is None or type(value) in (bool, int, str):
         return value
     if type(value) is float:

@@ -249,7 +249,7 @@ def warn_left_out(data: dict[str, Any]) -> None:
 
 def leave(found: Identification) -> None:
     """End with exit code 3 unless there is an answer that may be used."""
-    if str(found.status) == "failed" or any(reason.startswith("not converged") for reason in found.reasons):
+    if not found.at_minimum:
         raise typer.Exit(NOT_CONVERGED)
     if str(found.status) == "suspect":
         warn("the result is suspect: " + "; ".join(found.reasons))

@@ -1,4 +1,4 @@
-"""Every reason why an answer should not be believed at once, and what the data cannot tell, in words with numbers."""
+"""Every reason why an answer should not be believed at once, and what the data cannot tell, with numbers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.cutting.force import SLOPES
+from rcsa_ident.cutting.force import ForceTerm
 from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
@@ -17,6 +17,8 @@ from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import JOINT
 from rcsa_ident.identification.posterior import Posterior, spread
+from rcsa_ident.identification.result import IdentificationCode
+from rcsa_ident.remarks import Remark
 
 #: Above this share of unexplained signal the force model or the recordings are wrong.
 WORST_MODEL_ERROR = 0.02
@@ -36,59 +38,77 @@ _JOINT = ("translational stiffness", "rotational stiffness", "translational damp
 
 def diagnose(
     data: IdentificationData, searched: list[AxisSearch], solution: Solution, misfit: Misfit, posteriors: Sequence[Posterior]
-) -> list[str]:
+) -> list[Remark]:
     """Return the reasons for `suspect`; `posteriors` are those of the axes."""
-    reasons = []
+    reasons: list[Remark] = []
+
+    def doubt(code: IdentificationCode, sentence: str) -> None:
+        reasons.append(Remark(code, sentence))
+
     if not solution.converged:
-        reasons.append(f"not converged: the polish still gained after {solution.steps} steps")
+        doubt(IdentificationCode.NOT_CONVERGED, f"not converged: the polish still gained after {solution.steps} steps")
     for axis in data.axes:
         noise = np.sqrt(2.0 * axis.noise)
         signal = float(np.median(np.abs(axis.measured) / np.where(noise > 0.0, noise, 1e-300)))
         if signal < LEAST_SIGNAL:
-            reasons.append(f"{str(axis.axis).upper()}: half of the lines are below {signal:.2g} times their noise")
+            doubt(IdentificationCode.WEAK_SIGNAL, f"{str(axis.axis).upper()}: half of the lines are below {signal:.2g} times their noise")
     for axis, share in zip(data.axes, misfit.model_error, strict=True):
         if share > WORST_MODEL_ERROR:
-            reasons.append(
+            doubt(
+                IdentificationCode.UNEXPLAINED,
                 f"{str(axis.axis).upper()}: {100 * share:.1f} % of each line stay unexplained (at most {100 * WORST_MODEL_ERROR:g} %): "
-                "cutting coefficients, toolings, tooth count or sensor signs may be wrong, or the dynamics change with speed"
+                "cutting coefficients, toolings, tooth count or sensor signs may be wrong, or the dynamics change with speed",
             )
     bad = misfit.cut_weight < 1.0
     if np.mean(bad) > MOST_BAD_CUTS:
-        reasons.append(f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, {_named(data, bad, misfit)}")
+        doubt(
+            IdentificationCode.CONTRADICTING_CUTS,
+            f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, {_named(data, bad, misfit)}",
+        )
     for axis, found in zip(data.axes, searched, strict=True):
         if len(found.solutions) > 1 and found.evidences[1] - found.evidences[0] < EVIDENCE_TIE:
             difference, band = _difference(axis, *found.solutions[:2])
             if difference > max(LARGEST_DIFFERENCE, 3.0 * band):
-                reasons.append(
+                doubt(
+                    IdentificationCode.TWO_SOLUTIONS,
                     f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.1f} % in what a tooltip "
-                    f"feels of the machine, more than their deviation of {100 * band:.1f} %"
+                    f"feels of the machine, more than their deviation of {100 * band:.1f} %",
                 )
     for axis, posterior in zip(data.axes, posteriors, strict=True):
         band = _band(posterior, axis)
         if band > LARGEST_BAND:
-            reasons.append(
+            doubt(
+                IdentificationCode.WIDE_POSTERIOR,
                 f"{str(axis.axis).upper()}: what a tooltip feels of the machine is known to {100 * band:.1f} % only (at most "
-                f"{100 * LARGEST_BAND:g} %), and with tools that were never cut to several times that: more or quieter cuts are wanted"
+                f"{100 * LARGEST_BAND:g} %), and with tools that were never cut to several times that: more or quieter cuts are wanted",
             )
     if len(data.toolings) < 2:
-        reasons.append("one tooling only: flange translation and slope can't be told apart; cut with a second, different holder")
+        doubt(
+            IdentificationCode.ONE_TOOLING,
+            "one tooling only: flange translation and slope can't be told apart; cut with a second, different holder",
+        )
     for t, name in enumerate(data.toolings):
         count = int(np.sum(data.cut_tooling == t))
         if count < FEWEST_CUTS:
-            reasons.append(f"few cuts: {count} with {name}, at least {FEWEST_CUTS} are wanted")
+            doubt(IdentificationCode.FEW_CUTS, f"few cuts: {count} with {name}, at least {FEWEST_CUTS} are wanted")
     return reasons
 
 
-def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covariance: FloatArray) -> list[str]:
+def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covariance: FloatArray) -> list[Remark]:
     """Return what the data cannot tell, and what was done about single cuts."""
-    words = []
+    notes: list[Remark] = []
+
+    def note(code: IdentificationCode, sentence: str) -> None:
+        notes.append(Remark(code, sentence))
+
     layout, priors = solution.layout, misfit.priors
     deviation = np.sqrt(np.diag(covariance))
     for name, std in zip(_JOINT, deviation[layout.joint], strict=True):
         if std > TOLD * priors.joint_spread:
-            words.append(
+            note(
+                IdentificationCode.JOINT_UNKNOWN,
                 f"joint: its {name} cannot be told from the flange's own compliance (known to a factor of {np.exp(std):.1f}); "
-                "both together are what the tooltip feels"
+                "both together are what the tooltip feels",
             )
     for i, axis in enumerate(data.axes):
         natural = np.exp(solution.theta[layout.axis(i)][: layout.axes[i].modes]) / (2.0 * np.pi)
@@ -96,18 +116,22 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
         outside = np.sort(natural[(natural < low) | (natural > high)])
         if outside.size:
             listed = ", ".join(f"{f:.0f}" for f in outside)
-            words.append(
+            note(
+                IdentificationCode.MODES_OUTSIDE_BAND,
                 f"{str(axis.axis).upper()}: modes at {listed} Hz lie outside the excited band of {low:.0f} to {high:.0f} Hz: "
-                "they stand for all that the machine does there"
+                "they stand for all that the machine does there",
             )
-    for c, name in enumerate(data.coefficient_names):
+    for c, coefficient in enumerate(data.coefficients):
         std, before = deviation[layout.force][c], data.coefficient_spread[c]
-        if std > TOLD * before and name.split(" of ")[0] != SLOPES[-1]:
-            words.append(f"{name}: the cuts say little about it; it is known to {100.0 * min(std, before):.1f} %, nearly as before")
+        if std > TOLD * before and coefficient.term is not ForceTerm.RUNOUT:
+            note(
+                IdentificationCode.COEFFICIENT_UNKNOWN,
+                f"{coefficient}: the cuts say little about it; it is known to {100.0 * min(std, before):.1f} %, nearly as before",
+            )
     bad = misfit.cut_weight < 1.0
     if 0.0 < np.mean(bad) <= MOST_BAD_CUTS:
-        words.append(f"cuts that contradict the others and count less: {_named(data, bad, misfit)}")
-    return words
+        note(IdentificationCode.CUTS_WEIGHTED_DOWN, f"cuts that contradict the others and count less: {_named(data, bad, misfit)}")
+    return notes
 
 
 def _named(data: IdentificationData, bad: np.ndarray, misfit: Misfit) -> str:

@@ -193,7 +193,7 @@ def _result(
         trace=tuple(trace),
         notes=tuple(remarks(data, solution, misfit, covariance)),
         # the smooth errors stand behind them, unnamed
-        coefficients=dict(zip(data.coefficient_names, scales, strict=False)),
+        coefficients=dict(zip(data.coefficients, scales, strict=False)),
     )
 
 

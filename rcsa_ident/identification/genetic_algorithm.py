@@ -19,7 +19,8 @@ from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification._kernels import best_grid_misfit, modal_cross_frf
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
-from rcsa_ident.identification.result import AxisResult, Identification, Status
+from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode, Status
+from rcsa_ident.remarks import Remark
 
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 GRID = 64
@@ -136,13 +137,13 @@ class PaperGeneticAlgorithm:
             trace += [(str(axis.axis), "generation", float(c)) for c in costs]
             name, misfit = str(axis.axis).upper(), axes[axis.axis].chi2_per_point
             if misfit > WORST_MISFIT:
-                reasons.append(
-                    f"{name}: the modes miss the lines, chi2 per point {misfit:.0f} at 2 % of each line (at most {WORST_MISFIT:g})"
-                )
+                words = f"{name}: the modes miss the lines, chi2 per point {misfit:.0f} at 2 % of each line (at most {WORST_MISFIT:g})"
+                reasons.append(Remark(IdentificationCode.LINES_MISSED, words))
             omega = np.linspace(axis.omega.min(), axis.omega.max(), 400)
             worst = float(dissipation(omega, axes[axis.axis].modes.receptance(omega).values).min())
             if worst < -1e-9:
-                reasons.append(f"{name}: the modes are not passive, they feed energy in (down to {worst:.2f} of the mobility)")
+                words = f"{name}: the modes are not passive, they feed energy in (down to {worst:.2f} of the mobility)"
+                reasons.append(Remark(IdentificationCode.NOT_PASSIVE, words))
         assert problem is not None
         delays = problem.delays(axes[data.axes[-1].axis])
         return Identification(

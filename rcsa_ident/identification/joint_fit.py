@@ -126,7 +126,7 @@ def _from_start(job: tuple[IdentificationData, Priors, list[AxisSearch], tuple[f
     chosen = best if source is None else [best[source % len(best)]]
     layout = Layout(tuple(s.layout.axes[0] for s in best), len(data.coefficient_spread))
     force = np.zeros(layout.coefficients)
-    named = len(data.coefficient_names)
+    named = len(data.coefficients)
     force[:named] = np.mean([s.theta[s.layout.force][:named] for s in chosen], axis=0)
     joint = np.mean([s.theta[s.layout.joint] for s in chosen], axis=0)
     theta = np.concatenate([*(s.theta[s.layout.axis(0)] for s in best), joint, force])

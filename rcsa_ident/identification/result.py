@@ -8,9 +8,11 @@ from enum import StrEnum
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.cutting.force import ForceCoefficient
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.remarks import Remark, says
 
 
 class Status(StrEnum):
@@ -19,6 +21,25 @@ class Status(StrEnum):
     CONVERGED = "converged"
     SUSPECT = "suspect"
     FAILED = "failed"
+
+
+class IdentificationCode(StrEnum):
+    """What may be said of an identification: first the reasons for doubt, then what the data cannot tell."""
+
+    NOT_CONVERGED = "not-converged"
+    WEAK_SIGNAL = "weak-signal"
+    UNEXPLAINED = "unexplained"
+    CONTRADICTING_CUTS = "contradicting-cuts"
+    TWO_SOLUTIONS = "two-solutions"
+    WIDE_POSTERIOR = "wide-posterior"
+    ONE_TOOLING = "one-tooling"
+    FEW_CUTS = "few-cuts"
+    LINES_MISSED = "lines-missed"
+    NOT_PASSIVE = "not-passive"
+    JOINT_UNKNOWN = "joint-unknown"
+    MODES_OUTSIDE_BAND = "modes-outside-band"
+    COEFFICIENT_UNKNOWN = "coefficient-unknown"
+    CUTS_WEIGHTED_DOWN = "cuts-weighted-down"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,11 +81,11 @@ class Identification:
     Parameters
     ----------
     status : Status
-    reasons : tuple of str
+    reasons : tuple of Remark
         Why it is suspect or has failed.
-    notes : tuple of str
+    notes : tuple of Remark
         What the data cannot tell, and what was done about single cuts.
-    coefficients : mapping of str to (float, float)
+    coefficients : mapping of ForceCoefficient to (float, float)
         What was found of the forces' uncertain coefficients and its standard deviation: logarithms of scales, run-outs in units of
         the cutting model's reference.
     seed : int
@@ -79,7 +100,7 @@ class Identification:
     """
 
     status: Status
-    reasons: tuple[str, ...]
+    reasons: tuple[Remark, ...]
     seed: int
     method: str
     axes: Mapping[Dof, AxisResult]
@@ -88,5 +109,10 @@ class Identification:
     delay_std: FloatArray
     spindle_speed: FloatArray
     trace: tuple[tuple[str, str, float], ...]
-    notes: tuple[str, ...] = ()
-    coefficients: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    notes: tuple[Remark, ...] = ()
+    coefficients: Mapping[ForceCoefficient, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def at_minimum(self) -> bool:
+        """False where the search has failed, or still gained when its steps ran out: there is no answer to be used."""
+        return self.status is not Status.FAILED and not says(self.reasons, IdentificationCode.NOT_CONVERGED)

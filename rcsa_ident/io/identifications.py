@@ -10,7 +10,7 @@ import numpy as np
 
 from rcsa_ident import __version__
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.cutting.force import REFERENCE_RUNOUT, SLOPES
+from rcsa_ident.cutting.force import REFERENCE_RUNOUT, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.parameters import JOINT, AxisLayout
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
@@ -70,7 +70,7 @@ def identification_to_json(
         },
         "sensors": {sensor.name: _sensor_to_json(sensor) for sensor in campaign.sensors},
         "workpiece": workpiece_keys(campaign.workpiece, all_spreads=True),
-        "coefficients": {name: _coefficient(name, *found) for name, found in identification.coefficients.items()},
+        "coefficients": {str(each): _coefficient(each, *found) for each, found in identification.coefficients.items()},
         "band_hz": [w / (2.0 * np.pi) for w in band],
         "axes": _axes_to_json(identification, deviations or {}),
         "delays": _delays(identification, campaign),
@@ -113,9 +113,9 @@ def _axis_to_json(axis: AxisResult, deviation: tuple[FloatArray, FloatArray] | N
     return data
 
 
-def _coefficient(name: str, value: float, std: float) -> dict[str, float]:
+def _coefficient(coefficient: ForceCoefficient, value: float, std: float) -> dict[str, float]:
     """A factor on what the campaign says, or a run-out; with its standard deviation."""
-    if name.startswith(SLOPES[-1]):
+    if coefficient.term is ForceTerm.RUNOUT:
         unit = 1e6 * REFERENCE_RUNOUT
         return {"runout_um": value * unit, "std_um": std * unit}
     scale = math.exp(value)

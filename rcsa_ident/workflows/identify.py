@@ -16,9 +16,10 @@ from rcsa_ident.identification.data import IdentificationData, prepare
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.measurement import Reading, measure_cut
 from rcsa_ident.signals.recording import Recording
-from rcsa_ident.signals.verdict import Verdict
+from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
@@ -63,7 +64,7 @@ def judge_cut(campaign: Campaign, read: ReadCut, cut: Cut) -> Reading:
         cutter = campaign.toolings[cut.tooling].cutter
         return measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, campaign.workpiece.coefficients)
     except InputError as error:
-        return Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((f"unreadable: {error}",)))
+        return Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((Remark(RecordCode.UNREADABLE, f"unreadable: {error}"),)))
 
 
 def left_out(readings: Iterable[Reading]) -> list[tuple[str, str]]:

@@ -21,10 +21,12 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Evaluation, Residual
 from rcsa_ident.identification.parameters import AxisLayout, Layout
-from rcsa_ident.signals.verdict import Verdict
+from rcsa_ident.remarks import Remark
+from rcsa_ident.signals.verdict import RecordCode, Verdict
 
 DTYPES = st.sampled_from(["<f8", ">f8", "<c16", "<i8", "<i4", "<u2", "?", "<f4"])
 ARRAYS = DTYPES.flatmap(lambda kind: arrays.arrays(kind, arrays.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=4)))
+REMARKS = st.builds(Remark, st.sampled_from(RecordCode), st.text())
 LEAVES = st.one_of(
     st.none(),
     st.booleans(),
@@ -34,7 +36,7 @@ LEAVES = st.one_of(
     st.text(),
     st.sampled_from(list(Dof)),
     st.builds(AxisLayout, st.integers(1, 9), st.booleans(), st.booleans()),
-    st.builds(Verdict, st.lists(st.text(), max_size=2).map(tuple), st.just(())),
+    st.builds(Verdict, st.lists(REMARKS, max_size=2).map(tuple), st.just(())),
     ARRAYS,
     ARRAYS.map(lambda a: a.T),
     st.floats().map(np.float64),
@@ -69,6 +71,8 @@ def same(a, b) -> bool:
         return len(a) == len(b) and all(map(same, a, b))
     if isinstance(a, dict):
         return list(a) == list(b) and all(same(a[key], b[key]) for key in a)
+    if isinstance(a, Remark):
+        return a == b and a.code is b.code
     if is_dataclass(a):
         return all(same(getattr(a, field.name), getattr(b, field.name)) for field in fields(a))
     return a == b
@@ -105,7 +109,7 @@ def test_every_known_noun_is_a_frozen_one_or_a_name_of_something():
     for place in NOUNS:
         noun = _noun(place.rpartition(".")[2])
         assert f"{noun.__module__}.{noun.__name__}" == place
-        assert issubclass(noun, Enum) or noun.__dataclass_params__.frozen
+        assert issubclass(noun, Enum | Remark) or noun.__dataclass_params__.frozen
 
 
 @dataclass(frozen=True)

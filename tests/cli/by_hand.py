@@ -9,12 +9,14 @@ import numpy as np
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.parameters import AxisLayout, AxisParameters, pack, parameter_names, simple_axis
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.identification.result import AxisResult, Identification, Status
+from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode, Status
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machining_setup import Campaign, Cut, Workpiece
+from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import Quantity, Sensor
 
 TOOLING = """\
@@ -87,7 +89,7 @@ def identification(softening: bool = False) -> Identification:
     ]
     return Identification(
         Status.SUSPECT,
-        ("few cuts: 2 with T1, at least 8 are wanted",),
+        (Remark(IdentificationCode.FEW_CUTS, "few cuts: 2 with T1, at least 8 are wanted"),),
         7,
         "default",
         {axis: axis_result(axis, each) for axis, each in known.items()},
@@ -97,7 +99,7 @@ def identification(softening: bool = False) -> Identification:
         np.array([1000.0, 1100.0]),
         (*trace, ("both", "polish", 2.0)),
         ("joint: its rotational damping cannot be told",),
-        {"tangential coefficient": (np.log(1.25), 0.02), "run-out of T1": (-0.5, 0.25)},
+        {ForceCoefficient(ForceTerm.TANGENTIAL): (np.log(1.25), 0.02), ForceCoefficient(ForceTerm.RUNOUT, "T1"): (-0.5, 0.25)},
     )
 
 

@@ -5,14 +5,16 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.parameters import AxisLayout, parameter_names
 from rcsa_ident.identification.posterior import MachineAxis
-from rcsa_ident.identification.result import Status
+from rcsa_ident.identification.result import IdentificationCode, Status
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.machine.spindle import Spindle
+from rcsa_ident.remarks import says
 from rcsa_ident.workflows.tip import tooltip
 from tests.identification.conftest import AXES, TIP_OMEGA, open_shop
 
@@ -177,22 +179,22 @@ def clamped(clamped_cuts):
 
 def test_a_wrong_cutting_coefficient_is_found(shop, clamped_cuts, clamped):
     assert clamped.status is Status.CONVERGED, clamped.reasons
-    scale, std = clamped.coefficients["tangential coefficient"]
+    scale, std = clamped.coefficients[ForceCoefficient(ForceTerm.TANGENTIAL)]
     assert scale == pytest.approx(-np.log(1.1), abs=3.0 * std)
     assert std < 0.02
-    ratio, std = clamped.coefficients["radial ratio"]
+    ratio, std = clamped.coefficients[ForceCoefficient(ForceTerm.RATIO)]
     assert ratio == pytest.approx(0.0, abs=3.0 * std)
     assert std < 0.01
     # the smooth errors behind them have no name
-    assert tuple(clamped.coefficients) == clamped_cuts[0].coefficient_names
+    assert tuple(clamped.coefficients) == clamped_cuts[0].coefficients
     assert max(tip_errors(shop, clamped).values()) < 0.03
 
 
 def test_what_a_wrong_coefficient_costs_where_nobody_asks(shop, clamped_cuts, clamped):
     """The same lines with forces taken for exact."""
-    named = len(clamped_cuts[0].coefficient_names)
+    named = len(clamped_cuts[0].coefficients)
     axes = tuple(replace(a, force_slope=a.force_slope[:, named:]) for a in clamped_cuts[0].axes)
-    data = replace(clamped_cuts[0], axes=axes, coefficient_names=(), coefficient_spread=())
+    data = replace(clamped_cuts[0], axes=axes, coefficients=(), coefficient_spread=())
     warm = replace(SMALL, start={axis: result.posterior for axis, result in clamped.axes.items()})
     deaf = warm.run(data.only(Dof.Y), 1)
     assert tip_errors(shop, deaf)[Dof.Y] > 2.0 * tip_errors(shop, clamped)[Dof.Y]
@@ -248,7 +250,7 @@ def test_a_cut_that_contradicts_the_others_is_named_and_counts_less(shop, campai
     without = SMALL.run(shop.prepare([*bad[:7], *bad[8:]]), 102)
     spoilt = SMALL.run(shop.prepare(bad), 102)
     assert spoilt.status is Status.CONVERGED, spoilt.reasons
-    named = [note for note in spoilt.notes if "contradict" in note]
+    named = [note for note in spoilt.notes if note.code is IdentificationCode.CUTS_WEIGHTED_DOWN]
     assert len(named) == 1
     assert [c.cut_id for c in bad if f" {c.cut_id} (" in named[0]] == [bad[7].cut_id]
     # the others are believed as if it were not there
@@ -260,7 +262,7 @@ def test_one_tooling_is_not_enough(shop):
     cuts, _ = shop.measurements(np.random.default_rng(0), names=list(shop.truth)[:1], axes=(Dof.X,))
     found = TINY.run(shop.prepare(cuts), 1)
     assert found.status is Status.SUSPECT
-    assert any("one tooling" in reason for reason in found.reasons)
+    assert says(found.reasons, IdentificationCode.ONE_TOOLING)
     assert list(found.axes) == [Dof.X]
 
 
@@ -276,7 +278,7 @@ def test_a_sensor_of_the_wrong_sign(shop):
     found = TINY.run(shop.prepare(cuts[::4]), 1)
     assert found.status is Status.SUSPECT
     assert found.axes[Dof.X].model_error > 0.05
-    assert any(reason.startswith("X:") and "unexplained" in reason for reason in found.reasons)
+    assert any(reason.code is IdentificationCode.UNEXPLAINED and reason.startswith("X:") for reason in found.reasons)
 
 
 def test_forces_that_are_not_those_of_the_cut(shop):
@@ -288,14 +290,14 @@ def test_forces_that_are_not_those_of_the_cut(shop):
 
     found = TINY.run(shop.prepare(shop.measurements(np.random.default_rng(0), axes=(Dof.X,), change=wrong)[0][::2]), 1)
     assert found.status is Status.SUSPECT
-    assert any("unexplained" in reason for reason in found.reasons)
+    assert says(found.reasons, IdentificationCode.UNEXPLAINED)
 
 
 def test_noise_alone_is_not_a_machine(shop):
     cuts, _ = shop.measurements(np.random.default_rng(0), change=lambda values, force, axis: 0.0 * values)
     found = TINY.run(shop.prepare(cuts[::2]), 1)
     assert found.status is Status.SUSPECT
-    assert any("noise" in reason for reason in found.reasons)
+    assert says(found.reasons, IdentificationCode.WEAK_SIGNAL)
 
 
 ODD = {

@@ -9,12 +9,14 @@ import pytest
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.parameters import AxisLayout, joint_of, modes_of, pack, parameter_names, simple_axis, unpack
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.identification.result import AxisResult, Identification, Status
+from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode, Status
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machining_setup import Campaign, Cut, Workpiece
+from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import Quantity, Sensor
 
 TOOLING = """\
@@ -84,7 +86,7 @@ def identification() -> Identification:
     ]
     return Identification(
         Status.SUSPECT,
-        ("few cuts: 2 with T1, at least 8 are wanted",),
+        (Remark(IdentificationCode.FEW_CUTS, "few cuts: 2 with T1, at least 8 are wanted"),),
         7,
         "default",
         axes,
@@ -93,6 +95,11 @@ def identification() -> Identification:
         np.array([1e-6, 2e-6]),
         np.array([1000.0, 1100.0]),
         (*trace, ("both", "polish", 2.0)),
-        ("run-out of T1: the cuts say little about it; it is known to 250 %, nearly as before",),
-        {"tangential coefficient": (0.03, 0.02), "run-out of T1": (0.4, 2.5)},
+        (
+            Remark(
+                IdentificationCode.COEFFICIENT_UNKNOWN,
+                "run-out of T1: the cuts say little about it; it is known to 250 %, nearly as before",
+            ),
+        ),
+        {ForceCoefficient(ForceTerm.TANGENTIAL): (0.03, 0.02), ForceCoefficient(ForceTerm.RUNOUT, "T1"): (0.4, 2.5)},
     )
