@@ -6,6 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+#: What an unfinished job remembers belongs to this version: raise it when steps change their order, their names or what is in their
+#: texts. A job that was begun with another version starts over.
+VERSION = "2"
 #: Gives the text that a step of a job had come to, computed if it has not been: name of the step, and what computes it.
 Remember = Callable[[str, Callable[[], str]], str]
 #: Carries out a job of this id; whatever it does a second time gives what it gave the first time.

@@ -15,7 +15,7 @@ import numpy as np
 
 from rcsa_ident.remarks import Remark
 
-#: Module and name of every noun that may be told; a later release may read what an earlier one wrote as long as its fields stay.
+#: Module and name of every noun that may be written; a later release may read what an earlier one wrote as long as its fields stay.
 NOUNS = (
     "rcsa_ident.dynamics.coordinates.Dof",
     "rcsa_ident.remarks.Remark",
@@ -26,10 +26,9 @@ NOUNS = (
     "rcsa_ident.signals.measurement.Reading",
     "rcsa_ident.identification.parameters.AxisLayout",
     "rcsa_ident.identification.parameters.Layout",
-    "rcsa_ident.identification.misfit.Residual",
-    "rcsa_ident.identification.misfit.Linearisation",
-    "rcsa_ident.identification.misfit.Evaluation",
-    "rcsa_ident.identification.levenberg_marquardt.Solution",
+    "rcsa_ident.identification.candidate.Candidate",
+    "rcsa_ident.identification.progress.Stage",
+    "rcsa_ident.identification.progress.Step",
     "rcsa_ident.identification.joint_fit.AxisSearch",
     "rcsa_ident.cutting.conditions.Engagement",
     "rcsa_ident.cutting.process.ProcessDamping",
@@ -62,13 +61,13 @@ def decode(text: str) -> Any:
     Raises
     ------
     Unknown
-        If it has not.
+        If it has not, or its nouns have other fields now, or are gone.
     """
     try:
         return _value(json.loads(text))
     except Unknown:
         raise
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError, AttributeError, ImportError, RecursionError) as error:
         raise Unknown(f"no text of a known noun ({type(error).__name__})") from error
 
 
@@ -96,7 +95,7 @@ def _plain(value: Any) -> Any:
         return {"~table": [[_plain(key), _plain(each)] for key, each in value.items()]}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {f"~{_name(type(value))}": {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}}
-    raise Unknown(f"a {type(value).__name__} can not be told")
+    raise Unknown(f"a {type(value).__name__} cannot be told")
 
 
 def _value(plain: Any) -> Any:

@@ -73,7 +73,7 @@ class Event:
     number : int
         Rises within the job, with gaps.
     kind : str
-        progress, trace, fit or end.
+        progress, trace, fit, note or end.
     data : str
         JSON; empty for progress and end, which the job itself tells.
     topic : str

@@ -11,6 +11,7 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.cutting.force import ForceTerm
 from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.levenberg_marquardt import Solution
@@ -66,8 +67,8 @@ def diagnose(
             f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, {_named(data, bad, misfit)}",
         )
     for axis, found in zip(data.axes, searched, strict=True):
-        if len(found.solutions) > 1 and found.evidences[1] - found.evidences[0] < EVIDENCE_TIE:
-            difference, band = _difference(axis, *found.solutions[:2])
+        if len(found.candidates) > 1 and found.evidences[1] - found.evidences[0] < EVIDENCE_TIE:
+            difference, band = _difference(axis, *found.candidates[:2])
             if difference > max(LARGEST_DIFFERENCE, 3.0 * band):
                 doubt(
                     IdentificationCode.TWO_SOLUTIONS,
@@ -161,10 +162,10 @@ def _band(posterior: Posterior, axis: AxisData) -> float:
     return float(np.linalg.norm(spread(posterior, axis.axis, felt)) / max(float(np.linalg.norm(value)), 1e-300))
 
 
-def _difference(axis: AxisData, one: Solution, two: Solution) -> tuple[float, float]:
-    """Relative difference of two solutions in what a tooltip feels, and the first one's deviation."""
+def _difference(axis: AxisData, one: Candidate, two: Candidate) -> tuple[float, float]:
+    """Relative difference of two candidates in what a tooltip feels, and the first one's deviation."""
     felt = _machine_contribution(axis)
-    first, second = (_flange_posterior(s) for s in (one, two))
+    first, second = (_flange_posterior(candidate) for candidate in (one, two))
     value, other = felt(*first.machine(axis.axis)), felt(*second.machine(axis.axis))
     size = np.linalg.norm(value)
     if size == 0.0:
@@ -172,7 +173,7 @@ def _difference(axis: AxisData, one: Solution, two: Solution) -> tuple[float, fl
     return float(np.linalg.norm(value - other) / size), _band(first, axis)
 
 
-def _flange_posterior(solution: Solution) -> Posterior:
-    size = solution.layout.tail + JOINT
-    covariance = np.linalg.inv(solution.evaluation.hessian)[:size, :size]
-    return Posterior(solution.theta[:size], covariance, solution.layout.axes[0])
+def _flange_posterior(candidate: Candidate) -> Posterior:
+    size = candidate.layout.tail + JOINT
+    covariance = np.linalg.inv(candidate.information)[:size, :size]
+    return Posterior(candidate.theta[:size], covariance, candidate.layout.axes[0])

@@ -12,6 +12,7 @@ from rcsa_ident.cutting.force import ForceCoefficient
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.identification.progress import Step
 from rcsa_ident.remarks import Remark, says
 
 
@@ -95,7 +96,7 @@ class Identification:
     delay, delay_std : arrays, shape (k,) [s]
         Tooth 1 stands at immersion 0 that much after the record's start.
     spindle_speed : array, shape (k,) [rad/s]
-    trace : tuple of (axis, stage, cost)
+    trace : tuple of Step
         The search in order.
     """
 
@@ -108,7 +109,7 @@ class Identification:
     delay: FloatArray
     delay_std: FloatArray
     spindle_speed: FloatArray
-    trace: tuple[tuple[str, str, float], ...]
+    trace: tuple[Step, ...]
     notes: tuple[Remark, ...] = ()
     coefficients: Mapping[ForceCoefficient, tuple[float, float]] = field(default_factory=dict)
 

@@ -13,6 +13,7 @@ from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.parameters import AxisLayout, AxisParameters, pack, parameter_names, simple_axis
 from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.identification.progress import BOTH, Stage, Step
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode, Status
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machining_setup import Campaign, Cut, Workpiece
@@ -82,11 +83,8 @@ def axis_result(axis: Dof, known: Posterior) -> AxisResult:
 def identification(softening: bool = False) -> Identification:
     """Two axes with a posterior; the third cut is left out."""
     known = {Dof.X: posterior(1.0, softening, 3), Dof.Y: posterior(0.95, softening, 4)}
-    trace = [
-        (a, s, c)
-        for a in ("x", "y")
-        for s, c in (("search", 9.0), ("search", 5.0), ("refine", 3.0), ("3 modes", -20.0), ("2 modes", -40.0))
-    ]
+    told = ((Stage.SEARCH, 9.0, 3), (Stage.SEARCH, 5.0, 3), (Stage.REFINE, 3.0, 3), (Stage.MODES, -20.0, 3), (Stage.MODES, -40.0, 2))
+    trace = [Step(axis, stage, cost, modes) for axis in ("x", "y") for stage, cost, modes in told]
     return Identification(
         Status.SUSPECT,
         (Remark(IdentificationCode.FEW_CUTS, "few cuts: 2 with T1, at least 8 are wanted"),),
@@ -97,7 +95,7 @@ def identification(softening: bool = False) -> Identification:
         np.array([1e-3, 2.5e-3]),
         np.array([1e-6, 2e-6]),
         np.array([1000.0, 1100.0]),
-        (*trace, ("both", "polish", 2.0)),
+        (*trace, Step(BOTH, Stage.POLISH, 2.0, 4)),
         ("joint: its rotational damping cannot be told",),
         {ForceCoefficient(ForceTerm.TANGENTIAL): (np.log(1.25), 0.02), ForceCoefficient(ForceTerm.RUNOUT, "T1"): (-0.5, 0.25)},
     )

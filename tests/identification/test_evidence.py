@@ -1,5 +1,6 @@
 """The whole method on lines of the virtual machine, whose spindle is not of the form that is fitted."""
 
+import pickle
 from dataclasses import fields, replace
 
 import numpy as np
@@ -9,8 +10,11 @@ from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification.evidence import EvidenceSelection
+from rcsa_ident.identification.method import Phase
 from rcsa_ident.identification.parameters import AxisLayout, parameter_names
 from rcsa_ident.identification.posterior import MachineAxis
+from rcsa_ident.identification.preview import Preview
+from rcsa_ident.identification.progress import BOTH, Stage
 from rcsa_ident.identification.result import IdentificationCode, Status
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.machine.spindle import Spindle
@@ -57,7 +61,7 @@ def told():
 
 @pytest.fixture(scope="module")
 def found(campaign, told):
-    return SMALL.run(campaign[0], 102, progress=lambda *step: told.append(step))
+    return SMALL.run(campaign[0], 102, progress=told.append)
 
 
 def test_tooltip_of_a_tooling_that_never_cut(shop, found):
@@ -90,7 +94,8 @@ def test_the_result_tells_its_story(campaign, found):
     data = campaign[0]
     assert found.method == "default"
     assert (found.seed, found.reasons, found.cut_ids) == (102, (), data.cut_ids)
-    assert {stage for _, stage, _ in found.trace} >= {"search", "refine", "learn noise", "exchange", "grow", "polish"}
+    stages = {Stage.SEARCH, Stage.REFINE, Stage.NOISE, Stage.MODES, Stage.EXCHANGE, Stage.GROW, Stage.POLISH}
+    assert {step.stage for step in found.trace} >= stages
     assert found.coefficients == {}
     for axis, result in found.axes.items():
         assert 0.3 < result.chi2_per_point < 1.2
@@ -117,22 +122,48 @@ def test_the_result_tells_its_story(campaign, found):
 
 
 def test_progress_is_told_of_every_step_of_the_trace(found, told):
-    assert [(axis, stage, cost) for axis, stage, cost, _, _ in told if axis == "both"] == [t for t in found.trace if t[0] == "both"]
-    for axis in ("x", "y"):
-        assert sorted(step[:3] for step in told if step[0] == axis) == sorted(t for t in found.trace if t[0] == axis)
-    for axis, _, cost, theta, layout in told:
-        assert np.isfinite(cost)
-        assert theta.size == layout.size
-        assert len(layout.axes) == (2 if axis == "both" else 1)
+    for axis in ("x", "y", BOTH):
+        assert [step for step in told if step.axis == axis] == [step for step in found.trace if step.axis == axis]
+    assert all(step.candidate is None for step in found.trace)
+    for step in told:
+        candidate = step.candidate
+        assert np.isfinite(step.cost)
+        assert candidate.theta.size == candidate.layout.size == candidate.information.shape[0]
+        assert len(candidate.layout.axes) == (2 if step.axis == BOTH else 1)
+        assert sum(a.modes for a in candidate.layout.axes) == step.modes
+        assert step.label == (f"{step.modes} modes" if step.stage is Stage.MODES else step.stage.value)
+
+
+def test_a_preview_shows_what_a_step_has_come_to(campaign, found, told):
+    preview = Preview(campaign[0])
+    last = told[-1]
+    assert preview.axes(last) == AXES
+    for axis in AXES:
+        result, lines = found.axes[axis], preview.lines(last, axis)
+        order = np.argsort(result.measured["omega"], kind="stable")
+        np.testing.assert_array_equal(lines.omega, result.measured["omega"][order])
+        np.testing.assert_allclose(np.abs(lines.measured), np.abs(result.measured["value"])[order], rtol=1e-9)
+        np.testing.assert_allclose(lines.model, result.measured["model"][order], rtol=1e-9)
+    first = next(step for step in told if step.axis == "x")
+    assert preview.axes(first) == (Dof.X,)
+    assert preview.axes(replace(first, candidate=None)) == ()
 
 
 def test_same_seed_same_answer_in_any_order(shop, campaign):
     data = shop.prepare(campaign[2][::8], spread=(0.05, 0.05, 0.0, 0.0))
 
-    def backwards(function, jobs):
-        return [function(job) for job in reversed(list(jobs))][::-1]
+    phases = []
 
-    one, again, other = TINY.run(data, 5), TINY.run(data, 5, backwards), TINY.run(data, 6)
+    def elsewhere(function, tasks):
+        """Last task first, each as if in a process of its own."""
+        tasks = list(tasks)
+        phases.append({task.phase for task in tasks})
+        return [pickle.loads(pickle.dumps(function(pickle.loads(pickle.dumps(task))))) for task in reversed(tasks)][::-1]
+
+    one, again, other = TINY.run(data, 5), TINY.run(data, 5, elsewhere), TINY.run(data, 6)
+    # tasks of one call are of one phase, which they say
+    assert phases[:2] == [{Phase.SEARCH}, {Phase.OTHER_AXIS}]
+    assert phases[-1] == {Phase.BOTH_AXES}
     np.testing.assert_array_equal(again.delay, one.delay)
     np.testing.assert_array_equal(again.delay_std, one.delay_std)
     assert (again.trace, again.reasons, again.notes) == (one.trace, one.reasons, one.notes)
@@ -145,10 +176,10 @@ def test_same_seed_same_answer_in_any_order(shop, campaign):
 def test_warm_start_comes_to_the_same_machine_sooner(shop, campaign, found, told):
     warm = replace(SMALL, start={axis: result.posterior for axis, result in found.axes.items()})
     steps = []
-    again = warm.run(campaign[0], 7, progress=lambda *step: steps.append(step))
+    again = warm.run(campaign[0], 7, progress=steps.append)
     assert again.status is Status.CONVERGED
     assert len(steps) < 0.75 * len(told)
-    assert "search" not in {stage for _, stage, *_ in steps}
+    assert Stage.SEARCH not in {step.stage for step in steps}
     assert max(tip_errors(shop, again).values()) < 0.03
     machines = [{a: MachineAxis(Spindle(r.modes), r.joint, r.posterior) for a, r in f.axes.items()} for f in (found, again)]
     one, two = (tooltip(machine, shop.held_out.assembly, TIP_OMEGA) for machine in machines)

@@ -17,6 +17,7 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.parameters import AxisLayout, parameter_names
 from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.identification.progress import BOTH, Stage, Step
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode, Status
 from rcsa_ident.machining_setup import Campaign, Cut, Tooling, Workpiece
 from rcsa_ident.remarks import Remark
@@ -71,7 +72,8 @@ def found():
     covariance = np.diag([1.0] * layout.size + [1e-4, 1.0, 1e-4, 1e-4])
     posterior = Posterior(np.zeros(layout.size + 4), covariance, layout)
     part = AxisResult(modes, joint, 1.23, {NAME: 1.23}, 0.004, parameter_names(layout), posterior, measured)
-    trace = (("x", "search", 30.0), ("x", "search", 20.0), ("x", "3 modes", -5.0), ("x", "2 modes", -9.0), ("both", "polish", 4.0))
+    told = ((Stage.SEARCH, 30.0, 3), (Stage.SEARCH, 20.0, 3), (Stage.MODES, -5.0, 3), (Stage.MODES, -9.0, 2))
+    trace = (*(Step("x", *each) for each in told), Step(BOTH, Stage.POLISH, 4.0, 2))
     cuts = ("cut-0", "cut-1")
     reasons = (Remark(IdentificationCode.FEW_CUTS, "few cuts: 2"),)
     notes = (Remark(IdentificationCode.COEFFICIENT_UNKNOWN, "run-out of <T1>: the cuts say little about it"),)
