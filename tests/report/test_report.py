@@ -12,19 +12,22 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.parameters import AxisLayout, parameter_names
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.progress import BOTH, Stage, Step
+from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machining_setup import Campaign, Cut, Tooling, Workpiece
+from rcsa_ident.remarks import Remark
 from rcsa_ident.report.figures import svg, tooltip_frf
 from rcsa_ident.report.html import ToolingPage, report_html
 from rcsa_ident.report.summaries import coefficient_rows, mode_rows, recording_rows, two_digits
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement, Reading
-from rcsa_ident.signals.verdict import Verdict
+from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 
@@ -51,8 +54,10 @@ def readings(campaign):
     slope = np.zeros((2, 5), dtype=complex)
     lines = AxisLines(np.array([4, 8]), np.array([4e3, 8e3]), value, 0.0 * value, variance, np.ones(2), force, slope)
     measurement = CutMeasurement("cut-0", NAME, 1001.0, {Dof.X: lines}, 0.0)
-    good = [Reading(cut.id, NAME, 1000.0, Verdict((), ("no air cut",)), measurement) for cut in campaign.cuts[:2]]
-    return [*good, Reading(campaign.cuts[2].id, NAME, 1000.0, Verdict(("chatter: 3 µm at 1500 Hz",)))]
+    good = [
+        Reading(cut.id, NAME, 1000.0, Verdict((), (Remark(RecordCode.NO_AIR_CUT, "no air cut"),)), measurement) for cut in campaign.cuts[:2]
+    ]
+    return [*good, Reading(campaign.cuts[2].id, NAME, 1000.0, Verdict((Remark(RecordCode.CHATTER, "chatter: 3 µm at 1500 Hz"),)))]
 
 
 @pytest.fixture
@@ -68,12 +73,14 @@ def found():
     covariance = np.diag([1.0] * layout.size + [1e-4, 1.0, 1e-4, 1e-4])
     posterior = Posterior(np.zeros(layout.size + 4), covariance, layout)
     part = AxisResult(modes, joint, 1.23, {NAME: 1.23}, 0.004, parameter_names(layout), posterior, measured)
-    trace = (("x", "search", 30.0), ("x", "search", 20.0), ("x", "3 modes", -5.0), ("x", "2 modes", -9.0), ("both", "polish", 4.0))
+    told = ((Stage.SEARCH, 30.0, 3), (Stage.SEARCH, 20.0, 3), (Stage.MODES, -5.0, 3), (Stage.MODES, -9.0, 2))
+    trace = (*(Step("x", *each) for each in told), Step(BOTH, Stage.POLISH, 4.0, 2))
     cuts = ("cut-0", "cut-1")
-    notes = ("run-out of <T1>: the cuts say little about it",)
-    scales = {"tangential coefficient": (np.log(1.1), 0.01), f"run-out of {NAME}": (-0.6, 0.02)}
+    reasons = (Remark(IdentificationCode.FEW_CUTS, "few cuts: 2"),)
+    notes = (Remark(IdentificationCode.COEFFICIENT_UNKNOWN, "run-out of <T1>: the cuts say little about it"),)
+    scales = {ForceCoefficient(ForceTerm.TANGENTIAL): (np.log(1.1), 0.01), ForceCoefficient(ForceTerm.RUNOUT, NAME): (-0.6, 0.02)}
     return Identification(
-        Status.SUSPECT, ("few cuts: 2",), 1, "default", {Dof.X: part}, cuts, np.zeros(2), np.ones(2), np.ones(2), trace, notes, scales
+        Status.SUSPECT, reasons, 1, "default", {Dof.X: part}, cuts, np.zeros(2), np.ones(2), np.ones(2), trace, notes, scales
     )
 
 
@@ -205,7 +212,9 @@ def test_without_deviations_there_are_no_columns_for_them(found, campaign, readi
 
 
 def test_rows_of_coefficients_are_factors_and_micrometres():
-    scale, runout = coefficient_rows({"radial ratio": (np.log(0.8), 0.05), "run-out of T": (1.5, 0.5)})
+    scale, runout = coefficient_rows(
+        {ForceCoefficient(ForceTerm.RATIO): (np.log(0.8), 0.05), ForceCoefficient(ForceTerm.RUNOUT, "T"): (1.5, 0.5)}
+    )
     assert (scale.value, scale.std) == (pytest.approx(0.8), pytest.approx(0.04))
     assert (runout.value, runout.std, runout.unit) == (pytest.approx(3.0), pytest.approx(1.0), "µm")
 
