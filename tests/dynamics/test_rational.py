@@ -16,7 +16,7 @@ from rcsa_ident.dynamics.rational import FitStatus, fitted_poles, rational_fit
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.machine.machine import FlangeMachine
+from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 
 MACHINES = Path(__file__).parents[2] / "data" / "machines"

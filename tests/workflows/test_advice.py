@@ -13,6 +13,7 @@ from rcsa_ident.workflows.limits import Limits, least_within_tolerance, machine_
 from rcsa_ident.workflows.lobes import LobeConditions, lobe_bands, tooling_lobes
 from rcsa_ident.workflows.speeds import MachineOverSpeed, lobes_over_speed
 from rcsa_ident.workflows.tip import MachineAxis, tooltip
+from rcsa_ident.workflows.tip_fit import fitted_modes
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement

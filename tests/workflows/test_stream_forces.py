@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rcsa_ident.errors import InputError
 from rcsa_ident.workflows.estimate_forces import MonitoredCut, observe
 from rcsa_ident.workflows.stream_forces import LONGEST_BRIDGE, LiveObserver, live_observer
-from tests.fixtures.flange_machine import BAND, flange_machine
+from tests.fixtures.flange_machine import flange_machine
 from tests.fixtures.force_stream import RATE, SECOND, streamed, turning
 from tests.fixtures.virtual_cut import CASE, relative_error
 
@@ -23,7 +23,7 @@ def designed(air: bool = True) -> MonitoredCut:
     samples = streamed()[0][:SECOND] if air else streamed()[0][2 * SECOND : 2 * SECOND + SECOND // 2]
     record = turning().recording(samples)
     assembly = turning().made.tooling.assembly
-    return observe(flange_machine(), assembly, 2, record, record if air else None, BAND, CASE.spindle_speed)
+    return observe(flange_machine(), assembly, 2, record, record if air else None, CASE.spindle_speed)
 
 
 @cache
