@@ -7,7 +7,6 @@ import json
 
 import numpy as np
 import pytest
-
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app, lobes
