@@ -30,7 +30,7 @@ from benchmarks.machines import CONDITIONS, EVALUATION, random_machine, under
 from benchmarks.page import DOCS, append_row, draw_study, read_rows, write_block
 from benchmarks.study_table import AIMS, line, table
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.cli.simulation import simulate_campaign
+from rcsa_ident.samples import simulate_campaign
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.evidence import EvidenceSelection

@@ -6,12 +6,14 @@ import importlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -191,7 +193,7 @@ def workers(processes: int | None, early: Sequence[str] = EARLY) -> Iterator[Wor
     words: SimpleQueue[tuple[str, str, float]] = context.SimpleQueue()
     pool = ProcessPoolExecutor(helpers, context, initializer=_begin, initargs=(words, tuple(early)))
     try:
-        with _no_interrupts():
+        with _no_interrupts(), _no_script():
             for _ in range(helpers):
                 pool.submit(_nothing)
         yield Workers(helpers, pool, words)
@@ -214,6 +216,17 @@ def _no_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _no_script() -> Iterator[None]:
+    """Let processes that start here not run the script again that starts them: they need nothing of it, and it may have no guard."""
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
 
 
 def _begin(words: SimpleQueue[tuple[str, str, float]], early: Sequence[str]) -> None:

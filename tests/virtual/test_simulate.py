@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from rcsa_ident.cli.simulation import simulate_campaign as simulate
+from rcsa_ident.samples import simulate_campaign as simulate
 from rcsa_ident.cutting.force import force_lines
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
