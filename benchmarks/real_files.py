@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rcsa_ident.workflows.lobes import measured_tip
 
 from benchmarks.timing import once, row
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
