@@ -6,7 +6,6 @@ import json
 
 import numpy as np
 import pytest
-from rcsa_ident.workflows.tip import tooltip
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.curves import write_frf_csv

@@ -6,7 +6,6 @@ import json
 
 import numpy as np
 import pytest
-from rcsa_ident.workflows.tip import tooltip
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rcsa_ident.workflows.speeds import MachineOverSpeed
 
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof

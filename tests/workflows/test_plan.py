@@ -5,8 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rcsa_ident.workflows.lobes import LobeConditions, tooling_lobes
-from rcsa_ident.workflows.tip import tooltip
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
