@@ -131,7 +131,7 @@ def observe(
     top = min(identified[1], HIGHEST * 2.0 * np.pi * cut.rate)
     steady = steady_record(cut, axes, programmed, top / (2.0 * np.pi), teeth)
     speed = steady.spindle_speed
-    notes = list(speed_faults(steady.displacement, steady.lines, programmed))
+    notes: list[str] = [*speed_faults(steady.displacement, steady.lines, programmed)]
     _periodic(steady, programmed, notes)
     answers = identified if machine.ends else (0.0, np.inf)
     band = _band(identified, max(BELOW * identified[0], answers[0]), top, speed, teeth, notes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import threading
 import time
 import zipfile
@@ -18,12 +19,13 @@ from typer.testing import CliRunner
 from api.client import Client
 from api.jobs import identification as work
 from api.jobs.event_feed import Crowded, EventFeeds
-from api.jobs.job_context import JobContext
+from api.jobs.job_context import STARTS_OVER, JobContext
 from api.security import new_id, now
 from api.stores.entities import Machine
 from api.stores.jobs import Event, Job, Outcome
 from rcsa_ident.cli import app
 from rcsa_ident.errors import InputError
+from rcsa_ident.identification.method import Phase
 from rcsa_ident.io.recordings import read_cut
 from rcsa_ident.io.setups import read_campaign
 from tests.api import identifying
@@ -143,6 +145,48 @@ def test_a_killed_job_goes_on_and_finds_the_same(done, killed_after):
     assert [name for _, name in steps.computed] == names[killed_after:]
     # every text that a step left is the same: nothing rests on what a process has kept
     assert all(steps.texts[second, name] == engine.texts[id, name] for name in names)
+
+
+def test_a_job_that_an_earlier_version_began_starts_over(done):
+    """Its steps are in a form that nobody reads any more: the same bytes come out as if it had never begun, and it says so."""
+    client, _, campaign, id, engine, store, folder = done
+    second = client.identify_campaign(campaign, seed=3, apply=False).id
+    store.jobs.begin(second, "earlier", now())
+    store.jobs.tell(second, "earlier", [], json.dumps({"stage": "search", "done": 0, "total": 1}))
+    steps = Steps()
+    old = {"plan": [[cut.id, "x.h5", ""] for cut in client.campaign(campaign).cuts], "1_search_axis.0": {"~AxisSearch": {"solutions": []}}}
+    steps.texts = {(second, name): json.dumps({"~table": [["value", value]]}) for name, value in old.items()}
+    carried(store, folder, steps)
+    # the engine has seen it end, and forgets it
+    assert client.job(second).state == "running"
+    assert steps.computed == []
+    fresh = carried(store, folder)
+    assert client.job(second).state == "done"
+    assert client.result(second) == client.result(id)
+    assert [name for _, name in fresh.computed] == [name for job, name in engine.computed if job == id]
+    notes = [data["text"] for kind, data in client.events(second) if kind == "note"]
+    assert notes == [STARTS_OVER]
+    assert "starts over from its recordings" in notes[0]
+
+
+def test_what_a_job_keeps_is_documented(done):
+    """Nouns that methods promise to answer with, and none of the equations behind them."""
+    *_, id, engine, _, _ = done
+    kept = {noun for (job, _), text in engine.texts.items() if job == id for noun in re.findall(r'"~([A-Z]\w+)"', text)}
+    assert kept <= {
+        "Reading",
+        "Verdict",
+        "Remark",
+        "CutMeasurement",
+        "AxisLines",
+        "AxisSearch",
+        "Candidate",
+        "Layout",
+        "AxisLayout",
+        "Step",
+    }
+    names = [name for job, name in engine.computed if job == id]
+    assert {name.split(".")[1] for name in names if name[0].isdigit()} == {phase.name.lower() for phase in (Phase.SEARCH, Phase.BOTH_AXES)}
 
 
 def test_going_on_from_an_earlier_answer(done):
@@ -267,7 +311,7 @@ def test_cancelled_while_it_runs(client, store, tmp_path):
     assert client.job(id).state == "cancelled"
     refused(409, client.result, id)
     assert client.machine(machine).identification is None
-    assert not any(name.startswith("3") for _, name in engine.computed)
+    assert not any(Phase.BOTH_AXES.name.lower() in name for _, name in engine.computed)
 
 
 def test_a_query_that_waits_for_the_end(client, store):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.result import IdentificationCode, Status
 from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.remarks import Remark
 from tests.fixtures import by_hand
 
 
@@ -146,3 +149,29 @@ def test_a_method_sees_the_cuts_of_its_band_alone(tmp_path, small_campaign, monk
     data = read_result(out)
     low, high = ([edge * np.pi / 30.0 for edge in band["speed_range_rpm"]] for band in data["speed_bands"])
     assert low[1] == pytest.approx(high[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [
+        ({"reasons": (Remark(IdentificationCode.NOT_CONVERGED, "it was still gaining"),)}, 3),
+        ({"reasons": (Remark(IdentificationCode.FEW_CUTS, "not converged, says a tooling of that name"),)}, 0),
+        ({"status": Status.FAILED, "axes": {}}, 3),
+    ],
+)
+def test_the_exit_code_follows_the_code_and_not_the_words(tmp_path, small_campaign, monkeypatch, change, code):
+    from rcsa_ident.identification import evidence
+
+    class Found:
+        def __init__(self, start=None):
+            pass
+
+        def run(self, data, seed, map, progress=None):
+            return replace(by_hand.identification(), **change)
+
+    monkeypatch.setattr(evidence, "EvidenceSelection", Found)
+    monkeypatch.setattr("rcsa_ident.io.identifications._delays", lambda *_: {})
+    out = tmp_path / "R.json"
+    run("identify", small_campaign, "--out", out, "--processes", 1, code=code)
+    # it is written, whatever it is worth
+    assert read_result(out)["status"] == ("failed" if change.get("status") else "suspect")

@@ -9,9 +9,10 @@ import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
+from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement, Reading
-from rcsa_ident.signals.verdict import Verdict
+from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.workflows.speed_bands import divided, speed_bands
 from tests.fixtures import by_hand
 
@@ -19,7 +20,7 @@ from tests.fixtures import by_hand
 def reading(number, speed, tooling="T1", usable=True):
     id = f"{tooling}-{number}"
     if not usable:
-        return Reading(id, tooling, speed, Verdict(("chatter",)))
+        return Reading(id, tooling, speed, Verdict((Remark(RecordCode.CHATTER, "chatter"),)))
     order = np.array([4, 8])
     value = np.full((2, 1), 1e-8 + 1e-9j)
     lines = AxisLines(
