@@ -6,6 +6,7 @@ import importlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,6 +14,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.reduction import ForkingPickler
+from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -221,7 +223,7 @@ def workers(processes: int | None, early: Sequence[str] = EARLY) -> Iterator[Wor
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(helpers, context, initializer=_import, initargs=(tuple(early),))
     try:
-        with _no_interrupts():
+        with _no_interrupts(), _no_script():
             for _ in range(helpers):
                 pool.submit(_nothing)
         yield Workers(helpers, pool)
@@ -244,6 +246,17 @@ def _no_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _no_script() -> Iterator[None]:
+    """Let processes that start here not run the script again that starts them: they need nothing of it, and it may have no guard."""
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
 
 
 def _import(early: Sequence[str]) -> None:
