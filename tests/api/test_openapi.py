@@ -35,6 +35,7 @@ def operations(schema):
     return [(path, method, o) for path, item in schema["paths"].items() for method, o in item.items()]
 
 
+@pytest.mark.slow
 def test_every_answer_has_a_schema_and_every_problem_is_a_problem_document(http):
     schema = http.get("/openapi.json").json()
     for path, method, operation in operations(schema):
@@ -56,6 +57,7 @@ def test_every_answer_has_a_schema_and_every_problem_is_a_problem_document(http)
             assert operation["summary"]
 
 
+@pytest.mark.slow
 def test_references_lead_somewhere(http):
     schema = http.get("/openapi.json").json()
 
@@ -144,6 +146,7 @@ def jobs(http, store, folder, machine, campaign, result) -> dict[str, dict[str, 
     return {"/v1/identifications": {"id": id, "campaign": campaign}, "/v1/lobes/": {"id": lobes}}
 
 
+@pytest.mark.slow
 def test_the_api_keeps_to_its_description(tmp_path, result, fuzzing):
     """Whatever is sent: no 5xx, no undocumented status, type or body. With a fixed seed, and so many cases for each operation."""
     schemathesis, checks = fuzzing

@@ -80,6 +80,7 @@ def test_the_same_again_changes_nothing_and_another_content_needs_a_word(client,
     assert client.http.put(f"{url}?replace=true", content=other, headers=BINARY).status_code == 200
 
 
+@pytest.mark.slow
 def test_air_cuts_come_and_go_and_verdicts_with_them(client, campaign, tmp_path):
     def verdict():
         return client.campaign(campaign).cuts[0].verdict
@@ -240,6 +241,7 @@ def test_a_file_comes_back_as_a_download_only(client, campaign, tmp_path):
     assert client.http.get(url, headers={"If-None-Match": answer.headers["etag"]}).status_code == 304
 
 
+@pytest.mark.slow
 def test_several_in_one_body_each_on_its_own(client, campaign, tmp_path):
     (tmp_path / "stranger.h5").write_bytes(b"x")
     (tmp_path / "c1_cut.h5").write_bytes(b"no recording")
@@ -269,6 +271,7 @@ def test_of_a_path_in_a_form_the_last_part_counts(client, campaign, tmp_path):
     assert [item["status"] for item in answer.json()["items"]] == [404, 200]
 
 
+@pytest.mark.slow
 def test_parts_follow_each_other(client, campaign, tmp_path):
     url, raw = f"/v1/campaigns/{campaign}/recordings/c0_cut.h5", content(tmp_path)
 

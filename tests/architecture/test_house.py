@@ -45,6 +45,7 @@ def test_format():
     passes("ruff", "format", "--check", ".")
 
 
+@pytest.mark.slow
 def test_types():
     passes("mypy")
 
@@ -90,6 +91,7 @@ def test_kernels_need_no_types():
     assert sorted(untyped) == [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in KERNELS]
 
 
+@pytest.mark.slow
 def test_kernels_without_the_compiler():
     """The same tests, with the kernels as plain Python: no result rests on what the compiler lets pass."""
     tests = [str(file_of_tests(path)) for path in KERNELS]

@@ -92,6 +92,7 @@ def test_a_progress_that_goes_to_a_cluster_tells_nobody(two):
     assert heard == [("x", "search", 1.0)]
 
 
+@pytest.mark.slow
 def test_after_an_error_no_worker_is_left():
     children = []
 

@@ -50,6 +50,7 @@ def real_size(tmp_path_factory):
     return channels, read_recording(path, SENSORS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
 def test_a_recording_of_real_size_is_that_of_hdf5(tmp_path, real_size, name):
     channels, native = real_size

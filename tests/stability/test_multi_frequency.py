@@ -102,6 +102,7 @@ def multiplier(modes, cutter, engagement, rpm, depth, coefficients=COEFFICIENTS,
     return values[np.argmax(np.abs(values))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("modes", [ONE, TWO])
 def test_published_slot(modes):
     found = lobes(modes, Cutter(2, 0.012), SLOT, SLOT_RPM)
@@ -126,6 +127,7 @@ def test_flips_are_where_the_published_case_has_them():
     np.testing.assert_array_equal(found.flip, flips)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("modes", "cutter", "engagement", "rpm"),
     [
@@ -171,6 +173,7 @@ def test_no_harmonics_is_zero_order(engagement, helix):
     np.testing.assert_array_equal(one.lobe, two.lobe)
 
 
+@pytest.mark.slow
 def test_more_harmonics_come_closer():
     cutter, engagement, rpm = Cutter(2, 0.012), Engagement.from_immersion(0.3, "down"), np.array([7000.0, 11000.0, 17000.0])
     exact = lobes(SKEWED, cutter, engagement, rpm).limit_depth
@@ -221,6 +224,7 @@ def test_lines_of_the_directional_matrix(engagement):
     np.testing.assert_allclose(helical, straight[380:421] * mean[:, None, None], atol=1e-8)
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None)
 @given(feed_angle=st.floats(-4.0, 4.0), turn=st.floats(-4.0, 4.0), immersion=st.floats(0.1, 1.0))
 def test_machine_and_feed_turned_together(feed_angle, turn, immersion):
@@ -230,6 +234,7 @@ def test_machine_and_feed_turned_together(feed_angle, turn, immersion):
     np.testing.assert_allclose(one.limit_depth, two.limit_depth, rtol=1e-6)
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None)
 @given(feed_angle=st.floats(-4.0, 4.0), immersion=st.floats(0.1, 1.0), factor=st.floats(0.3, 3.0))
 def test_symmetric_structure_and_scale(feed_angle, immersion, factor):
@@ -243,6 +248,7 @@ def test_symmetric_structure_and_scale(feed_angle, immersion, factor):
     np.testing.assert_allclose(one.limit_depth, factor * hard.limit_depth, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_order_of_the_speeds_and_the_depth_that_is_asked_for():
     rpm = [14000.0, 6000.0, 9000.0]
     one, two = (lobes(SKEWED, Cutter(2, 0.012, 0.5), HALF_DOWN, r).limit_depth for r in (rpm, rpm[::-1]))
