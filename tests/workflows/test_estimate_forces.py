@@ -10,7 +10,7 @@ import pytest
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
-from rcsa_ident.machine.machine import FlangeMachine
+from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.observer.tuning import PaperWalk, Resonators
 from rcsa_ident.report.forces import force_history, observer_frf
