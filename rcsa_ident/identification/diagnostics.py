@@ -18,7 +18,7 @@ from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import JOINT
 from rcsa_ident.identification.posterior import Posterior, spread
-from rcsa_ident.identification.result import IdentificationCode
+from rcsa_ident.identification.result import Identification, IdentificationCode, Status
 from rcsa_ident.remarks import Remark
 
 #: Above this share of unexplained signal the force model or the recordings are wrong.
@@ -35,6 +35,30 @@ LEAST_SIGNAL = 3.0
 #: A posterior narrower than this share of its prior was told by the data.
 TOLD = 0.5
 _JOINT = ("translational stiffness", "rotational stiffness", "translational damping", "rotational damping")
+
+
+def not_finite(data: IdentificationData) -> list[Remark]:
+    """Return which of the inputs hold something else than finite numbers; a line may have an infinite variance, which says nothing."""
+    found = []
+    for axis in data.axes:
+        inputs = {
+            "lines": np.isfinite(axis.lines),
+            "variances of the lines": ~np.isnan(axis.variance),
+            "receptances of the tool-holders": np.isfinite(np.hstack([axis.flange, axis.tip])),
+            "slopes of the simulated forces": np.isfinite(axis.force_slope),
+        }
+        wrong = [words for words, fine in inputs.items() if not np.all(fine)]
+        name = str(axis.axis).upper()
+        found += [Remark(IdentificationCode.NO_FINITE_FIT, f"{name}: not all {words} are finite numbers") for words in wrong]
+    return found
+
+
+def failed(data: IdentificationData, seed: int, method: str) -> Identification:
+    """Return the answer where no machine has a finite misfit to the data."""
+    words = "no machine has a finite misfit to the lines: units of recordings, toolings or coefficients may be wrong"
+    reasons = not_finite(data) or [Remark(IdentificationCode.NO_FINITE_FIT, words)]
+    nothing = np.zeros(0)
+    return Identification(Status.FAILED, tuple(reasons), seed, method, {}, (), nothing, nothing, nothing, ())
 
 
 def diagnose(

@@ -165,6 +165,8 @@ def promising(solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, 
         # what the nearest rank-one shape keeps of the promise
         kept = np.array([shapes[k, 0] ** 2, shapes[k, 0] * shapes[k, 1], shapes[k, 1] ** 2])
         promise[k] = 2.0 * kept @ right + kept @ matrix @ kept
+    if not np.all(np.isfinite(promise)):
+        raise FloatingPointError("no finite promise of another mode")
     best = promise.reshape(len(NEW_DAMPING), PLACES).argmin(axis=0) * PLACES + np.arange(PLACES)
     hill = promise[best]
     # one of each hill: its neighbours lead to the same place

@@ -17,7 +17,7 @@ from rcsa_ident.remarks import Remark, says
 
 
 class Status(StrEnum):
-    """May the answer be used?"""
+    """May the answer be used? With doubts where it is suspect; one that has failed has no axes."""
 
     CONVERGED = "converged"
     SUSPECT = "suspect"
@@ -25,8 +25,9 @@ class Status(StrEnum):
 
 
 class IdentificationCode(StrEnum):
-    """What may be said of an identification: first the reasons for doubt, then what the data cannot tell."""
+    """What may be said of an identification: why it has failed, reasons for doubt, and what the data cannot tell."""
 
+    NO_FINITE_FIT = "no-finite-fit"
     NOT_CONVERGED = "not-converged"
     WEAK_SIGNAL = "weak-signal"
     UNEXPLAINED = "unexplained"
