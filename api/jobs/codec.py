@@ -95,7 +95,7 @@ def _plain(value: Any) -> Any:
         return {"~table": [[_plain(key), _plain(each)] for key, each in value.items()]}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {f"~{_name(type(value))}": {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}}
-    raise Unknown(f"a {type(value).__name__} cannot be told")
+    raise Unknown(f"a {type(value).__name__} cannot be written")
 
 
 def _value(plain: Any) -> Any:

@@ -52,7 +52,7 @@ def carry(
         if job is None:
             return
         start = time.monotonic()
-        outcome = _worn(attempts) if job.attempts > attempts else _outcome(jobs, carriers[job.kind], job, token, remember, leave)
+        outcome = _given_up(attempts) if job.attempts > attempts else _outcome(jobs, carriers[job.kind], job, token, remember, leave)
         if outcome is not None:
             seconds = job.seconds + time.monotonic() - start
             names = ("state", "status", "problem", "texts", "applied")
@@ -89,7 +89,7 @@ def failed(detail: str, *errors: tuple[str, str, str]) -> Outcome:
     return Outcome("failed", "", problem=json.dumps({"detail": detail, "errors": entries}))
 
 
-def _worn(attempts: int) -> Outcome:
+def _given_up(attempts: int) -> Outcome:
     return failed(f"its process has died {attempts} times at the same step: perhaps it needs more memory than there is")
 
 
@@ -129,15 +129,15 @@ class JobWorker:
                         log.error("taken for dead", extra={"fields": {"worker": self.id}})
                         os._exit(3)
                     last_beat = now
-                self.look()
+                self.submit_accepted()
                 if now - last_round >= ROUND:
-                    self.round()
+                    self.reconcile()
                     last_round = now
             except Unavailable as error:
                 log.warning("the store is away", exc_info=error)
         self.jobs.leave(self.id, self.token)
 
-    def look(self) -> None:
+    def submit_accepted(self) -> None:
         """Hand all jobs to the engine that were accepted: also those between whose row and whose hand-over somebody died."""
         open = {job.id: job for job in self.jobs.open()}
         for id, job in open.items():
@@ -145,7 +145,7 @@ class JobWorker:
                 self.backend.submit(id, PRIORITY.get(job.kind, 10))
         self.submitted = set(open)
 
-    def round(self) -> None:
+    def reconcile(self) -> None:
         """Take over from the dead, forget what is over, and start again what the engine has lost."""
         # in this order: a job that is accepted in between is open, and not yet carried
         carried = {each.job: each for each in self.backend.carried()}
@@ -219,9 +219,9 @@ def process(number: int) -> str:
     return f"{number}:" if fields[0] == "Z" else f"{number}:{fields[19]}"
 
 
-def gone(told: str) -> bool:
+def gone(identity: str) -> bool:
     """Whether a process of this place has certainly ended."""
-    return not told.endswith(":") and process(int(told.partition(":")[0])) != told
+    return not identity.endswith(":") and process(int(identity.partition(":")[0])) != identity
 
 
 def _now() -> str:

@@ -168,7 +168,7 @@ class IdentificationData:
 
     @property
     def relative_speed(self) -> FloatArray:
-        """Of each cut, from -1 at the lowest to 1 at the highest, shape (k,)."""
+        """Speed of each cut, from -1 at the lowest to 1 at the highest, shape (k,)."""
         middle, half = self.speed_range
         return (self.spindle_speed - middle) / half if half > 0.0 else np.zeros(self.spindle_speed.size)
 

@@ -33,7 +33,7 @@ MOST_BAD_CUTS = 0.1
 #: Half of the lines must carry at least this many times their noise (its amplitude's root mean square).
 LEAST_SIGNAL = 3.0
 #: A posterior narrower than this share of its prior was told by the data.
-TOLD = 0.5
+INFORMED = 0.5
 _JOINT = ("translational stiffness", "rotational stiffness", "translational damping", "rotational damping")
 
 
@@ -129,7 +129,7 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
     layout, priors = solution.layout, misfit.priors
     deviation = np.sqrt(np.diag(covariance))
     for name, std in zip(_JOINT, deviation[layout.joint], strict=True):
-        if std > TOLD * priors.joint_spread:
+        if std > INFORMED * priors.joint_spread:
             note(
                 IdentificationCode.JOINT_UNKNOWN,
                 f"joint: its {name} cannot be told from the flange's own compliance (known to a factor of {np.exp(std):.1f}); "
@@ -148,7 +148,7 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
             )
     for c, coefficient in enumerate(data.coefficients):
         std, before = deviation[layout.force][c], data.coefficient_spread[c]
-        if std > TOLD * before and coefficient.term is not ForceTerm.RUNOUT:
+        if std > INFORMED * before and coefficient.term is not ForceTerm.RUNOUT:
             note(
                 IdentificationCode.COEFFICIENT_UNKNOWN,
                 f"{coefficient}: the cuts say little about it; it is known to {100.0 * min(std, before):.1f} %, nearly as before",
@@ -171,26 +171,26 @@ def _machine_contribution(axis: AxisData) -> Callable[[ModalModel, LumpedJoint],
     flange = axis.flange[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
     directions = tuple(c.dof for c in plane("flange", axis.axis))
 
-    def felt(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
+    def contribution(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
         soft = joint.compliance_along(axis.omega, directions)[:, :, None] * np.eye(2)
         together = flange + lever * (soft + modes.receptance(axis.omega).values)
         return np.einsum("ni,ni->n", axis.tip, np.linalg.solve(together, axis.tip[:, :, None])[:, :, 0])
 
-    return felt
+    return contribution
 
 
 def _band(posterior: Posterior, axis: AxisData) -> float:
     """Relative standard deviation of what a tooltip feels of the machine."""
-    felt = _machine_contribution(axis)
-    value = felt(*posterior.machine(axis.axis))
-    return float(np.linalg.norm(spread(posterior, axis.axis, felt)) / max(float(np.linalg.norm(value)), 1e-300))
+    contribution = _machine_contribution(axis)
+    value = contribution(*posterior.machine(axis.axis))
+    return float(np.linalg.norm(spread(posterior, axis.axis, contribution)) / max(float(np.linalg.norm(value)), 1e-300))
 
 
 def _difference(axis: AxisData, one: Candidate, two: Candidate) -> tuple[float, float]:
     """Relative difference of two candidates in what a tooltip feels, and the first one's deviation."""
-    felt = _machine_contribution(axis)
+    contribution = _machine_contribution(axis)
     first, second = (_flange_posterior(candidate) for candidate in (one, two))
-    value, other = felt(*first.machine(axis.axis)), felt(*second.machine(axis.axis))
+    value, other = contribution(*first.machine(axis.axis)), contribution(*second.machine(axis.axis))
     size = np.linalg.norm(value)
     if size == 0.0:
         return 0.0, 0.0

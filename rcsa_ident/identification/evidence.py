@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -57,7 +58,7 @@ class EvidenceSelection:
 
     @property
     def name(self) -> str:
-        """As in a result file."""
+        """Name of the method in a result file."""
         return "default"
 
     def run(self, data: IdentificationData, seed: int, map: Map = map, progress: Progress | None = None) -> Identification:
@@ -124,15 +125,11 @@ class SearchAxis:
     progress : callable or None
     """
 
+    phase: ClassVar[Phase] = Phase.SEARCH
     method: EvidenceSelection
     data: IdentificationData
     sequence: np.random.SeedSequence
     progress: Progress | None
-
-    @property
-    def phase(self) -> Phase:
-        """The search."""
-        return Phase.SEARCH
 
     def run(self) -> AxisSearch:
         """Explore, refine, learn the noise, and let the evidence choose the modes."""
@@ -191,16 +188,12 @@ class SearchFromOtherAxis:
     progress : callable or None
     """
 
+    phase: ClassVar[Phase] = Phase.OTHER_AXIS
     method: EvidenceSelection
     data: IdentificationData
     own: AxisSearch
     other: AxisSearch
     progress: Progress | None
-
-    @property
-    def phase(self) -> Phase:
-        """From the other axis."""
-        return Phase.OTHER_AXIS
 
     def run(self) -> AxisSearch:
         """Refine the other axis' answer, and drop the modes that this axis does not need."""

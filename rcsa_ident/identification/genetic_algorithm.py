@@ -7,7 +7,7 @@ force's phase is tied to the record; here each cut is granted its best delay on 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -73,7 +73,7 @@ class LiteralCost:
     nu: float = 700.0
 
     def weights(self, data: AxisData) -> FloatArray:
-        """All lines count alike."""
+        """Return ones: all lines count alike."""
         return np.ones(data.omega.size)
 
     def value(self, misfit: FloatArray, points: FloatArray, p3: FloatArray, space: SearchSpace) -> FloatArray:
@@ -97,7 +97,7 @@ class NoiseWeightedCost:
     strength: float = 0.01
 
     def weights(self, data: AxisData) -> FloatArray:
-        """Inverse variances."""
+        """Return the inverse variances of noise and model error together, shape (n,)."""
         return 1.0 / (data.noise + 0.5 * self.model_error**2 * np.abs(data.measured) ** 2)
 
     def value(self, misfit: FloatArray, points: FloatArray, p3: FloatArray, space: SearchSpace) -> FloatArray:
@@ -124,7 +124,7 @@ class PaperGeneticAlgorithm:
 
     @property
     def name(self) -> str:
-        """As in a result file."""
+        """Name of the method in a result file."""
         return "paper"
 
     def run(self, data: IdentificationData, seed: int, map: Map = map, progress: Progress | None = None) -> Identification:
@@ -290,18 +290,14 @@ class GeneticSearch:
     progress : callable or None
     """
 
+    phase: ClassVar[Phase] = Phase.SEARCH
     method: PaperGeneticAlgorithm
     data: IdentificationData
     seed: int
     progress: Progress | None = None
 
-    @property
-    def phase(self) -> Phase:
-        """The search."""
-        return Phase.SEARCH
-
     def run(self) -> tuple[FloatArray, list[float]]:
-        """Return the answer."""
+        """Return best variables and costs."""
         from pymoo.algorithms.soo.nonconvex.ga import GA
         from pymoo.core.problem import Problem
         from pymoo.optimize import minimize

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -137,16 +138,12 @@ class JointStart:
         Axis whose joint and force it starts from; None is the mean over the axes.
     """
 
+    phase: ClassVar[Phase] = Phase.BOTH_AXES
     data: IdentificationData
     priors: Priors
     searched: list[AxisSearch]
     coarse: float
     source: int | None
-
-    @property
-    def phase(self) -> Phase:
-        """Both axes."""
-        return Phase.BOTH_AXES
 
     def run(self) -> Candidate:
         """Return the polished candidate."""

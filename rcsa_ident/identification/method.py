@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -29,13 +29,11 @@ class Task(Protocol):
     numbers lead nowhere finite it raises ArithmeticError or LinAlgError.
     """
 
-    @property
-    def phase(self) -> Phase:
-        """The part that it belongs to, the same for all tasks of a call."""
-        ...
+    #: The part that it belongs to, the same for all tasks of a call.
+    phase: ClassVar[Phase]
 
     def run(self) -> Any:
-        """Return the answer."""
+        """Return the task's answer."""
         ...
 
 

@@ -266,8 +266,8 @@ def _share(squares: FloatArray, noise: FloatArray, size: FloatArray, freedom: fl
     """Solve for the share by bisection of its logarithm: the sum falls with it."""
     low, high = smallest, 1.0
     # lines of nothing, in a record without noise, say nothing about shares
-    told = (noise > 0.0) | (size > 0.0)
-    squares, noise, size = squares[told], noise[told], size[told]
+    informative = (noise > 0.0) | (size > 0.0)
+    squares, noise, size = squares[informative], noise[informative], size[informative]
     if np.sum(squares / (noise + 0.5 * low**2 * size)) <= freedom:
         return smallest
     for _ in range(60):

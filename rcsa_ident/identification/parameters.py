@@ -53,7 +53,7 @@ class AxisLayout:
 
     @property
     def pairs(self) -> int:
-        """Entries of a lower triangle."""
+        """Number of entries of a lower triangle."""
         return self.modes * (self.modes + 1) // 2
 
     @property
@@ -87,7 +87,7 @@ class Layout:
 
     @property
     def tail(self) -> int:
-        """Where begins what all axes share."""
+        """Place of the first unknown that all axes share."""
         return sum(a.size for a in self.axes)
 
     @property
@@ -102,21 +102,21 @@ class Layout:
 
     @property
     def joint(self) -> slice:
-        """Joint's logarithms."""
+        """Places of the joint's logarithms."""
         return slice(self.tail, self.tail + JOINT)
 
     @property
     def force(self) -> slice:
-        """Logarithms of the cutting coefficients' scales."""
+        """Places of the logarithms of the cutting coefficients' scales."""
         return slice(self.tail + JOINT, self.size - self.clampings)
 
     @property
     def clamping(self) -> slice:
-        """Tooth angles [rad]."""
+        """Places of the clampings' tooth angles [rad]."""
         return slice(self.size - self.clampings, self.size)
 
 
-def plain(*modes: int) -> Layout:
+def flange_layout(*modes: int) -> Layout:
     """Return the layout of axes with so many modes each, and a joint."""
     return Layout(tuple(AxisLayout(m) for m in modes))
 
@@ -306,7 +306,7 @@ def joint_of(logs: FloatArray) -> LumpedJoint:
     return LumpedJoint(k_t, k_r, c_t, c_r)
 
 
-def modes_of(axis: AxisParameters, dof: Dof) -> ModalModel:
+def flange_modes(axis: AxisParameters, dof: Dof) -> ModalModel:
     """Return the axis as complex modes at the flange (the paper's form), in SI, sorted by frequency."""
     lever = np.array([1.0, 1.0 / LEVER])
     residual = axis.residual @ axis.residual.T * np.outer(lever, lever)

@@ -56,7 +56,7 @@ class SteadyRecord:
 
     @property
     def variance(self) -> FloatArray:
-        """Of its real and of its imaginary part each, shape (orders, axes) [m^2]."""
+        """Variance of the real and of the imaginary part of the flange's displacement each, shape (orders, axes) [m^2]."""
         return np.sum(self.output_variance, axis=2)
 
     def has_fixture(self, axis: Dof) -> bool:
@@ -65,17 +65,17 @@ class SteadyRecord:
 
     @property
     def spindle_speed(self) -> float:
-        """From the record itself [rad/s]."""
+        """Spindle speed as the record itself has it [rad/s]."""
         return self.lines.spindle_speed
 
     @property
     def highest_order(self) -> int:
-        """Of the lines."""
+        """Highest multiple of the spindle frequency among the lines."""
         return self.lines.amplitude.shape[0] - 1
 
     @property
     def displacement(self) -> FloatArray:
-        """Displacement channels in the steady part, shape (n, axes) [m]."""
+        """Samples of the displacement channels in the steady part, shape (n, axes) [m]."""
         return self.recording.samples[self.part][:, self.columns[: len(self.axes)]]
 
     def segments(self, order: np.ndarray, count: int) -> ComplexArray:

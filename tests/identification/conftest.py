@@ -11,7 +11,7 @@ from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.data import prepare
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import DAMPING_UNIT, JOINT, plain
+from rcsa_ident.identification.parameters import DAMPING_UNIT, JOINT, flange_layout
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
@@ -181,7 +181,7 @@ def vector_of(layout, frequency_hz, seed=1):
 
 def machine_vector(frequency_hz, seed=1):
     """A vector of one axis, its flange the only output."""
-    return vector_of(plain(len(frequency_hz)), (frequency_hz,), seed)
+    return vector_of(flange_layout(len(frequency_hz)), (frequency_hz,), seed)
 
 
 def own(theta):

@@ -11,7 +11,7 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.identification.parameters import AxisLayout, joint_of, modes_of, pack, parameter_names, simple_axis, unpack
+from rcsa_ident.identification.parameters import AxisLayout, flange_modes, joint_of, pack, parameter_names, simple_axis, unpack
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import BOTH, Stage, Step
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode, Status
@@ -76,7 +76,7 @@ def identification() -> Identification:
         omega = 2.0 * np.pi * np.array([600.0, 1200.0, 3000.0, 700.0])
         value = np.array([1e-8, 3e-8j, -1e-9, 2e-8 + 1e-8j])
         axes[axis] = AxisResult(
-            modes_of(unpack(theta[:-4], layout), axis), joint_of(logs), 1.1, {"T1": 1.1}, 0.004, parameter_names(layout),
+            flange_modes(unpack(theta[:-4], layout), axis), joint_of(logs), 1.1, {"T1": 1.1}, 0.004, parameter_names(layout),
             Posterior(theta, np.diag(deviation**2), layout, (1050.0, 50.0)),
             {"omega": omega, "value": value, "model": 1.01 * value, "cut": np.array([0, 0, 0, 1]), "coherence": np.ones(4)},
         )  # fmt: skip
