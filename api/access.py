@@ -1,4 +1,4 @@
-"""One line of log and one count for each request, under an id that the answer carries, too; nothing unexpected leaves the service."""
+"""Access log, metrics and limits: one line and one count per request, under an id that the answer carries, too; errors never leak."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from api.work.pool import Busy
 log = logging.getLogger("rcsa_ident.service")
 _ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 RETRY = {"Retry-After": "2"}
-#: Time for a body that is no upload [s], what more it gets for each byte that has come, and for a request's head [s]; bytes of a head.
+#: Time limit of a body that is not an upload [s], its extension per received byte [s], and time limit [s] and size of a request's head.
 BODY_SECONDS, BYTE_SECONDS, HEAD_SECONDS, HEAD_BYTES = 60.0, 1e-4, 20.0, 262_144
 
 
 class AccessMonitor:
-    """The outermost layer of the service."""
+    """Middleware around the whole service: request ids, size and time limits of bodies, access log and metrics."""
 
-    def __init__(self, app: ASGIApp, parts: Components) -> None:
-        self.app, self.parts = app, parts
+    def __init__(self, app: ASGIApp, components: Components) -> None:
+        self.app, self.components = app, components
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
@@ -43,8 +43,8 @@ class AccessMonitor:
         id = given if _ID.fullmatch(given) else secrets.token_hex(8)
         request.state.request_id = id
         status, start = 0, time.perf_counter()
-        # routes that stream to the disk let more in
-        request.state.body = body = _Body(request, receive, self.parts.settings.max_body_bytes)
+        # routes that stream uploads to the disk raise this limit
+        request.state.body = body = _Body(request, receive, self.components.settings.max_body_bytes)
 
         async def observed(message: Message) -> None:
             nonlocal status
@@ -52,7 +52,7 @@ class AccessMonitor:
                 status = message["status"]
                 extra = [(b"x-request-id", id.encode()), (b"x-content-type-options", b"nosniff")]
                 if not body.read:
-                    # what nobody will read any more need not be sent, least of all if it has no end
+                    # the rest of a body that nobody will read need not be sent
                     extra.append((b"connection", b"close"))
                 message = {**message, "headers": [*message.get("headers", []), *extra]}
             await send(message)
@@ -65,32 +65,32 @@ class AccessMonitor:
             if status == 0:
                 await document(request, problem)(scope, receive, observed)
         finally:
-            self._told(scope, id, status, time.perf_counter() - start)
+            self._record(scope, id, status, time.perf_counter() - start)
 
-    def _told(self, scope: Scope, id: str, status: int, seconds: float) -> None:
-        # the pattern, not the path: ids would make a counter each
+    def _record(self, scope: Scope, id: str, status: int, seconds: float) -> None:
+        # the pattern, not the path: every id would make a counter of its own
         route = getattr(scope.get("route"), "path", "unknown")
         method = scope["method"] if scope["method"] in ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS") else "other"
-        self.parts.metrics.requests.labels(method, route, str(status)).inc()
-        self.parts.metrics.seconds.labels(method, route).observe(seconds)
+        self.components.metrics.requests.labels(method, route, str(status)).inc()
+        self.components.metrics.seconds.labels(method, route).observe(seconds)
         caller = scope.get("state", {}).get("caller")
         fields = {"request_id": id, "method": method, "route": route, "status": status, "seconds": round(seconds, 6)}
         log.info("request", extra={"fields": fields | ({} if caller is None else {"key": caller.id, "group": caller.group})})
 
 
 class _Body:
-    """A request's body, of which no more is let in than is allowed, whether its length is told before or not."""
+    """A request's body with limits of size and time, whether its length is declared or not."""
 
     def __init__(self, request: Request, receive: Receive, most: int) -> None:
         self.source, self.most, self.seen = receive, most, 0
         self.usual, self.start = most, time.monotonic()
-        told = request.headers.get("content-length", "")
-        self.told = int(told[:20]) if told.isdecimal() and told.isascii() else 0
-        self.read = self.told == 0 and "transfer-encoding" not in request.headers
+        text = request.headers.get("content-length", "")
+        self.declared = int(text[:20]) if text.isdecimal() and text.isascii() else 0
+        self.read = self.declared == 0 and "transfer-encoding" not in request.headers
 
     async def receive(self) -> Message:
-        """Return the next part."""
-        if self.told <= self.most:
+        """Return the next part of the body; raises 413 beyond the limit and 408 where it arrives too slowly."""
+        if self.declared <= self.most:
             message = await self._in_time()
             self.seen += len(message.get("body", b""))
             if self.seen <= self.most:
@@ -99,7 +99,7 @@ class _Body:
         raise HTTPException(413, f"at most {self.most} bytes")
 
     async def _in_time(self) -> Message:
-        """The next part, if it does not keep everybody waiting; those who let more in look at the clock themselves."""
+        """The next part within the time limit; routes that raise the size limit have a time limit of their own."""
         if self.read or self.most != self.usual:
             return await self.source()
         try:
@@ -109,8 +109,8 @@ class _Body:
             raise HTTPException(408, "too slow") from None
 
 
-class Patient(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
-    """A connection that is closed if the head of a request does not come in time, or does not end."""
+class TimedHeadProtocol(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
+    """HTTP connection that is closed when the head of a request takes too long or grows too large."""
 
     seconds, most = HEAD_SECONDS, HEAD_BYTES
 
@@ -121,7 +121,7 @@ class Patient(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
         if self.cycle is not None and not self.cycle.response_complete:
-            # a head has come to its end
+            # the head is complete
             self.waiting.cancel()
             self.came = 0
             return
@@ -132,7 +132,7 @@ class Patient(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
             self.waiting = self.loop.call_later(self.seconds, self._over)
 
     def _over(self) -> None:
-        # unless it has become a WebSocket
+        # unless the connection has become a WebSocket
         if self.transport.get_protocol() is self:
             self.transport.close()
 
@@ -143,14 +143,14 @@ class Patient(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
 
 def _problem(error: Exception) -> Problem:
     if isinstance(error, Unavailable):
-        return Problem(503, "the store does not answer now", headers=RETRY)
+        return Problem(503, "the database does not answer", headers=RETRY)
     if isinstance(error, Busy):
-        return Problem(503, "too many questions wait for an answer", headers=RETRY)
-    return Problem(500, "something unexpected happened; the log has it under this request's id")
+        return Problem(503, "too many queries are waiting for an answer", headers=RETRY)
+    return Problem(500, "an internal error occurred; it is logged under this request's id")
 
 
 class JsonLines(logging.Formatter):
-    """A record as one line of JSON."""
+    """Log formatter: a record as one line of JSON."""
 
     def format(self, record: logging.LogRecord) -> str:
         line: dict[str, Any] = {

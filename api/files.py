@@ -1,4 +1,4 @@
-"""Files of uploads: written once, named by what they hold, never by a client.
+"""Files of uploads: written once, named by the hash of their content, never by a client.
 
 A group has a folder of its own. What arrives goes to a part; a part that is complete is synced and takes its place under the hash
 of its content by one rename, so that a file that is there is whole. A row of the store refers to a file only after that.
@@ -19,29 +19,29 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-#: What a file is: an upload as it came, or the samples that were read from one.
+#: Kinds of files: uploads as received, samples read from them, and parts of unfinished uploads.
 UPLOADS, NORMALISED, PARTS = "uploads", "normalised", "parts"
-#: Age [s] at which a part that nobody goes on with is removed, and a file that no row refers to.
+#: Age [s] at which an abandoned part is removed, and a file that no row refers to.
 STALE_PART, STALE_FILE = 86400.0, 600.0
 _KEY = re.compile(r"[0-9a-f]{64}")
 
 
 class TooLarge(Exception):
-    """More than the group may keep."""
+    """The group's quota is exceeded."""
 
 
 class Full(Exception):
-    """The disk has to keep what is left of it."""
+    """The free space of the disk is below its limit."""
 
 
 @dataclass(frozen=True, slots=True)
 class Partial:
-    """An upload that goes on.
+    """State of a resumable upload.
 
     Parameters
     ----------
     offset : int [bytes]
-        So many are on the disk.
+        Received and on the disk.
     length : int [bytes]
         Of the whole.
     """
@@ -57,7 +57,7 @@ class Part:
     ----------
     path : Path
     offset : int
-        Bytes that are there already, which stay; what stands behind them goes.
+        Length to keep of an existing file; the rest is cut off.
     """
 
     def __init__(self, path: Path, offset: int = 0) -> None:
@@ -80,7 +80,7 @@ class Part:
         os.fsync(self.file.fileno())
 
     def close(self) -> None:
-        """Let go of the file; it stays."""
+        """Close the file and keep it."""
         self.file.close()
 
     def drop(self) -> None:
@@ -98,35 +98,35 @@ class Part:
 
 
 class Files:
-    """All files of all groups.
+    """Files of all groups.
 
     Parameters
     ----------
     folder : Path
         Made at the first upload.
     group_bytes : int
-        That a group may keep.
+        Quota of a group.
     free_bytes : int
-        That stay free on the disk.
+        Kept free on the disk.
     """
 
     def __init__(self, folder: Path, group_bytes: int = 1 << 62, free_bytes: int = 0) -> None:
         self.folder, self.group_bytes, self.free_bytes = folder, group_bytes, free_bytes
-        #: Held from a file's rename until its row stands, and while files without a row are removed.
+        #: Held from the rename of a file until its row is written, and while files without a row are removed.
         self.lock = threading.Lock()
 
     def of_group(self, group: str, kind: str) -> Path:
-        """Return a folder of a group, which is there then."""
+        """Return a folder of a group, made where it is missing."""
         folder = self.folder / _folder_name(group) / kind
         if not folder.is_dir():
             folder.mkdir(parents=True, exist_ok=True)
-            # also the names of the folders are on the disk before anything in them counts
+            # the names of the folders are on the disk before anything in them counts
             for each in (folder.parent, self.folder, self.folder.parent):
                 _sync_folder(each)
         return folder
 
     def path(self, group: str, kind: str, key: str) -> Path:
-        """Return where a file is or will be."""
+        """Return the path of a file, whether it exists or not."""
         if not _KEY.fullmatch(key) or kind not in (UPLOADS, NORMALISED):
             raise ValueError(f"no key of a file: {kind}/{key}")
         return self.of_group(group, kind) / f"{key}{'.h5' if kind == NORMALISED else ''}"
@@ -136,11 +136,11 @@ class Files:
         return Part(self.spare(group))
 
     def spare(self, group: str) -> Path:
-        """Return a path for a part, where nothing is."""
+        """Return an unused path for a part."""
         return self.of_group(group, PARTS) / f"{secrets.token_hex(16)}.part"
 
     def check_space(self, group: str, more: int = 0) -> None:
-        """Raise `TooLarge` or `Full` if so many bytes more have no place."""
+        """Raise `TooLarge` or `Full` where so many more bytes do not fit."""
         used = self.used(group)
         if used + more > self.group_bytes:
             raise TooLarge(f"the group keeps {used} bytes, and may keep {self.group_bytes}")
@@ -148,7 +148,7 @@ class Files:
             raise Full
 
     def used(self, group: str) -> int:
-        """Return the bytes of all files of a group, parts among them."""
+        """Return the size of all files of a group, including parts [bytes]."""
         total = 0
         for kind in (UPLOADS, NORMALISED, PARTS):
             for entry in os.scandir(self.of_group(group, kind)):
@@ -159,18 +159,18 @@ class Files:
         return total
 
     def keep(self, group: str, kind: str, key: str, source: Path) -> None:
-        """Give a synced part its place; where the same is there already it is dropped. The caller holds `lock`."""
+        """Rename a synced part to its final name, replacing an equal file. The caller holds `lock`."""
         target = self.path(group, kind, key)
         os.replace(source, target)
         _sync_folder(target.parent)
 
     def remove(self, group: str, keys: Iterable[tuple[str, str]]) -> None:
-        """Remove files. The caller holds `lock`, and knows that no row refers to them."""
+        """Remove files. The caller holds `lock` and has checked that no row refers to them."""
         for kind, key in keys:
             self.path(group, kind, key).unlink(missing_ok=True)
 
     def partial(self, group: str, name: str) -> tuple[Path, Partial | None]:
-        """Return where the parts of an upload of a campaign's recording are gathered, and how far it is."""
+        """Return the path of a resumable upload, and its state."""
         path = self.of_group(group, PARTS) / f"{hashlib.sha256(name.encode()).hexdigest()}.part"
         try:
             state = Partial(**json.loads(path.with_suffix(".json").read_text(encoding="utf-8")))
@@ -180,7 +180,7 @@ class Files:
         return path, state if there else None
 
     def note(self, path: Path, state: Partial) -> None:
-        """Keep how far an upload is; its bytes are synced before."""
+        """Record the state of a resumable upload, whose bytes have been synced."""
         target, new = path.with_suffix(".json"), path.with_suffix(".new")
         with new.open("w", encoding="utf-8") as file:
             json.dump(asdict(state), file)
@@ -190,7 +190,7 @@ class Files:
         _sync_folder(target.parent)
 
     def forget(self, path: Path) -> None:
-        """Remove what was gathered of an upload."""
+        """Remove a resumable upload."""
         for each in (path.with_suffix(".json"), path.with_suffix(".new"), path):
             each.unlink(missing_ok=True)
 
@@ -200,14 +200,14 @@ class Files:
         Parameters
         ----------
         kept : mapping of group to files
-            That rows refer to.
+            Files that rows refer to.
         """
         now, count = time.time() if now is None else now, 0
         known = {_folder_name(group): files for group, files in kept.items()}
         for folder in self.folder.iterdir() if self.folder.is_dir() else ():
             for kind, age in ((UPLOADS, STALE_FILE), (NORMALISED, STALE_FILE), (PARTS, STALE_PART)):
                 for entry in list(os.scandir(folder / kind)) if (folder / kind).is_dir() else ():
-                    # a row follows its file's last change by minutes at most
+                    # a row is written within minutes of its file
                     referred = (kind, entry.name.removesuffix(".h5")) in known.get(folder.name, ())
                     if not referred and now - entry.stat().st_mtime > age:
                         Path(entry.path).unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""The service, put together in one place."""
+"""The application: its components are chosen and wired here."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from fastapi.openapi.utils import get_openapi
 
 from api import problems
 from api.access import AccessMonitor
-from api.components import Components, JobCounts, Metrics, Rates
+from api.components import Components, Rates
 from api.files import Files
 from api.jobs.event_feed import EventFeeds
 from api.jobs.supervisor import Supervisor
-from api.reading.reader import Limits, Reader, Reading
+from api.metrics import JobCounts, Metrics
+from api.reading.reader import Limits, Reader
 from api.reading.uploads import Uploads
 from api.routes import (
     campaigns,
@@ -57,9 +58,9 @@ def create_app(
     settings: Settings,
     store: Store | None = None,
     work: Work | None = None,
-    reader: Reading | None = None,
+    reader: Work | None = None,
     host: Host | None = None,
-    crew: Supervisor | None = None,
+    supervisor: Supervisor | None = None,
 ) -> FastAPI:
     """Return the service.
 
@@ -67,9 +68,9 @@ def create_app(
     ----------
     settings : Settings
     store, work, reader, host : optional
-        In place of the database and the processes that the settings name.
-    crew : Supervisor, optional
-        Who carries out jobs; without one they wait for workers that run elsewhere.
+        Replace the database and the processes that the settings name.
+    supervisor : Supervisor, optional
+        Of the job workers; without one, jobs wait for workers that run elsewhere.
     """
     if store is None and not settings.database:
         settings.data.mkdir(parents=True, exist_ok=True)
@@ -82,8 +83,8 @@ def create_app(
     rates, metrics = Rates(settings.requests_per_minute, settings.burst), Metrics(lambda: float(workers.waiting))
     hub = Hub(StreamProcess() if host is None else host, _stream_limits(settings), metrics)
     metrics.streams.set_function(lambda: float(len(hub.sessions)))
-    parts = Components(
-        settings, kept, workers, files, readers, uploads, rates, metrics, hub, EventFeeds(kept.jobs, settings.watchers), crew
+    components = Components(
+        settings, kept, workers, files, readers, uploads, rates, metrics, hub, EventFeeds(kept.jobs, settings.watchers), supervisor
     )
     metrics.registry.register(JobCounts(kept.jobs))
 
@@ -92,15 +93,15 @@ def create_app(
         workers.start()
         readers.start()
         await hub.start()
-        if crew is not None:
-            crew.start()
-        attending = asyncio.create_task(uploads.attend())
+        if supervisor is not None:
+            supervisor.start()
+        maintenance = asyncio.create_task(uploads.maintain())
         yield
         await hub.stop()
-        attending.cancel()
-        await asyncio.gather(attending, return_exceptions=True)
-        if crew is not None:
-            await asyncio.to_thread(crew.stop)
+        maintenance.cancel()
+        await asyncio.gather(maintenance, return_exceptions=True)
+        if supervisor is not None:
+            await asyncio.to_thread(supervisor.stop)
         readers.stop()
         workers.stop()
         kept.close()
@@ -113,14 +114,14 @@ def create_app(
         docs_url=None,
         redoc_url=None,
     )
-    app.state.parts = parts
+    app.state.components = components
     problems.install(app)
     app.include_router(health.router)
     app.include_router(static_files.router)
     about = (keys, machines, toolings, libraries, materials, examples)
     for each in (*about, campaigns, recordings, resumable_upload, multi_upload, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
-    app.add_middleware(AccessMonitor, parts=parts)
+    app.add_middleware(AccessMonitor, components=components)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
     return app
 
@@ -134,7 +135,7 @@ def _openapi(app: FastAPI) -> dict[str, Any]:
     if app.openapi_schema is None:
         schema = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
         components = schema.setdefault("components", {})
-        # bodies that a route reads itself, and the answer that every route may give
+        # bodies that routes parse themselves, and the error answer of all routes
         for model in (ProblemDocument, NewCampaign, ForceQuery, ForceUpload):
             described = model.model_json_schema(ref_template="#/components/schemas/{model}")
             components.setdefault("schemas", {}).update(described.pop("$defs"))

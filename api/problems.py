@@ -1,4 +1,4 @@
-"""Problem documents (RFC 9457): every error that a client sees, with the field at fault; never the text of an unexpected exception."""
+"""Problem documents (RFC 9457): every error that a client sees, with the fields at fault; never the text of an unexpected exception."""
 
 from __future__ import annotations
 
@@ -17,11 +17,20 @@ from rcsa_ident.io.validated_table import describe
 
 MEDIA_TYPE = "application/problem+json"
 _LONGEST = 200
+#: The library's fields as the bodies call them.
+_FIELDS = {
+    "spindle_speed": "spindle_speed_rpm",
+    "idle share": "idle_percent",
+    "runout": "cut.runout_um",
+    "tangential coefficient": "cut.ktc_mpa",
+    "radial ratio": "cut.krc",
+    "feed_per_tooth": "cut.feed_per_tooth_mm",
+}
 _TITLES = {413: "Content too large", 422: "Input not usable"}
 
 
 class Problem(Exception):
-    """An answer other than the one that was asked for.
+    """An error answer.
 
     Parameters
     ----------
@@ -45,11 +54,11 @@ def title(status: int) -> str:
 
 def document(request: Request, problem: Problem) -> JSONResponse:
     """Return a problem as the answer to a request."""
-    return JSONResponse(told(problem, getattr(request.state, "request_id", "")), problem.status, problem.headers, MEDIA_TYPE)
+    return JSONResponse(content_of(problem, getattr(request.state, "request_id", "")), problem.status, problem.headers, MEDIA_TYPE)
 
 
-def told(problem: Problem, request_id: str) -> dict[str, Any]:
-    """Return a problem as a document."""
+def content_of(problem: Problem, request_id: str) -> dict[str, Any]:
+    """Return the content of a problem document."""
     content: dict[str, Any] = {"type": "about:blank", "title": title(problem.status), "status": problem.status, "detail": problem.detail}
     if problem.errors:
         content["errors"] = problem.errors
@@ -57,17 +66,18 @@ def told(problem: Problem, request_id: str) -> dict[str, Any]:
 
 
 def of_input(error: InputError) -> Problem:
-    """Return the problem of something that is not usable."""
+    """Return the problem of unusable input."""
     found = _short(error.found if isinstance(error.found, str) else describe(error.found))
-    return Problem(422, f"{error.field}: found {found}, allowed is {error.allowed}", [_entry(error.field, found, error.allowed)])
+    field = _FIELDS.get(error.field, error.field)
+    return Problem(422, f"{field}: found {found}, allowed is {error.allowed}", [_entry(field, found, error.allowed)])
 
 
 def of_validation(errors: Sequence[Any]) -> Problem:
-    """Return the problem of a body, a query or a path that has not the documented form; long values are cut."""
+    """Return the problem of a body, query or path that does not match its schema; long values are cut."""
     entries = []
     for error in errors[:20]:
         place = [str(part) for part in error["loc"] if part not in ("body", "query", "path", "header")]
-        # of a choice between forms pydantic names its own types, which the client has not written
+        # for a union pydantic reports its own type names, which the client has not written
         name = ".".join(place) or str(error["loc"][0] if error["loc"] else "body")
         found = "nothing" if error["type"] == "missing" else _short(describe(error.get("input")))
         entries.append(_entry(name, found, error["msg"]))
@@ -80,7 +90,7 @@ def _entry(field: str, found: str, allowed: str) -> dict[str, str]:
 
 
 def _short(text: str) -> str:
-    # a lone half of a surrogate pair has no UTF-8
+    # a lone surrogate has no encoding in UTF-8
     text = text.encode("utf-8", "backslashreplace").decode("utf-8")
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
 
@@ -110,10 +120,10 @@ def install(app: FastAPI) -> None:
         assert isinstance(error, HTTPException)
         words = {
             413: f"the body is too large: {error.detail}",
-            400: "the body can not be read",
-            408: "the body comes too slowly",
-            404: "nothing is there",
-            405: "the path does not take this method",
+            400: "the body cannot be read",
+            408: "the body arrives too slowly",
+            404: "there is nothing at this path",
+            405: "this path does not support the method",
         }
         detail = words.get(error.status_code, title(error.status_code))
         headers = dict(error.headers or {})

@@ -25,12 +25,12 @@ def serve(
     port: Annotated[int | None, typer.Option(help="Port (RCSA_IDENT_PORT).", show_default="8000")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes that compute (RCSA_IDENT_WORKERS).", show_default="cores")] = None,
 ) -> None:
-    """Start the service, unless a command is named."""
+    """Start the service, unless a command is given."""
     from api.settings import from_environment
 
     given = {"data": data, "host": host, "port": port, "workers": workers}
     try:
-        # with both at once, so that a host is never judged beside the keys of another
+        # options and environment together, so that HOST and KEYS are checked against each other once
         found = {f"RCSA_IDENT_{name.upper()}": str(value) for name, value in given.items() if value is not None}
         settings = from_environment({**os.environ, **found})
     except InputError as error:
@@ -44,10 +44,10 @@ def serve(
 def create_key(
     context: typer.Context,
     group: Annotated[str, typer.Option(help="Whose machines and toolings it opens.")] = "default",
-    scopes: Annotated[str, typer.Option(help="Some of read, upload, run, admin, divided by commas.")] = "admin",
+    scopes: Annotated[str, typer.Option(help="Some of read, upload, run, admin, separated by commas.")] = "admin",
     label: Annotated[str, typer.Option(help="What it is for.")] = "",
 ) -> None:
-    """Make a key and print it once; the first one of a group is made so."""
+    """Make an API key and print it once: the way to the first key of a group."""
     import re
 
     from api.schemas.common import NAME_PATTERN
@@ -57,7 +57,7 @@ def create_key(
     try:
         wanted = tuple(dict.fromkeys(part.strip() for part in scopes.split(",")))
         if not set(wanted) <= set(SCOPES):
-            raise InputError("--scopes", scopes, f"some of {', '.join(SCOPES)}, divided by commas")
+            raise InputError("--scopes", scopes, f"some of {', '.join(SCOPES)}, separated by commas")
         if not re.fullmatch(NAME_PATTERN.strip("^$"), group):
             raise InputError("--group", group, "letters, digits, blanks and . _ + - ( ), at most 64")
         if not label.isprintable() or len(label) > 200:
@@ -79,7 +79,7 @@ def worker(
     context: typer.Context,
     count: Annotated[int | None, typer.Option(min=1, max=256, help="Processes (RCSA_IDENT_JOB_WORKERS).", show_default=False)] = None,
 ) -> None:
-    """Carry out jobs of a service that runs elsewhere: with the same database, and the same folder for recordings."""
+    """Run job workers for a service that runs elsewhere, with the same database and the same folder for recordings."""
     import signal
     import threading
 
@@ -87,20 +87,20 @@ def worker(
 
     settings = context.obj
     _log()
-    crew = Supervisor(count or max(settings.job_workers, 1), job_worker, settings, settings.job_nice)
+    supervisor = Supervisor(count or max(settings.job_workers, 1), job_worker, settings, settings.job_nice)
     ended = threading.Event()
     for each in (signal.SIGTERM, signal.SIGINT):
         signal.signal(each, lambda *_: ended.set())
-    crew.start()
+    supervisor.start()
     ended.wait()
-    crew.stop()
+    supervisor.stop()
 
 
 @app.command("backup")
 def backup_store(
     context: typer.Context, file: Annotated[Path, typer.Argument(metavar="FILE.tar", help="To write; nothing may be there yet.")]
 ) -> None:
-    """Write the embedded store into one file, while the service runs."""
+    """Back up the embedded store into one file while the service runs."""
     from api.backups.save import backup
 
     settings = context.obj
@@ -125,7 +125,7 @@ def restore_store(
     file: Annotated[Path, typer.Argument(metavar="FILE.tar", help="Written by backup.")],
     data: Annotated[Path, typer.Option(help="Folder to make; nothing may be in it yet.", show_default=False)],
 ) -> None:
-    """Make a data folder of a backup, for --data of a service that starts on it."""
+    """Restore a backup into a data folder, for --data of a service."""
     from api.backups.load import restore
 
     try:
@@ -136,7 +136,7 @@ def restore_store(
 
 
 def job_worker(settings: Any, ready: Callable[[], None], stop: Event) -> None:
-    """Carry out jobs until told to stop: what each process for jobs does."""
+    """Carry out jobs until `stop` is set: what each job worker does."""
     from functools import partial
 
     from api.files import Files
@@ -166,7 +166,7 @@ def _log() -> None:
 def _run(settings: object) -> None:
     import uvicorn
 
-    from api.access import Patient
+    from api.access import TimedHeadProtocol
     from api.jobs.supervisor import Supervisor
     from api.main import create_app
     from api.settings import Settings
@@ -174,19 +174,19 @@ def _run(settings: object) -> None:
     assert isinstance(settings, Settings)
     _log()
     try:
-        service = create_app(settings, crew=Supervisor(settings.job_workers, job_worker, settings, settings.job_nice))
+        service = create_app(settings, supervisor=Supervisor(settings.job_workers, job_worker, settings, settings.job_nice))
     except InputError as error:
         _fail(error)
     except OSError as error:
         _fail(InputError("RCSA_IDENT_DATA", error.strerror or "an error", "a folder that can be made and written to"))
-    told = {"store": (settings.database and "database by URL") or str(settings.data), "workers": settings.workers}
+    fields = {"store": (settings.database and "database by URL") or str(settings.data), "workers": settings.workers}
     log = logging.getLogger("rcsa_ident.service")
-    log.info("starting", extra={"fields": told | {"address": f"http://{settings.host}:{settings.port}"}})
+    log.info("starting", extra={"fields": fields | {"address": f"http://{settings.host}:{settings.port}"}})
     if not settings.asks_for_keys:
         log.warning("no keys are asked for: everybody on this machine may do everything (RCSA_IDENT_KEYS=on asks for them)")
-    # streams of events and forces would keep it from ending
-    # samples are noise to the last bits: packing them costs a core and gains nothing
-    limits: dict[str, Any] = {"timeout_graceful_shutdown": 3, "ws_per_message_deflate": False, "http": Patient}
+    # open streams of events and forces would delay the end
+    # no compression: measured samples do not shrink
+    limits: dict[str, Any] = {"timeout_graceful_shutdown": 3, "ws_per_message_deflate": False, "http": TimedHeadProtocol}
     uvicorn.run(service, host=settings.host, port=settings.port, log_config=None, access_log=False, server_header=False, **limits)
 
 

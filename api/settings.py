@@ -1,4 +1,4 @@
-"""What a person may set about the service, from the environment; read once, then handed down."""
+"""Settings of the service, read once from the environment."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ class Settings:
         if self.dask and not ADDRESS.fullmatch(self.dask):
             raise InputError(f"{PREFIX}DASK", self.dask, "the address of a Dask scheduler, as tcp://host:8786")
         if self.keys is False and not self.loopback:
-            raise InputError(f"{PREFIX}KEYS", "off", f"on: the service listens on {self.host}, which others reach, too")
+            raise InputError(f"{PREFIX}KEYS", "off", f"on, since the service listens on {self.host}, which other machines reach")
 
     @property
     def loopback(self) -> bool:
@@ -153,17 +153,17 @@ class Settings:
 
     @property
     def asks_for_keys(self) -> bool:
-        """Whether a query needs a key."""
+        """Whether requests need an API key."""
         return not self.loopback if self.keys is None else self.keys
 
     @property
     def database_url(self) -> str:
-        """Where the store is."""
+        """URL of the store's database."""
         return self.database or f"sqlite:///{self.data / 'service.db'}"
 
     @property
     def engine_url(self) -> str:
-        """Where the durable engine keeps what jobs remember."""
+        """URL of the durable engine's database, which holds the steps of jobs."""
         return self.database or f"sqlite:///{self.data / 'jobs.db'}"
 
 

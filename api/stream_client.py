@@ -1,4 +1,4 @@
-"""A data logger's side of a force stream, typed: samples out, forces and events in, from one thread or two.
+"""Client of a force stream for data loggers: sends samples, receives forces and events, from one thread or two.
 
 Needs nothing but this package's own base.
 
@@ -52,7 +52,7 @@ class Forces:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What the service tells: opened, settling, ready, status, restarted, end.
+    """An event of the stream: opened, settling, ready, status, restarted or end.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class StreamRefused(Exception):
     Parameters
     ----------
     code : int
-        Of the WebSocket's close, or the HTTP status where none was opened.
+        Close code of the WebSocket, or the HTTP status where it was not opened.
     problem : mapping
         Problem document; empty where there is none.
     """
@@ -97,7 +97,7 @@ class ForceStream:
         self.following, self._problem, self._opened = 0, dict[str, Any](), ExitStack()
         headers = {} if key is None else {"X-API-Key": key}
         try:
-            # noise does not shrink
+            # measured samples do not shrink
             opening = connect(f"{url}/v1/forces/stream", additional_headers=headers, compression=None, max_size=None)
             self.socket = self._opened.enter_context(opening)
         except InvalidStatus as error:
@@ -111,7 +111,7 @@ class ForceStream:
         self._opened.close()
 
     def send(self, samples: FloatArray, first: int | None = None) -> None:
-        """Send samples, shape (n, c); by default they follow those before.
+        """Send samples, shape (n, c), by default directly after the previous ones.
 
         Raises
         ------
@@ -124,16 +124,16 @@ class ForceStream:
         self.following = first + values.shape[0]
 
     def end(self) -> None:
-        """Say that no more samples come: what the service still has is answered, then it ends the stream."""
+        """End the stream after the forces of all samples sent so far."""
         self._send('{"event": "end"}')
 
     def received(self, timeout: float | None = None) -> Iterator[Forces | Event]:
-        """Yield what comes, until the stream ends or nothing has come for so long [s]; 0: what is there already.
+        """Yield forces and events until the stream ends or nothing arrives for so long [s]; 0 for those that have arrived already.
 
         Raises
         ------
         StreamRefused
-            The service has ended the stream otherwise than by its end.
+            The service has ended the stream with a problem.
         """
         while True:
             try:
@@ -158,7 +158,7 @@ class ForceStream:
         try:
             self.socket.send(message)
         except ConnectionClosed:
-            # what was told before the end says why
+            # a problem document before the close has the reason
             for _ in self.received(1.0):
                 pass
             raise StreamRefused(1000, {"detail": "the stream has ended"}) from None

@@ -249,7 +249,7 @@ def _database(kind: str) -> Iterator[str]:
     if kind == "sqlite":
         yield ""
         return
-    from tests.api.postgres import new_database, server
+    from tests.fixtures.postgres import new_database, server
 
     with server(safe=True) as url:
         yield new_database(url)

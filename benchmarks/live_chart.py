@@ -18,7 +18,7 @@ import numpy as np
 from api.client import Client
 from benchmarks.service import serving
 from benchmarks.streaming import ENTRY, SAG, WANDER, paced, prepared
-from benchmarks.turning import turning_cut
+from tests.fixtures.turning_cut import turning_cut
 
 CHROMIUM = "/usr/bin/chromium"
 _QUIET = (

@@ -1,4 +1,4 @@
-"""The published modes (tables A.4-A.6) with nominal toolings, both signs of the printed phi_r, beside the paper's words.
+"""The published modes ([inprocess], tables A.4-A.6) with nominal toolings, both signs of the printed phi_r, beside what is said there.
 
 Words: case 2 chatters at the mode near 2400 Hz; the idle FRFs also show one near 2700 Hz. Passivity: the smallest eigenvalue of
 the mobility's Hermitian part relative to the mobility, and on how many lines Im C11 is above zero (it feeds energy in).
@@ -79,5 +79,5 @@ def run() -> list[dict[str, Any]]:
         )
         if case["tooling"] == 2 and case["axis"] == "Y" and case["peaks_hz"]:
             strongest = float(case["peaks_hz"][int(np.argmax(case["peaks_um_per_n"]))])
-            rows.append(row(f"strongest peak, tooling 2, Y, phi_r {sign.strip()}", strongest, 2400.0, "Hz", "peer: the paper's words"))
+            rows.append(row(f"strongest peak, tooling 2, Y, phi_r {sign.strip()}", strongest, 2400.0, "Hz", "peer: the source's words"))
     return rows

@@ -16,17 +16,17 @@ from benchmarks.timing import best_of, once, row
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.deflection import ToolDeflection, deflected_edge, deflected_process
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
-from rcsa_ident.stability.deformation import ToolDeflection, deflected_edge, deflected_engagement
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.stability_map import stability_map
 from rcsa_ident.stability.tip_modes import TipModes
 
 RPM = np.pi / 30.0
-#: Insperger & Stepan's mill.
+#: The two-tooth mill of [insperger2004].
 FREQUENCY, DAMPING, MASS = 922.0, 0.011, 0.03993
 KT, KN = 6e8, 2e8
 SPEEDS, DEPTHS = np.linspace(5000.0, 25000.0, 200), np.linspace(5e-5, 5e-3, 100)
@@ -108,7 +108,7 @@ def _many_modes() -> dict[str, Any]:
 
 
 def _robot_cut() -> list[dict[str, Any]]:
-    """Limits of the robot cut of Du et al., Metals 13 (2023) 974, with a tool of 10 mm, beside reference figures of the same model."""
+    """Limits of the robot cut of [du2023] with a tool of 10 mm, beside reference figures of the same model."""
     tip = TipModes.of({Dof.X: modes(Dof.X, 2060.49, 0.0237, 3.232**-2), Dof.Y: modes(Dof.Y, 2045.24, 0.0207, 4.119**-2)})
     cutter, engagement = Cutter(3, 0.010, np.radians(45.0)), Engagement.from_immersion(0.4, "down")
     coefficients = CuttingCoefficients(855e6, 270.93 / 855.0, tangential_edge=15.64e3, radial_edge=14.167e3)
@@ -124,8 +124,8 @@ def _robot_cut() -> list[dict[str, Any]]:
     }
     rows, at_8200 = [], {}
     for name, (process, deflection, reference) in columns.items():
-        engagements = None if deflection is None else deflected_engagement(process, deflection)
-        limit = 1e3 * stability_lobes(tip, process, speeds, 0.02, FullDiscretisation(engagements=engagements)).limit_depth
+        cut = process if deflection is None else deflected_process(process, deflection)
+        limit = 1e3 * stability_lobes(tip, cut, speeds, 0.02, FullDiscretisation()).limit_depth
         at_8200[name] = float(limit[4])
         worst = 100.0 * float(np.max(np.abs(limit / np.array(reference) - 1.0)))
         shown = ", ".join(f"{value:.3f}" for value in limit)

@@ -1,7 +1,7 @@
 """Force streams against the service as its command starts it: a minute at its pace beside an identification, an hour as fast as it goes.
 
-The signals are those of the virtual machine in the paper's cut (`turning`), 51.2 kHz, gap and fixture's acceleration of two axes: half a
-second more than the first second in air, then the cut, under a spindle whose speed wanders. The service knows the machine as it was
+The signals are those of the virtual machine in the cut of [inprocess] (`turning`), 51.2 kHz, gap and fixture's acceleration of two axes:
+half a second more than the first second in air, then the cut, under a spindle whose speed wanders. The service knows the machine as it was
 identified from the sample runs. The client is this process, on the same cores.
 """
 
@@ -21,10 +21,12 @@ import numpy as np
 
 from api.client import Client
 from api.stream_client import Event, Forces, ForceStream
-from benchmarks.observer import DATA, relative_error
+from benchmarks.observer import DATA
 from benchmarks.service import serving
 from benchmarks.timing import row
-from benchmarks.turning import TurningCut, turning_cut
+from tests.fixtures.service import processes
+from tests.fixtures.turning_cut import TurningCut, turning_cut
+from tests.fixtures.virtual_cut import relative_error
 
 #: Samples of a frame: 20 ms.
 FRAME = 1024
@@ -185,27 +187,6 @@ def told(found: dict[str, Any], count: int, true: np.ndarray, rate: float, besid
 def taken() -> float:
     """Return the time that the host of a virtual machine has kept its cores for others [s]."""
     return int(Path("/proc/stat").read_text().split(maxsplit=9)[8]) / os.sysconf("SC_CLK_TCK")
-
-
-def processes() -> dict[str, tuple[float, float]]:
-    """Return time on a core [s] and memory [MB] of the service's process and that of its streams, newest first."""
-    found: dict[str, tuple[float, float]] = {}
-    ours = {str(os.getpid())}
-    for folder in sorted(Path("/proc").glob("[0-9]*"), key=lambda f: int(f.name)):
-        try:
-            fields = (folder / "stat").read_text().rsplit(")", 1)[1].split()
-            name, parent = (folder / "comm").read_text().strip(), fields[1]
-            pages = int((folder / "statm").read_text().split()[1])
-        except (OSError, IndexError):
-            continue
-        if parent in ours:
-            # children of this process, and theirs
-            ours.add(folder.name)
-            kind = "streams" if name == "rcsa-streams" else "service" if parent == str(os.getpid()) else ""
-            if kind:
-                ticks = int(fields[11]) + int(fields[12])
-                found[kind] = ticks / os.sysconf("SC_CLK_TCK"), pages * os.sysconf("SC_PAGE_SIZE") / 1e6
-    return found
 
 
 def hour(seconds: float) -> None:

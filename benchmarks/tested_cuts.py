@@ -1,4 +1,4 @@
-"""The paper's Fig. 8 on the sample machine: its four cases (Table 3), each with 33 cuts that the virtual machine tries.
+"""[inprocess], Fig. 8, on the sample machine: its four cases (Table 3), each with 33 cuts that the virtual machine tries.
 
 Lobes come from the identified sample runs, whose cuts were half-immersion, stable and of the first two toolings alone; whether a cut
 chatters is told by a march of the true machine. Cuts lie between 0.6 and 1.6 times the zero-order limit of the true receptance; those

@@ -1,37 +1,128 @@
-"""What was on the machine: toolings, workpiece, sensors, cuts. A campaign file becomes these nouns."""
+"""What is on the machine: toolings, workpiece, sensors, cuts that were made, and a cut that somebody asks about."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, feed_direction
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.materials import material
+from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
+from rcsa_ident.errors import InputError
+from rcsa_ident.shown import Saved, Shown
 from rcsa_ident.signals.recording import Sensor
 from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.units import to_rpm
 
 
-@dataclass(frozen=True, slots=True)
-class Tooling:
+@dataclass(frozen=True, slots=True, repr=False)
+class Tooling(Saved):
     """A cutter, with the tool and holder that carry it."""
 
     name: str
     cutter: Cutter
     assembly: ToolAssembly
 
+    def __str__(self) -> str:
+        return f"{self.name}: {self.cutter}, {self.assembly}"
 
-@dataclass(frozen=True, slots=True)
-class Workpiece:
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Workpiece(Shown):
     """A material and its cutting coefficients with the campaign's cutters."""
 
     name: str
     coefficients: CuttingCoefficients
 
+    def __str__(self) -> str:
+        return f"{self.name}: {self.coefficients}"
 
-@dataclass(frozen=True, slots=True)
-class Cut:
+
+@dataclass(frozen=True, slots=True, repr=False)
+class CutSpec(Shown):
+    """A cut that is asked about: all that a tooling and a workpiece leave open.
+
+    Parameters
+    ----------
+    engagement : Engagement, default half immersion, down-milling
+    feed_angle : float [rad], default 0
+        Direction of the feed in the machine's X-Y plane, from +X towards +Y.
+    feed_per_tooth : float or None [m]
+        Power, torque, removal rate and run-out need it.
+    material : str or None
+        Of the library of materials, in place of the workpiece.
+    coefficients : mapping of field of CuttingCoefficients to float [SI]
+        Single ones, over those of the material or the workpiece.
+    runout : tuple of float or None [m]
+        Radial offset of each edge.
+    damping : ProcessDamping or None
+    speed_variation : SpeedVariation or None
+
+    Examples
+    --------
+    >>> slot = CutSpec(Engagement.from_immersion(1.0, "down"), coefficients={"tangential": 9e8, "radial_ratio": 0.3})
+    >>> slot.process(Cutter(teeth=4, diameter=0.012)).coefficients.tangential
+    900000000.0
+    """
+
+    engagement: Engagement = field(default_factory=lambda: Engagement.from_immersion(0.5, "down"))
+    feed_angle: float = 0.0
+    feed_per_tooth: float | None = None
+    material: str | None = None
+    coefficients: Mapping[str, float] = field(default_factory=dict)
+    runout: tuple[float, ...] | None = None
+    damping: ProcessDamping | None = None
+    speed_variation: SpeedVariation | None = None
+
+    def process(self, cutter: Cutter, workpiece: Workpiece | None = None) -> MillingProcess:
+        """Return the milling process with a cutter, in a workpiece where the cut names no material.
+
+        Raises
+        ------
+        InputError
+            If the cutting coefficients are not known, or the run-out does not fit the teeth.
+        """
+        if self.runout is not None:
+            if len(self.runout) != cutter.teeth:
+                raise InputError("runout", f"{len(self.runout)} numbers", f"{cutter.teeth}, one for each tooth")
+            cutter = replace(cutter, runout=np.array(self.runout))
+        return MillingProcess(
+            cutter,
+            self._coefficients(workpiece),
+            self.engagement,
+            self.feed_angle,
+            self.feed_per_tooth,
+            self.damping,
+            self.speed_variation,
+        )
+
+    def _coefficients(self, workpiece: Workpiece | None) -> CuttingCoefficients:
+        if self.material is not None:
+            return replace(material(self.material).coefficients, **self.coefficients)
+        if workpiece is not None:
+            return replace(workpiece.coefficients, **self.coefficients)
+        for key, name in (("tangential", "tangential coefficient"), ("radial_ratio", "radial ratio")):
+            if key not in self.coefficients:
+                allowed = "the tangential coefficient and the radial ratio, or a material: without a campaign no workpiece is known"
+                raise InputError(name, "nothing", allowed)
+        return CuttingCoefficients(**self.coefficients)
+
+    def __str__(self) -> str:
+        parts = [str(self.engagement), f"feed {feed_direction(self.feed_angle)}"]
+        parts += [] if self.feed_per_tooth is None else [f"{1e3 * self.feed_per_tooth:.3g} mm per tooth"]
+        parts += [] if self.material is None else [self.material]
+        parts += [f"{name} {value:.4g}" for name, value in self.coefficients.items()]
+        parts += [] if self.runout is None else [f"run-out {1e6 * (max(self.runout) - min(self.runout)):.2g} µm"]
+        return ", ".join([*parts, *(str(each) for each in (self.damping, self.speed_variation) if each is not None)])
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Cut(Shown):
     """One cut, and the files that it was recorded in.
 
     Parameters
@@ -52,9 +143,12 @@ class Cut:
     recording: Path
     air: Path | None = None
 
+    def __str__(self) -> str:
+        return f"{self.id}: {self.tooling}, {self.conditions}{'' if self.air else ', no air cut'}"
 
-@dataclass(frozen=True, slots=True)
-class Campaign:
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Campaign(Shown):
     """Recordings of one machine.
 
     Parameters
@@ -69,3 +163,8 @@ class Campaign:
     workpiece: Workpiece
     toolings: Mapping[str, Tooling]
     cuts: tuple[Cut, ...]
+
+    def __str__(self) -> str:
+        speeds = to_rpm(np.array([cut.conditions.spindle_speed for cut in self.cuts]))
+        made = f"{self.name}: {len(self.cuts)} cuts with {', '.join(self.toolings)}"
+        return f"{made}, {speeds.min():.0f} to {speeds.max():.0f} rev/min, {self.workpiece.name}" if speeds.size else made

@@ -10,8 +10,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
-from rcsa_ident import __version__
 from rcsa_ident.errors import InputError, RcsaIdentError
+from rcsa_ident.version import __version__
 
 #: What takes a function and tasks and returns the results in the tasks' order: the builtin, a pool's, a cluster's.
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
@@ -58,9 +58,9 @@ class ClusterMap:
                 # the cluster keeps a result as long as its future is kept
                 futures.pop(0)
         except KilledWorker:
-            raise ClusterLost(f"{self.address}: a task has ended its workers again and again (out of memory?)") from None
+            raise ClusterLost(f"{self.address}: a task has ended its workers repeatedly (out of memory?)") from None
         except (CancelledError, CommClosedError):
-            raise ClusterLost(f"{self.address}: the scheduler is gone, and the work with it") from None
+            raise ClusterLost(f"{self.address}: the connection to the scheduler was lost, and the work with it") from None
         finally:
             if futures:
                 with suppress(Exception):
@@ -103,7 +103,7 @@ def cluster_map(address: str, timeout: float = 10.0) -> Iterator[ClusterMap]:
             try:
                 client = Client(address, timeout=timeout, set_as_default=False, name="rcsa-ident")
             except (OSError, TimeoutError):
-                raise InputError("dask", f"nobody at {address}", _ALLOWED) from None
+                raise InputError("dask", f"no scheduler at {address}", _ALLOWED) from None
         try:
             yield ClusterMap(client, address, _slots(client, address, timeout))
         finally:

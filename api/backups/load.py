@@ -1,4 +1,4 @@
-"""A data folder from a backup, which may be anything."""
+"""Restoring of a backup, whose content is not trusted."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ _LARGEST_MANIFEST = 1 << 28
 
 
 def restore(source: Path, data: Path) -> Account:
-    """Make a data folder of a backup.
+    """Restore a backup into a data folder.
 
     Raises
     ------
     InputError
-        The folder is not empty, or the file is no whole backup that this release can read.
+        The folder is not empty, or the file is not a complete backup that this release can read.
     """
     if data.is_symlink() or (data.exists() and not (data.is_dir() and not any(data.iterdir()))):
-        raise InputError("--data", f"{data.name} with something in it", "a folder that is empty, or not there yet")
+        raise InputError("--data", f"{data.name} which is not empty", "a folder that is empty or does not exist yet")
     with disk("--data"):
         data.absolute().parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(prefix=f".{data.name}.restoring-", dir=data.absolute().parent))
@@ -46,7 +46,7 @@ def restore(source: Path, data: Path) -> Account:
 
 
 def _extract(source: Path, folder: Path) -> Account:
-    """Every member under a name of the service's own, as the manifest has it."""
+    """Extract every member to the path that the manifest gives it."""
     if not source.is_file():
         raise InputError("FILE.tar", "no such file", "a backup of this service")
     found: dict[str, dict[str, Any]] = {}
@@ -74,7 +74,7 @@ def _extract(source: Path, folder: Path) -> Account:
 
 
 def _header(file: BinaryIO, size: int) -> tarfile.TarInfo | None:
-    """The next member, None at the end; long names, links and holes are nothing that a backup has."""
+    """Header of the next member, None at the end; long names, links and sparse files are refused."""
     block = file.read(BLOCK)
     if block == bytes(BLOCK):
         return None
@@ -104,12 +104,12 @@ def _manifest(path: Path) -> dict[str, Any]:
     except InputError:
         raise
     except (ValueError, TypeError, KeyError, RecursionError):
-        raise _no_backup("a manifest that can not be read") from None
+        raise _no_backup("a manifest that cannot be read") from None
     return dict(manifest)
 
 
 def _check(folder: Path) -> None:
-    """Databases that are whole, and of a version that this release knows."""
+    """Check that the databases are intact, and of a version that this release knows."""
     for name in (STORE, ENGINE):
         if (folder / name).is_file():
             try:
@@ -126,13 +126,13 @@ def _check(folder: Path) -> None:
 
 
 def _place(folder: Path, data: Path) -> None:
-    """Give the folder its name."""
+    """Rename the folder to its final name."""
     try:
         os.rename(folder, data)
     except OSError as error:
         if error.errno not in (errno.EBUSY, errno.EXDEV):
             raise
-        # a disk of its own is mounted there: what makes it a store comes last
+        # the folder is a mount point: the database, which makes it a store, comes last
         inside = data / folder.name
         shutil.copytree(folder, inside)
         for name in sorted(os.listdir(inside), key=lambda each: each == STORE):
@@ -143,4 +143,4 @@ def _place(folder: Path, data: Path) -> None:
 
 
 def _no_backup(found: str) -> InputError:
-    return InputError("FILE.tar", found, "a whole backup of this service")
+    return InputError("FILE.tar", found, "a complete backup of this service")

@@ -1,4 +1,4 @@
-"""What a backup is made of."""
+"""Members of a backup."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ MEMBER = re.compile(rf"service\.db|jobs\.db|manifest\.json|files/[0-9a-f]{{32}}/
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """What went into a backup, or came out of it.
+    """Summary of a backup or of its restoring.
 
     Parameters
     ----------
     files, bytes : int
-        Of all members.
+        Of all members together.
     missing : tuple of str
-        Files that rows refer to and that are nowhere.
+        Files that rows refer to but that do not exist.
     damaged : tuple of str
-        Uploads that are not any more what they were when they came.
+        Uploads whose content does not match its hash any more.
     """
 
     files: int
@@ -40,18 +40,18 @@ class Account:
 
 @contextmanager
 def disk(field: str) -> Iterator[None]:
-    """Tell what the disk refuses as bad input."""
+    """Turn errors of the disk into `InputError`."""
     try:
         yield
     except OSError as error:
-        raise InputError(field, error.strerror or "an error of the disk", "a disk with room that can be written to") from None
+        raise InputError(field, error.strerror or "a disk error", "a writable disk with enough free space") from None
 
 
 def copy(source: Any, target: Any, size: int, digest: Any) -> None:
     while size > 0:
         data = source.read(min(size, CHUNK))
         if not data:
-            raise InputError("FILE.tar", "a file that has become shorter", "files that stay, and a whole backup")
+            raise InputError("FILE.tar", "a file that has become shorter", "files that do not change, and a complete backup")
         digest.update(data)
         target.write(data)
         size -= len(data)

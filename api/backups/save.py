@@ -1,4 +1,4 @@
-"""A backup of the data folder of a service that runs."""
+"""Backup of a data folder while the service runs."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ _STAGING = ".backup-"
 
 
 def backup(data: Path, target: Path) -> Account:
-    """Write a backup of a data folder; a service may work on it meanwhile.
+    """Write a backup of a data folder, which a service may be using.
 
     Raises
     ------
     InputError
-        There is no store, something is in the target's place, or the disk refuses.
+        There is no store, the target exists, or the disk fails.
     """
     if not (data / STORE).is_file():
         raise InputError("RCSA_IDENT_DATA", f"no {STORE}", "the data folder of a service")
     if target.exists() or target.is_symlink():
-        raise InputError("FILE.tar", f"{target.name} is there already", "a name that is free")
+        raise InputError("FILE.tar", f"{target.name}, which exists already", "the name of a new file")
     if not target.absolute().parent.is_dir():
-        raise InputError("FILE.tar", "no such folder", "a file in a folder that is there")
+        raise InputError("FILE.tar", "no such folder", "a file in an existing folder")
     part = target.with_name(f".{target.name}.{os.getpid()}.part")
     with disk("FILE.tar"), _alone(data) as staging:
         missing = _gather(data, staging)
         try:
-            # what keys open is in it
+            # readable by the owner only
             with open(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "wb") as file:
                 account = _write(file, staging, missing)
                 file.flush()
@@ -56,24 +56,24 @@ def backup(data: Path, target: Path) -> Account:
 
 
 def _name(part: Path, target: Path) -> None:
-    """Of two backups under one name one fails, and none is lost."""
+    """Give the file its name without replacing another."""
     try:
         os.link(part, target)
     except FileExistsError:
-        raise InputError("FILE.tar", f"{target.name} is there already", "a name that is free") from None
+        raise InputError("FILE.tar", f"{target.name}, which exists already", "the name of a new file") from None
     except OSError:
-        # a disk without links
+        # a file system without hard links
         os.rename(part, target)
 
 
 @contextmanager
 def _alone(data: Path) -> Iterator[Path]:
-    """A folder for what a backup holds, on the data's own disk; one at a time, and what a killed one has left is removed."""
+    """Staging folder on the data's own disk, for one backup at a time; remains of a killed backup are removed."""
     with (data / "backup.lock").open("a") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise InputError("RCSA_IDENT_DATA", "another backup under way", "one at a time") from None
+            raise InputError("RCSA_IDENT_DATA", "another backup in progress", "one at a time") from None
         for old in data.glob(f"{_STAGING}*"):
             shutil.rmtree(old, ignore_errors=True)
         staging = Path(tempfile.mkdtemp(prefix=_STAGING, dir=data))
@@ -84,10 +84,10 @@ def _alone(data: Path) -> Iterator[Path]:
 
 
 def _gather(data: Path, staging: Path) -> tuple[str, ...]:
-    """Snapshots of the databases and links to all files that rows of the snapshot refer to; returns those that are nowhere."""
+    """Make snapshots of the databases and links to all files that their rows refer to; return the missing ones."""
     missing: tuple[str, ...] = ()
     for _ in range(5):
-        # a file that is deleted after the snapshot is linked before it; one that came just before the snapshot, after it
+        # links before the snapshot keep files that are deleted after it; links after it include those that arrived just before it
         _link(data / FILES, staging / FILES)
         if (data / ENGINE).is_file():
             _snapshot(data / ENGINE, staging / ENGINE)
@@ -109,17 +109,17 @@ def _link(source: Path, target: Path) -> None:
             there = target / folder.relative_to(source)
             there.mkdir(parents=True, exist_ok=True)
             for entry in os.scandir(folder):
-                # gone meanwhile, or linked before
+                # deleted meanwhile, or already linked
                 with suppress(FileNotFoundError, FileExistsError):
                     try:
                         os.link(entry.path, there / entry.name)
                     except PermissionError:
-                        # a disk without links
+                        # a file system without hard links
                         shutil.copyfile(entry.path, there / entry.name)
 
 
 def _snapshot(source: Path, target: Path) -> None:
-    """A database as it is at one moment, in one file."""
+    """Snapshot of a database in one file."""
     target.unlink(missing_ok=True)
     try:
         with closing(sqlite3.connect(source, timeout=30.0)) as live, closing(sqlite3.connect(target)) as copy:
@@ -137,7 +137,7 @@ def _referred(folder: Path) -> set[str]:
         return {files.path(*each).relative_to(folder).as_posix() for each in found}
     finally:
         store.close()
-        # back into one file
+        # without a separate WAL file
         with closing(sqlite3.connect(folder / STORE)) as database:
             database.execute("PRAGMA journal_mode=DELETE")
 
@@ -167,7 +167,7 @@ def _write(file: BinaryIO, staging: Path, missing: tuple[str, ...]) -> Account:
 
 
 def header(name: str, size: int) -> bytes:
-    """Return the block before a member: of the old form, which any program reads, with the size in binary where octal digits end."""
+    """Return the header block of a member: GNU format, with a binary size where octal digits do not suffice."""
     info = tarfile.TarInfo(name)
     info.mode, info.size = 0o600, size if size < 8**11 else 0
     block = bytearray(info.tobuf(tarfile.USTAR_FORMAT))

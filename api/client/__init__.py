@@ -1,4 +1,4 @@
-"""A client in Python, typed: what the service answers, as the same nouns; everything else is a `ServiceError`.
+"""Typed client in Python: answers are the models of the service, errors are `ServiceError`.
 
 Needs httpx2 (``pip install 'rcsa-ident[client]'``).
 """

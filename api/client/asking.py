@@ -1,4 +1,4 @@
-"""How a service is asked: what it answers below 400, or a `ServiceError`."""
+"""Requests to the service: answers below status 400, or a `ServiceError`."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ Json = Mapping[str, Any]
 
 
 class ServiceError(Exception):
-    """The service has answered otherwise.
+    """The service has answered with an error.
 
     Parameters
     ----------
     status : int
     problem : ProblemDocument or None
-        None where something else than the service has answered.
+        None where the answer did not come from the service.
     """
 
     def __init__(self, status: int, problem: ProblemDocument | None) -> None:
@@ -30,20 +30,20 @@ class ServiceError(Exception):
 
 
 class Asking:
-    """A service.
+    """Connection to a service.
 
     Parameters
     ----------
     url : str
     key : str or None
     http : httpx2.Client or None
-        In place of one of its own.
+        To be used instead of a client of its own.
     """
 
     def __init__(self, url: str = "http://127.0.0.1:8000", key: str | None = None, http: httpx2.Client | None = None) -> None:
         self.http = httpx2.Client(base_url=url, timeout=60.0) if http is None else http
-        #: For answers that come when a long recording is read; a client that is given keeps its own patience.
-        self.patient: dict[str, Any] = {"timeout": httpx2.Timeout(60.0, read=1200.0)} if http is None else {}
+        #: Timeout of requests that wait for a long recording to be read; a given client keeps its own.
+        self.long_timeout: dict[str, Any] = {"timeout": httpx2.Timeout(60.0, read=1200.0)} if http is None else {}
         self.headers = {} if key is None else {"X-API-Key": key}
 
     def __enter__(self) -> Self:
@@ -70,7 +70,7 @@ class Asking:
                 opened.write(block)
 
     def all(self, path: str, kind: Any, limit: int, query: Mapping[str, str] | None = None) -> Iterator[Any]:
-        """Yield the items of all parts of a list."""
+        """Yield the items of all pages of a list."""
         after: str | None = ""
         while after is not None:
             part = kind.model_validate_json(self.send("GET", path, params={"after": after, "limit": limit, **(query or {})}).content)
@@ -79,17 +79,17 @@ class Asking:
 
 
 def refused(answer: httpx2.Response) -> ServiceError:
-    """Return what an answer from 400 on says."""
+    """Return the error of an answer from status 400 on."""
     # the answer to HEAD has no body
-    told = answer.headers.get("content-type", "").startswith("application/problem+json") and answer.content
-    return ServiceError(answer.status_code, ProblemDocument.model_validate_json(answer.content) if told else None)
+    is_problem = answer.headers.get("content-type", "").startswith("application/problem+json") and answer.content
+    return ServiceError(answer.status_code, ProblemDocument.model_validate_json(answer.content) if is_problem else None)
 
 
 def match(seen: str | None) -> dict[str, str]:
-    """Return the header of a writer that has seen an entity tag."""
+    """Return the header of a write that expects an entity tag."""
     return {} if seen is None else {"If-Match": f'"{seen}"'}
 
 
 def read(model: type[Model], answer: httpx2.Response) -> Model:
-    """Return an answer as a noun."""
+    """Return an answer as a model."""
     return model.model_validate_json(answer.content)

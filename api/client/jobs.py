@@ -1,4 +1,4 @@
-"""The client's jobs: identifications, and lobes that take long."""
+"""Jobs of the client: identifications, and lobes that take long."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from api.schemas.queries import LobeAnswer
 
 
 class Jobs(Asking):
-    """Jobs."""
+    """Requests about jobs."""
 
     def identify_campaign(self, campaign: str, repeat: str | None = None, **further: Any) -> JobAnswer:
-        """Have a machine identified from a campaign; seed, method, start, apply. `repeat` is an idempotency key."""
+        """Submit the identification of a machine from a campaign; options seed, method, start, apply. `repeat` is an idempotency key."""
         headers = {} if repeat is None else {"Idempotency-Key": repeat}
         return read(JobAnswer, self.send("POST", "/identifications", json={"campaign": campaign, **further}, headers=headers))
 
     def job(self, id: str, wait: int = 0) -> JobAnswer:
-        """Return how far an identification is; after so many seconds at the latest, where it has not ended before."""
+        """Return an identification, once it has ended or after so many seconds."""
         headers = {"Prefer": f"wait={wait}"} if wait else {}
         return read(JobAnswer, self.send("GET", f"/identifications/{id}", headers=headers))
 
@@ -35,7 +35,7 @@ class Jobs(Asking):
         return self.all("/identifications", Page[JobAnswer], limit, query)
 
     def wait(self, id: str, seconds: float = 3600.0) -> JobAnswer:
-        """Return an identification when it has ended, or after so many seconds as it is then."""
+        """Return an identification, once it has ended or after so many seconds."""
         end = time.monotonic() + seconds
         while True:
             left = max(end - time.monotonic(), 0.0)
@@ -44,14 +44,14 @@ class Jobs(Asking):
                 return job
 
     def events(self, id: str, kind: str = "identifications", attempts: int = 5) -> Iterator[tuple[str, dict[str, Any]]]:
-        """Yield what a job tells, as kind of event and its data, until it has ended; a lost connection is taken up where it was lost.
+        """Yield kind and data of a job's events until it has ended; a lost connection continues where it broke.
 
         Parameters
         ----------
         kind : str
             identifications or lobes.
         attempts : int
-            Connections without a single event in a row.
+            Successive connections without an event.
         """
         number, failed = "", 0
         while True:
@@ -77,7 +77,7 @@ class Jobs(Asking):
         return read(JobAnswer, self.send("DELETE", f"/identifications/{id}"))
 
     def found_modes(self, id: str) -> Modes:
-        """Return the modes that an identification has found."""
+        """Return the modes of an identification."""
         return read(Modes, self.send("GET", f"/identifications/{id}/modes"))
 
     def fitted(self, id: str) -> FittedLines:
@@ -93,7 +93,7 @@ class Jobs(Asking):
         return self.send("GET", f"/identifications/{id}/report").text
 
     def lobes(self, machine: str, *toolings: str | Json, **further: Any) -> LobeAnswer:
-        """Return stability lobes of one tooling or several, also where the service makes a job of them."""
+        """Return stability lobes of one or more toolings, also where the service turns the query into a job."""
         answer = self.send("POST", "/lobes", json={"machine": machine, "toolings": list(toolings), **further})
         if answer.status_code == 200:
             return read(LobeAnswer, answer)
@@ -102,23 +102,23 @@ class Jobs(Asking):
             pass
         if found.answer is None:
             problem = found.job.problem
-            told = {"detail": f"the job is {found.job.state}"} if problem is None else problem.model_dump()
-            told |= {"type": "about:blank", "title": found.job.state, "status": 422, "request_id": id}
-            raise ServiceError(422, ProblemDocument.model_validate(told))
+            document = {"detail": f"the job is {found.job.state}"} if problem is None else problem.model_dump()
+            document |= {"type": "about:blank", "title": found.job.state, "status": 422, "request_id": id}
+            raise ServiceError(422, ProblemDocument.model_validate(document))
         return found.answer
 
     def lobes_later(self, machine: str, *toolings: str | Json, **further: Any) -> JobAnswer:
-        """Have stability lobes computed as a job."""
+        """Submit stability lobes as a job."""
         body = {"machine": machine, "toolings": list(toolings), **further}
         return read(JobAnswer, self.send("POST", "/lobes", json=body, headers={"Prefer": "respond-async"}))
 
     def lobe_job(self, id: str, wait: int = 0) -> LobeJob:
-        """Return lobes that are computed as a job; after so many seconds at the latest, where it has not ended before."""
+        """Return a job of lobes, once it has ended or after so many seconds."""
         return read(LobeJob, self.send("GET", f"/lobes/{id}", headers={"Prefer": f"wait={wait}"} if wait else {}))
 
 
 def _events(lines: Iterable[str]) -> Iterator[dict[str, str]]:
-    """Fields of server-sent events; a comment and a pause that is asked for are none."""
+    """Fields of server-sent events, without comments and `retry`."""
     fields: dict[str, str] = {}
     for line in lines:
         if line:

@@ -1,4 +1,4 @@
-"""The client's campaigns and recordings."""
+"""Campaigns and recordings of the client."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _BLOCK = 1 << 20
 
 
 class Uploads(Asking):
-    """Campaigns and recordings."""
+    """Requests about campaigns and recordings."""
 
     def make_campaign(self, machine: str, campaign: str | Json, repeat: str | None = None) -> CampaignAnswer:
         """Make a campaign, from the text of campaign.toml or from its keys; `repeat` is an idempotency key."""
@@ -50,7 +50,7 @@ class Uploads(Asking):
         self.download(f"/campaigns/{id}/archive", file)
 
     def forget_campaign(self, id: str) -> None:
-        """Forget a campaign and its recordings."""
+        """Delete a campaign and its recordings."""
         self.send("DELETE", f"/campaigns/{id}")
 
     def recordings(self, campaign: str, limit: int = 50) -> Iterator[RecordingAnswer]:
@@ -58,27 +58,27 @@ class Uploads(Asking):
         return self.all(f"/campaigns/{campaign}/recordings", Page[RecordingAnswer], limit)
 
     def recording(self, campaign: str, name: str) -> RecordingAnswer:
-        """Return what was found in a recording."""
+        """Return the description of a recording."""
         return read(RecordingAnswer, self.send("GET", _recording(campaign, name)))
 
     def recording_file(self, campaign: str, name: str, file: Path) -> None:
-        """Write a recording, as it came, to a file."""
+        """Download the original file of a recording."""
         self.download(f"{_recording(campaign, name)}/file", file)
 
     def spectrum(self, campaign: str, name: str, **query: int) -> SpectrumAnswer:
-        """Return amplitudes over frequency; points."""
+        """Return the amplitude spectrum; option points."""
         return read(SpectrumAnswer, self.send("GET", f"{_recording(campaign, name)}/spectrum", params=query))
 
     def signal(self, campaign: str, name: str, **query: int) -> SignalAnswer:
-        """Return the outline over time; points."""
+        """Return the envelope over time; option points."""
         return read(SignalAnswer, self.send("GET", f"{_recording(campaign, name)}/signal", params=query))
 
     def forget_recording(self, campaign: str, name: str) -> None:
-        """Forget a recording, or what has come of one."""
+        """Delete a recording or its unfinished upload."""
         self.send("DELETE", _recording(campaign, name))
 
     def upload(self, campaign: str, file: Path, name: str | None = None, replace: bool = False) -> RecordingAnswer:
-        """Upload a recording at once, and have its checksum compared; `name` where the campaign calls it otherwise."""
+        """Upload a recording in one request, with a checksum; `name` where the campaign names it differently."""
         with file.open("rb") as opened:
             digest = hashlib.file_digest(opened, "sha256").digest()
             opened.seek(0)
@@ -87,19 +87,21 @@ class Uploads(Asking):
             path = _recording(campaign, name or file.name)
             return read(
                 RecordingAnswer,
-                self.send("PUT", path, content=iter(partial(opened.read, _BLOCK), b""), headers=headers, params=params, **self.patient),
+                self.send(
+                    "PUT", path, content=iter(partial(opened.read, _BLOCK), b""), headers=headers, params=params, **self.long_timeout
+                ),
             )
 
     def upload_in_parts(
         self, campaign: str, file: Path, name: str | None = None, part: int = 8 << 20, replace: bool = False, attempts: int = 5
     ) -> RecordingAnswer:
-        """Upload a recording in parts, each from where the service says that the one before ended, also after a lost connection.
+        """Upload a recording in parts; after a lost connection it continues where the service has received the last byte.
 
         Parameters
         ----------
         part : int [bytes]
         attempts : int
-            For a part that the connection loses.
+            For each part.
         """
         path, size = _recording(campaign, name or file.name), file.stat().st_size
         with file.open("rb") as opened:
@@ -120,7 +122,7 @@ class Uploads(Asking):
                 }
                 try:
                     answer = self.send(
-                        "PATCH", path, content=data, headers=headers, params={"replace": "true"} if replace else {}, **self.patient
+                        "PATCH", path, content=data, headers=headers, params={"replace": "true"} if replace else {}, **self.long_timeout
                     )
                 except (httpx2.TransportError, ServiceError) as error:
                     failed += 1
@@ -135,7 +137,7 @@ class Uploads(Asking):
                 failed, offset = 0, int(answer.headers["Upload-Offset"])
 
     def _offset(self, path: str, size: int) -> int:
-        """Where an upload goes on: 0 where another file is there, the size where one of that size is whole."""
+        """Offset at which an upload continues: 0 where another file is stored, the size where the file is complete."""
         try:
             state = self.send("HEAD", path).headers
         except ServiceError as error:
@@ -154,29 +156,29 @@ class Uploads(Asking):
             return None
 
     def upload_together(self, campaign: str, files: Iterable[Path], replace: bool = False) -> UploadAnswer:
-        """Upload several recordings in one body; of each file stands in the answer what has become of it."""
+        """Upload several recordings in one request; the answer has the outcome of each."""
         with ExitStack() as stack:
             parts = [("files", (file.name, stack.enter_context(file.open("rb")), "application/octet-stream")) for file in files]
             path, params = f"/campaigns/{campaign}/recordings", {"replace": "true"} if replace else {}
-            return read(UploadAnswer, self.send("POST", path, files=parts, params=params, **self.patient))
+            return read(UploadAnswer, self.send("POST", path, files=parts, params=params, **self.long_timeout))
 
-    def upload_folder(self, machine: str, folder: Path, told: Callable[[RecordingAnswer], object] | None = None) -> CampaignAnswer:
-        """Upload the folder of a campaign: campaign.toml, its toolings and every recording that is there.
+    def upload_folder(self, machine: str, folder: Path, report: Callable[[RecordingAnswer], object] | None = None) -> CampaignAnswer:
+        """Upload the folder of a campaign: campaign.toml, its toolings and all recordings.
 
         Parameters
         ----------
-        told : callable, optional
-            Given each recording when it is kept.
+        report : callable, optional
+            Called with each stored recording.
         """
         data = tomllib.loads((folder / "campaign.toml").read_text(encoding="utf-8-sig"))
         toolings = {name: tomllib.loads((folder / path).read_text(encoding="utf-8-sig")) for name, path in data["toolings"].items()}
         campaign = self.make_campaign(machine, {**data, "toolings": toolings})
-        # air cuts first: a cut is then judged once, beside its own
+        # air cuts first: each cut is then judged once
         paths = dict.fromkeys(cut[key] for key in ("air", "cut") for cut in data["cuts"] if key in cut)
         for path in paths:
             answer = self.upload(campaign.id, folder / path)
-            if told is not None:
-                told(answer)
+            if report is not None:
+                report(answer)
         return self.campaign(campaign.id)
 
 

@@ -1,4 +1,4 @@
-"""The client as a whole."""
+"""The complete client."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from api.schemas.toolings import ToolingAnswer, ToolingSummary
 
 
 class Client(Uploads, Jobs):
-    """A service.
+    """Client of a service.
 
     Parameters
     ----------
     url : str
     key : str or None
     http : httpx2.Client or None
-        In place of one of its own.
+        To be used instead of a client of its own.
     """
 
     def make_machine(self, name: str, description: str = "", repeat: str | None = None) -> MachineAnswer:
@@ -49,11 +49,11 @@ class Client(Uploads, Jobs):
         return self.all("/machines", Page[MachineAnswer], limit)
 
     def forget_machine(self, id: str) -> None:
-        """Forget a machine and its identification."""
+        """Delete a machine and its identification."""
         self.send("DELETE", f"/machines/{id}")
 
     def identify(self, id: str, result: str | bytes, seen: str | None = None) -> IdentificationSummary:
-        """Give a machine the content of RESULT.json; `seen` is the etag of the one that it replaces."""
+        """Write the identification of a machine (content of RESULT.json); `seen` is the etag of the one that it replaces."""
         headers = {"Content-Type": "application/json", **match(seen)}
         return read(IdentificationSummary, self.send("PUT", f"/machines/{id}/identification", content=result, headers=headers))
 
@@ -66,7 +66,7 @@ class Client(Uploads, Jobs):
         return read(Modes, self.send("GET", f"/machines/{id}/identification/modes"))
 
     def frf(self, id: str, **query: float) -> Frf:
-        """Return the spindle's receptance; from_hz, to_hz, step_hz."""
+        """Return the spindle's receptance at its flange; options from_hz, to_hz, step_hz."""
         return read(Frf, self.send("GET", f"/machines/{id}/identification/frf", params=query))
 
     def write_tooling(self, name: str, tooling: str | Json, seen: str | None = None) -> ToolingAnswer:
@@ -85,7 +85,7 @@ class Client(Uploads, Jobs):
         return self.send("GET", f"/toolings/{name}", headers={"Accept": "application/toml"}).text
 
     def drawing(self, name: str) -> str:
-        """Return a tooling to scale, SVG."""
+        """Return the drawing of a tooling to scale, SVG."""
         return self.send("GET", f"/toolings/{name}/drawing").text
 
     def toolings(self, limit: int = 50) -> Iterator[ToolingSummary]:
@@ -93,7 +93,7 @@ class Client(Uploads, Jobs):
         return self.all("/toolings", Page[ToolingSummary], limit)
 
     def import_toolings(self, library: bytes, **assumed: Any) -> ImportAnswer:
-        """Write the toolings of a Fusion 360 or HSM tool library; `replace` writes also over what is there."""
+        """Import the toolings of a Fusion 360 or HSM tool library; `replace` overwrites existing ones."""
         kind = "application/zip" if library.startswith(b"PK") else "application/json"
         query = {key: str(value).lower() if isinstance(value, bool) else value for key, value in assumed.items() if value is not None}
         return read(ImportAnswer, self.send("POST", "/toolings/import", content=library, params=query, headers={"Content-Type": kind}))
@@ -103,15 +103,15 @@ class Client(Uploads, Jobs):
         return read(Materials, self.send("GET", "/materials")).items
 
     def examples(self) -> list[Example]:
-        """Return what there is to start with."""
+        """Return the list of examples."""
         return read(Examples, self.send("GET", "/examples")).items
 
     def example(self, name: str, file: Path) -> None:
-        """Write an example's file."""
+        """Download the file of an example."""
         self.download(f"/examples/{quote(name)}", file)
 
     def forget_tooling(self, name: str, seen: str | None = None) -> None:
-        """Forget a tooling."""
+        """Delete a tooling."""
         self.send("DELETE", f"/toolings/{name}", headers=match(seen))
 
     def tooltip(self, machine: str, tooling: str | Json, **further: Any) -> TipAnswer:
@@ -124,11 +124,11 @@ class Client(Uploads, Jobs):
         return self.send("POST", "/tooltip", json=body, headers={"Accept": "text/csv"}).text
 
     def advice(self, machine: str, *toolings: str | Json, **further: Any) -> AdviceAnswer:
-        """Return what removes most, and how planned cuts stand."""
+        """Return the cuts of highest removal rate, and the margins of planned cuts."""
         return read(AdviceAnswer, self.send("POST", "/advice", json={"machine": machine, "toolings": list(toolings), **further}))
 
     def forces(self, machine: str, tooling: str | Json, recording: Path, air: Path | None = None, **further: Any) -> ForceAnswer:
-        """Return the forces of a recording that is a file here."""
+        """Return the forces of a local recording."""
         return read(ForceAnswer, self._forces({"machine": machine, "tooling": tooling, **further}, recording, air))
 
     def forces_file(self, machine: str, tooling: str | Json, recording: Path, air: Path | None = None, **further: Any) -> str:
@@ -137,7 +137,7 @@ class Client(Uploads, Jobs):
         return self._forces(query, recording, air, {"Accept": "text/csv"}).text
 
     def forces_of_campaign(self, machine: str, campaign: str, recording: str, **further: Any) -> ForceAnswer:
-        """Return the forces of an uploaded recording, with its air cut."""
+        """Return the forces of an uploaded recording, using its air cut."""
         body = {"machine": machine, "campaign": campaign, "recording": recording, **further}
         return read(ForceAnswer, self.send("POST", "/forces", json=body))
 
@@ -152,7 +152,7 @@ class Client(Uploads, Jobs):
             return self.send("POST", "/forces", data={"query": json.dumps(query)}, files=files, headers=dict(headers or {}))
 
     def make_key(self, *scopes: str, label: str = "") -> MadeKey:
-        """Make a key."""
+        """Make an API key."""
         return read(MadeKey, self.send("POST", "/keys", json={"scopes": list(scopes), "label": label}))
 
     def keys(self, limit: int = 50) -> Iterator[KeyAnswer]:
@@ -160,5 +160,5 @@ class Client(Uploads, Jobs):
         return self.all("/keys", Page[KeyAnswer], limit)
 
     def withdraw_key(self, id: str) -> None:
-        """Withdraw a key."""
+        """Revoke an API key."""
         self.send("DELETE", f"/keys/{id}")

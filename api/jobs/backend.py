@@ -1,4 +1,4 @@
-"""What carries jobs to their end, whatever dies: asked for here, done by a durable engine, or by a table of steps in tests."""
+"""Protocol of the durable engine, which carries jobs to their end whatever process dies; tests have one in memory."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-#: What an unfinished job remembers belongs to this version: raise it when steps change their order, their names or what is in their
-#: texts. A job that was begun with another version starts over.
+#: What an unfinished job remembers belongs to this version: raise it when steps change their order, names or texts.
+#: A job that began with another version starts over.
 VERSION = "2"
-#: Gives the text that a step of a job had come to, computed if it has not been: name of the step, and what computes it.
+#: Returns the stored text of a step by its name, or computes and stores it.
 Remember = Callable[[str, Callable[[], str]], str]
-#: Carries out a job of this id; whatever it does a second time gives what it gave the first time.
+#: Carries out the job of an id; a repetition gives the same result.
 Carry = Callable[[str, Remember], None]
 
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """What the engine knows of a job.
+    """State of a job in the engine.
 
     Parameters
     ----------
@@ -25,9 +25,9 @@ class Carried:
     state : str
         waiting, running or over.
     executor : str or None
-        Who runs it.
+        Name of the worker that runs it.
     current : bool
-        Whether workers of this release take it.
+        Whether workers of this release can run it.
     """
 
     job: str
@@ -40,16 +40,16 @@ class JobBackend(Protocol):
     """A durable engine: a job that was submitted is carried out until its call returns."""
 
     def start(self, executor: str, carry: Carry) -> None:
-        """Carry out jobs under this name, one at a time; those that the name had taken up before come first."""
+        """Carry out jobs as this executor, one at a time, its own unfinished ones first."""
 
     def submit(self, job: str, priority: int) -> None:
-        """Have a job carried out, lower priorities first; once, however often it is submitted."""
+        """Submit a job, which is carried out once however often it is submitted; lower numbers first."""
 
     def carried(self) -> Sequence[Carried]:
-        """Return all jobs that the engine knows."""
+        """Return all jobs of the engine."""
 
     def resume(self, job: str) -> None:
-        """Give the job of an executor that is dead to whoever is free."""
+        """Return the job of a dead executor to the queue."""
 
     def forget(self, jobs: Sequence[str]) -> None:
-        """Forget jobs that are over, with every step."""
+        """Delete jobs that are over, with their steps."""

@@ -1,4 +1,4 @@
-"""Searches on a Dask cluster; what it cannot do is done here, with the same result."""
+"""Map over a Dask cluster; tasks that the cluster cannot do are done here, with the same result."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ log = logging.getLogger("rcsa_ident.jobs")
 
 
 def over_cluster(address: str) -> Map:
-    """Return a map over the workers of a cluster; a job does not fail because the cluster is away."""
+    """Return a map over the workers of a cluster; a job does not fail because the cluster cannot be reached."""
 
     def spread(function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Any]:
         left = list(tasks)
@@ -22,7 +22,7 @@ def over_cluster(address: str) -> Map:
             try:
                 cluster = stack.enter_context(cluster_map(address))
             except InputError as error:
-                log.warning("the cluster is away: working here", exc_info=error)
+                log.warning("the cluster cannot be reached: the tasks are done here", exc_info=error)
             else:
                 try:
                     for answer in cluster(function, left[:]):

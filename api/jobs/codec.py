@@ -33,9 +33,9 @@ NOUNS = (
     "rcsa_ident.cutting.conditions.Engagement",
     "rcsa_ident.cutting.process.ProcessDamping",
     "api.work.requests.MachineText",
-    "api.work.requests.ToolingText",
-    "api.work.requests.CutQuestion",
-    "api.work.requests.LobeQuestion",
+    "rcsa_ident.machining_setup.CutSpec",
+    "api.work.requests.ToolingSource",
+    "api.work.requests.LobeRequest",
 )
 _PLACES = {place.rpartition(".")[2]: place for place in NOUNS}
 
@@ -95,7 +95,7 @@ def _plain(value: Any) -> Any:
         return {"~table": [[_plain(key), _plain(each)] for key, each in value.items()]}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {f"~{_name(type(value))}": {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}}
-    raise Unknown(f"a {type(value).__name__} cannot be written")
+    raise Unknown(f"a {type(value).__name__} cannot be encoded")
 
 
 def _value(plain: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The durable engine: DBOS, on a file of its own or in the service's database. Nothing else imports it."""
+"""The durable engine: DBOS, on a file of its own or in the service's database."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from dbos import Serializer as _Serializer
 from api.jobs.backend import VERSION, Carried, Carry
 
 QUEUE = "jobs"
-#: Seconds between two looks for a job.
+#: Interval between two polls for a job [s].
 POLL = 0.5
 _NAME = "rcsa-ident"
 _STATES = {"ENQUEUED": "waiting", "DELAYED": "waiting", "PENDING": "running"}
 
 
 class Json(_Serializer):
-    """Plain values alone, so that what is read runs nothing."""
+    """Serialiser of plain values only: reading them runs no code."""
 
     def serialize(self, data: Any) -> str:
         return json.dumps(data, default=lambda other: f"a {type(other).__name__}")
@@ -34,12 +34,12 @@ class Json(_Serializer):
 
 
 class Durable:
-    """DBOS in this process; a process has one.
+    """DBOS in this process, which can have one only.
 
     Parameters
     ----------
     url : str
-        Of the engine's tables, as of the store.
+        Of the engine's tables.
     """
 
     def __init__(self, url: str) -> None:
@@ -48,7 +48,7 @@ class Durable:
 
     def start(self, executor: str, carry: Carry) -> None:
         if self.url.startswith("sqlite:///"):
-            # kept by the file: readers and writers do not wait for each other
+            # stays with the file: readers and writers do not block each other
             with sqlite3.connect(self.url.removeprefix("sqlite:///")) as connection:
                 connection.execute("PRAGMA journal_mode=WAL")
             connection.close()
@@ -63,7 +63,7 @@ class Durable:
             "sys_db_pool_size": 5,
         }
         DBOS(config=config)
-        # one place for logs
+        # its records go to the handlers of the service
         log = logging.getLogger("dbos")
         log.handlers.clear()
         log.propagate = True

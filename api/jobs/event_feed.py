@@ -1,4 +1,4 @@
-"""What jobs tell, for many who watch: one look at the store for all of them, and one reading of what is new."""
+"""Event feeds of jobs for many clients: one poll of the store for all jobs, and one read of the new events of each."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from contextlib import contextmanager
 from api.stores.entities import Unavailable
 from api.stores.jobs import Event, Jobs
 
-#: Seconds between two looks, and events that are read at once.
+#: Interval between two polls [s], and most events per read.
 LOOK, BATCH = 0.3, 500
 
 
 class Crowded(Exception):
-    """As many watch as are allowed."""
+    """The limit of event streams is reached."""
 
 
 class EventFeeds:
-    """Events of jobs.
+    """Feeds of the events of jobs.
 
     Parameters
     ----------
     jobs : Jobs
     most : int
-        Streams at once.
+        Simultaneous streams.
     """
 
     def __init__(self, jobs: Jobs, most: int) -> None:
@@ -38,7 +38,7 @@ class EventFeeds:
 
     @contextmanager
     def stream(self) -> Iterator[None]:
-        """Count one who watches; raises `Crowded` where there are too many."""
+        """Count a stream while it is open; raises `Crowded` where there are too many."""
         if self.streams >= self.most:
             raise Crowded
         self.streams += 1
@@ -48,7 +48,7 @@ class EventFeeds:
             self.streams -= 1
 
     async def events(self, job: str, after: int) -> Sequence[Event]:
-        """Return events behind a number; those who wait for the same read once."""
+        """Return the events after a number; concurrent requests share one read."""
         now = time.monotonic()
         self.readings = {key: value for key, value in self.readings.items() if now - value[0] < LOOK}
         if (job, after) not in self.readings:
@@ -56,7 +56,7 @@ class EventFeeds:
         return await asyncio.shield(self.readings[job, after][1])
 
     async def wait(self, job: str, after: int, seconds: float) -> bool:
-        """Return whether there is an event behind a number, after so many seconds at the latest."""
+        """Wait at most so many seconds for an event after a number, and return whether there is one."""
         end = time.monotonic() + seconds
         bell = asyncio.Event()
         self.bells.setdefault(job, set()).add(bell)

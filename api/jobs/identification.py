@@ -32,7 +32,8 @@ from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.scaleout import Map
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.recording import Recording
-from rcsa_ident.workflows.identify import ReadCut, data_of, judge_cut, left_out, mode_deviations
+from rcsa_ident.units import to_hz
+from rcsa_ident.workflows.identify import ReadCut, data_of, judge_cut, left_out, mode_deviations, of_campaign
 
 #: Returns a campaign of a group and what reads its cuts.
 Load = Callable[[str, str], tuple[Campaign, ReadCut]]
@@ -64,7 +65,7 @@ def carry(load: Load, job: Job, context: JobContext, spread: Map = map) -> Outco
     readings = _readings(campaign, read, context)
     data = data_of(campaign, readings)
     story = _Story(context, Preview(data), datetime.fromisoformat(str(job.started)))
-    found = _method(request["method"], start).run(data, request["seed"], _Remembering(context, spread), story)
+    found = of_campaign(_method(request["method"], start).run(data, request["seed"], _Remembering(context, spread), story), campaign)
     context.progress("result", 0, 1)
     deviations = mode_deviations(found)
     content = plain(identification_to_json(found, campaign, left_out(readings), deviations))
@@ -124,7 +125,7 @@ def _all(reading: Callable[[Cut], Reading], cuts: Iterable[Cut]) -> list[Reading
 def _method(name: str, start: str | None) -> Method:
     if name == "paper":
         return PaperGeneticAlgorithm()
-    return EvidenceSelection(start=None if start is None else posteriors(json.loads(start)))
+    return EvidenceSelection(start=None if start is None else posteriors(start))
 
 
 class _Remembering:
@@ -172,7 +173,7 @@ class _Story:
         lines = self.preview.lines(step, axis)
         some = np.linspace(0, lines.omega.size - 1, min(lines.omega.size, POINTS)).round().astype(int)
         curves = {
-            "frequency_hz": lines.omega / (2.0 * np.pi),
+            "frequency_hz": to_hz(lines.omega),
             "measured_abs": np.abs(lines.measured),
             "model_abs": np.abs(lines.model),
         }
@@ -190,7 +191,7 @@ def _lines(found: Identification, campaign: Campaign) -> dict[str, Any]:
         order = np.argsort(lines["omega"], kind="stable")
         value, model = (np.asarray(lines[name], dtype=complex)[order] for name in ("value", "model"))
         axes[axis.upper()] = {
-            "frequency_hz": (lines["omega"][order] / (2.0 * np.pi)).tolist(),
+            "frequency_hz": to_hz(lines["omega"][order]).tolist(),
             "measured_re": value.real.tolist(),
             "measured_im": value.imag.tolist(),
             "model_re": model.real.tolist(),

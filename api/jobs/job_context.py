@@ -1,4 +1,4 @@
-"""Where a job is worked on: what it remembers, what it tells on its way, and whether it is still wanted."""
+"""Context of a running job: its stored steps, its events and progress, and its cancellation."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.scaleout import Map
 
 log = logging.getLogger("rcsa_ident.jobs")
-#: What a job says that has lost its memory.
-STARTS_OVER = "The job starts over from its recordings: what it had remembered was written by another version of the service, or is lost."
-#: Seconds between two deliveries of events, and between two events of a kind or two curves of one axis.
+#: Said by a job whose memory is of no use.
+STARTS_OVER = "The job starts over from its recordings: what it had stored was written by another version of the service, or is lost."
+#: Intervals between two deliveries of events, two events of a kind and two curves of one topic [s].
 DELIVERY, PAUSE, CURVE = 0.4, 0.1, 1.0
-#: Events of one job after which they come half as often, again and again.
+#: Events of a job after which their interval doubles, again and again.
 MANY = 1000
-#: Seconds in which a job that is no longer wanted ends by itself.
+#: Time for a cancelled job to end by itself [s].
 GRACE = 2.0
-#: Seconds for which the store may be away before the process gives up.
+#: Time without an answer of the store after which the process gives up [s].
 PATIENCE = 60.0
 
 
 class Stopped(Exception):
-    """The job is no longer wanted."""
+    """The job has been cancelled or given to another worker."""
 
 
 class Outdated(Exception):
@@ -39,11 +39,11 @@ class Outdated(Exception):
 
 
 class Faulty(Exception):
-    """A step of the job has failed in a way that nobody foresaw."""
+    """A step of the job has failed unexpectedly."""
 
 
 class JobContext:
-    """What a job works with; everything that it tells is delivered by a thread of its own.
+    """Context of a running job, whose events a thread of its own delivers to the store.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class JobContext:
         Of the job, and of the worker.
     remember : Remember
     leave : callable
-        Ends the process with an exit code: what cannot go on here goes on after a start from the last step.
+        Ends the process with an exit code; the job continues from its last step elsewhere or after a restart.
     resumed : bool
         The job had come past its first step before: if that is not remembered, it says so.
     """
@@ -87,12 +87,12 @@ class JobContext:
             self._deliver()
 
     def check(self) -> None:
-        """Raise `Stopped` where the job is no longer wanted."""
+        """Raise `Stopped` where the job is not to continue here."""
         if self.stopped.is_set():
             raise Stopped
 
     def remember(self, name: str, compute: Callable[[], Any]) -> Any:
-        """Return what a step came to: computed once, whatever dies meanwhile.
+        """Return the result of a step, which is computed once whatever process dies.
 
         Raises
         ------
@@ -114,8 +114,8 @@ class JobContext:
         try:
             text = self.engine(name, outcome)
         except Exception as error:
-            # it has given the job to somebody else, or is out of order itself: what is known by now is not told as an end
-            log.error("the engine has refused", exc_info=error, extra={"fields": {"job": self.job, "step": name}})
+            # the job belongs to another worker, or the engine fails: no outcome of the job
+            log.error("the durable engine has refused a step", exc_info=error, extra={"fields": {"job": self.job, "step": name}})
             self.leave(3)
             raise Stopped from error
         if computed and self.resumed:
@@ -136,7 +136,7 @@ class JobContext:
         return found["value"]
 
     def _outcome(self, name: str, compute: Callable[[], Any]) -> str:
-        # the engine sees answers alone: what it made of exceptions would be read back by other rules
+        # the engine stores results only: it would restore exceptions by rules of its own
         try:
             text = _text(value=compute())
             self.came_further = True
@@ -155,11 +155,11 @@ class JobContext:
         Parameters
         ----------
         name : str
-            Of this call: the same each time that the job is carried out, and no other call's.
+            Of this call: unique in the job, and the same in every run.
         stage : str
-            What the job is told to be at meanwhile.
+            Reported as progress meanwhile.
         spread : callable
-            The builtin, or a pool's: those that have no result yet go through it together.
+            The builtin `map` or that of a pool; tasks without a stored result go through it together.
         """
         running: Any = None
         found = []
@@ -177,13 +177,13 @@ class JobContext:
         return found
 
     def progress(self, stage: str, done: int, total: int) -> None:
-        """Say how far the job is."""
+        """Report the progress of the job."""
         with self.lock:
             self.state = json.dumps({"stage": stage, "done": done, "total": total})
         self.check()
 
     def event(self, kind: str, data: dict[str, Any]) -> None:
-        """Add an event; most of what comes in quick succession is left out."""
+        """Report an event; most events in quick succession are omitted."""
         now = time.monotonic()
         if now - self.last.get(kind, 0.0) >= PAUSE * 2.0 ** (self.count // MANY):
             self.last[kind] = now
@@ -192,7 +192,7 @@ class JobContext:
         self.check()
 
     def curve(self, topic: str, data: Callable[[], dict[str, Any] | None]) -> None:
-        """Add a curve, which takes the place of the one before; at most one a second is computed, and None is left out."""
+        """Report a curve that replaces the previous one of its topic; computed at most once a second, None is not reported."""
         now = time.monotonic()
         if now - self.last.get(topic, 0.0) >= CURVE:
             self.last[topic] = now
@@ -210,12 +210,12 @@ class JobContext:
             if not self._deliver():
                 job = self.jobs.find(self.job)
                 if job is not None and job.state == "running":
-                    # it is another's now: not a word more of it
-                    log.error("superseded", extra={"fields": {"job": self.job}})
+                    # another worker has taken the job over: report nothing more
+                    log.error("the job belongs to another worker now", extra={"fields": {"job": self.job}})
                     self.leave(3)
                 self.stopped.set()
                 if not self.over.wait(GRACE):
-                    # long work without a word cannot be stopped otherwise
+                    # long work without a check cannot be stopped otherwise
                     self.leave(0)
                 return
 
@@ -231,7 +231,7 @@ class JobContext:
                 return self.jobs.tell(self.job, self.token, events, state, further)
             except Unavailable:
                 if time.monotonic() - start > PATIENCE:
-                    log.error("the store is away", extra={"fields": {"job": self.job}})
+                    log.error("the database does not answer", extra={"fields": {"job": self.job}})
                     self.leave(1)
                     return False
                 time.sleep(1.0)

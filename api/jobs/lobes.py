@@ -12,11 +12,11 @@ from api.jobs.job_context import JobContext
 from api.stores.jobs import Job, Outcome
 from api.work import tasks
 from api.work.pool import guarded
-from api.work.requests import LobeQuestion, MachineText, ToolingText
+from api.work.requests import LobeRequest, MachineText, ToolingSource
 from rcsa_ident.errors import InputError
 
 
-def asked(machine: MachineText, toolings: Sequence[ToolingText], question: LobeQuestion) -> str:
+def asked(machine: MachineText, toolings: Sequence[ToolingSource], question: LobeRequest) -> str:
     """Return the text of a job: machine and toolings as they are now, whatever becomes of them while it waits."""
     return encode((machine, tuple(toolings), question))
 

@@ -1,4 +1,4 @@
-"""A process that carries out jobs: it takes a name, lives on, takes over from the dead, and hands jobs to the engine."""
+"""Job worker: claims a name, sends heartbeats, takes over the jobs of dead workers, and hands jobs to the durable engine."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from api.stores.jobs import Job, Jobs, Outcome, Worker
 from rcsa_ident.errors import InputError
 
 log = logging.getLogger("rcsa_ident.jobs")
-#: Seconds between two looks for new jobs, between two signs of life, between two looks at everything, and after which a worker
-#: without a sign is dead.
+#: Intervals between two polls for new jobs, two heartbeats and two rounds of housekeeping, and time without a heartbeat after which a
+#: worker counts as dead [s].
 LOOK, BEAT, ROUND, LEASE = 0.5, 4.0, 3.0, 20.0
-#: Jobs that somebody waits for at the screen come first.
+#: Jobs that a user waits for come first.
 PRIORITY = {"lobes": 1}
-#: Carries out a job of one kind and returns how it ended, seconds left out.
+#: Carries out a job of one kind and returns its outcome, without the seconds.
 Carrier = Callable[[Job, JobContext], Outcome]
 
 
@@ -40,12 +40,12 @@ def carry(
     remember: Remember,
     leave: Callable[[int], Any] = os._exit,
 ) -> None:
-    """Carry out a job and note how it ended; whatever happens, it ends or the process does.
+    """Carry out a job and store its outcome; in any case either the job ends or the process does.
 
     Parameters
     ----------
     attempts : int
-        Times that a job may be taken up without coming further.
+        Times that a job may be started without completing another step.
     """
     try:
         job = jobs.begin(id, token, _now())
@@ -58,12 +58,12 @@ def carry(
             names = ("state", "status", "problem", "texts", "applied")
             jobs.finish(id, token, Outcome(finished=_now(), seconds=seconds, **{name: getattr(outcome, name) for name in names}))
     except Unavailable as error:
-        log.error("the store is away", exc_info=error, extra={"fields": {"job": id}})
+        log.error("the database does not answer", exc_info=error, extra={"fields": {"job": id}})
         leave(1)
 
 
 def _outcome(jobs: Jobs, carrier: Carrier, job: Job, token: str, remember: Remember, leave: Callable[[int], Any]) -> Outcome | None:
-    """How the job ended; None where it was stopped, or has to start over."""
+    """Outcome of the job; None where it was stopped, or has to start over."""
     try:
         with JobContext(jobs, job.id, token, remember, leave, resumed=job.progress is not None) as context:
             return carrier(job, context)
@@ -77,24 +77,24 @@ def _outcome(jobs: Jobs, carrier: Carrier, job: Job, token: str, remember: Remem
     except Unavailable:
         raise
     except Faulty:
-        return failed("something unexpected happened; the log has it under this job's id")
+        return failed("an internal error occurred; it is logged under this job's id")
     except Exception as error:
         log.error("unexpected", exc_info=error, extra={"fields": {"job": job.id}})
-        return failed("something unexpected happened; the log has it under this job's id")
+        return failed("an internal error occurred; it is logged under this job's id")
 
 
 def failed(detail: str, *errors: tuple[str, str, str]) -> Outcome:
-    """Return how a job ends that came to nothing."""
+    """Return the outcome of a failed job."""
     entries = [dict(zip(("field", "found", "allowed"), error, strict=True)) for error in errors]
     return Outcome("failed", "", problem=json.dumps({"detail": detail, "errors": entries}))
 
 
 def _given_up(attempts: int) -> Outcome:
-    return failed(f"its process has died {attempts} times at the same step: perhaps it needs more memory than there is")
+    return failed(f"the worker process has died {attempts} times at the same step: perhaps it needs more memory than is available")
 
 
 class JobWorker:
-    """The one worker of a process.
+    """The job worker of this process.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class JobWorker:
         self.seen: dict[str, tuple[int, float]] = {}
 
     def run(self, ready: Callable[[], None], stop: threading.Event) -> None:
-        """Work until `stop` is set; what runs then goes on elsewhere, or after the next start."""
+        """Work until `stop` is set; a running job continues elsewhere, or after the next start."""
         while not self._claim():
             if stop.wait(LOOK):
                 return
@@ -125,8 +125,8 @@ class JobWorker:
             try:
                 if now - last_beat >= BEAT:
                     if not self.jobs.beat(self.id, self.token):
-                        # frozen for so long that another has taken over: what runs here is its now
-                        log.error("taken for dead", extra={"fields": {"worker": self.id}})
+                        # suspended for so long that another worker has taken over the jobs
+                        log.error("another worker has taken this one for dead", extra={"fields": {"worker": self.id}})
                         os._exit(3)
                     last_beat = now
                 self.submit_accepted()
@@ -134,11 +134,11 @@ class JobWorker:
                     self.reconcile()
                     last_round = now
             except Unavailable as error:
-                log.warning("the store is away", exc_info=error)
+                log.warning("the database does not answer", exc_info=error)
         self.jobs.leave(self.id, self.token)
 
     def submit_accepted(self) -> None:
-        """Hand all jobs to the engine that were accepted: also those between whose row and whose hand-over somebody died."""
+        """Hand all accepted jobs to the engine, including those whose service died between row and submission."""
         open = {job.id: job for job in self.jobs.open()}
         for id, job in open.items():
             if id not in self.submitted:
@@ -146,17 +146,17 @@ class JobWorker:
         self.submitted = set(open)
 
     def reconcile(self) -> None:
-        """Take over from the dead, forget what is over, and start again what the engine has lost."""
-        # in this order: a job that is accepted in between is open, and not yet carried
+        """Take over jobs of dead workers, delete finished ones from the engine, and submit again those that it has lost."""
+        # in this order: a job accepted in between is open and not yet in the engine
         carried = {each.job: each for each in self.backend.carried()}
         open = {job.id: job for job in self.jobs.open()}
         rows = self._living()
         names, tokens = {row.id for row in rows}, {row.token for row in rows} - {self.token}
         for id, each in carried.items():
             orphan = each.state == "running" and each.executor not in names and id in open and open[id].worker not in tokens
-            # of several that have seen it one takes it over
+            # one of several workers that see it takes it over
             if orphan and self.jobs.take(id, open[id].worker, self.token):
-                log.warning("taken over", extra={"fields": {"job": id, "from": each.executor, "worker": self.id}})
+                log.warning("job taken over from a dead worker", extra={"fields": {"job": id, "from": each.executor, "worker": self.id}})
                 self.backend.resume(id)
         done = {
             id
@@ -168,11 +168,11 @@ class JobWorker:
         }
         if done:
             self.backend.forget(sorted(done))
-        # the row is what counts: the engine's own tables may be younger or older than it, or gone
+        # the row counts: the tables of the engine may be older, newer or lost
         self.submitted &= set(carried) - done
 
     def _claim(self) -> bool:
-        """Take the first name of this place that is free, or whose bearer is dead."""
+        """Claim the first name of this place that is free or belongs to a dead worker."""
         living = {row.id for row in self._living()}
         rows = {row.id: row for row in self.jobs.workers()}
         number = 1
@@ -186,7 +186,7 @@ class JobWorker:
         return True
 
     def _living(self) -> list[Worker]:
-        """Workers that live, as far as one can see: clocks differ from place to place, so that only changes count."""
+        """Workers that appear alive; clocks differ between machines, so only changes of their heartbeats count."""
         now, found = time.monotonic(), []
         for row in self.jobs.workers():
             beats, since = self.seen.get(row.token, (-1, now))
@@ -199,7 +199,7 @@ class JobWorker:
 
 
 def place() -> str:
-    """Return what processes share that can see each other: the machine, since its start, and the container in it."""
+    """Return an id shared by processes that can see each other: of the machine since its boot, and of the container."""
     parts = [socket.gethostname()]
     for name in ("/proc/sys/kernel/random/boot_id", "/proc/self/ns/pid"):
         try:
@@ -210,9 +210,9 @@ def place() -> str:
 
 
 def process(number: int) -> str:
-    """Return what tells a process from a later one of the same number, as far as the system says."""
+    """Return the identity of a process, its number and start time, which differs from a later one of the same number."""
     try:
-        # behind the name in parentheses, which may hold anything: the third field is the state, the 22nd the start
+        # after the name in parentheses, which may hold anything: field 3 is the state, field 22 the start time
         fields = Path(f"/proc/{number}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
     except OSError:
         return f"{number}:"
@@ -220,7 +220,7 @@ def process(number: int) -> str:
 
 
 def gone(identity: str) -> bool:
-    """Whether a process of this place has certainly ended."""
+    """Whether a process of this place has certainly ended, by its identity."""
     return not identity.endswith(":") and process(int(identity.partition(":")[0])) != identity
 
 

@@ -1,1 +1,1 @@
-"""Uploads are read in a process of their own with limits; what it can not read costs nothing else."""
+"""Reading of uploads, in a process of its own with limits of memory and time."""

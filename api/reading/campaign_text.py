@@ -1,4 +1,4 @@
-"""Campaigns as they were declared: keys as in campaign.toml, toolings by their texts, recordings by the last part of their paths."""
+"""Declared campaigns: the keys of campaign.toml, with toolings by their texts and recordings by the last part of their paths."""
 
 from __future__ import annotations
 
@@ -8,27 +8,28 @@ import unicodedata
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any, NoReturn
+from typing import Any
 
 from api.work.toolings import parsed, toml_of, weigh
 from rcsa_ident.errors import InputError
+from rcsa_ident.io.recordings import READERS
 from rcsa_ident.io.setups import campaign_of
 from rcsa_ident.io.setups import tooling_of as tooling_of_keys
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machining_setup import Campaign, Tooling
 
-#: Suffixes of recordings, in lower case.
-FORMATS = (".h5", ".hdf5", ".csv", ".tdms", ".uff", ".unv", ".wav", ".mat", ".parquet")
-#: Largest text of a campaign, and of its toolings together.
+#: Suffixes of recordings in lower case.
+FORMATS = tuple(READERS)
+#: Largest text of a campaign, and of its toolings together [characters].
 LARGEST, LARGEST_TOOLINGS = 1_000_000, 4_000_000
 MOST_CUTS, MOST_SENSORS, MOST_TOOLINGS = 2000, 64, 200
-#: Frequency up to which toolings are weighed [Hz].
+#: Frequency up to which the cost of toolings is estimated [Hz].
 HIGHEST_HZ = 5000.0
 TOOLING_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._+()-]{0,63}")
 _FORBIDDEN = frozenset('/\\:*?"<>|')
 _LONGEST_NAME = 128
 
-#: Given a name, returns the text of a tooling of the library, or None.
+#: Returns the text of a tooling of the library by its name, or None.
 Library = Callable[[str], str | None]
 
 
@@ -50,16 +51,16 @@ class File:
 
 @dataclass(frozen=True, slots=True)
 class Upload:
-    """A file that came, and what it should be.
+    """An uploaded file and its interpretation.
 
     Parameters
     ----------
     path : Path
-        Where it is; its name says nothing.
+        Of the file; its name has no meaning.
     name : str
-        As the client calls it: its suffix says the format.
+        Given by the client; its suffix is the format.
     target : Path
-        Where its samples are written; nothing is there.
+        To write the samples to; does not exist yet.
     """
 
     path: Path
@@ -68,12 +69,12 @@ class Upload:
 
 
 def recording_name(text: str) -> str:
-    """Return the last part of a path as the service writes it: one form for letters that have two."""
+    """Return the last part of a path in Unicode normal form C."""
     return unicodedata.normalize("NFC", re.split(r"[/\\]", text)[-1])
 
 
 def declare(data: Mapping[str, Any], library: Library) -> tuple[str, str, int]:
-    """Return name, text and number of cuts of a campaign, after every check that `rcsa-ident check` makes before it reads recordings.
+    """Return name, text and number of cuts of a campaign that has passed the checks of `rcsa-ident check`, recordings aside.
 
     Parameters
     ----------
@@ -114,7 +115,7 @@ def _cuts(top: Table) -> list[dict[str, Any]]:
                 continue
             cut[key] = name = _checked_name(f"cuts[{i}].{key}", text)
             if paths.setdefault(name, text) != text:
-                raise InputError(f"cuts[{i}].{key}", f'"{text}" beside "{paths[name]}"', "files that differ in the last part of their path")
+                raise InputError(f"cuts[{i}].{key}", f'"{text}" beside "{paths[name]}"', "file names (last parts of the paths) that differ")
     return cuts
 
 
@@ -125,12 +126,12 @@ def _checked_name(field: str, text: str) -> str:
     if odd or not 1 <= len(name) <= _LONGEST_NAME:
         raise InputError(field, repr(text[:80]), allowed)
     if PurePosixPath(name).suffix.lower() not in FORMATS:
-        raise InputError(field, repr(text[-80:]), f"a file that ends in one of {', '.join(FORMATS)}")
+        raise InputError(field, repr(text[-80:]), f"a file name that ends in one of {', '.join(FORMATS)}")
     return name
 
 
 def _check_files(cuts: list[dict[str, Any]]) -> None:
-    """A cut has a file of its own, which is nobody's air cut."""
+    """Refuse a file that serves two cuts, or a cut and an air cut."""
     owner: dict[str, int] = {}
     for i, cut in enumerate(cuts):
         if cut["cut"] in owner:
@@ -142,7 +143,7 @@ def _check_files(cuts: list[dict[str, Any]]) -> None:
 
 
 def _toolings(top: Table, cuts: list[dict[str, Any]], library: Library) -> dict[str, str]:
-    """The text of every tooling."""
+    """Texts of all toolings by name."""
     if "toolings" in top:
         given = dict(top.table("toolings").data)
     else:
@@ -159,16 +160,16 @@ def _toolings(top: Table, cuts: list[dict[str, Any]], library: Library) -> dict[
             continue
         if not isinstance(what, str):
             raise InputError(field, what, "a name of the library, the path of a tooling file, or a table of the tooling's keys")
-        # a path means the tooling of the library that has the key as its name
+        # a path stands for the library's tooling that is named by the key
         name = key if what.endswith(".toml") else what
         text = library(name) if TOOLING_NAME.fullmatch(name) else None
         if text is None:
             raise InputError(
-                field, f'"{name[:80]}", which the library has not', "a tooling of the library (PUT /v1/toolings/NAME writes one)"
+                field, f'"{name[:80]}", which is not in the library', "a tooling of the library (PUT /v1/toolings/NAME writes one)"
             )
         texts[key] = text
     if sum(map(len, texts.values())) > LARGEST_TOOLINGS:
-        raise InputError("toolings", "very long ones", f"at most {LARGEST_TOOLINGS // 1000} kB together")
+        raise InputError("toolings", "texts that are too long", f"at most {LARGEST_TOOLINGS // 1000} kB together")
     return texts
 
 
@@ -204,7 +205,7 @@ def toml_text(text: str, there: Callable[[str], bool] = lambda _: True) -> str:
     Parameters
     ----------
     there : callable
-        Whether the folder holds a recording; cuts without theirs are left out.
+        Whether the folder holds a recording; cuts without one are omitted.
     """
     data = json.loads(text)
     for cut in (cuts := [cut for cut in data["cuts"] if there(cut["cut"])]):
@@ -215,8 +216,3 @@ def toml_text(text: str, there: Callable[[str], bool] = lambda _: True) -> str:
     head = {key: value for key, value in data.items() if key != "cuts"}
     head["toolings"] = {name: f"toolings/{name}.toml" for name in data["toolings"]}
     return toml_of(head) + "".join(f"[[cuts]]\n{toml_of(cut)}" for cut in cuts)
-
-
-def refuse_name(name: str, known: Mapping[str, File]) -> NoReturn:
-    """Raise for a recording that a campaign does not name."""
-    raise InputError("name", f'"{name[:80]}"', "a recording that the campaign names: " + ", ".join(list(known)[:5]) + ", ...")

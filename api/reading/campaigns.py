@@ -1,4 +1,4 @@
-"""Campaigns of the store as the rest of the project knows them: what an identification reads."""
+"""Campaigns of the store in the form that an identification reads."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
 
 
 def load_campaign(store: Store, files: Files, group: str, campaign_id: str) -> tuple[Campaign, ReadCut]:
-    """Return a campaign with the cuts whose recordings are there, and what reads them; it crosses processes.
+    """Return a campaign with the cuts that have recordings, and a picklable function that reads them.
 
     Raises
     ------
     InputError
-        The campaign is gone, or no cut of it is uploaded.
+        The campaign has been deleted, or none of its cuts has a recording.
     """
     from api.reading.samples import read_cut_normalised
 
     row = store.campaigns.get(group, campaign_id)
     if row is None:
-        raise InputError("campaign", f'"{campaign_id}"', "a campaign that is there")
+        raise InputError("campaign", f'"{campaign_id}"', "an existing campaign")
     keys = {each.name: each.normalised for each in store.recordings.list(group, campaign_id, "", 1_000_000)}
 
     def locate(name: str) -> Path:

@@ -1,4 +1,4 @@
-"""What the reader process does with an upload: read it, write its samples in one form, and tell what was found. Answers are plain."""
+"""Examination of an upload in the reader process: read, normalise its samples, judge it; answers are plain JSON types."""
 
 from __future__ import annotations
 
@@ -18,44 +18,43 @@ from rcsa_ident.signals.measurement import Reading, judge_air, measure_cut
 from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.signals.steady import measured_axes
 from rcsa_ident.signals.verdict import RecordCode, Verdict
-
-_RPM = 30.0 / np.pi
+from rcsa_ident.units import to_rpm
 
 
 def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) -> Recording:
-    """Return the samples of an upload in SI, and write them; errors name the file as the client does.
+    """Return the samples of an upload in SI and write them normalised; errors carry the client's file name.
 
     Parameters
     ----------
     rate : float or None [Hz]
-        For a file that carries none.
+        Of a file without a rate.
     """
     try:
         found, signals = read_signals(upload.path, [sensor.name for sensor in sensors], rate, Path(upload.name).suffix)
         write_normalised(upload.target, found, signals, sensors)
         return in_si(found, signals, sensors)
     except InputError as error:
-        raise _told(error, upload) from None
+        raise _with_client_name(error, upload) from None
     except RecursionError:
-        raise InputError("recording", "one that cannot be read (nested without end)", "a complete file", upload.name) from None
+        raise InputError("recording", "a file nested too deeply to be read", "a complete file", upload.name) from None
 
 
-def _told(error: InputError, upload: Upload) -> InputError:
+def _with_client_name(error: InputError, upload: Upload) -> InputError:
     found = error.found.replace(str(upload.path), upload.name) if isinstance(error.found, str) else error.found
     return InputError(error.field, found, error.allowed.replace(str(upload.path), upload.name), upload.name)
 
 
 def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) -> dict[str, Any]:
-    """Read an upload of a campaign and return what was found in it.
+    """Read an upload of a campaign and return its description with the verdict.
 
     Parameters
     ----------
     text : str
         The campaign as declared.
     cut_id, role : str
-        The cut that it belongs to, one of them where it is an air cut.
+        The cut it belongs to; one of them for an air cut.
     air : Path or None
-        Samples of the air cut, where the upload is a cut and they are there.
+        Samples of the cut's air cut, where they have been uploaded.
     """
     campaign = campaign_of_text(text)
     cut = next(each for each in campaign.cuts if each.id == cut_id)
@@ -63,26 +62,26 @@ def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) ->
     try:
         beside = None if air is None else read_normalised(air)
     except InputError:
-        # it went in this moment: the verdict is looked at once more anyway
+        # deleted meanwhile: the cut will be judged again
         beside = None
     verdict, reading = judged(campaign, cut, recording, beside, role)
     speed = reading.spindle_speed
-    return told(recording) | {
+    return described(recording) | {
         "verdict": verdict,
-        "spindle_speed_rpm": speed * _RPM if speed is not None and np.isfinite(speed) else None,
+        "spindle_speed_rpm": to_rpm(speed) if speed is not None and np.isfinite(speed) else None,
         "harmonics_above_noise": {axis.upper(): reading.harmonics.get(axis, 0) for axis in measured_axes(recording)},
     }
 
 
 def judge(text: str, cut_id: str, cut: Path, air: Path | None) -> dict[str, Any]:
-    """Return the verdict on samples of a cut that are there already."""
+    """Return the verdict on the stored samples of a cut."""
     campaign = campaign_of_text(text)
     declared = next(each for each in campaign.cuts if each.id == cut_id)
     return judged(campaign, declared, read_normalised(cut), None if air is None else read_normalised(air), "cut")[0]
 
 
-def told(recording: Recording) -> dict[str, Any]:
-    """Return what needs no analysis."""
+def described(recording: Recording) -> dict[str, Any]:
+    """Return rate, duration and channels of a recording."""
     return {
         "sampling_rate_hz": recording.rate,
         "duration_s": recording.samples.shape[0] / recording.rate,
@@ -91,7 +90,7 @@ def told(recording: Recording) -> dict[str, Any]:
 
 
 def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | None, role: str) -> tuple[dict[str, Any], Reading]:
-    """Return the verdict on a cut, beside its air cut where there is one, or on an air cut alone; and what it rests on."""
+    """Return the verdict on a cut (with its air cut, where there is one) or on an air cut, and the reading it is based on."""
     cutter = campaign.toolings[cut.tooling].cutter
     try:
         with np.errstate(all="ignore"):
@@ -118,7 +117,7 @@ def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | 
 
 
 def warm() -> None:
-    """Judge a small record, so that what a verdict needs is imported and compiled."""
+    """Judge a small record: imports and compiles everything a verdict needs."""
     from rcsa_ident.cutting.coefficients import CuttingCoefficients
     from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
     from rcsa_ident.cutting.cutter import Cutter

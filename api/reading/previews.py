@@ -1,4 +1,4 @@
-"""What a page draws of a recording: its outline over time, and its amplitudes over frequency; so many points, whatever its length."""
+"""Previews of a recording with a limited number of points: envelope over time and amplitude spectrum."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.steady_part import hann
 
 _BLOCK = 1 << 20
-#: A spectrum is taken from the middle of a longer recording.
+#: Longest record of a spectrum, taken from the middle of a longer recording.
 _LONGEST = 1 << 21
 _UNITS = {Quantity.DISPLACEMENT: "m", Quantity.ACCELERATION: "m/s^2", Quantity.FORCE: "N", Quantity.TRIGGER: ""}
 
 
 def envelope(path: Path, points: int) -> dict[str, Any]:
-    """Return lowest and highest sample of each channel in at most `points` stretches of one length, and where they begin [s].
+    """Return minimum and maximum of each channel over at most `points` intervals of equal length, and the starts of those [s].
 
-    A stretch of lost samples alone has no extremes: None.
+    An interval without any valid sample has None.
     """
     rate, count = length(path)
     width = -(-count // points)
@@ -43,12 +43,12 @@ def envelope(path: Path, points: int) -> dict[str, Any]:
 
 
 def spectrum(path: Path, speed_rpm: float | None, points: int) -> dict[str, Any]:
-    """Return amplitudes of each channel, Hann window, the largest of each of at most `points` bands; lost samples count as none.
+    """Return the amplitude spectrum of each channel (Hann window), the maximum of each of at most `points` bands; lost samples are zero.
 
     Parameters
     ----------
     speed_rpm : float or None
-        Its multiples are told as harmonics.
+        Spindle speed, whose multiples are returned as harmonics.
     """
     rate, count = length(path)
     start = max(0, (count - _LONGEST) // 2)
@@ -60,7 +60,7 @@ def spectrum(path: Path, speed_rpm: float | None, points: int) -> dict[str, Any]
     width = -(-amplitude.shape[0] // points)
     starts = np.arange(0, amplitude.shape[0], width)
     largest = np.maximum.reduceat(amplitude, starts)
-    # of each band the frequency of its strongest line in any channel
+    # for each band the frequency of its strongest line in any channel
     within = [int(s + np.argmax(amplitude[s : s + width].max(axis=1))) for s in starts]
     frequency = np.array(within) * rate / samples.shape[0]
     step = 0.0 if speed_rpm is None else speed_rpm / 60.0

@@ -1,63 +1,44 @@
-"""One process that reads uploads, with limits: what costs more than them is refused, and the process is replaced."""
+"""The reader process: reads uploads within limits of memory and time, and is replaced where an upload exceeds them."""
 
 from __future__ import annotations
 
 import asyncio
 import json
 import logging
-import multiprocessing
-import os
 import signal
-import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
+from api.processes import Child, spawn_context
 from api.reading import reader_tasks
 from api.work.pool import Busy
 from rcsa_ident.errors import InputError
 
 log = logging.getLogger("rcsa_ident.reading")
 MEBIBYTE = 1 << 20
-#: For the start of a process, imports and compiling [s].
+#: Time limit for the start of the process, including imports and compilation [s].
 _START = 300.0
-
-
-class Reading(Protocol):
-    """Where uploads are read."""
-
-    async def run(self, call: Callable[..., Any], *arguments: Any) -> Any:
-        """Return what a call answers, in JSON's types; raises `Busy` where too many wait, `InputError` where the upload is at fault."""
-
-    @property
-    def waiting(self) -> int:
-        """Calls that have no answer yet."""
-
-    def start(self) -> None:
-        """Start the process."""
-
-    def stop(self) -> None:
-        """End the process."""
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What one call may cost.
+    """Limits of one call.
 
     Parameters
     ----------
     memory : int [MiB]
-        Address space beyond what the process takes before it reads anything.
+        Address space beyond that of the idle process.
     seconds : float [s]
-        Of one core.
+        CPU time.
     wall_seconds : float [s]
-        By the clock.
+        Wall-clock time.
     calls : int
-        After so many the process is replaced.
+        After which the process is replaced.
     """
 
     memory: int = 2048
@@ -67,34 +48,35 @@ class Limits:
 
     @property
     def costly(self) -> InputError:
-        """What is told of an upload that costs more."""
+        """The refusal of an upload that costs more."""
         found = f"a file that costs more than {self.memory} MiB or {self.seconds:g} s to read"
-        return InputError("recording", found, "a recording that takes less: fewer samples, or a plainer format")
+        return InputError("recording", found, "a recording that is cheaper to read: fewer samples, or a simpler format")
 
 
 class Reader:
-    """A spawned process that serves one call at a time.
+    """A spawned process that answers one call at a time.
 
     Parameters
     ----------
     limits : Limits
     queue : int
-        Calls that may wait beyond the one at work.
+        Calls that may wait beyond the running one.
     prepare : callable
-        What the process does first, outside of the limits.
+        Called first in the process, without limits.
     """
 
     def __init__(self, limits: Limits, queue: int, prepare: Callable[[], None] = reader_tasks.warm) -> None:
         self.limits, self.queue, self.prepare, self.waiting = limits, queue, prepare, 0
         self.threads: ThreadPoolExecutor | None = None
-        self.child: _Child | None = None
+        self.child: _Reading | None = None
 
     def start(self) -> None:
         self.threads = ThreadPoolExecutor(1, "reader")
-        self.child = self._new()
+        self.child = _Reading(self.limits, self.prepare)
 
-    def _new(self) -> _Child:
-        return _Child(self.limits, self.prepare)
+    @property
+    def ready(self) -> bool:
+        return self.child is not None
 
     async def run(self, call: Callable[..., Any], *arguments: Any) -> Any:
         if self.threads is None or self.waiting > self.queue:
@@ -106,21 +88,13 @@ class Reader:
             self.waiting -= 1
 
     def _ask(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        # a process killed from outside says nothing about the upload: ask a new one once
         for _ in range(2):
             if self.threads is None:
                 break
-            child = self.child or self._new()
-            self.child = child
-            try:
-                kind, answer = child.ask(call, arguments)
-            except InputError:
-                self._replace()
-                raise
-            except _Killed:
-                # not by its own doing: somebody, or the system for want of memory, has ended it
-                self._replace()
-                continue
-            if child.calls >= self.limits.calls or kind == "costly":
+            self.child = child = self.child or _Reading(self.limits, self.prepare)
+            kind, answer = child.ask(call, arguments)
+            if kind in ("costly", "killed") or child.calls >= self.limits.calls:
                 self._replace()
             if kind == "answer":
                 return answer
@@ -128,19 +102,20 @@ class Reader:
                 raise self.limits.costly
             if kind == "refused":
                 raise InputError(*answer)
-            log.error("a call of the reader has failed", extra={"fields": {"error": answer}})
-            raise InputError("recording", "one that cannot be read", "a complete file of its format")
+            if kind == "failed":
+                log.error("a call of the reader has failed", extra={"fields": {"error": answer}})
+                raise InputError("recording", "a file that cannot be read", "a complete file of its format")
         raise Busy
 
     def _replace(self) -> None:
         if self.child is not None:
             self.child.end()
-        self.child = None if self.threads is None else self._new()
+        self.child = None if self.threads is None else _Reading(self.limits, self.prepare)
 
     def stop(self) -> None:
         threads, self.threads = self.threads, None
         if self.child is not None:
-            # a call at work ends with its process
+            # a running call ends with its process
             self.child.process.kill()
         if threads is not None:
             threads.shutdown(wait=True, cancel_futures=True)
@@ -149,88 +124,68 @@ class Reader:
         self.child = None
 
 
-class _Killed(Exception):
-    """The process has ended for no reason of its own."""
-
-
-class _Child:
-    """A process and the line to it."""
+class _Reading:
+    """One reader process and the pipe to it."""
 
     def __init__(self, limits: Limits, prepare: Callable[[], None]) -> None:
-        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-            os.environ.setdefault(name, "1")
-        context = multiprocessing.get_context("spawn")
         self.limits, self.calls, self.ready = limits, 0, False
-        self.line, theirs = context.Pipe()
-        self.process = context.Process(target=_serve, args=(theirs, limits, prepare), daemon=True, name="reader")
-        self.process.start()
+        self.pipe, theirs = spawn_context().Pipe()
+        self.process = Child(_serve, theirs, limits, prepare, name="reader")
         theirs.close()
 
     def ask(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
-        """Return kind and content of the answer."""
-        if not self.ready:
-            self._receive(_START)
-            self.ready = True
-        self.calls += 1
+        """Return the outcome of a call (answer, refused, failed, costly, or killed from outside) and its content."""
         try:
-            self.line.send((call, arguments))
-        except OSError:
-            raise _Killed from None
-        kind, answer = self._receive(self.limits.wall_seconds)
+            if not self.ready:
+                self._receive(_START)
+                self.ready = True
+            self.calls += 1
+            self.pipe.send((call, arguments))
+            kind, answer = self._receive(self.limits.wall_seconds)
+        except TimeoutError:
+            self.process.kill()
+            return "costly", None
+        except BrokenPipeError:
+            # it ended before this call
+            return "killed", None
+        except (EOFError, OSError):
+            self.process.join(10.0)
+            return "killed" if self.process.exitcode == -signal.SIGKILL or not self.ready else "costly", None
         return kind, answer
 
     def _receive(self, seconds: float) -> Any:
-        # what comes back is parsed as data: the process may be in the hands of what it has read
-        if not self.line.poll(seconds):
-            self.process.kill()
-            raise self.limits.costly
-        try:
-            return json.loads(self.line.recv_bytes())
-        except (EOFError, OSError):
-            self.process.join(10.0)
-            if self.process.exitcode == -signal.SIGKILL or not self.ready:
-                raise _Killed from None
-            raise self.limits.costly from None
+        if not self.pipe.poll(seconds):
+            raise TimeoutError
+        # parsed as JSON, never unpickled: an upload may have taken the process over
+        return json.loads(self.pipe.recv_bytes())
 
     def end(self) -> None:
-        """Have it ended."""
-        self.line.close()
-        self.process.join(0.5)
-        if self.process.is_alive():
-            self.process.kill()
-            self.process.join()
-        self.process.close()
+        """End the process: by closing its pipe, else by SIGKILL."""
+        self.pipe.close()
+        self.process.end(0.5)
 
 
-def _serve(line: Connection, limits: Limits, prepare: Callable[[], None]) -> None:
-    """In the process: answer calls until the line ends, and end with the service, however that ends."""
+def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None]) -> None:
+    """In the process: answer calls until the pipe is closed."""
     import resource
 
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def follow() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=follow, daemon=True).start()
     from rcsa_ident.io.hdf5 import LARGEST_DATA
 
     prepare()
     taken = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (taken + limits.memory * MEBIBYTE,) * 2)
-    # no core of somebody's data, and no file larger than what it may write
+    # no core dump of a client's data, and no file larger than the largest result
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_DATA + LARGEST_DATA // 8,) * 2)
-    line.send_bytes(b"{}")
+    pipe.send_bytes(b"{}")
     while True:
         try:
-            call, arguments = line.recv()
+            call, arguments = pipe.recv()
         except EOFError:
             return
-        # counted from the start of the process; the system ends it at the limit
+        # CPU time counts from the start of the process
         resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time() + limits.seconds) + 1, resource.RLIM_INFINITY))
-        line.send_bytes(_answer(call, arguments))
+        pipe.send_bytes(_answer(call, arguments))
 
 
 def _answer(call: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:

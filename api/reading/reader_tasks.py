@@ -1,4 +1,4 @@
-"""What the reader process is asked for, by functions that import nothing here: only there are formats and signals loaded."""
+"""Calls of the reader process and the workers; they import formats and signals where they run, so that the service does not."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from api.reading.campaign_text import Upload
+from rcsa_ident.signals.recording import Sensor
 
 
 def warm() -> None:
@@ -16,21 +17,35 @@ def warm() -> None:
 
 
 def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) -> dict[str, Any]:
-    """Return what was found in an upload, see `examine.look`."""
+    """Return the description of an upload, see `examine.look`."""
     from api.reading import examine
 
     return examine.look(upload, text, cut_id, role, air)
 
 
+def read_alone(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) -> dict[str, Any]:
+    """Write the samples of an upload that comes without a campaign, and return its rate, duration and channels."""
+    from api.reading import examine
+
+    return examine.described(examine.read_upload(upload, sensors, rate))
+
+
+def recording_and_air(cut: Path, air: Path | None) -> tuple[Any, Any]:
+    """Return the stored samples of a recording and of its air cut, where there is one."""
+    from api.reading.samples import read_normalised
+
+    return read_normalised(cut), None if air is None else read_normalised(air)
+
+
 def judge(text: str, cut_id: str, cut: Path, air: Path | None) -> dict[str, Any]:
-    """Return the verdict on samples that are there, see `examine.judge`."""
+    """Return the verdict on stored samples, see `examine.judge`."""
     from api.reading import examine
 
     return examine.judge(text, cut_id, cut, air)
 
 
 def envelope(path: Path, points: int) -> dict[str, Any]:
-    """Return the outline of a recording, see `previews.envelope`."""
+    """Return the envelope of a recording, see `previews.envelope`."""
     from api.reading import previews
 
     return previews.envelope(path, points)

@@ -1,4 +1,4 @@
-"""Samples of an upload in one form, whatever it came as: signals of the campaign's sensors in HDF5, and the sensors beside them.
+"""Normalised samples of an upload: the signals of the campaign's sensors and the sensors themselves in HDF5, whatever its format.
 
 Signals stay undivided by their sensitivities, as float32 where that holds every one of them, else as float64: what is read from here
 is to the last bit what the commands read from the upload. Chunks of a second let a part be read alone, each with a checksum.
@@ -28,14 +28,14 @@ _SENSORS = "sensors"
 
 
 def write_normalised(path: Path, rate: float, signals: Sequence[FloatArray], sensors: tuple[Sensor, ...]) -> None:
-    """Write signals, shape (n,) each, of sensors; all of it is on the disk then."""
+    """Write the signals of sensors, shape (n,) each, and sync them to the disk."""
     with h5py.File(path, "w") as file:
         file.attrs[RATE] = float(rate)
         file.attrs[_SENSORS] = json.dumps([asdict(sensor) for sensor in sensors])
         for i, signal in enumerate(signals):
             data = _smallest(np.asarray(signal))
             chunk = int(min(max(rate, 1.0), LARGEST_CHUNK // 8, data.size))
-            # a channel's name may be one that is none in HDF5
+            # a channel's name may not be valid in HDF5
             file.create_dataset(f"{i}", data=data, chunks=(chunk,), fletcher32=True, track_times=False)
     with path.open("rb+") as written:
         os.fsync(written.fileno())
@@ -57,7 +57,7 @@ def read_normalised(path: str | Path) -> Recording:
     Raises
     ------
     InputError
-        The file is gone or damaged.
+        The file is missing or damaged.
     """
     sensors = _sensors(Path(path))
     rate, signals = read_signals(path, [f"{i}" for i in range(len(sensors))], suffix=".h5")
@@ -65,12 +65,12 @@ def read_normalised(path: str | Path) -> Recording:
 
 
 def read_cut_normalised(cut: Cut) -> tuple[Recording, Recording | None]:
-    """Return the recordings of a cut whose files are normalised ones."""
+    """Return the recordings of a cut with normalised files."""
     return read_normalised(cut.recording), None if cut.air is None else read_normalised(cut.air)
 
 
 def blocks(path: Path, samples: int) -> Iterator[tuple[int, Recording]]:
-    """Yield first sample and recording of parts of so many samples, one after the other."""
+    """Yield the first index and the recording of successive parts of so many samples."""
     sensors = _sensors(path)
     with h5py.File(path, "r", locking=False) as file:
         rate, datasets = float(file.attrs[RATE]), [file[f"{i}"] for i in range(len(sensors))]
@@ -89,7 +89,7 @@ def _sensors(path: Path) -> tuple[Sensor, ...]:
         with h5py.File(path, "r", locking=False) as file:
             return tuple(_sensor(each) for each in json.loads(file.attrs[_SENSORS]))
     except (OSError, KeyError, ValueError):
-        raise InputError("recording", "samples that are gone or damaged", "a recording that is uploaded") from None
+        raise InputError("recording", "samples that are missing or damaged", "an uploaded recording") from None
 
 
 def _sensor(data: dict[str, Any]) -> Sensor:

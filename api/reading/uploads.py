@@ -1,4 +1,4 @@
-"""From a file that has come to a recording that is kept: read, stored, and judged with what is there."""
+"""From an uploaded file to a stored recording: read, stored, and judged with the recordings uploaded so far."""
 
 from __future__ import annotations
 
@@ -17,22 +17,21 @@ from typing import Any
 from api.files import NORMALISED, UPLOADS, Files
 from api.reading import reader_tasks
 from api.reading.campaign_text import Upload, files_of
-from api.reading.reader import Reading
 from api.stores.campaigns import Campaign, FileKey, Recording
 from api.stores.entities import Store, Taken, Unavailable
-from api.work.pool import Busy
+from api.work.pool import Busy, Work
 from rcsa_ident.errors import InputError
 
 log = logging.getLogger("rcsa_ident.reading")
-#: Between two looks at what nobody refers to [s].
+#: Interval of the maintenance [s].
 _ROUND = 3600.0
-#: Of the form that samples are written in.
+#: Version of the normalised form of samples.
 _FORM = 1
 
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """A file that has come as a whole, and is on the disk."""
+    """A completely received file on the disk."""
 
     path: Path
     size: int
@@ -40,18 +39,18 @@ class Received:
 
 
 class Uploads:
-    """Recordings on their way in and out.
+    """Storage of recordings.
 
     Parameters
     ----------
     store : Store
     files : Files
-    reader : Reading
+    reader : Work
     most : int
-        Uploads at once.
+        Simultaneous uploads.
     """
 
-    def __init__(self, store: Store, files: Files, reader: Reading, most: int) -> None:
+    def __init__(self, store: Store, files: Files, reader: Work, most: int) -> None:
         self.store, self.files, self.reader, self.most = store, files, reader, most
         self.running = 0
         self.writing: set[tuple[str, str]] = set()
@@ -59,7 +58,7 @@ class Uploads:
 
     @contextmanager
     def admitted(self) -> Iterator[None]:
-        """Count an upload while it runs; raises `Busy` where too many do, before anything of it is read."""
+        """Count an upload while it runs; raises `Busy` where too many do."""
         if self.running >= self.most:
             raise Busy
         self.running += 1
@@ -69,16 +68,16 @@ class Uploads:
             self.running -= 1
 
     async def take(self, campaign: Campaign, name: str, received: Received, replacing: bool = False) -> tuple[int, Recording]:
-        """Keep a file as a recording that the campaign names; return 201, or 200 where it was there, and the recording.
+        """Store a file as a recording of the campaign; return 201, or 200 where it existed already, and the recording.
 
         Raises
         ------
         Taken
-            Another content is there.
+            A recording with other content exists.
         InputError
-            It cannot be read; nothing is kept.
+            The file cannot be read; nothing is stored.
         KeyError
-            The campaign is gone.
+            The campaign does not exist any more.
         """
         file = files_of(campaign.text)[name]
         there = await asyncio.to_thread(self.store.recordings.get, campaign.group, campaign.id, name)
@@ -116,7 +115,7 @@ class Uploads:
         return (200, before) if before is not None and before.sha256 == recording.sha256 else (201, recording)
 
     def _keep(self, recording: Recording, upload: Path, samples: Path, replacing: bool) -> Recording | None:
-        """First the files, then the row: what a row names is whole and on the disk."""
+        """Store first the files, then the row: files that a row names are complete and on the disk."""
         group = recording.group
         with self.files.lock:
             self.files.keep(group, UPLOADS, recording.sha256, upload)
@@ -132,7 +131,7 @@ class Uploads:
             return before
 
     def _release(self, group: str, keys: Iterable[FileKey]) -> None:
-        """Remove files that no row refers to any more; the lock is held."""
+        """Remove files that no row refers to any more; the caller holds the lock."""
         self.files.remove(group, set(keys) - self.store.recordings.kept(group))
 
     def _air(self, campaign: Campaign, cut: str) -> Recording | None:
@@ -143,7 +142,7 @@ class Uploads:
         return None if recording is None else self.files.path(recording.group, NORMALISED, recording.normalised)
 
     async def settle(self, campaign: Campaign) -> None:
-        """Judge every cut again whose air cut has come or gone since."""
+        """Judge every cut again whose air cut has been added or removed since its verdict."""
         lock = self.settling.setdefault(campaign.id, asyncio.Lock())
         async with lock:
             for _ in range(10):
@@ -153,7 +152,7 @@ class Uploads:
                     try:
                         await self._judge(campaign, cut, recording, air)
                     except Busy:
-                        # the recording is kept all the same; the next round judges it
+                        # the recording stays; the next maintenance judges it
                         return
                 if not stale:
                     await asyncio.to_thread(self.store.campaigns.settle, campaign.group, campaign.id, changes)
@@ -180,7 +179,7 @@ class Uploads:
         await asyncio.to_thread(self.store.recordings.judge, recording, after)
 
     async def forget(self, campaign: Campaign, name: str) -> bool:
-        """Remove a recording, or what has come of one; return whether there was anything."""
+        """Remove a recording or its unfinished upload; return whether there was one."""
 
         def remove() -> bool:
             with self.files.lock:
@@ -220,19 +219,19 @@ class Uploads:
             kept = {group: self.store.recordings.kept(group) for group in list(self.store.recordings.groups())}
             return self.files.sweep(kept)
 
-    async def attend(self) -> None:
-        """At the start and every hour: sweep, and judge what a crash has left without its verdict."""
+    async def maintain(self) -> None:
+        """At the start and every hour: remove orphaned files, and judge recordings that a crash has left without a verdict."""
         while True:
             try:
                 swept = await asyncio.to_thread(self.sweep)
                 if swept:
-                    log.info("swept", extra={"fields": {"files": swept}})
+                    log.info("orphaned files removed", extra={"fields": {"files": swept}})
                 for group, id in await asyncio.to_thread(self.store.campaigns.unsettled):
                     campaign = await asyncio.to_thread(self.store.campaigns.get, group, id)
                     if campaign is not None:
                         await self.settle(campaign)
             except (Unavailable, OSError) as error:
-                log.warning("uploads are looked after later", extra={"fields": {"error": type(error).__name__}})
+                log.warning("maintenance of uploads is postponed", extra={"fields": {"error": type(error).__name__}})
             await asyncio.sleep(_ROUND)
 
 
@@ -242,17 +241,17 @@ def files_named(recording: Recording) -> list[FileKey]:
 
 
 def partial_name(campaign: str, name: str) -> str:
-    """Return what an upload in parts is known by."""
+    """Return the name of a resumable upload."""
     return f"{campaign}/{name}"
 
 
 def normalised_key(text: str, name: str, sha256: str) -> str:
-    """Return what names the samples of an upload: what came, and everything of the campaign that decides how it is read."""
+    """Return the key of the samples of an upload: a hash of its content and of everything in the campaign that decides how it is read."""
     data = json.loads(text)
     basis = [_FORM, sha256, Path(name).suffix.lower(), data["sensors"], data.get("campaign", {}).get("sampling_rate_hz")]
     return hashlib.sha256(json.dumps(basis, sort_keys=False).encode()).hexdigest()
 
 
 def refused_verdict(reason: str) -> dict[str, Any]:
-    """Return the verdict on what cannot be judged."""
+    """Return the verdict on a recording that cannot be judged."""
     return {"usable": False, "reasons": [reason], "notes": [], "spindle_speed_rpm": None, "lines": 0, "signal_to_noise_db": {}}

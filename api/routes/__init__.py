@@ -1,1 +1,1 @@
-"""Thin: a question in, what the parts answer out."""
+"""Routes: a request in, what the components answer out."""

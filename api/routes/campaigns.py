@@ -1,4 +1,4 @@
-"""Campaigns of a machine: what was cut, with which toolings, measured by which sensors."""
+"""Campaigns of a machine: cuts, toolings and sensors."""
 
 from __future__ import annotations
 
@@ -6,29 +6,28 @@ import hashlib
 import json
 from collections.abc import Iterator
 from pathlib import Path as FilePath
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 from api.components import Components, ThisService
+from api.conventions import BODY, After, CampaignId, Limit, MachineId, Repeat, guard, in_use, page, problems, utf8
 from api.files import UPLOADS
+from api.lookups import known_campaign, machine_of
 from api.problems import Problem
 from api.reading.campaign_text import LARGEST, declare, toml_text
-from api.routes.archives import zipped
-from api.routes.common import BODY, After, Limit, MachineId, found_or_404, guard, page, problems, utf8
-from api.routes.machines import Repeat
 from api.schemas.campaigns import EXAMPLE, CampaignAnswer, CampaignSummary, CutAnswer, FileState, NewCampaign, VerdictAnswer
-from api.schemas.common import ID_PATTERN, Page, body_of
+from api.schemas.common import Page, body_of
 from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.campaigns import Campaign, Counts, Recording
 from api.stores.entities import Taken
+from api.transfer.archives import zipped
 from api.work.toolings import parsed, toml_of
 
 router = APIRouter(tags=["campaigns"], route_class=Guarded)
 TOML, JSON, ZIP = "application/toml", "application/json", "application/zip"
-CampaignId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a campaign.")]
 _EXAMPLE_TOML = toml_of({key: value for key, value in EXAMPLE.items() if key != "cuts"}) + "".join(
     f"[[cuts]]\n{toml_of(cut)}" for cut in EXAMPLE["cuts"]
 )
@@ -44,14 +43,14 @@ _BODY = {
 @router.post(
     "/machines/{id}/campaigns",
     status_code=201,
-    summary="Make a campaign: campaign.toml, or the same keys as JSON",
-    description="Toolings are copied: what happens to the library later does not change the campaign. "
-    "Recordings are named by the last part of their paths.",
+    summary="Make a campaign from campaign.toml, or from its keys as JSON",
+    description="Toolings are copied: later changes of the library do not affect the campaign. "
+    "Recordings are named by the last parts of their paths.",
     openapi_extra=guard("upload", requestBody=_BODY, **{"x-content-types": (JSON, TOML)}),
     responses=problems(404, 409, *BODY),
 )
 async def make(
-    id: MachineId, request: Request, response: Response, parts: ThisService, caller: WhoAsks, repeat: Repeat = None
+    id: MachineId, request: Request, response: Response, components: ThisService, caller: WhoAsks, repeat: Repeat = None
 ) -> CampaignAnswer:
     raw = await request.body()
     if len(raw) > LARGEST:
@@ -59,34 +58,33 @@ async def make(
     is_toml = request.headers["content-type"].split(";")[0].strip().lower() == TOML
 
     def keep() -> Campaign:
-        found_or_404(parts.store.machines.get(caller.group, id), "machine")
+        machine_of(components, caller.group, id)
         data = parsed(utf8(raw)) if is_toml else body_of(NewCampaign, raw).model_dump(exclude_unset=True, exclude_none=True)
-        name, text, cuts = declare(data, lambda name: _tooling(parts, caller.group, name))
+        name, text, cuts = declare(data, lambda name: _tooling(components, caller.group, name))
         campaign = Campaign(new_id(), caller.group, id, name, text, cuts, now())
         digest = hashlib.sha256(json.dumps([id, is_toml]).encode() + raw).hexdigest()
-        return parts.store.campaigns.add(campaign, None if repeat is None else (repeat, digest))
+        return components.store.campaigns.add(campaign, None if repeat is None else (repeat, digest))
 
     try:
         campaign = await run_in_threadpool(keep)
     except Taken as taken:
-        what, fault = str(taken), {"found": str(repeat), "allowed": f"an {taken} of its own"}
-        raise Problem(409, f"the {what} is in use", [{"field": what, **fault}]) from None
+        raise in_use(taken, None, repeat) from None
     except KeyError:
         raise Problem(404, "there is no such machine") from None
     response.headers["Location"] = f"/v1/campaigns/{campaign.id}"
-    return await run_in_threadpool(_answer, parts, campaign)
+    return await run_in_threadpool(_answer, components, campaign)
 
 
-def _tooling(parts: Components, group: str, name: str) -> str | None:
-    document = parts.store.toolings.get(group, name)
+def _tooling(components: Components, group: str, name: str) -> str | None:
+    document = components.store.toolings.get(group, name)
     return None if document is None else document.text
 
 
 @router.get("/machines/{id}/campaigns", summary="List campaigns of a machine", openapi_extra=guard("read"), responses=problems(404, 422))
-def list_campaigns(id: MachineId, parts: ThisService, caller: WhoAsks, after: After = "", limit: Limit = 50) -> Page[CampaignSummary]:
-    found_or_404(parts.store.machines.get(caller.group, id), "machine")
-    rows, following = page(parts.store.campaigns.list(caller.group, id, after, limit + 1), limit, lambda row: row.id)
-    counts = parts.store.campaigns.counts(caller.group, [row.id for row in rows])
+def list_campaigns(id: MachineId, components: ThisService, caller: WhoAsks, after: After = "", limit: Limit = 50) -> Page[CampaignSummary]:
+    machine_of(components, caller.group, id)
+    rows, following = page(components.store.campaigns.list(caller.group, id, after, limit + 1), limit, lambda row: row.id)
+    counts = components.store.campaigns.counts(caller.group, [row.id for row in rows])
     items = []
     for row in rows:
         count = counts.get(row.id, Counts(0, 0))
@@ -97,7 +95,7 @@ def list_campaigns(id: MachineId, parts: ThisService, caller: WhoAsks, after: Af
 
 @router.get(
     "/campaigns/{id}",
-    summary="A campaign, as JSON or as campaign.toml (Accept: application/toml)",
+    summary="A campaign as JSON, or as campaign.toml (Accept: application/toml)",
     openapi_extra=guard("read"),
     response_class=Response,
     responses={
@@ -105,55 +103,50 @@ def list_campaigns(id: MachineId, parts: ThisService, caller: WhoAsks, after: Af
         **problems(404, 422),
     },
 )
-def get(id: CampaignId, request: Request, parts: ThisService, caller: WhoAsks) -> Response:
-    campaign = known_campaign(parts, caller.group, id)
+def get(id: CampaignId, request: Request, components: ThisService, caller: WhoAsks) -> Response:
+    campaign = known_campaign(components, caller.group, id)
     headers = {"Vary": "Accept"}
     if TOML in request.headers.get("accept", ""):
         return Response(toml_text(campaign.text).encode(), media_type=TOML, headers=headers)
-    return Response(_answer(parts, campaign).model_dump_json(), media_type=JSON, headers=headers)
+    return Response(_answer(components, campaign).model_dump_json(), media_type=JSON, headers=headers)
 
 
 @router.get(
     "/campaigns/{id}/archive",
-    summary="What `rcsa-ident identify` takes: campaign.toml, toolings and the recordings as they came, ZIP",
-    description="Cuts whose recording is not there are left out.",
+    summary="ZIP archive for `rcsa-ident identify`: campaign.toml, toolings and the original recordings",
+    description="Cuts without a recording are omitted.",
     openapi_extra=guard("read"),
     response_class=StreamingResponse,
     responses={
-        200: {"description": "A folder.", "content": {ZIP: {"schema": {"type": "string", "format": "binary"}}}},
+        200: {"description": "The archive.", "content": {ZIP: {"schema": {"type": "string", "format": "binary"}}}},
         **problems(404, 409, 422),
     },
 )
-def archive(id: CampaignId, parts: ThisService, caller: WhoAsks) -> StreamingResponse:
-    campaign = known_campaign(parts, caller.group, id)
-    rows = {row.name: row for row in parts.store.recordings.list(caller.group, id, "", 1_000_000)}
+def archive(id: CampaignId, components: ThisService, caller: WhoAsks) -> StreamingResponse:
+    campaign = known_campaign(components, caller.group, id)
+    rows = {row.name: row for row in components.store.recordings.list(caller.group, id, "", 1_000_000)}
     if not any(row.role == "cut" for row in rows.values()):
-        raise Problem(409, "no recording of a cut is uploaded yet")
+        raise Problem(409, "no recording of a cut has been uploaded yet")
     headers = {"Content-Disposition": f'attachment; filename="campaign-{campaign.id}.zip"'}
-    return StreamingResponse(zipped(_members(parts, campaign, rows)), media_type=ZIP, headers=headers)
+    return StreamingResponse(zipped(_members(components, campaign, rows)), media_type=ZIP, headers=headers)
 
 
 @router.delete(
     "/campaigns/{id}",
     status_code=204,
-    summary="Forget a campaign and its recordings",
+    summary="Delete a campaign and its recordings",
     openapi_extra=guard("upload"),
     responses=problems(404, 422),
 )
-def forget(id: CampaignId, parts: ThisService, caller: WhoAsks) -> Response:
-    if not parts.uploads.forget_campaign(known_campaign(parts, caller.group, id)):
+def forget(id: CampaignId, components: ThisService, caller: WhoAsks) -> Response:
+    if not components.uploads.forget_campaign(known_campaign(components, caller.group, id)):
         raise Problem(404, "there is no such campaign")
     return Response(status_code=204)
 
 
-def known_campaign(parts: Components, group: str, id: str) -> Campaign:
-    """Return a campaign that is there."""
-    return found_or_404(parts.store.campaigns.get(group, id), "campaign")
-
-
-def _answer(parts: Components, campaign: Campaign) -> CampaignAnswer:
+def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
     data = json.loads(campaign.text)
-    rows = {row.name: row for row in parts.store.recordings.list(campaign.group, campaign.id, "", 1_000_000)}
+    rows = {row.name: row for row in components.store.recordings.list(campaign.group, campaign.id, "", 1_000_000)}
     cuts = [_cut(cut, rows) for cut in data["cuts"]]
     return CampaignAnswer(
         id=campaign.id,
@@ -179,9 +172,9 @@ def _cut(cut: dict[str, Any], rows: dict[str, Recording]) -> CutAnswer:
     return CutAnswer(**cut | files, verdict=verdict)
 
 
-def _members(parts: Components, campaign: Campaign, rows: dict[str, Recording]) -> Iterator[tuple[str, bytes | FilePath]]:
+def _members(components: Components, campaign: Campaign, rows: dict[str, Recording]) -> Iterator[tuple[str, bytes | FilePath]]:
     yield "campaign.toml", toml_text(campaign.text, rows.__contains__).encode()
     for name, text in json.loads(campaign.text)["toolings"].items():
         yield f"toolings/{name}.toml", text.encode()
     for name, row in rows.items():
-        yield f"recordings/{name}", parts.files.path(campaign.group, UPLOADS, row.sha256)
+        yield f"recordings/{name}", components.files.path(campaign.group, UPLOADS, row.sha256)

@@ -1,4 +1,4 @@
-"""Files to start with: a tooling, a campaign, tested cuts, modes, a tool library, and recordings."""
+"""Example files: toolings, a campaign, tested cuts, modes, a tool library and recordings."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from fastapi import APIRouter, Path, Response
 from fastapi.responses import FileResponse, StreamingResponse
 
 from api.components import Components, ThisService
+from api.conventions import guard, problems
 from api.problems import Problem
-from api.routes.archives import zipped, zipped_bytes
-from api.routes.common import guard, problems
 from api.schemas.libraries import Example, Examples
 from api.security import Guarded
+from api.transfer.archives import zipped, zipped_bytes
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_campaign
 
@@ -24,19 +24,19 @@ _TYPES = {".toml": "application/toml", ".csv": "text/csv; charset=utf-8", ".json
 _ABOUT = {
     "S1-ER32.toml": "A tooling: end mill of 12 mm in a collet chuck.",
     "S2-PG25.toml": "A tooling: the same end mill, shorter, in a press-fit chuck.",
-    "campaign.toml": "A campaign of one cut, with a word to every key.",
-    "CUTS.csv": "Tested cuts, which lobes are drawn with.",
-    "MODES.toml": "A tooltip's modes, which lobes are computed from without an identification.",
-    "tool-library.json": "A tool library as CAM programs export it.",
+    "campaign.toml": "A campaign of one cut, with an explanation of every key.",
+    "CUTS.csv": "Tested cuts, drawn together with lobes.",
+    "MODES.toml": "Tooltip modes, from which lobes are computed without an identification.",
+    "tool-library.json": "A tool library as exported by CAM programs.",
     "small-campaign.zip": "A campaign of two cuts with their air cuts: to see uploads and verdicts.",
 }
 SAMPLE, _SAMPLE_ABOUT = "sample-campaign.zip", "A campaign with two toolings: enough for an identification."
 
 
 @router.get("", summary="List examples", openapi_extra=guard("read"), responses=problems())
-def list_examples(parts: ThisService) -> Examples:
+def list_examples(components: ThisService) -> Examples:
     items = [Example(name=name, size_bytes=(_FOLDER / name).stat().st_size, about=about) for name, about in _ABOUT.items()]
-    members = _sample(parts)
+    members = _sample(components)
     if members:
         items.append(Example(name=SAMPLE, size_bytes=zipped_bytes(members), about=_SAMPLE_ABOUT))
     return Examples(items=items)
@@ -44,7 +44,7 @@ def list_examples(parts: ThisService) -> Examples:
 
 @router.get(
     "/{name}",
-    summary="An example's file",
+    summary="The file of an example",
     openapi_extra=guard("read"),
     response_class=Response,
     responses={
@@ -52,19 +52,19 @@ def list_examples(parts: ThisService) -> Examples:
         **problems(404, 422),
     },
 )
-def get_example(name: Annotated[str, Path(pattern=r"^[A-Za-z0-9.-]{1,64}$")], parts: ThisService) -> Response:
+def get_example(name: Annotated[str, Path(pattern=r"^[A-Za-z0-9.-]{1,64}$")], components: ThisService) -> Response:
     if name in _ABOUT:
         return FileResponse(_FOLDER / name, media_type=_TYPES[(_FOLDER / name).suffix], filename=name)
-    members = _sample(parts) if name == SAMPLE else []
+    members = _sample(components) if name == SAMPLE else []
     if not members:
         raise Problem(404, "there is no such example")
     headers = {"Content-Disposition": f'attachment; filename="{SAMPLE}"'}
     return StreamingResponse(zipped(members), media_type=_TYPES[".zip"], headers=headers)
 
 
-def _sample(parts: Components) -> list[tuple[str, Folder]]:
-    """What the folder of the settings holds of a campaign, by name in the archive; nothing where there is none."""
-    folder = parts.settings.examples
+def _sample(components: Components) -> list[tuple[str, Folder]]:
+    """Files of the campaign in the folder of the settings, by name in the archive; empty where there is none."""
+    folder = components.settings.examples
     try:
         campaign = read_campaign(folder)
         with (folder / "campaign.toml").open("rb") as file:

@@ -1,4 +1,4 @@
-"""Forces of a recording: one that comes with the query, or one of a campaign."""
+"""Forces of a recording, uploaded with the query or of a campaign."""
 
 from __future__ import annotations
 
@@ -13,20 +13,19 @@ from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
 from api.components import Components, ThisService
+from api.conventions import BODY, guard, problems
+from api.lookups import known_machine, pair_reader, tooling_source, uploaded
 from api.problems import Problem
+from api.reading import reader_tasks
 from api.reading.campaign_text import FORMATS, Upload
-from api.reading.plain import read_plain
 from api.reading.uploads import Received
-from api.routes.common import BODY, guard, problems
-from api.routes.machines import known_machine
-from api.routes.multipart import FORM, form
-from api.routes.stream_opening import given_sensors, reader, uploaded
-from api.routes.tool_change import tooling_text
+from api.schemas.campaigns import given_sensors
 from api.schemas.common import body_of
 from api.schemas.forces import ForceAnswer, ForceQuery, ForceUpload
 from api.security import Guarded, WhoAsks
+from api.transfer.multipart import FORM, form
 from api.work.forces import ForceQuestion, ReadPair, forces, sensors_of
-from api.work.requests import MachineText, ToolingText
+from api.work.requests import MachineText, ToolingSource
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Sensor
 
@@ -42,8 +41,12 @@ _BODY = {
                 "required": ["query", "recording"],
                 "properties": {
                     "query": {"$ref": "#/components/schemas/ForceUpload"},
-                    "recording": {"type": "string", "format": "binary", "description": "Its file name's suffix says the format."},
-                    "air": {"type": "string", "format": "binary", "description": "Of an air cut with the same clamping and speed."},
+                    "recording": {"type": "string", "format": "binary", "description": "The suffix of its file name is the format."},
+                    "air": {
+                        "type": "string",
+                        "format": "binary",
+                        "description": "Recording of an air cut with the same clamping and speed.",
+                    },
                 },
                 "additionalProperties": False,
             },
@@ -56,65 +59,70 @@ _BODY = {
 @router.post(
     "/forces",
     summary="Forces of a recording; Accept: text/csv for FORCES.csv",
-    description="Either a form with the recording, or JSON that names one of a campaign. Without an air cut run-out stays in the forces.",
+    description="Either a form with the recording, or JSON that names a recording of a campaign. "
+    "Without an air cut run-out remains in the forces.",
     openapi_extra=guard("run", requestBody=_BODY, **{"x-content-types": (JSON, FORM)}),
     response_model=ForceAnswer,
     responses={200: {"description": "Forces.", "content": {CSV: {"schema": {"type": "string"}}}}, **problems(404, 408, *BODY)},
 )
-async def estimate(request: Request, parts: ThisService, caller: WhoAsks) -> Any:
+async def estimate(request: Request, components: ThisService, caller: WhoAsks) -> Any:
     csv = CSV in request.headers.get("accept", "")
     if request.headers["content-type"].split(";")[0].strip().lower() == JSON:
         query = body_of(ForceQuery, await request.body())
-        return await _answered(parts, caller.group, *await run_in_threadpool(_of_campaign, parts, caller.group, query), csv)
-    with parts.uploads.admitted():
-        async with form(request, parts, caller.group, ("query",), ("recording", "air")) as (texts, files):
+        return await _answered(components, caller.group, *await run_in_threadpool(_of_campaign, components, caller.group, query), csv)
+    with components.uploads.admitted():
+        async with form(request, components, caller.group, ("query",), ("recording", "air")) as (texts, files):
             missing = "query" if "query" not in texts else "recording" if "recording" not in files else ""
             if missing:
-                raise Problem(422, f"the form has no {missing}", [{"field": missing, "found": "nothing", "allowed": "a part of this name"}])
+                raise Problem(
+                    422, f"the form has no part named {missing}", [{"field": missing, "found": "nothing", "allowed": "a part of this name"}]
+                )
             upload = body_of(ForceUpload, texts["query"])
-            machine, tooling, question, sensors = await run_in_threadpool(_of_upload, parts, caller.group, upload)
-            async with _read(parts, caller.group, files, sensors, upload.sampling_rate_hz) as source:
-                return await _answered(parts, caller.group, machine, tooling, question, source, csv)
+            machine, tooling, question, sensors = await run_in_threadpool(_of_upload, components, caller.group, upload)
+            async with _read(components, caller.group, files, sensors, upload.sampling_rate_hz) as source:
+                return await _answered(components, caller.group, machine, tooling, question, source, csv)
 
 
-def _of_campaign(parts: Components, group: str, query: ForceQuery) -> tuple[MachineText, ToolingText, ForceQuestion, ReadPair]:
-    found = uploaded(parts, group, query.campaign, query.recording)
-    tooling = found.tooling if query.tooling is None else tooling_text(parts, group, query.tooling)
-    return known_machine(parts, group, query.machine), tooling, query.question(found.speed), reader(found.cut, found.air)
+def _of_campaign(components: Components, group: str, query: ForceQuery) -> tuple[MachineText, ToolingSource, ForceQuestion, ReadPair]:
+    found = uploaded(components, group, query.campaign, query.recording)
+    tooling = found.tooling if query.tooling is None else tooling_source(components, group, query.tooling)
+    return known_machine(components, group, query.machine), tooling, query.question(found.speed), pair_reader(found.cut, found.air)
 
 
-def _of_upload(parts: Components, group: str, upload: ForceUpload) -> tuple[MachineText, ToolingText, ForceQuestion, tuple[Sensor, ...]]:
-    machine = known_machine(parts, group, upload.machine)
+def _of_upload(
+    components: Components, group: str, upload: ForceUpload
+) -> tuple[MachineText, ToolingSource, ForceQuestion, tuple[Sensor, ...]]:
+    machine = known_machine(components, group, upload.machine)
     sensors = given_sensors(upload.sensors) or sensors_of(machine.text)
-    return machine, tooling_text(parts, group, upload.tooling), upload.question(), sensors
+    return machine, tooling_source(components, group, upload.tooling), upload.question(), sensors
 
 
 @contextlib.asynccontextmanager
 async def _read(
-    parts: Components, group: str, files: Mapping[str, tuple[str, Received]], sensors: tuple[Sensor, ...], rate: float | None
+    components: Components, group: str, files: Mapping[str, tuple[str, Received]], sensors: tuple[Sensor, ...], rate: float | None
 ) -> AsyncIterator[ReadPair]:
-    """What reads the samples of a form's files, which the reader process has taken from them; nothing is kept."""
+    """Function that reads the samples of a form's files, normalised by the reader process and deleted at the end of the context."""
     targets: dict[str, Path] = {}
     try:
         for name, (file, received) in files.items():
             if not file.lower().endswith(FORMATS):
-                raise InputError(name, file[-80:], f"a file that ends in one of {', '.join(FORMATS)}")
-            targets[name] = await run_in_threadpool(parts.files.spare, group)
-            await parts.reader.run(read_plain, Upload(received.path, file, targets[name]), sensors, rate)
-        yield reader(targets["recording"], targets.get("air"))
+                raise InputError(name, file[-80:], f"a file name that ends in one of {', '.join(FORMATS)}")
+            targets[name] = await run_in_threadpool(components.files.spare, group)
+            await components.reader.run(reader_tasks.read_alone, Upload(received.path, file, targets[name]), sensors, rate)
+        yield pair_reader(targets["recording"], targets.get("air"))
     finally:
         for path in targets.values():
             path.unlink(missing_ok=True)
 
 
 async def _answered(
-    parts: Components, group: str, machine: MachineText, tooling: ToolingText, question: ForceQuestion, source: ReadPair, csv: bool
+    components: Components, group: str, machine: MachineText, tooling: ToolingSource, question: ForceQuestion, source: ReadPair, csv: bool
 ) -> Any:
     if not csv:
-        return ForceAnswer.model_validate(await parts.work.run(forces, machine, tooling, question, source))
-    path: Path = await run_in_threadpool(parts.files.spare, group)
+        return ForceAnswer.model_validate(await components.work.run(forces, machine, tooling, question, source))
+    path: Path = await run_in_threadpool(components.files.spare, group)
     try:
-        await parts.work.run(forces, machine, tooling, question, source, path)
+        await components.work.run(forces, machine, tooling, question, source, path)
     except BaseException:
         path.unlink(missing_ok=True)
         raise

@@ -1,4 +1,4 @@
-"""For those who run the service: is it there, does it answer, what has it done."""
+"""Health checks and metrics, for operators."""
 
 from __future__ import annotations
 
@@ -8,41 +8,41 @@ from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
 from api.components import ThisService
+from api.conventions import problems
 from api.problems import Problem
-from api.routes.common import problems
 from api.schemas.common import Answer
 
 router = APIRouter(tags=["health"])
 
 
 class State(Answer):
-    """How it is."""
+    """State of the service."""
 
     status: Literal["ok"]
 
 
-@router.get("/health", summary="Whether the process is there")
+@router.get("/health", summary="Whether the service runs")
 async def health() -> State:
     return State(status="ok")
 
 
-@router.get("/ready", summary="Whether store and workers answer", responses=problems(503, always=()))
-def ready(parts: ThisService) -> State:
-    parts.store.check()
-    if not parts.work.ready:
-        raise Problem(503, "workers are starting", headers={"Retry-After": "2"})
-    if not parts.streams.host.ready:
-        raise Problem(503, "the process of the streams is starting", headers={"Retry-After": "2"})
-    if parts.crew is not None and not parts.crew.ready:
-        raise Problem(503, "no worker for jobs is alive: those that are accepted wait", headers={"Retry-After": "5"})
+@router.get("/ready", summary="Whether database and workers answer", responses=problems(503, always=()))
+def ready(components: ThisService) -> State:
+    components.store.check()
+    if not components.work.ready:
+        raise Problem(503, "the worker processes are starting", headers={"Retry-After": "2"})
+    if not components.streams.host.ready:
+        raise Problem(503, "the process of the force streams is starting", headers={"Retry-After": "2"})
+    if components.supervisor is not None and not components.supervisor.ready:
+        raise Problem(503, "no job worker is running: accepted jobs wait", headers={"Retry-After": "5"})
     return State(status="ok")
 
 
 @router.get(
     "/metrics",
-    summary="Prometheus",
+    summary="Metrics for Prometheus",
     response_class=Response,
     responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}, "description": "Counters since the start."}},
 )
-def metrics(parts: ThisService) -> Response:
-    return Response(generate_latest(parts.metrics.registry), media_type=CONTENT_TYPE_LATEST)
+def metrics(components: ThisService) -> Response:
+    return Response(generate_latest(components.metrics.registry), media_type=CONTENT_TYPE_LATEST)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import StreamingResponse
 
 from api.components import ThisService
-from api.routes import jobs
-from api.routes.common import BODY, After, Limit, found_or_404, guard, page, problems
-from api.routes.jobs import ACCEPTED, RETRY, STREAM, JobId, Prefer, Seen
-from api.routes.machines import Repeat
+from api.conventions import BODY, After, Limit, Repeat, guard, page, problems
+from api.live import jobs
+from api.live.jobs import ACCEPTED, RETRY, STREAM, JobId, Prefer, Seen
+from api.lookups import known_campaign
 from api.schemas.common import ID_PATTERN, Page
 from api.schemas.jobs import FittedLines, JobAnswer, JobState, NewIdentification
 from api.schemas.machines import Identification, Modes
@@ -25,7 +24,7 @@ from rcsa_ident.errors import InputError
 
 router = APIRouter(prefix="/identifications", tags=["identifications"], route_class=Guarded)
 KIND = "identification"
-#: Opened as a page of its own a report runs nothing and loads nothing.
+#: A report opened as a page of its own runs and loads nothing.
 _ALONE = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; img-src data:"}
 _Of = Annotated[str | None, Query(pattern=ID_PATTERN)]
 
@@ -34,34 +33,34 @@ _Of = Annotated[str | None, Query(pattern=ID_PATTERN)]
     "",
     status_code=202,
     summary="Identify a machine from a campaign",
-    description="A job. What has been uploaded by its start belongs to it.",
+    description="The identification is a job; it uses the recordings that have been uploaded when it starts.",
     openapi_extra=guard("run"),
     response_model=JobAnswer,
     responses={202: ACCEPTED, **problems(404, 409, *BODY)},
 )
-def identify(body: NewIdentification, parts: ThisService, caller: WhoAsks, repeat: Repeat = None) -> Any:
-    campaign = found_or_404(parts.store.campaigns.get(caller.group, body.campaign), "campaign")
-    counts = parts.store.campaigns.counts(caller.group, [campaign.id]).get(campaign.id)
+def identify(body: NewIdentification, components: ThisService, caller: WhoAsks, repeat: Repeat = None) -> Any:
+    campaign = known_campaign(components, caller.group, body.campaign)
+    counts = components.store.campaigns.counts(caller.group, [campaign.id]).get(campaign.id)
     if counts is None or counts.uploaded == 0:
         raise InputError("campaign", f"no recording of its {campaign.cuts} cuts", "a campaign with recordings")
     texts = {}
     if body.start:
         if body.method == "paper":
             raise InputError("start", "true with the method paper", "the default method, which has a posterior")
-        known = parts.store.identifications.get(caller.group, campaign.machine)
+        known = components.store.identifications.get(caller.group, campaign.machine)
         if known is None:
             raise InputError("start", "true for a machine without an identification", "a machine that has one")
-        posteriors(json.loads(known.text))
+        posteriors(known.text)
         texts["start"] = known.text
     request = body.model_dump_json()
     job = Job(new_id(), caller.group, KIND, campaign.machine, campaign.id, request, "queued", now())
     digest = hashlib.sha256(request.encode()).hexdigest()
-    return jobs.accepted(jobs.submit(parts, job, texts, None if repeat is None else (repeat, digest)))
+    return jobs.accepted(jobs.submit(components, job, texts, None if repeat is None else (repeat, digest)))
 
 
 @router.get("", summary="List identifications, newest first", openapi_extra=guard("read"), responses=problems(422))
 def list_jobs(
-    parts: ThisService,
+    components: ThisService,
     caller: WhoAsks,
     machine: _Of = None,
     campaign: _Of = None,
@@ -71,47 +70,52 @@ def list_jobs(
 ) -> Page[JobAnswer]:
     wanted = {"kind": KIND, "machine": machine, "campaign": campaign, "state": state}
     given = {name: str(value) for name, value in wanted.items() if value is not None}
-    rows, following = page(parts.store.jobs.list(caller.group, given, after, limit + 1), limit, lambda job: job.id)
+    rows, following = page(components.store.jobs.list(caller.group, given, after, limit + 1), limit, lambda job: job.id)
     return Page(items=[jobs.answer(job) for job in rows], next=following)
 
 
 @router.get(
     "/{id}",
-    summary="How far an identification is",
+    summary="State of an identification",
     openapi_extra=guard("read"),
     responses={200: {"description": "The job.", "headers": RETRY}, **problems(404, 422)},
 )
-async def get(id: JobId, parts: ThisService, caller: WhoAsks, response: Response, prefer: Prefer = None) -> JobAnswer:
-    job = await jobs.awaited(parts, caller.group, id, KIND, prefer)
+async def get(id: JobId, components: ThisService, caller: WhoAsks, response: Response, prefer: Prefer = None) -> JobAnswer:
+    job = await jobs.awaited(components, caller.group, id, KIND, prefer)
     if job.finished is None:
         response.headers["Retry-After"] = jobs.AGAIN
     return jobs.answer(job)
 
 
 @router.delete("/{id}", status_code=202, summary="Cancel an identification", openapi_extra=guard("run"), responses=problems(404, 409, 422))
-def cancel(id: JobId, parts: ThisService, caller: WhoAsks, response: Response) -> JobAnswer:
-    return jobs.cancel(parts, caller.group, id, KIND, response)
+def cancel(id: JobId, components: ThisService, caller: WhoAsks, response: Response) -> JobAnswer:
+    return jobs.cancel(components, caller.group, id, KIND, response)
 
 
 @router.get(
     "/{id}/events",
-    summary="What an identification tells on its way",
+    summary="Events of an identification",
     openapi_extra=guard("read"),
     response_class=StreamingResponse,
     responses={200: STREAM, **problems(404, 422)},
 )
-async def events(id: JobId, parts: ThisService, caller: WhoAsks, seen: Seen = None) -> StreamingResponse:
-    return await jobs.events(parts, caller.group, id, KIND, seen)
+async def events(id: JobId, components: ThisService, caller: WhoAsks, seen: Seen = None) -> StreamingResponse:
+    return await jobs.events(components, caller.group, id, KIND, seen)
 
 
 @router.get("/{id}/modes", summary="Modes with their uncertainties", openapi_extra=guard("read"), responses=problems(404, 409, 422))
-def modes(id: JobId, parts: ThisService, caller: WhoAsks) -> Modes:
-    return Modes.model_validate(tasks.modes(json.loads(jobs.finished(parts, caller.group, id, KIND, "result"))))
+def modes(id: JobId, components: ThisService, caller: WhoAsks) -> Modes:
+    return Modes.model_validate(tasks.modes(jobs.finished(components, caller.group, id, KIND, "result")))
 
 
-@router.get("/{id}/frf", summary="Measured lines beside the model's", openapi_extra=guard("read"), responses=problems(404, 409, 422))
-def frf(id: JobId, parts: ThisService, caller: WhoAsks) -> FittedLines:
-    return FittedLines.model_validate_json(jobs.finished(parts, caller.group, id, KIND, "frf"))
+@router.get(
+    "/{id}/frf",
+    summary="Measured lines of the cross FRF, and those of the model",
+    openapi_extra=guard("read"),
+    responses=problems(404, 409, 422),
+)
+def frf(id: JobId, components: ThisService, caller: WhoAsks) -> FittedLines:
+    return FittedLines.model_validate_json(jobs.finished(components, caller.group, id, KIND, "frf"))
 
 
 @router.get(
@@ -119,18 +123,18 @@ def frf(id: JobId, parts: ThisService, caller: WhoAsks) -> FittedLines:
     summary="RESULT.json",
     openapi_extra=guard("read"),
     response_class=Response,
-    responses={200: {"model": Identification, "description": "To be used with the commands, too."}, **problems(404, 409, 422)},
+    responses={200: {"model": Identification, "description": "For use with the commands, too."}, **problems(404, 409, 422)},
 )
-def result(id: JobId, parts: ThisService, caller: WhoAsks) -> Response:
-    return Response(jobs.finished(parts, caller.group, id, KIND, "result").encode(), media_type="application/json")
+def result(id: JobId, components: ThisService, caller: WhoAsks) -> Response:
+    return Response(jobs.finished(components, caller.group, id, KIND, "result").encode(), media_type="application/json")
 
 
 @router.get(
     "/{id}/report",
-    summary="Report as a page without scripts",
+    summary="Report as HTML without scripts",
     openapi_extra=guard("read"),
     response_class=Response,
     responses={200: {"content": {"text/html": {"schema": {"type": "string"}}}, "description": "A page."}, **problems(404, 409, 422)},
 )
-def report(id: JobId, parts: ThisService, caller: WhoAsks) -> Response:
-    return Response(jobs.finished(parts, caller.group, id, KIND, "report").encode(), media_type="text/html", headers=_ALONE)
+def report(id: JobId, components: ThisService, caller: WhoAsks) -> Response:
+    return Response(jobs.finished(components, caller.group, id, KIND, "report").encode(), media_type="text/html", headers=_ALONE)

@@ -1,12 +1,12 @@
-"""Keys of the caller's group."""
+"""API keys of the caller's group."""
 
 from __future__ import annotations
 
 from fastapi import APIRouter, Response
 
 from api.components import ThisService
+from api.conventions import BODY, After, KeyId, Limit, guard, page, problems
 from api.problems import Problem
-from api.routes.common import BODY, After, KeyId, Limit, guard, page, problems
 from api.schemas.common import Page
 from api.schemas.keys import KeyAnswer, MadeKey, NewKey
 from api.security import Guarded, WhoAsks, make_key
@@ -15,22 +15,22 @@ from api.stores.entities import Key
 router = APIRouter(prefix="/keys", tags=["keys"], route_class=Guarded)
 
 
-@router.post("", status_code=201, summary="Make a key", openapi_extra=guard("admin"), responses=problems(*BODY))
-def make(body: NewKey, parts: ThisService, caller: WhoAsks) -> MadeKey:
+@router.post("", status_code=201, summary="Make an API key", openapi_extra=guard("admin"), responses=problems(*BODY))
+def make(body: NewKey, components: ThisService, caller: WhoAsks) -> MadeKey:
     key, text = make_key(caller.group, tuple(dict.fromkeys(body.scopes)), body.label)
-    parts.store.keys.add(key)
+    components.store.keys.add(key)
     return MadeKey(**_answer(key).model_dump(), key=text)
 
 
-@router.get("", summary="List keys", openapi_extra=guard("admin"), responses=problems(422))
-def list_keys(parts: ThisService, caller: WhoAsks, after: After = "", limit: Limit = 50) -> Page[KeyAnswer]:
-    rows, following = page(parts.store.keys.list(caller.group, after, limit + 1), limit, lambda key: key.id)
+@router.get("", summary="List API keys", openapi_extra=guard("admin"), responses=problems(422))
+def list_keys(components: ThisService, caller: WhoAsks, after: After = "", limit: Limit = 50) -> Page[KeyAnswer]:
+    rows, following = page(components.store.keys.list(caller.group, after, limit + 1), limit, lambda key: key.id)
     return Page(items=[_answer(key) for key in rows], next=following)
 
 
-@router.delete("/{id}", status_code=204, summary="Withdraw a key", openapi_extra=guard("admin"), responses=problems(404, 422))
-def withdraw(id: KeyId, parts: ThisService, caller: WhoAsks) -> Response:
-    if not parts.store.keys.delete(caller.group, id):
+@router.delete("/{id}", status_code=204, summary="Revoke an API key", openapi_extra=guard("admin"), responses=problems(404, 422))
+def withdraw(id: KeyId, components: ThisService, caller: WhoAsks) -> Response:
+    if not components.store.keys.delete(caller.group, id):
         raise Problem(404, "there is no such key")
     return Response(status_code=204)
 

@@ -1,4 +1,4 @@
-"""Tool libraries of CAM programs, into the library of toolings."""
+"""Import of tool libraries of CAM programs into the library of toolings."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from fastapi import APIRouter, Query, Request
 from fastapi.concurrency import run_in_threadpool
 
 from api.components import ThisService
+from api.conventions import BODY, found_or_404, guard, problems
 from api.problems import Problem
-from api.routes.common import BODY, found_or_404, guard, problems
 from api.routes.toolings import summary
 from api.schemas.common import NAME_PATTERN
 from api.schemas.libraries import ImportAnswer, ImportedTool
@@ -45,45 +45,49 @@ _BODY = {
 
 @router.post(
     "/import",
-    summary="Toolings of a Fusion 360 or HSM tool library",
-    description="JSON, or the .tools container. Each entry on its own: what is there already is skipped unless replace=true.",
+    summary="Import the toolings of a Fusion 360 or HSM tool library",
+    description="JSON, or a .tools container. Entries are independent; existing toolings are skipped unless replace=true.",
     openapi_extra=guard("upload", requestBody=_BODY, **{"x-content-types": (JSON, ZIP)}),
     responses=problems(404, *BODY),
 )
 async def import_library(
     request: Request,
-    parts: ThisService,
+    components: ThisService,
     caller: WhoAsks,
-    flute_ratio: Annotated[float, Query(ge=0.3, le=1.0, description="Diameter that bends as the fluted part, over the cutting one.")] = 0.8,
-    helix_deg: Annotated[float, Query(ge=0.0, le=80.0, description="Where the library gives none.")] = 30.0,
-    stickout_mm: Annotated[float | None, Query(gt=0.0, le=5000.0, description="In place of the library's length below holder.")] = None,
-    insertion_mm: Annotated[float | None, Query(ge=0.0, le=5000.0, description="In place of what is left of the tool.")] = None,
-    material: Annotated[str | None, Query(max_length=50, description="In place of the library's.")] = None,
+    flute_ratio: Annotated[
+        float, Query(ge=0.3, le=1.0, description="Ratio of the bending diameter of the fluted part to the cutting diameter.")
+    ] = 0.8,
+    helix_deg: Annotated[float, Query(ge=0.0, le=80.0, description="Helix angle where the library has none.")] = 30.0,
+    stickout_mm: Annotated[float | None, Query(gt=0.0, le=5000.0, description="Instead of the library's length below holder.")] = None,
+    insertion_mm: Annotated[float | None, Query(ge=0.0, le=5000.0, description="Instead of the rest of the tool's length.")] = None,
+    material: Annotated[str | None, Query(max_length=50, description="Instead of the library's material.")] = None,
     holder: Annotated[str | None, Query(max_length=200, description="Holder of the library, for tools without one.")] = None,
-    contact: Annotated[str | None, Query(pattern=NAME_PATTERN, description="Tooling here whose contact joins tool and holder.")] = None,
-    replace: Annotated[bool, Query(description="Write also over toolings that are there.")] = False,
+    contact: Annotated[
+        str | None, Query(pattern=NAME_PATTERN, description="Name of the tooling whose contact parameters are used.")
+    ] = None,
+    replace: Annotated[bool, Query(description="Overwrite existing toolings.")] = False,
 ) -> ImportAnswer:
     raw = await request.body()
     if len(raw) > LARGEST_LIBRARY:
         raise Problem(413, f"a tool library has at most {LARGEST_LIBRARY // 1_000_000} MB")
     joint = None
     if contact is not None:
-        joint = found_or_404(await run_in_threadpool(parts.store.toolings.get, caller.group, contact), f"tooling {contact}").text
+        joint = found_or_404(await run_in_threadpool(components.store.toolings.get, caller.group, contact), f"tooling {contact}").text
     given = Assumptions(flute_ratio, helix_deg, stickout_mm, insertion_mm, material, None, holder)
-    entries = await parts.work.run(imported, raw, given, joint)
+    entries = await components.work.run(imported, raw, given, joint)
 
     def keep() -> list[ImportedTool]:
-        return [_kept(parts, caller.group, *entry, replace) for entry in entries]
+        return [_kept(components, caller.group, *entry, replace) for entry in entries]
 
     return ImportAnswer(items=await run_in_threadpool(keep))
 
 
-def _kept(parts: Any, group: str, name: str, text: str, assumed: tuple[str, ...], reason: str, replace: bool) -> ImportedTool:
-    """What becomes of one entry; the others do not hang on it."""
+def _kept(components: Any, group: str, name: str, text: str, assumed: tuple[str, ...], reason: str, replace: bool) -> ImportedTool:
+    """Outcome of one entry, independent of the others."""
     if not reason:
         try:
             document = Document(group, name, text, json.dumps(summary(text)), digest_of(text), now())
-            parts.store.toolings.put(document, None if replace else ABSENT)
+            components.store.toolings.put(document, None if replace else ABSENT)
         except InputError as error:
             reason = str(error)
         except Stale:

@@ -1,4 +1,4 @@
-"""Machines, and what is known of their dynamics."""
+"""Machines and their identifications."""
 
 from __future__ import annotations
 
@@ -6,79 +6,77 @@ import hashlib
 import json
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from api.components import Components, ThisService
+from api.conventions import BODY, After, Limit, MachineId, Repeat, expected, guard, in_use, page, problems, tagged, unchanged, utf8
+from api.lookups import identification_of, known_machine, machine_of
 from api.problems import Problem
-from api.routes.common import BODY, After, Limit, MachineId, expected, found_or_404, guard, page, problems, tagged, unchanged, utf8
 from api.schemas.common import Page
 from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes, NewMachine
 from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.entities import Document, Machine, Stale, Taken, digest_of
 from api.work import tasks
-from api.work.requests import MachineText
-from rcsa_ident.errors import InputError
+from api.work.machine_cache import is_result
 
 router = APIRouter(prefix="/machines", tags=["machines"], route_class=Guarded)
-_RESULT = {"content": {"application/json": {"schema": {"$ref": "#/components/schemas/Identification"}}}, "required": True}
-Repeat = Annotated[
-    str | None,
-    Header(alias="Idempotency-Key", pattern=r"^[\x21-\x7e]{1,128}$", description="The same again answers as the first time, for a day."),
-]
+JSON, CSV = "application/json", "text/csv"
+_RESULT = {
+    "content": {JSON: {"schema": {"$ref": "#/components/schemas/Identification"}}, CSV: {"schema": {"type": "string"}}},
+    "required": True,
+}
 
 
 @router.post("", status_code=201, summary="Make a machine", openapi_extra=guard("upload"), responses=problems(409, *BODY))
-def make(body: NewMachine, parts: ThisService, caller: WhoAsks, response: Response, repeat: Repeat = None) -> MachineAnswer:
+def make(body: NewMachine, components: ThisService, caller: WhoAsks, response: Response, repeat: Repeat = None) -> MachineAnswer:
     machine = Machine(new_id(), caller.group, body.name, body.description, now())
     digest = hashlib.sha256(body.model_dump_json().encode()).hexdigest()
     try:
-        kept = parts.store.machines.add(machine, None if repeat is None else (repeat, digest))
+        kept = components.store.machines.add(machine, None if repeat is None else (repeat, digest))
     except Taken as taken:
-        what = str(taken)
-        found = body.name if what == "name" else str(repeat)
-        raise Problem(409, f"the {what} is in use", [{"field": what, "found": found, "allowed": f"a {what} of its own"}]) from None
+        raise in_use(taken, body.name, repeat) from None
     response.headers["Location"] = f"/v1/machines/{kept.id}"
-    return _answer(parts, kept)
+    return _answer(components, kept)
 
 
 @router.get("", summary="List machines", openapi_extra=guard("read"), responses=problems(422))
-def list_machines(parts: ThisService, caller: WhoAsks, after: After = "", limit: Limit = 50) -> Page[MachineAnswer]:
-    rows, following = page(parts.store.machines.list(caller.group, after, limit + 1), limit, lambda machine: machine.id)
-    return Page(items=[_answer(parts, machine) for machine in rows], next=following)
+def list_machines(components: ThisService, caller: WhoAsks, after: After = "", limit: Limit = 50) -> Page[MachineAnswer]:
+    rows, following = page(components.store.machines.list(caller.group, after, limit + 1), limit, lambda machine: machine.id)
+    return Page(items=[_answer(components, machine) for machine in rows], next=following)
 
 
 @router.get("/{id}", summary="A machine", openapi_extra=guard("read"), responses=problems(404, 422))
-def get(id: MachineId, parts: ThisService, caller: WhoAsks) -> MachineAnswer:
-    return _answer(parts, found_or_404(parts.store.machines.get(caller.group, id), "machine"))
+def get(id: MachineId, components: ThisService, caller: WhoAsks) -> MachineAnswer:
+    return _answer(components, machine_of(components, caller.group, id))
 
 
 @router.delete(
     "/{id}",
     status_code=204,
-    summary="Forget a machine, its identification and its campaigns",
+    summary="Delete a machine, its identification and its campaigns",
     openapi_extra=guard("upload"),
     responses=problems(404, 422),
 )
-def forget(id: MachineId, parts: ThisService, caller: WhoAsks) -> Response:
-    if not parts.uploads.forget_machine(caller.group, id):
+def forget(id: MachineId, components: ThisService, caller: WhoAsks) -> Response:
+    if not components.uploads.forget_machine(caller.group, id):
         raise Problem(404, "there is no such machine")
     return Response(status_code=204)
 
 
 @router.put(
     "/{id}/identification",
-    summary="Say how a machine vibrates: RESULT.json of `rcsa-ident identify`",
-    description="If-Match or If-None-Match: * keep what somebody else has written meanwhile.",
-    openapi_extra=guard("upload", requestBody=_RESULT),
-    responses={201: {"model": IdentificationSummary, "description": "There was none before."}, **problems(404, 412, *BODY)},
+    summary="Write the dynamics of a machine: RESULT.json of `rcsa-ident identify`, or FLANGE.csv of a measured or decoupled flange",
+    description="If-Match or If-None-Match: * protect against overwriting concurrent changes.",
+    openapi_extra=guard("upload", requestBody=_RESULT, **{"x-content-types": (JSON, CSV)}),
+    responses={201: {"model": IdentificationSummary, "description": "The machine had none before."}, **problems(404, 412, *BODY)},
 )
-async def identify(id: MachineId, request: Request, response: Response, parts: ThisService, caller: WhoAsks) -> IdentificationSummary:
-    await run_in_threadpool(_machine, parts, caller.group, id)
+async def identify(id: MachineId, request: Request, response: Response, components: ThisService, caller: WhoAsks) -> IdentificationSummary:
+    await run_in_threadpool(machine_of, components, caller.group, id)
     text = utf8(await request.body())
-    summary = await parts.work.run(tasks.check, text)
+    summary = await components.work.run(tasks.check, text)
     document = Document(caller.group, id, text, json.dumps(summary), digest_of(text), now())
-    kept = parts.store.identifications
+    kept = components.store.identifications
 
     def write() -> bool:
         return kept.put(document, expected(request, lambda: _digest(kept.brief(caller.group, id))))
@@ -86,34 +84,35 @@ async def identify(id: MachineId, request: Request, response: Response, parts: T
     try:
         response.status_code = 201 if await run_in_threadpool(write) else 200
     except Stale:
-        raise Problem(412, "the identification is not the one that the query expects") from None
+        raise Problem(412, "the stored identification does not match If-Match or If-None-Match") from None
     response.headers.update(tagged(document.digest))
     return _summary(document)
 
 
 @router.get(
     "/{id}/identification",
-    summary="RESULT.json as it was written",
+    summary="The dynamics of a machine: RESULT.json or FLANGE.csv, as written",
     openapi_extra=guard("read"),
     response_class=Response,
     responses={
-        200: {"model": Identification, "description": "To be used with the commands, too."},
-        304: {"description": "If-None-Match names it."},
+        200: {"model": Identification, "description": "For use with the commands, too."},
+        304: {"description": "The content matches If-None-Match."},
         **problems(404, 422),
     },
 )
-def result(id: MachineId, request: Request, parts: ThisService, caller: WhoAsks) -> Response:
-    document = _document(parts, caller.group, id)
+def result(id: MachineId, request: Request, components: ThisService, caller: WhoAsks) -> Response:
+    document = identification_of(components, caller.group, id)
     if unchanged(request, document.digest):
         return Response(status_code=304, headers=tagged(document.digest))
-    return Response(document.text.encode(), media_type="application/json", headers=tagged(document.digest))
+    media_type = JSON if is_result(document.text) else CSV
+    return Response(document.text.encode(), media_type=media_type, headers=tagged(document.digest))
 
 
 @router.get(
     "/{id}/identification/modes", summary="Modes with their uncertainties", openapi_extra=guard("read"), responses=problems(404, 422)
 )
-def modes(id: MachineId, parts: ThisService, caller: WhoAsks) -> Modes:
-    return Modes.model_validate(tasks.modes(json.loads(_document(parts, caller.group, id).text)))
+def modes(id: MachineId, components: ThisService, caller: WhoAsks) -> Modes:
+    return Modes.model_validate(tasks.modes(identification_of(components, caller.group, id).text))
 
 
 @router.get(
@@ -124,31 +123,16 @@ def modes(id: MachineId, parts: ThisService, caller: WhoAsks) -> Modes:
 )
 async def frf(
     id: MachineId,
-    parts: ThisService,
+    components: ThisService,
     caller: WhoAsks,
     from_hz: Annotated[float, Query(ge=1.0, le=20_000.0, allow_inf_nan=False)] = 100.0,
     to_hz: Annotated[float | None, Query(ge=1.0, le=20_000.0, allow_inf_nan=False)] = None,
     step_hz: Annotated[float, Query(ge=0.01, le=1000.0, allow_inf_nan=False)] = 2.0,
 ) -> Frf:
-    machine = await run_in_threadpool(known_machine, parts, caller.group, id)
-    return Frf.model_validate(await parts.work.run(tasks.flange_frf, machine, (from_hz, to_hz, step_hz), parts.settings.work_seconds))
-
-
-def known_machine(parts: Components, group: str, id: str) -> MachineText:
-    """Return the identification of a machine that one can compute with."""
-    document = _document(parts, group, id)
-    if not json.loads(document.summary)["axes"]:
-        raise InputError("machine", "an identification that has failed", "a machine with an identification of axis X, Y or both")
-    return MachineText(document.digest, document.text)
-
-
-def _machine(parts: Components, group: str, id: str) -> Machine:
-    return found_or_404(parts.store.machines.get(group, id), "machine")
-
-
-def _document(parts: Components, group: str, id: str) -> Document:
-    _machine(parts, group, id)
-    return found_or_404(parts.store.identifications.get(group, id), "identification of the machine")
+    machine = await run_in_threadpool(known_machine, components, caller.group, id)
+    return Frf.model_validate(
+        await components.work.run(tasks.flange_frf, machine, (from_hz, to_hz, step_hz), components.settings.work_seconds)
+    )
 
 
 def _digest(document: Document | None) -> str | None:
@@ -159,7 +143,7 @@ def _summary(document: Document) -> IdentificationSummary:
     return IdentificationSummary(**json.loads(document.summary), changed=document.changed, etag=document.digest)
 
 
-def _answer(parts: Components, machine: Machine) -> MachineAnswer:
-    document = parts.store.identifications.brief(machine.group, machine.id)
+def _answer(components: Components, machine: Machine) -> MachineAnswer:
+    document = components.store.identifications.brief(machine.group, machine.id)
     summary = None if document is None else _summary(document)
     return MachineAnswer(id=machine.id, name=machine.name, description=machine.description, created=machine.created, identification=summary)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from api.routes.common import guard, problems
+from api.conventions import guard, problems
 from api.schemas.materials import MaterialAnswer, Materials
 from api.security import Guarded
 from rcsa_ident.cutting.materials import materials

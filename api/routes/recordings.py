@@ -1,4 +1,4 @@
-"""Recordings of a campaign: uploaded at once, in parts or several together; read, judged, drawn, and given back as they came."""
+"""Recordings of a campaign: upload in one request, description, spectrum, envelope, original file and deletion."""
 
 from __future__ import annotations
 
@@ -13,27 +13,36 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 from api.components import Components, ThisService
+from api.conventions import BODY, CampaignId, Limit, found_or_404, guard, page, problems, tagged, unchanged
 from api.files import NORMALISED, UPLOADS
+from api.lookups import known_campaign
 from api.problems import Problem
 from api.reading import reader_tasks
 from api.reading.campaign_text import File, files_of
 from api.reading.uploads import Received
-from api.routes.body_stream import append, arriving, check_digest, complete, plain, room, told_digest, told_length
-from api.routes.campaigns import CampaignId, known_campaign
-from api.routes.common import BODY, Limit, found_or_404, guard, page, problems, tagged, unchanged
 from api.schemas.campaigns import RecordingAnswer, SignalAnswer, SpectrumAnswer
 from api.schemas.common import Page
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign, Recording
 from api.stores.entities import Taken
+from api.transfer.body_stream import (
+    announced_digest,
+    announced_length,
+    append,
+    check_digest,
+    check_room,
+    complete,
+    new_part,
+    refuse_encoded,
+)
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
 BINARY = "application/octet-stream"
 _NAME = r"^[^\x00-\x1f\x7f/\\]{1,128}$"
-RecordingName = Annotated[str, Path(pattern=_NAME, description="As the campaign names it.")]
-AfterName = Annotated[str, Query(pattern=r"^[^\x00-\x1f\x7f/\\]{0,128}$", description="`next` of the part before.")]
-Replace = Annotated[bool, Query(description="Take the place of another content under the name.")]
-Points = Annotated[int, Query(ge=10, le=10_000, description="At most so many.")]
+RecordingName = Annotated[str, Path(pattern=_NAME, description="Name of the recording in the campaign.")]
+AfterName = Annotated[str, Query(pattern=r"^[^\x00-\x1f\x7f/\\]{0,128}$", description="`next` of the previous page.")]
+Replace = Annotated[bool, Query(description="Replace a recording of this name that has other content.")]
+Points = Annotated[int, Query(ge=10, le=10_000, description="Largest number of points.")]
 _FILE = {"required": True, "content": {BINARY: {"schema": {"type": "string", "format": "binary"}}}}
 _DIGESTS = [
     {"name": name, "in": "header", "schema": {"type": "string"}, "description": "sha-256=:BASE64: of the file, checked (RFC 9530)."}
@@ -45,76 +54,84 @@ _STREAM = 1 << 20
 @router.put(
     "/{name}",
     summary="Upload a recording",
-    description="Any format of the commands; the suffix of the name says which. The answer comes when the file is on the disk, "
+    description="Any format of the commands, by the suffix of the name. The answer comes when the file is on the disk, "
     "read and judged. The same content again changes nothing.",
     openapi_extra=guard("upload", requestBody=_FILE, parameters=_DIGESTS, **{"x-content-types": (BINARY,)}),
-    responses={201: {"model": RecordingAnswer, "description": "It is kept."}, **problems(404, 408, 409, *BODY)},
+    responses={201: {"model": RecordingAnswer, "description": "The recording is stored."}, **problems(404, 408, 409, *BODY)},
 )
 async def put(
-    id: CampaignId, name: RecordingName, request: Request, response: Response, parts: ThisService, caller: WhoAsks, replace: Replace = False
+    id: CampaignId,
+    name: RecordingName,
+    request: Request,
+    response: Response,
+    components: ThisService,
+    caller: WhoAsks,
+    replace: Replace = False,
 ) -> RecordingAnswer:
-    campaign, name, _ = await run_in_threadpool(named, parts, caller.group, id, name)
-    digest = told_digest(request, "Repr-Digest", "Content-Digest")
-    plain(request)
-    with parts.uploads.admitted():
-        await room(parts, caller.group, told_length(request))
-        async with arriving(parts, caller.group) as part:
-            await append(request, parts, caller.group, part)
+    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
+    digest = announced_digest(request, "Repr-Digest", "Content-Digest")
+    refuse_encoded(request)
+    with components.uploads.admitted():
+        await check_room(components, caller.group, announced_length(request))
+        async with new_part(components, caller.group) as part:
+            await append(request, components, caller.group, part)
             received = await complete(part)
             check_digest(digest, received.sha256)
-            response.status_code, kept = await take(parts, campaign, name, received, replace)
+            response.status_code, kept = await take(components, campaign, name, received, replace)
     response.headers.update(tagged(kept.sha256))
     return answer(campaign, kept)
 
 
-async def take(parts: Components, campaign: Campaign, name: str, received: Received, replacing: bool) -> tuple[int, Recording]:
-    """Keep what has come, or say why not."""
+async def take(components: Components, campaign: Campaign, name: str, received: Received, replacing: bool) -> tuple[int, Recording]:
+    """Store a received file, or raise a problem with the reason."""
     try:
-        return await parts.uploads.take(campaign, name, received, replacing)
+        return await components.uploads.take(campaign, name, received, replacing)
     except Taken:
         fault = {"field": "name", "found": name[:120], "allowed": "the same content, or ?replace=true"}
-        raise Problem(409, "another content is there under this name", [fault]) from None
+        raise Problem(409, "a recording with other content exists under this name", [fault]) from None
     except KeyError:
         raise Problem(404, "there is no such campaign") from None
 
 
 @router.get("", summary="List recordings", openapi_extra=guard("read"), responses=problems(404, 422))
-def list_recordings(id: CampaignId, parts: ThisService, caller: WhoAsks, after: AfterName = "", limit: Limit = 50) -> Page[RecordingAnswer]:
-    campaign = known_campaign(parts, caller.group, id)
-    rows, following = page(parts.store.recordings.list(caller.group, id, _form(after), limit + 1), limit, lambda row: row.name)
+def list_recordings(
+    id: CampaignId, components: ThisService, caller: WhoAsks, after: AfterName = "", limit: Limit = 50
+) -> Page[RecordingAnswer]:
+    campaign = known_campaign(components, caller.group, id)
+    rows, following = page(components.store.recordings.list(caller.group, id, _form(after), limit + 1), limit, lambda row: row.name)
     known = files_of(campaign.text)
     return Page(items=[_answer(known[row.name], row) for row in rows], next=following)
 
 
-@router.get("/{name}", summary="What was found in a recording", openapi_extra=guard("read"), responses=problems(404, 422))
-def get(id: CampaignId, name: RecordingName, response: Response, parts: ThisService, caller: WhoAsks) -> RecordingAnswer:
-    campaign, row = _kept(parts, caller.group, id, name)
+@router.get("/{name}", summary="Description of a recording with its verdict", openapi_extra=guard("read"), responses=problems(404, 422))
+def get(id: CampaignId, name: RecordingName, response: Response, components: ThisService, caller: WhoAsks) -> RecordingAnswer:
+    campaign, row = _kept(components, caller.group, id, name)
     response.headers.update(tagged(row.sha256))
     return answer(campaign, row)
 
 
 @router.get(
     "/{name}/file",
-    summary="The file as it came",
+    summary="The original file",
     openapi_extra=guard("read"),
     response_class=StreamingResponse,
     responses={
         200: {"description": "Its entity tag is its SHA-256.", "content": {BINARY: {"schema": {"type": "string", "format": "binary"}}}},
-        304: {"description": "If-None-Match names it."},
+        304: {"description": "The content matches If-None-Match."},
         **problems(404, 422),
     },
 )
-def file(id: CampaignId, name: RecordingName, request: Request, parts: ThisService, caller: WhoAsks) -> Response:
-    _, row = _kept(parts, caller.group, id, name)
+def file(id: CampaignId, name: RecordingName, request: Request, components: ThisService, caller: WhoAsks) -> Response:
+    _, row = _kept(components, caller.group, id, name)
     if unchanged(request, row.sha256):
         return Response(status_code=304, headers=tagged(row.sha256))
-    # what comes from a client is never shown as a page
+    # a browser must never show an uploaded file as a page
     headers = {
         "Content-Disposition": "attachment",
         "Content-Length": str(row.size),
         "Content-Security-Policy": "default-src 'none'; sandbox",
     }
-    path = parts.files.path(caller.group, UPLOADS, row.sha256)
+    path = components.files.path(caller.group, UPLOADS, row.sha256)
     return StreamingResponse(_read(path), media_type=BINARY, headers=tagged(row.sha256) | headers)
 
 
@@ -124,31 +141,31 @@ def _read(path: FilePath) -> Iterator[bytes]:
             yield block
 
 
-@router.get("/{name}/spectrum", summary="Amplitudes over frequency", openapi_extra=guard("read"), responses=problems(404, 422))
-async def spectrum(id: CampaignId, name: RecordingName, parts: ThisService, caller: WhoAsks, points: Points = 2000) -> SpectrumAnswer:
-    _, row = await run_in_threadpool(_kept, parts, caller.group, id, name)
-    path = parts.files.path(caller.group, NORMALISED, row.normalised)
+@router.get("/{name}/spectrum", summary="Amplitude spectrum", openapi_extra=guard("read"), responses=problems(404, 422))
+async def spectrum(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks, points: Points = 2000) -> SpectrumAnswer:
+    _, row = await run_in_threadpool(_kept, components, caller.group, id, name)
+    path = components.files.path(caller.group, NORMALISED, row.normalised)
     speed = json.loads(row.found)["spindle_speed_rpm"]
-    return SpectrumAnswer.model_validate(await parts.work.run(reader_tasks.spectrum, path, speed, points))
+    return SpectrumAnswer.model_validate(await components.work.run(reader_tasks.spectrum, path, speed, points))
 
 
-@router.get("/{name}/signal", summary="The outline over time", openapi_extra=guard("read"), responses=problems(404, 422))
-async def signal(id: CampaignId, name: RecordingName, parts: ThisService, caller: WhoAsks, points: Points = 1000) -> SignalAnswer:
-    _, row = await run_in_threadpool(_kept, parts, caller.group, id, name)
-    path = parts.files.path(caller.group, NORMALISED, row.normalised)
-    return SignalAnswer.model_validate(await parts.work.run(reader_tasks.envelope, path, points))
+@router.get("/{name}/signal", summary="Envelope over time", openapi_extra=guard("read"), responses=problems(404, 422))
+async def signal(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks, points: Points = 1000) -> SignalAnswer:
+    _, row = await run_in_threadpool(_kept, components, caller.group, id, name)
+    path = components.files.path(caller.group, NORMALISED, row.normalised)
+    return SignalAnswer.model_validate(await components.work.run(reader_tasks.envelope, path, points))
 
 
 @router.delete(
     "/{name}",
     status_code=204,
-    summary="Forget a recording, or what has come of one",
+    summary="Delete a recording or its unfinished upload",
     openapi_extra=guard("upload"),
     responses=problems(404, 422),
 )
-async def forget(id: CampaignId, name: RecordingName, parts: ThisService, caller: WhoAsks) -> Response:
-    campaign, name, _ = await run_in_threadpool(named, parts, caller.group, id, name)
-    if not await parts.uploads.forget(campaign, name):
+async def forget(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks) -> Response:
+    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
+    if not await components.uploads.forget(campaign, name):
         raise Problem(404, "there is no such recording")
     return Response(status_code=204)
 
@@ -157,22 +174,22 @@ def _form(name: str) -> str:
     return unicodedata.normalize("NFC", name)
 
 
-def named(parts: Components, group: str, id: str, name: str) -> tuple[Campaign, str, File]:
+def named(components: Components, group: str, id: str, name: str) -> tuple[Campaign, str, File]:
     """Return a campaign and a recording that it names."""
-    campaign = known_campaign(parts, group, id)
+    campaign = known_campaign(components, group, id)
     found = files_of(campaign.text).get(_form(name))
     if found is None:
-        raise Problem(404, "the campaign names no such recording")
+        raise Problem(404, "the campaign does not name this recording")
     return campaign, _form(name), found
 
 
-def _kept(parts: Components, group: str, id: str, name: str) -> tuple[Campaign, Recording]:
-    campaign = known_campaign(parts, group, id)
-    return campaign, found_or_404(parts.store.recordings.get(group, id, _form(name)), "recording")
+def _kept(components: Components, group: str, id: str, name: str) -> tuple[Campaign, Recording]:
+    campaign = known_campaign(components, group, id)
+    return campaign, found_or_404(components.store.recordings.get(group, id, _form(name)), "recording")
 
 
 def answer(campaign: Campaign, row: Recording) -> RecordingAnswer:
-    """Return what is told of a recording."""
+    """Return the description of a recording."""
     return _answer(files_of(campaign.text)[row.name], row)
 
 

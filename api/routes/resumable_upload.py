@@ -1,4 +1,4 @@
-"""Uploads in parts: what has come stays through lost connections and restarts, and the client goes on from there."""
+"""Resumable uploads: received bytes survive lost connections and restarts, and the client continues from there."""
 
 from __future__ import annotations
 
@@ -11,16 +11,25 @@ from fastapi.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 
 from api.components import Components, ThisService
+from api.conventions import BODY, CampaignId, guard, problems, tagged
 from api.files import Part, Partial
 from api.problems import Problem
 from api.reading.uploads import partial_name
-from api.routes.body_stream import LOOK, blocks, check_digest, complete, plain, room, spacious, told_digest, write
-from api.routes.campaigns import CampaignId
-from api.routes.common import BODY, guard, problems, tagged
 from api.routes.recordings import BINARY, RecordingName, Replace, answer, named, take
 from api.schemas.campaigns import RecordingAnswer
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign
+from api.transfer.body_stream import (
+    LOOK,
+    announced_digest,
+    blocks,
+    check_digest,
+    check_room,
+    complete,
+    refuse_encoded,
+    storage_problems,
+    write,
+)
 from rcsa_ident.errors import InputError
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
@@ -29,24 +38,26 @@ _DIGESTS = [
     {"name": name, "in": "header", "schema": {"type": "string"}, "description": f"sha-256=:BASE64: of {what}, checked (RFC 9530)."}
     for name, what in (("Repr-Digest", "the whole file"), ("Content-Digest", "this part"))
 ]
-_OFFSET: dict[str, Any] = {"Upload-Offset": {"description": "So many bytes are kept.", "schema": {"type": "string"}}}
-_LENGTH: dict[str, Any] = {"Upload-Length": {"description": "Of the whole file.", "schema": {"type": "string"}}}
-Offset = Annotated[int, Header(alias="Upload-Offset", ge=0, lt=10**15, description="Where this part begins.")]
-Length = Annotated[int | None, Header(alias="Upload-Length", ge=0, lt=10**15, description="Of the whole file; needed with the first part.")]
+_OFFSET: dict[str, Any] = {"Upload-Offset": {"description": "Number of bytes received.", "schema": {"type": "string"}}}
+_LENGTH: dict[str, Any] = {"Upload-Length": {"description": "Length of the whole file.", "schema": {"type": "string"}}}
+Offset = Annotated[int, Header(alias="Upload-Offset", ge=0, lt=10**15, description="Offset of this part.")]
+Length = Annotated[
+    int | None, Header(alias="Upload-Length", ge=0, lt=10**15, description="Length of the whole file; required with the first part.")
+]
 
 
 @router.head(
     "/{name}",
     status_code=204,
-    summary="How far an upload is",
+    summary="State of an upload",
     openapi_extra=guard("upload"),
-    responses={204: {"description": "So far.", "headers": _OFFSET | _LENGTH}, **problems(404, 422)},
+    responses={204: {"description": "The state of the upload.", "headers": _OFFSET | _LENGTH}, **problems(404, 422)},
 )
-def head(id: CampaignId, name: RecordingName, parts: ThisService, caller: WhoAsks) -> Response:
-    campaign, name, _ = named(parts, caller.group, id, name)
-    state = _state(parts, campaign, name)
+def head(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks) -> Response:
+    campaign, name, _ = named(components, caller.group, id, name)
+    state = _state(components, campaign, name)
     if state is None:
-        raise Problem(404, "nothing has come of it")
+        raise Problem(404, "no part of this recording has been uploaded")
     return Response(
         status_code=204, headers={"Upload-Offset": str(state.offset), "Upload-Length": str(state.length), "Cache-Control": "no-store"}
     )
@@ -56,12 +67,12 @@ def head(id: CampaignId, name: RecordingName, parts: ThisService, caller: WhoAsk
     "/{name}",
     summary="Upload a part of a recording",
     response_model=RecordingAnswer,
-    description="Components follow each other; HEAD tells where to go on. What has come is kept when the connection breaks, and through "
+    description="Parts follow each other; HEAD returns where to continue. Received bytes survive lost connections and "
     "restarts, for a day. The last part answers as an upload at once does.",
     openapi_extra=guard("upload", requestBody=_PART, parameters=_DIGESTS, **{"x-content-types": (BINARY,)}),
     responses={
-        201: {"model": RecordingAnswer, "description": "It is complete and kept."},
-        204: {"description": "The part is kept, more is to come.", "headers": _OFFSET},
+        201: {"model": RecordingAnswer, "description": "The upload is complete and stored."},
+        204: {"description": "The part is stored; more parts follow.", "headers": _OFFSET},
         **problems(404, 408, 409, *BODY),
     },
 )
@@ -70,96 +81,98 @@ async def patch(
     name: RecordingName,
     request: Request,
     response: Response,
-    parts: ThisService,
+    components: ThisService,
     caller: WhoAsks,
     offset: Offset,
     length: Length = None,
     replace: Replace = False,
 ) -> Any:
-    campaign, name, _ = await run_in_threadpool(named, parts, caller.group, id, name)
-    whole, content = told_digest(request, "Repr-Digest"), told_digest(request, "Content-Digest")
-    plain(request)
+    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
+    whole, content = announced_digest(request, "Repr-Digest"), announced_digest(request, "Content-Digest")
+    refuse_encoded(request)
     key = (campaign.id, name)
-    if key in parts.uploads.writing:
-        # perhaps the same client's, whose connection is not yet known to be lost
-        raise Problem(503, "another query is writing this recording", headers={"Retry-After": "2"})
-    parts.uploads.writing.add(key)
+    if key in components.uploads.writing:
+        # perhaps by the same client, whose lost connection has not been noticed yet
+        raise Problem(503, "another request is writing this recording", headers={"Retry-After": "2"})
+    components.uploads.writing.add(key)
     try:
-        with parts.uploads.admitted():
-            state = await _go_on(parts, campaign, name, offset, length)
-            path = parts.files.partial(caller.group, partial_name(campaign.id, name))[0]
-            part = await _append(request, parts, caller.group, path, state, content)
+        with components.uploads.admitted():
+            state = await _go_on(components, campaign, name, offset, length)
+            path = components.files.partial(caller.group, partial_name(campaign.id, name))[0]
+            part = await _append(request, components, caller.group, path, state, content)
             try:
                 if part.size < state.length:
                     return Response(status_code=204, headers={"Upload-Offset": str(part.size)})
                 received = await complete(part)
                 check_digest(whole, received.sha256)
-                response.status_code, kept = await take(parts, campaign, name, received, replace)
+                response.status_code, kept = await take(components, campaign, name, received, replace)
             except (InputError, Problem) as error:
-                # another content under the name may still be replaced by this one
+                # kept on a conflict: the client may still replace the other content
                 if not (isinstance(error, Problem) and error.status == 409):
-                    await run_in_threadpool(parts.files.forget, path)
+                    await run_in_threadpool(components.files.forget, path)
                 raise
             finally:
                 part.close()
-            await run_in_threadpool(parts.files.forget, path)
+            await run_in_threadpool(components.files.forget, path)
     finally:
-        parts.uploads.writing.discard(key)
+        components.uploads.writing.discard(key)
     response.headers.update(tagged(kept.sha256))
     return answer(campaign, kept)
 
 
-def _state(parts: Components, campaign: Campaign, name: str) -> Partial | None:
-    """How far an upload is; a recording that is kept is complete."""
-    state = parts.files.partial(campaign.group, partial_name(campaign.id, name))[1]
-    row = None if state is not None else parts.store.recordings.get(campaign.group, campaign.id, name)
+def _state(components: Components, campaign: Campaign, name: str) -> Partial | None:
+    """State of an upload; a stored recording is complete."""
+    state = components.files.partial(campaign.group, partial_name(campaign.id, name))[1]
+    row = None if state is not None else components.store.recordings.get(campaign.group, campaign.id, name)
     return state if row is None else Partial(row.size, row.size)
 
 
-async def _go_on(parts: Components, campaign: Campaign, name: str, offset: int, length: int | None) -> Partial:
-    """Return where a part begins, if it begins where the parts before it end; offset 0 with another length begins anew."""
-    path, state = await run_in_threadpool(parts.files.partial, campaign.group, partial_name(campaign.id, name))
+async def _go_on(components: Components, campaign: Campaign, name: str, offset: int, length: int | None) -> Partial:
+    """Return the state of an upload if the part continues it; offset 0 with another length starts a new one."""
+    path, state = await run_in_threadpool(components.files.partial, campaign.group, partial_name(campaign.id, name))
     if offset == 0 and (state is None or (length is not None and length != state.length)):
         if length is None:
             raise InputError("Upload-Length", "nothing", "the length of the whole file, with its first part")
-        await room(parts, campaign.group, length)
+        await check_room(components, campaign.group, length)
         state = Partial(0, length)
-        await run_in_threadpool(parts.files.forget, path)
+        await run_in_threadpool(components.files.forget, path)
         return state
     if state is None or state.offset != offset or length not in (None, state.length):
-        there = await run_in_threadpool(_state, parts, campaign, name)
+        there = await run_in_threadpool(_state, components, campaign, name)
         found = 0 if there is None else there.offset
         fault = {"field": "Upload-Offset", "found": str(offset), "allowed": f"{found}, of {there.length if there else 'nothing'} bytes"}
-        raise Problem(409, f"the upload goes on at {found}", [fault], {"Upload-Offset": str(found)})
+        raise Problem(409, f"the upload continues at byte {found}", [fault], {"Upload-Offset": str(found)})
     return state
 
 
-async def _append(request: Request, parts: Components, group: str, path: Path, state: Partial, content: str | None) -> Part:
-    """Write what comes behind the parts before, and note how far it is, also where it breaks off."""
+async def _append(request: Request, components: Components, group: str, path: Path, state: Partial, content: str | None) -> Part:
+    """Append a part and record the state, also where the part breaks off."""
     part, digest = await run_in_threadpool(Part, path, state.offset), hashlib.sha256()
     noted = 0
     try:
-        async for block in blocks(request, parts):
+        async for block in blocks(request, components):
             if part.size + len(block) > state.length:
-                raise InputError("body", "more than Upload-Length", f"at most {state.length - state.offset} bytes from {state.offset}")
-            with spacious():
-                await write(parts, group, part, block, part.size - state.offset + len(block))
+                raise InputError(
+                    "body", "more bytes than Upload-Length", f"at most {state.length - state.offset} bytes from {state.offset}"
+                )
+            with storage_problems():
+                await write(components, group, part, block, part.size - state.offset + len(block))
             digest.update(block)
             if content is None and (part.size - state.offset) // LOOK > noted:
                 noted += 1
-                await run_in_threadpool(_note, parts, part, part.size, state.length)
+                await run_in_threadpool(_note, components, part, part.size, state.length)
         check_digest(content, digest.hexdigest(), "Content-Digest")
     except (Problem, InputError, HTTPException) as error:
-        # of a part whose digest would have to be checked only the whole counts
+        # a part with a digest counts only when it is complete
         kept = state.offset if content is not None or isinstance(error, InputError) else part.size
-        await run_in_threadpool(_note, parts, part, kept, state.length)
+        await run_in_threadpool(_note, components, part, kept, state.length)
         part.close()
         raise
-    await run_in_threadpool(_note, parts, part, part.size, state.length)
+    await run_in_threadpool(_note, components, part, part.size, state.length)
     return part
 
 
-def _note(parts: Components, part: Part, offset: int, length: int) -> None:
-    with spacious():
+def _note(components: Components, part: Part, offset: int, length: int) -> None:
+    with storage_problems():
         part.sync()
-        parts.files.note(part.path, Partial(offset, length))
+        components.files.note(part.path, Partial(offset, length))

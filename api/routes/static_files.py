@@ -1,4 +1,4 @@
-"""The page, its files, and the description of the API to read: all from here, nothing from elsewhere."""
+"""Static files: the page and the description of the API, with nothing loaded from elsewhere."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pathlib import Path
 
 from fastapi import APIRouter, Request, Response
 
+from api.conventions import tagged, unchanged
 from api.problems import Problem
-from api.routes.common import tagged, unchanged
 
 router = APIRouter(include_in_schema=False)
 FOLDER = Path(__file__).resolve().parents[1] / "web"
@@ -22,9 +22,9 @@ _KINDS = {
     ".json": "application/json",
     ".svg": "image/svg+xml",
 }
-#: Hash of an empty style element: Plotly makes one, and writes its rules into it as a script may.
+#: Hash of an empty style element: Plotly makes one and fills it by script.
 _EMPTY = "'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='"
-#: What a page of the service may load: its own files, and pictures that it makes itself.
+#: A page of the service may load its own files, and images that it makes itself.
 _POLICY = (
     f"default-src 'none'; script-src 'self'; style-src 'self' {_EMPTY}; img-src 'self' data: blob:; connect-src 'self'; font-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -40,13 +40,13 @@ _MONTHS = "public, max-age=31536000, immutable"
 
 @dataclass(frozen=True, slots=True)
 class _File:
-    """A file as it is sent.
+    """A file to send.
 
     Parameters
     ----------
     kind : str
     plain, packed : bytes
-        As it is, and with gzip.
+        Content without and with gzip.
     digest : str
     """
 
@@ -58,13 +58,13 @@ class _File:
 
 @lru_cache(maxsize=1)
 def _names() -> dict[str, Path]:
-    """All files that there are, by the path that a browser asks for; what is not here is not looked for anywhere."""
+    """All files by their URL paths; no other file can be requested."""
     return {path.relative_to(FOLDER).as_posix(): path for path in sorted(FOLDER.rglob("*")) if path.suffix in _KINDS}
 
 
 @lru_cache(maxsize=1)
 def _tag() -> str:
-    """Name of this state of all files: it stands in their addresses, so that browsers may keep them for ever."""
+    """Hash of all files: part of their URLs, so that browsers may cache them for ever."""
     sums = (f"{name} {hashlib.sha256(path.read_bytes()).hexdigest()}" for name, path in _names().items())
     return hashlib.sha256("\n".join(sums).encode()).hexdigest()[:16]
 
@@ -82,13 +82,13 @@ def _sent(request: Request, name: str, headers: dict[str, str]) -> Response:
     file = _file(name)
     packs = any(part.split(";")[0].strip().lower() == "gzip" for part in request.headers.get("accept-encoding", "").split(","))
     small = packs and len(file.packed) < len(file.plain)
-    # two forms of one file are two entities
+    # each encoding of a file has its own entity tag
     digest = file.digest + ("-gzip" if small else "")
-    told = tagged(digest) | {"Vary": "Accept-Encoding"} | headers
+    all_headers = tagged(digest) | {"Vary": "Accept-Encoding"} | headers
     if unchanged(request, digest):
-        return Response(status_code=304, headers=told)
+        return Response(status_code=304, headers=all_headers)
     return Response(
-        file.packed if small else file.plain, media_type=file.kind, headers=told | ({"Content-Encoding": "gzip"} if small else {})
+        file.packed if small else file.plain, media_type=file.kind, headers=all_headers | ({"Content-Encoding": "gzip"} if small else {})
     )
 
 
@@ -106,5 +106,5 @@ def docs(request: Request) -> Response:
 def static(tag: str, name: str, request: Request) -> Response:
     if name not in _names() or name.endswith(".html"):
         raise Problem(404, "there is no such file")
-    # a page from before an update asks for what is no more: it gets today's, and keeps it for no longer than it needs it
+    # a page from before an update asks for old files: it gets the current ones, not to be cached
     return _sent(request, name, {"Cache-Control": _MONTHS if tag == _tag() else "no-cache", **_GUARDS})

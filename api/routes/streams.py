@@ -1,4 +1,4 @@
-"""Live forces over a WebSocket: samples in, forces out, and others who watch."""
+"""Live forces over a WebSocket: samples in, forces out, also to viewers."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from starlette.websockets import WebSocketDisconnect, WebSocketState
 
 from api import problems
 from api.components import Components, ThisService
+from api.conventions import guard
+from api.conventions import problems as documented
+from api.live.stream_connection import LINGER, UNEXPECTED, end_of, serve_owner, serve_viewer
+from api.live.stream_opening import open_logger, open_replay
 from api.problems import Problem
-from api.routes.common import guard
-from api.routes.common import problems as documented
-from api.routes.stream_connection import LINGER, UNEXPECTED, ended, owned, watched
-from api.routes.stream_opening import logger, replayed
 from api.schemas.common import body_of
 from api.schemas.forces import Hello, ReplayHello, StreamHello, StreamsAnswer, StreamSummary, WatchHello
 from api.security import HEADER, Caller, Guarded, WhoAsks, caller_of, new_id
@@ -30,9 +30,9 @@ from api.streams.session import End, Session
 
 router = APIRouter(tags=["forces"], route_class=Guarded)
 log = logging.getLogger("rcsa_ident.service")
-#: Time for the first message [s].
+#: Time limit for the first message [s].
 HELLO = 10.0
-#: Bytes of a first message.
+#: Largest first message [characters].
 MOST_HELLO = 300_000
 
 
@@ -43,8 +43,8 @@ MOST_HELLO = 300_000
     openapi_extra=guard("read"),
     responses=documented(),
 )
-async def streams(parts: ThisService, caller: WhoAsks) -> StreamsAnswer:
-    return StreamsAnswer(items=[_summary(session) for session in parts.streams.list(caller.group)])
+async def streams(components: ThisService, caller: WhoAsks) -> StreamsAnswer:
+    return StreamsAnswer(items=[_summary(session) for session in components.streams.list(caller.group)])
 
 
 def _summary(session: Session) -> StreamSummary:
@@ -66,22 +66,22 @@ def _summary(session: Session) -> StreamSummary:
 
 @router.websocket("/forces/stream")
 async def stream(websocket: WebSocket) -> None:
-    parts: Components = websocket.app.state.parts
+    components: Components = websocket.app.state.components
     id = new_id()
     try:
-        caller = await _admitted(websocket, parts)
+        caller = await _admit(websocket, components)
     except Problem as problem:
-        document = JSONResponse(problems.told(problem, id), problem.status, problem.headers, problems.MEDIA_TYPE)
+        document = JSONResponse(problems.content_of(problem, id), problem.status, problem.headers, problems.MEDIA_TYPE)
         await websocket.send_denial_response(document)
         return
     await websocket.accept()
     end = UNEXPECTED
     try:
-        end = await _served(websocket, parts, caller, id)
+        end = await _serve(websocket, components, caller, id)
     except WebSocketDisconnect:
         return
     except Exception as error:
-        end = ended(error)
+        end = end_of(error)
         if end.status == 500:
             log.error("unexpected", exc_info=error, extra={"fields": {"request_id": id}})
     finally:
@@ -89,57 +89,57 @@ async def stream(websocket: WebSocket) -> None:
             await _farewell(websocket, end, id)
 
 
-async def _admitted(websocket: HTTPConnection, parts: Components) -> Caller | None:
-    """Return who asks, None where the first message is to tell; a page from elsewhere is not let in, whatever the browser would send."""
+async def _admit(websocket: HTTPConnection, components: Components) -> Caller | None:
+    """Return the caller, None where the first message has the key; pages of other origins are refused, whatever the browser would send."""
     origin, host = websocket.headers.get("origin"), websocket.headers.get("host", "")
     if origin is not None and (urlsplit(origin).scheme not in ("http", "https") or urlsplit(origin).netloc.lower() != host.lower()):
-        raise Problem(403, "a page of another origin can not open a stream")
+        raise Problem(403, "a page of another origin cannot open a stream")
     where = websocket.client.host if websocket.client is not None else "nobody"
-    _paced(parts, f"open {where}")
-    if parts.settings.asks_for_keys and not websocket.headers.get(HEADER):
+    _check_rate(components, f"open {where}")
+    if components.settings.asks_for_keys and not websocket.headers.get(HEADER):
         return None
-    return await run_in_threadpool(caller_of, websocket, parts)
+    return await run_in_threadpool(caller_of, websocket, components)
 
 
-def _paced(parts: Components, who: str) -> None:
-    seconds = parts.rates.wait(who)
+def _check_rate(components: Components, who: str) -> None:
+    seconds = components.rates.wait(who)
     if seconds > 0.0:
-        raise Problem(429, "too many streams are opened", headers={"Retry-After": str(math.ceil(seconds))})
+        raise Problem(429, "streams are opened too often", headers={"Retry-After": str(math.ceil(seconds))})
 
 
-async def _served(websocket: WebSocket, parts: Components, caller: Caller | None, id: str) -> End:
-    """Read the first message, do what it says, and return how it ended."""
+async def _serve(websocket: WebSocket, components: Components, caller: Caller | None, id: str) -> End:
+    """Read the first message, serve the stream, and return its end."""
     raw = await _hello(websocket)
     data = object_of(raw)
     kind: type[Hello] = WatchHello if "watch" in data else ReplayHello if "replay" in data else StreamHello
     hello = body_of(kind, raw.encode("utf-8", "replace"))
     if caller is None:
-        caller = await run_in_threadpool(caller_of, websocket, parts, hello.key)
-    _paced(parts, caller.id)
+        caller = await run_in_threadpool(caller_of, websocket, components, hello.key)
+    _check_rate(components, caller.id)
     scope = "read" if isinstance(hello, WatchHello) and not caller.may("run") else "run"
     if not caller.may(scope):
-        raise Problem(403, f"the key has not the scope {scope}")
+        raise Problem(403, f"the API key does not have the scope {scope}")
     log.info("stream", extra={"fields": {"request_id": id, "kind": kind.__name__, "key": caller.id, "group": caller.group}})
-    hub = parts.streams
+    hub = components.streams
     if isinstance(hello, WatchHello):
         session = hub.get(caller.group, hello.watch)
         if session is None:
             raise Problem(404, "there is no such stream")
-        return await watched(websocket, parts, caller, session, hello)
+        return await serve_viewer(websocket, components, caller, session, hello)
     if isinstance(hello, ReplayHello):
-        opening = await replayed(parts, caller.group, hello)
+        opening = await open_replay(components, caller.group, hello)
     else:
         assert isinstance(hello, StreamHello)
-        opening = await logger(parts, caller.group, hello)
-    about = opening.about(id, caller.group, parts.settings.stream_buffer_seconds)
+        opening = await open_logger(components, caller.group, hello)
+    about = opening.about(id, caller.group, components.settings.stream_buffer_seconds)
     session = hub.open(about)
     try:
-        return await owned(websocket, parts, caller, session, opening, hello)
+        return await serve_owner(websocket, components, caller, session, opening, hello)
     except WebSocketDisconnect:
         hub.close(session, End())
         raise
     except BaseException as error:
-        hub.close(session, ended(error) if isinstance(error, Exception) else End(1001, 503, "the service ends"))
+        hub.close(session, end_of(error) if isinstance(error, Exception) else End(1001, 503, "the service is shutting down"))
         raise
 
 
@@ -147,7 +147,7 @@ async def _hello(websocket: WebSocket) -> str:
     try:
         message = await asyncio.wait_for(websocket.receive(), HELLO)
     except TimeoutError:
-        raise Problem(408, f"no first message in {HELLO:g} s") from None
+        raise Problem(408, f"no first message within {HELLO:g} s") from None
     if message["type"] == "websocket.disconnect":
         raise WebSocketDisconnect(message.get("code", 1006))
     text = message.get("text")
@@ -159,11 +159,11 @@ async def _hello(websocket: WebSocket) -> str:
 
 
 async def _farewell(websocket: WebSocket, end: End, id: str) -> None:
-    """Tell why, and close."""
+    """Send the reason and close the WebSocket."""
     if websocket.client_state is WebSocketState.DISCONNECTED or websocket.application_state is WebSocketState.DISCONNECTED:
         return
     if end.status:
-        document = problems.told(Problem(end.status, end.detail, end.errors), id)
+        document = problems.content_of(Problem(end.status, end.detail, end.errors), id)
         await asyncio.wait_for(websocket.send_text(json.dumps({"event": "problem", "problem": document})), LINGER)
     # a reason has at most 123 bytes
     await websocket.close(end.code, end.detail.encode()[:120].decode("utf-8", "ignore"))

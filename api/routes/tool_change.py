@@ -11,19 +11,17 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 from api.components import Components, ThisService
+from api.conventions import BODY, Repeat, guard, problems
 from api.jobs.lobes import asked
-from api.problems import Problem
-from api.routes import jobs
-from api.routes.common import BODY, guard, problems
-from api.routes.machines import Repeat, known_machine
-from api.routes.toolings import toml_text
+from api.live import jobs
+from api.lookups import known_machine, tooling_source
 from api.schemas.jobs import JobAnswer, LobeJob
 from api.schemas.queries import AdviceAnswer, AdviceQuery, LobeAnswer, LobeQuery, TipAnswer, TipQuery
 from api.schemas.toolings import ToolingKeys
 from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.jobs import Job
 from api.work import tasks
-from api.work.requests import MachineText, ToolingText, TooLong
+from api.work.requests import MachineText, ToolingSource, TooLong
 
 router = APIRouter(tags=["tool change"], route_class=Guarded)
 CSV, LOBES = "text/csv", "lobes"
@@ -40,7 +38,7 @@ Later = Annotated[str | None, Header(alias="Prefer", max_length=200, description
 async def tooltip(body: TipQuery, request: Request, parts: ThisService, caller: WhoAsks) -> Any:
     machine, (tooling,) = await _subject(parts, caller.group, body.machine, [body.tooling])
     csv = CSV in request.headers.get("accept", "")
-    answer = await parts.work.run(tasks.tooltip, machine, tooling, body.question(parts.settings.work_seconds), csv)
+    answer = await parts.work.run(tasks.tooltip, machine, tooling, body.request(parts.settings.work_seconds), csv)
     return Response(answer, media_type=CSV) if csv else TipAnswer.model_validate(answer)
 
 
@@ -53,7 +51,7 @@ async def tooltip(body: TipQuery, request: Request, parts: ThisService, caller: 
     responses={202: jobs.ACCEPTED, **problems(404, 409, *BODY)},
 )
 async def lobes(body: LobeQuery, parts: ThisService, caller: WhoAsks, prefer: Later = None, repeat: Repeat = None) -> Any:
-    question = body.question(parts.settings.work_seconds)
+    question = body.request(parts.settings.work_seconds)
     machine, toolings = await _subject(parts, caller.group, body.machine, body.toolings)
     most = parts.settings.job_work_seconds
     if "respond-async" not in (prefer or "").lower():
@@ -63,7 +61,7 @@ async def lobes(body: LobeQuery, parts: ThisService, caller: WhoAsks, prefer: La
         except TooLong as error:
             if error.seconds * len(toolings) > most:
                 raise
-    text = asked(machine, toolings, body.question(most))
+    text = asked(machine, toolings, body.request(most))
     request = body.model_dump_json()
     job = Job(new_id(), caller.group, LOBES, body.machine, None, request, "queued", now())
     digest = hashlib.sha256(request.encode()).hexdigest()
@@ -120,7 +118,7 @@ async def advice(body: AdviceQuery, parts: ThisService, caller: WhoAsks) -> Advi
     return AdviceAnswer.model_validate({"machine": body.machine, "toolings": found})
 
 
-async def _each(parts: Components, call: Any, machine: MachineText, toolings: list[ToolingText], question: Any) -> list[Any]:
+async def _each(parts: Components, call: Any, machine: MachineText, toolings: list[ToolingSource], question: Any) -> list[Any]:
     """Ask for every tooling, on as many workers as are free; the first failure is the answer."""
     found = await asyncio.gather(*(parts.work.run(call, machine, tooling, question) for tooling in toolings), return_exceptions=True)
     for answer in found:
@@ -129,21 +127,13 @@ async def _each(parts: Components, call: Any, machine: MachineText, toolings: li
     return found
 
 
-async def _subject(parts: Components, group: str, machine: str, toolings: list[str | ToolingKeys]) -> tuple[MachineText, list[ToolingText]]:
+async def _subject(
+    parts: Components, group: str, machine: str, toolings: list[str | ToolingKeys]
+) -> tuple[MachineText, list[ToolingSource]]:
     """Return the machine and the toolings, each from the library or as it came."""
 
-    def look() -> tuple[MachineText, list[ToolingText]]:
+    def look() -> tuple[MachineText, list[ToolingSource]]:
         known = known_machine(parts, group, machine)
-        return known, [tooling_text(parts, group, tooling, i + 1) for i, tooling in enumerate(toolings)]
+        return known, [tooling_source(parts, group, tooling, i + 1) for i, tooling in enumerate(toolings)]
 
     return await run_in_threadpool(look)
-
-
-def tooling_text(parts: Components, group: str, tooling: str | ToolingKeys, number: int = 1) -> ToolingText:
-    """Return a tooling from the library, or as it came; without a name it has a number."""
-    if isinstance(tooling, ToolingKeys):
-        return ToolingText(tooling.name or f"tooling {number}", toml_text(tooling))
-    document = parts.store.toolings.get(group, tooling)
-    if document is None:
-        raise Problem(404, f"there is no tooling {tooling}")
-    return ToolingText(tooling, document.text)

@@ -9,8 +9,8 @@ from fastapi import APIRouter, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from api.components import ThisService
+from api.conventions import BODY, After, Limit, ToolingName, expected, found_or_404, guard, page, problems, tagged, unchanged, utf8
 from api.problems import Problem
-from api.routes.common import BODY, After, Limit, ToolingName, expected, found_or_404, guard, page, problems, tagged, unchanged, utf8
 from api.schemas.common import Page, body_of
 from api.schemas.toolings import EXAMPLE, ToolingAnswer, ToolingKeys, ToolingSummary
 from api.security import Guarded, WhoAsks, now

@@ -1,7 +1,9 @@
-"""Campaigns, as in campaign.toml, and the recordings that are uploaded for them."""
+"""Campaigns as in campaign.toml, and their recordings."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, StringConstraints
@@ -9,6 +11,8 @@ from pydantic import ConfigDict, Field, StringConstraints
 from api.schemas.common import Answer, Body, Fault, Line
 from api.schemas.toolings import EXAMPLE as TOOLING
 from api.schemas.toolings import Text, ToolingKeys
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.signals.recording import Quantity, Sensor
 
 FileName = Annotated[str, StringConstraints(min_length=1, max_length=1000)]
 
@@ -41,19 +45,39 @@ class HeadKeys(Body):
     """[campaign]"""
 
     name: Line | None = None
-    sampling_rate_hz: float | None = Field(None, description="For files that carry none.")
+    sampling_rate_hz: float | None = Field(None, description="For files without a sampling rate.")
 
 
 class SensorKeys(Body):
-    """[sensors.CHANNEL]; the key is the channel's name in the recordings"""
+    """A sensor as [sensors.CHANNEL] of campaign.toml; the key is the channel's name in the recordings."""
 
     quantity: Literal["displacement", "acceleration", "trigger", "force"]
     axis: Literal["X", "Y", "Z"] | None = None
-    sensitivity: float | None = Field(None, description="V/m, V/(m/s^2), V/N; 1 where the file is in SI.")
-    delay_s: float | None = None
-    bandwidth_hz: float | None = None
-    pulses_per_revolution: int | None = None
-    tooth_angle_deg: float | None = None
+    sensitivity: float | None = Field(
+        None, ge=-1e12, le=1e12, description="Signal per quantity: V/m, V/(m/s^2), V/N; 1 where the file is in SI."
+    )
+    delay_s: float | None = Field(None, ge=-1.0, le=1.0)
+    bandwidth_hz: float | None = Field(None, gt=0.0)
+    pulses_per_revolution: int | None = Field(None, ge=1, le=100_000)
+    tooth_angle_deg: float | None = Field(None, ge=-360.0, le=360.0)
+
+    def sensor(self, name: str) -> Sensor:
+        """Return the sensor of a channel."""
+        return Sensor(
+            name,
+            Quantity(self.quantity),
+            None if self.axis is None else Dof(self.axis.lower()),
+            1.0 if self.sensitivity is None else self.sensitivity,
+            0.0 if self.delay_s is None else self.delay_s,
+            self.bandwidth_hz,
+            1 if self.pulses_per_revolution is None else self.pulses_per_revolution,
+            None if self.tooth_angle_deg is None else math.radians(self.tooth_angle_deg),
+        )
+
+
+def given_sensors(keys: Mapping[str, SensorKeys] | None) -> tuple[Sensor, ...]:
+    """Return the sensors that a query brings."""
+    return tuple(each.sensor(name) for name, each in (keys or {}).items())
 
 
 class WorkpieceKeys(Body):
@@ -82,8 +106,8 @@ class CutKeys(Body):
     entry_angle_deg: float
     exit_angle_deg: float
     feed_direction: str | float = Field(description="+X, -X, +Y, -Y, or an angle from +X in degrees.")
-    cut: FileName = Field(description="The recording; of a path the last part counts, and its suffix says the format.")
-    air: FileName | None = Field(None, description="The same speed without cutting; may serve several cuts.")
+    cut: FileName = Field(description="Recording of the cut; only the last part of a path counts, and its suffix is the format.")
+    air: FileName | None = Field(None, description="Recording at the same speed without cutting; may serve several cuts.")
 
 
 class NewCampaign(Body):
@@ -106,9 +130,9 @@ class VerdictAnswer(Answer):
     """Whether a recording is used."""
 
     usable: bool
-    reasons: list[str] = Field(description="Why it is not.")
-    notes: list[str] = Field(description="What one should know though it is.")
-    spindle_speed_rpm: float | None = Field(description="From the record, of a usable cut.")
+    reasons: list[str] = Field(description="Why the recording is not usable.")
+    notes: list[str] = Field(description="Remarks on a usable recording.")
+    spindle_speed_rpm: float | None = Field(description="Measured speed of a usable cut.")
     lines: int = Field(description="Points of the cross FRF, all axes together.")
     signal_to_noise_db: dict[str, float] = Field(description="Median over the lines, for each axis.")
 
@@ -133,7 +157,7 @@ class CutAnswer(Answer):
     feed_direction: str | float
     cut: FileState
     air: FileState | None
-    verdict: VerdictAnswer | None = Field(description="With what is there so far; null until the cut's recording is.")
+    verdict: VerdictAnswer | None = Field(description="With the recordings uploaded so far; null without the cut's recording.")
 
 
 class CampaignAnswer(Answer):
@@ -147,59 +171,59 @@ class CampaignAnswer(Answer):
     sensors: dict[str, dict[str, Any]]
     workpiece: dict[str, Any]
     toolings: list[str]
-    usable: int = Field(description="Cuts that an identification would use.")
+    usable: int = Field(description="Number of cuts that an identification would use.")
     cuts: list[CutAnswer]
 
 
 class CampaignSummary(Answer):
-    """A campaign in short."""
+    """Summary of a campaign."""
 
     id: str
     machine: str
     name: str
     created: str
     cuts: int
-    uploaded: int = Field(description="Cuts whose recording is there.")
+    uploaded: int = Field(description="Number of cuts with a recording.")
     usable: int
 
 
 class RecordingAnswer(Answer):
-    """An uploaded recording, and what was found in it."""
+    """An uploaded recording and its description."""
 
     name: str
     role: Literal["cut", "air"]
     cuts: list[str]
     size_bytes: int
-    sha256: str = Field(description="Of the file as it came.")
+    sha256: str = Field(description="SHA-256 of the original file.")
     sampling_rate_hz: float
     duration_s: float
     channels: list[str]
-    spindle_speed_rpm: float | None = Field(description="As the record itself tells.")
+    spindle_speed_rpm: float | None = Field(description="Measured speed.")
     harmonics_above_noise: dict[str, int] = Field(
-        description="For each axis: multiples of the tooth-passing frequency, of an air cut of the spindle's, that stand above the noise."
+        description="Number of harmonics above the noise for each axis: of the tooth-passing frequency, of an air cut of the spindle's."
     )
     verdict: VerdictAnswer
     created: str
 
 
 class ItemProblem(Answer):
-    """Why a part of an upload was not kept."""
+    """Why a file of an upload was not stored."""
 
     detail: str
     errors: list[Fault] | None
 
 
 class UploadItem(Answer):
-    """One file of an upload of several."""
+    """One file of a common upload."""
 
     name: str
-    status: int = Field(description="201 kept, 200 was there already, or the status that the same upload alone would have met.")
+    status: int = Field(description="201 where it is stored, 200 where it existed already, or the status of the same upload on its own.")
     recording: RecordingAnswer | None
     problem: ItemProblem | None
 
 
 class UploadAnswer(Answer):
-    """What has become of each file."""
+    """Outcome of each file."""
 
     items: list[UploadItem]
 
@@ -216,11 +240,11 @@ class SpectrumAnswer(Answer):
 
     frequency_hz: list[float]
     channels: dict[str, ChannelSpectrum]
-    harmonics_hz: list[float] = Field(description="Multiples of the spindle's frequency.")
+    harmonics_hz: list[float] = Field(description="Harmonics of the spindle frequency.")
 
 
 class ChannelOutline(Answer):
-    """Extremes of a channel; null where all samples of a stretch were lost."""
+    """Minima and maxima of a channel; null where all samples of an interval were lost."""
 
     unit: str
     low: list[float | None]
@@ -228,7 +252,7 @@ class ChannelOutline(Answer):
 
 
 class SignalAnswer(Answer):
-    """A recording's outline over time."""
+    """Envelope of a recording over time."""
 
     time_s: list[float]
     channels: dict[str, ChannelOutline]

@@ -1,4 +1,4 @@
-"""What all bodies share."""
+"""Base classes and types of all bodies."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ from typing import Annotated, Generic, TypeVar
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
-#: What a person may call something: no path, no control characters.
+#: Names given by users: no paths, no control characters.
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 ._+()-]{0,63}$"
 ID_PATTERN = r"^[A-Za-z0-9]{1,64}$"
 Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN)]
 Id = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
-#: Text of people; no control characters, which not every store takes.
+#: Free text without control characters, which not every database accepts.
 Line = Annotated[str, StringConstraints(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
 Item = TypeVar("Item")
 Model = TypeVar("Model", bound=BaseModel)
 
 
 class Body(BaseModel):
-    """What a client sends: every key is known, every number finite, nothing is turned into what it is not."""
+    """Body of a request: unknown keys and non-finite numbers are refused, and types are not coerced."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
 
 
 class Answer(BaseModel):
-    """What a client gets: every number finite."""
+    """Body of an answer: every number is finite."""
 
     model_config = ConfigDict(allow_inf_nan=False, frozen=True)
 
 
 def body_of(model: type[Model], raw: bytes) -> Model:
-    """Return a body that a route reads itself."""
+    """Return the model of a body that a route has read itself."""
     try:
         return model.model_validate_json(raw)
     except ValidationError as error:
@@ -39,10 +39,10 @@ def body_of(model: type[Model], raw: bytes) -> Model:
 
 
 class Page(Answer, Generic[Item]):
-    """A part of a list."""
+    """A page of a list."""
 
     items: list[Item]
-    next: str | None = Field(description="Value of `after` for the next part; null at the end.")
+    next: str | None = Field(description="Value of `after` for the next page; null at the end.")
 
 
 class Fault(Answer):
@@ -54,7 +54,7 @@ class Fault(Answer):
 
 
 class ProblemDocument(Answer):
-    """RFC 9457."""
+    """Problem document (RFC 9457)."""
 
     type: str
     title: str

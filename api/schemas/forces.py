@@ -7,62 +7,41 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, StringConstraints
 
+from api.schemas.campaigns import SensorKeys
 from api.schemas.common import Answer, Body, Id, Line
 from api.schemas.queries import Angle, Depth, Percent, Tooling, Turn
 from api.schemas.toolings import EXAMPLE
 from api.work.forces import ForceQuestion, WornQuestion
 from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import FEED_DIRECTIONS
-from rcsa_ident.signals.recording import Quantity, Sensor
+from rcsa_ident.units import from_rpm
 
-_RPM = math.pi / 30.0
 MOST_CHANNELS = 32
-#: Rates that a stream may have [Hz]; a file's own may be higher.
+#: Sampling rates of a stream [Hz]; those of a file may be higher.
 LEAST_RATE, MOST_RATE = 1000.0, 500_000.0
 Rate = Annotated[float, Field(ge=LEAST_RATE, le=10_000_000.0)]
-Speed = Annotated[float | None, Field(ge=100.0, le=200_000.0, description="As programmed, to 1 %; null: from the trigger.")]
+Speed = Annotated[float | None, Field(ge=100.0, le=200_000.0, description="Programmed speed, accurate to 1 %; null: from the trigger.")]
 Method = Literal["resonators", "paper"]
-#: Last part of a path, as campaigns name their recordings; no control characters.
+#: Name of a recording in its campaign: the last part of a path, without control characters.
 FileName = Annotated[str, StringConstraints(min_length=1, max_length=255, pattern=r"^[^\x00-\x1f\x7f/\\]+$")]
 Axis = Literal["X", "Y"]
 
 
-class SensorKeys(Body):
-    """A sensor as in campaign.toml."""
-
-    quantity: Literal["displacement", "acceleration", "trigger", "force"]
-    axis: Literal["X", "Y", "Z"] | None = None
-    sensitivity: Annotated[float, Field(ge=-1e12, le=1e12, description="Signal per quantity: V/m, V/(m/s^2), V/N.")] = 1.0
-    delay_s: Annotated[float, Field(ge=-1.0, le=1.0)] = 0.0
-    bandwidth_hz: Annotated[float | None, Field(gt=0.0, le=1e9)] = None
-    pulses_per_revolution: Annotated[int, Field(ge=1, le=10_000)] = 1
-    tooth_angle_deg: Annotated[float | None, Field(ge=-360.0, le=360.0)] = None
-
-    def sensor(self, name: str) -> Sensor:
-        """Return the sensor."""
-        angle = None if self.tooth_angle_deg is None else math.radians(self.tooth_angle_deg)
-        axis = None if self.axis is None else Dof(self.axis.lower())
-        return Sensor(
-            name, Quantity(self.quantity), axis, self.sensitivity, self.delay_s, self.bandwidth_hz, self.pulses_per_revolution, angle
-        )
-
-
 Sensors = Annotated[
     dict[Line, SensorKeys] | None,
-    Field(min_length=1, max_length=MOST_CHANNELS, description="By channel; null: those of the machine's identification."),
+    Field(min_length=1, max_length=MOST_CHANNELS, description="Sensors by channel; null: those of the machine's identification."),
 ]
 
 
 class WornCut(Body):
-    """The cut whose cutting coefficients are asked, revolution by revolution."""
+    """The cut whose cutting coefficients are estimated revolution by revolution."""
 
     axial_depth_mm: Depth
     feed_per_tooth_mm: Annotated[float, Field(gt=0.0, le=10.0)]
     immersion: Annotated[float, Field(ge=0.001, le=1.0)] = 0.5
     strategy: Literal["up", "down"] = "down"
-    entry_deg: Annotated[Angle | None, Field(description="With exit_deg in place of immersion.")] = None
+    entry_deg: Annotated[Angle | None, Field(description="Together with exit_deg, instead of immersion.")] = None
     exit_deg: Angle | None = None
     feed_direction: Literal["+X", "-X", "+Y", "-Y"] | Turn = "+X"
 
@@ -81,26 +60,33 @@ class WornCut(Body):
 
 
 class ForceKeys(Body):
-    """What both forms of the query share."""
+    """Keys of both forms of the query."""
 
     machine: Id
     spindle_speed_rpm: Speed = None
-    method: Annotated[Method, Field(description="Oscillators at the spindle's orders, or the paper's random walk.")] = "resonators"
-    smooth: Annotated[bool, Field(description="Each sample given the whole record, instead of as it would be live.")] = False
+    method: Annotated[
+        Method,
+        Field(
+            description="Force model of the Kalman filter: resonators at the spindle harmonics, or the random walk of the published method."
+        ),
+    ] = "resonators"
+    smooth: Annotated[bool, Field(description="Smoothed estimate from the whole record, instead of the filtered one of a live stream.")] = (
+        False
+    )
     idle_percent: Annotated[
-        Percent | None, Field(gt=0.0, description="Share of the time in which no tooth cuts, at least: it gives the mean force away.")
+        Percent | None, Field(gt=0.0, description="Least share of the time in which no tooth cuts, from which the mean force is estimated.")
     ] = None
     cut: Annotated[WornCut | None, Field(description="For cutting coefficients over time.")] = None
 
     def question(self, programmed: float | None = None) -> ForceQuestion:
         """Return the query in SI; `programmed` [rad/s] is the campaign's speed."""
-        speed = programmed if self.spindle_speed_rpm is None else self.spindle_speed_rpm * _RPM
+        speed = programmed if self.spindle_speed_rpm is None else from_rpm(self.spindle_speed_rpm)
         idle = None if self.idle_percent is None else self.idle_percent / 100.0
         return ForceQuestion(speed, self.method, self.smooth, idle, None if self.cut is None else self.cut.question())
 
 
 class ForceUpload(ForceKeys):
-    """Beside a file: the part `query` of a form."""
+    """Query for an uploaded file: the part `query` of a form."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"machine": "m1", "tooling": EXAMPLE, "spindle_speed_rpm": 12000.0, "smooth": True}]}
@@ -108,7 +94,7 @@ class ForceUpload(ForceKeys):
 
     tooling: Tooling
     sensors: Sensors = None
-    sampling_rate_hz: Annotated[Rate | None, Field(description="Of a recording that carries none.")] = None
+    sampling_rate_hz: Annotated[Rate | None, Field(description="For a recording without a sampling rate.")] = None
 
 
 class ForceQuery(ForceKeys):
@@ -118,24 +104,24 @@ class ForceQuery(ForceKeys):
 
     campaign: Id
     recording: FileName
-    tooling: Annotated[Tooling | None, Field(description="null: the cut's own.")] = None
+    tooling: Annotated[Tooling | None, Field(description="null: the tooling of the cut.")] = None
 
 
 class AxisForces(Answer):
     """Forces along an axis [N]."""
 
     std_n: float = Field(description="Standard deviation of a sample of the estimate.")
-    mean_n: float | None = Field(description="null: the sensors do not show it.")
-    rms_n: float = Field(description="Without the mean.")
+    mean_n: float | None = Field(description="Mean force; null where the sensors do not show it.")
+    rms_n: float = Field(description="Root mean square without the mean.")
     peak_n: float
-    low: list[float] = Field(description="Lowest of each bucket.")
+    low: list[float] = Field(description="Minimum of each bucket.")
     high: list[float]
 
 
 class Harmonic(Answer):
-    """A line of the force."""
+    """A harmonic of the force."""
 
-    order: int = Field(description="Multiple of the spindle's frequency.")
+    order: int = Field(description="Order of the harmonic of the spindle frequency.")
     frequency_hz: float
     amplitude_n: float
 
@@ -154,25 +140,25 @@ class Wear(Answer):
     """Cutting coefficients."""
 
     coefficients: dict[str, Coefficient]
-    separable: bool = Field(description="Whether the harmonics in the band tell them from each other.")
+    separable: bool = Field(description="Whether the harmonics in the band separate the coefficients.")
     misfit: float
 
 
 class ForceAnswer(Answer):
-    """Forces of a recording, as a picture of at most 2000 buckets; every sample with Accept: text/csv."""
+    """Forces of a recording as an envelope of at most 2000 buckets; every sample with Accept: text/csv."""
 
     spindle_speed_rpm: float
     sampling_rate_hz: float
     band_hz: list[float]
     notes: list[str]
     axes: dict[str, AxisForces]
-    time_s: list[float] = Field(description="Of each bucket's first sample.")
+    time_s: list[float] = Field(description="Time of each bucket's first sample.")
     harmonics: dict[str, list[Harmonic]]
     wear: Wear | None
 
 
 class StreamSummary(Answer):
-    """A stream that is open."""
+    """An open stream."""
 
     session: str
     name: str
@@ -201,13 +187,13 @@ class AirCut(Body):
 
 
 class Replay(AirCut):
-    """An uploaded recording, played."""
+    """Replay of an uploaded recording."""
 
-    rate: Annotated[float, Field(ge=0.1, le=100.0, description="So many times as fast as it was recorded.")] = 1.0
+    rate: Annotated[float, Field(ge=0.1, le=100.0, description="Replay speed as a multiple of the recorded one.")] = 1.0
 
 
 class Hello(Body):
-    """The first message of every stream: what it brings, or what it wants to see."""
+    """Keys of the first message of every stream."""
 
     key: Annotated[str, StringConstraints(max_length=300)] | None = None
     format: Literal["float32", "json"] = "float32"
@@ -215,7 +201,7 @@ class Hello(Body):
 
 
 class StreamHello(Hello):
-    """A data logger."""
+    """First message of a data logger."""
 
     machine: Id
     tooling: Tooling
@@ -232,7 +218,7 @@ class StreamHello(Hello):
 
 
 class ReplayHello(Hello):
-    """A recording in the place of a data logger."""
+    """First message of a replay."""
 
     replay: Replay
     machine: Id | None = None
@@ -242,6 +228,6 @@ class ReplayHello(Hello):
 
 
 class WatchHello(Hello):
-    """A viewer of another client's stream."""
+    """First message of a viewer of another client's stream."""
 
     watch: Id

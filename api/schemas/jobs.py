@@ -1,4 +1,4 @@
-"""Jobs, and what an identification has found."""
+"""Jobs, and results of identifications."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
 
 class NewIdentification(Body):
-    """A campaign to identify its machine from."""
+    """Identification of a machine from a campaign."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"campaign": "c1", "seed": 1, "method": "default"}]})
 
     campaign: Id
-    seed: Annotated[int, Field(ge=0, le=2**63 - 1, description="Same seed and recordings, same answer.")] = 1
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1, description="The same seed and recordings give the same result.")] = 1
     method: Annotated[Literal["default", "paper"], Field(description="paper: the published genetic algorithm, which takes long.")] = (
         "default"
     )
-    start: bool = Field(False, description="Go on from the machine's current identification; with the default method.")
+    start: bool = Field(False, description="Start from the machine's current identification; with the default method only.")
     apply: bool = Field(True, description="Make it the machine's current identification, unless it failed.")
 
 
 class Progress(Answer):
-    """How far a stage is."""
+    """Progress of a stage."""
 
     stage: str
     done: int
@@ -53,7 +53,7 @@ class JobAnswer(Answer):
     created: str = Field(description="UTC, ISO 8601.")
     started: str | None
     finished: str | None
-    status: Literal["converged", "suspect", "failed"] | None = Field(description="Of an identification that is done.")
+    status: Literal["converged", "suspect", "failed"] | None = Field(description="Of a finished identification.")
     problem: JobProblem | None
 
 
@@ -61,11 +61,11 @@ class LobeJob(Answer):
     """Lobes that were computed as a job."""
 
     job: JobAnswer
-    answer: LobeAnswer | None = Field(description="Once it is done.")
+    answer: LobeAnswer | None = Field(description="Once the job is done.")
 
 
 class Lines(Answer):
-    """Lines of the cross FRF from the tip's force to the flange [m/N], each cut's delay taken out, beside the model's."""
+    """Measured and fitted lines of the cross FRF from the tip force to the flange [m/N], with the delay of each cut removed."""
 
     frequency_hz: list[float]
     measured_re: list[float]
@@ -77,6 +77,6 @@ class Lines(Answer):
 
 
 class FittedLines(Answer):
-    """What was measured, and what was fitted to it."""
+    """Measured and fitted lines of all axes."""
 
     axes: dict[str, Lines]

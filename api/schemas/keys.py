@@ -1,4 +1,4 @@
-"""Keys."""
+"""API keys."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class NewKey(Body):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"label": "presetting", "scopes": ["read", "run"]}]})
 
-    label: Line = Field("", description="What it is for.")
-    scopes: list[Scope] = Field(min_length=1, max_length=4, description="What it may do; admin may do everything in its group.")
+    label: Line = Field("", description="Purpose of the key.")
+    scopes: list[Scope] = Field(min_length=1, max_length=4, description="Scopes of the key; admin includes all others.")
 
 
 class KeyAnswer(Answer):
@@ -31,6 +31,6 @@ class KeyAnswer(Answer):
 
 
 class MadeKey(KeyAnswer):
-    """A key as it is told once."""
+    """A new key with its text, which is shown once."""
 
-    key: str = Field(description="Send it as X-API-Key. It is not kept, and not told again.")
+    key: str = Field(description="To be sent as X-API-Key. It is not stored, and not shown again.")

@@ -1,4 +1,4 @@
-"""Tool libraries that come in, and examples that go out."""
+"""Imports of tool libraries, and examples."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from api.schemas.common import Answer
 class ImportedTool(Answer):
     """An entry of a tool library."""
 
-    name: str = Field(description="In the library here.")
+    name: str = Field(description="Name in the library of toolings.")
     status: Literal["written", "skipped"]
     reason: str | None = Field(description="Why it was skipped.")
-    assumed: list[str] = Field(description="What the tool library does not tell; the tooling file begins with it.")
+    assumed: list[str] = Field(description="Assumptions about data missing in the tool library, which begin the tooling file.")
 
 
 class ImportAnswer(Answer):
-    """What became of each entry."""
+    """Outcome of each entry."""
 
     items: list[ImportedTool]
 
 
 class Example(Answer):
-    """A file to start with."""
+    """An example file."""
 
     name: str
     size_bytes: int
@@ -33,6 +33,6 @@ class Example(Answer):
 
 
 class Examples(Answer):
-    """All of them."""
+    """All examples."""
 
     items: list[Example]

@@ -1,4 +1,4 @@
-"""Machines and what their identification says."""
+"""Machines and their identifications."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class NewMachine(Body):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"name": "HPM 800U", "description": "hall 3"}]})
 
-    name: Name = Field(description="One of its own in the group.")
+    name: Name = Field(description="Unique in the group.")
     description: Line = ""
 
 
@@ -25,13 +25,13 @@ class MachineAnswer(Answer):
     name: str
     description: str
     created: str = Field(description="UTC, ISO 8601.")
-    identification: IdentificationSummary | None = Field(description="What is known of its dynamics, if anything is.")
+    identification: IdentificationSummary | None = Field(description="null where the machine has not been identified.")
 
 
 class IdentificationSummary(Answer):
-    """An identification in short."""
+    """Summary of an identification."""
 
-    status: str = Field(description="converged, suspect or failed")
+    status: str = Field(description="converged, suspect or failed; measured where a flange was measured in place of it")
     reasons: list[str]
     campaign: str
     axes: list[str]
@@ -41,7 +41,7 @@ class IdentificationSummary(Answer):
 
 
 class Identification(Answer):
-    """RESULT.json, as `rcsa-ident identify` writes it; its keys are those of that file, further ones are kept."""
+    """RESULT.json of `rcsa-ident identify`; further keys are kept."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -59,7 +59,7 @@ class Identification(Answer):
 
 
 class Mode(Answer):
-    """A mode of the spindle, seen at its flange."""
+    """A mode of the spindle at its flange."""
 
     natural_frequency_hz: float
     natural_frequency_std_hz: float | None
@@ -78,11 +78,11 @@ class AxisModes(Answer):
 
 
 class Modes(Answer):
-    """What an identification found, with standard deviations where it has told them."""
+    """Modes of an identification, with standard deviations where it has them."""
 
     status: str
     reasons: list[str]
-    notes: list[str] = Field(description="What the data could not tell.")
+    notes: list[str] = Field(description="What the data could not determine.")
     band_hz: list[float]
     axes: dict[str, AxisModes]
 
@@ -95,7 +95,7 @@ class Frf(Answer):
 
 
 class Curve(Answer):
-    """A receptance [m/N] with the standard deviations of its parts, where there is a posterior."""
+    """A receptance [m/N], with the standard deviations of its real and imaginary parts where there is a posterior."""
 
     re: list[float]
     im: list[float]

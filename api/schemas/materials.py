@@ -8,20 +8,20 @@ from api.schemas.common import Answer
 
 
 class MaterialAnswer(Answer):
-    """A workpiece material as one source has cut it."""
+    """Cutting coefficients of a workpiece material from one source."""
 
-    name: str = Field(description="What a query's cut.material may say.")
-    condition: str = Field(description="Cutter, lubrication, feed that the coefficients hold for.")
+    name: str = Field(description="Value for `cut.material` of a query.")
+    condition: str = Field(description="Cutter, lubrication and feed of the coefficients.")
     ktc_mpa: float
     krc: float
     kte_n_per_mm: float
     kre_n_per_mm: float
-    ktc_spread_percent: float = Field(description="What another cutter may be off.")
+    ktc_spread_percent: float = Field(description="Uncertainty for another cutter.")
     source: str
     notes: str
 
 
 class Materials(Answer):
-    """All of them."""
+    """All materials."""
 
     items: list[MaterialAnswer]

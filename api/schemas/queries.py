@@ -11,15 +11,16 @@ from pydantic import ConfigDict, Field
 from api.schemas.common import Answer, Body, Id, Line, Name
 from api.schemas.machines import Curve
 from api.schemas.toolings import EXAMPLE, ToolingKeys
-from api.work.requests import AdviceQuestion, CutQuestion, LobeQuestion, TipQuestion
+from api.work.requests import AdviceRequest, LobeRequest, TipRequest
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import FEED_DIRECTIONS
+from rcsa_ident.machining_setup import CutSpec
+from rcsa_ident.stability.methods import MethodName
+from rcsa_ident.units import from_rpm
 
-_RPM = math.pi / 30.0
 MOST_TOOLINGS, MOST_SPEEDS, MOST_TESTED = 12, 5000, 1000
-Method = Literal["zero-order", "multi-frequency", "semi-discretisation", "full-discretisation", "time-domain"]
 Angle = Annotated[float, Field(ge=0.0, le=180.0)]
 Turn = Annotated[float, Field(ge=-360.0, le=360.0)]
 Micrometre = Annotated[float, Field(ge=-1000.0, le=1000.0)]
@@ -47,11 +48,11 @@ class TipQuery(Body):
     bands: bool = True
     stiffness_spread_percent: Spread = 0.05
 
-    def question(self, work_seconds: float) -> TipQuestion:
+    def request(self, work_seconds: float) -> TipRequest:
         """Return the query in SI."""
-        speed = None if self.spindle_speed_rpm is None else self.spindle_speed_rpm * _RPM
+        speed = None if self.spindle_speed_rpm is None else from_rpm(self.spindle_speed_rpm)
         spread = self.stiffness_spread_percent / 100.0
-        return TipQuestion(self.from_hz, self.to_hz, self.step_hz, speed, self.bands, spread, work_seconds)
+        return TipRequest(self.from_hz, self.to_hz, self.step_hz, speed, self.bands, spread, work_seconds)
 
 
 class TipAnswer(Answer):
@@ -84,7 +85,7 @@ class Cut(Body):
     indentation: Annotated[Pressure | None, Field(description="[N/m^3], 1e14 for aluminium.")] = None
     friction: Annotated[float, Field(ge=0.0, le=2.0)] = 0.3
 
-    def question(self) -> CutQuestion:
+    def spec(self) -> CutSpec:
         """Return the cut in SI."""
         if (self.entry_deg is None) != (self.exit_deg is None):
             raise InputError("cut.exit_deg" if self.exit_deg is None else "cut.entry_deg", "nothing", "both angles, or neither")
@@ -106,12 +107,12 @@ class Cut(Body):
         damping = None
         if self.wear_land_um is not None and self.indentation is not None:
             damping = ProcessDamping(self.indentation, self.wear_land_um * 1e-6, self.friction)
-        return CutQuestion(
+        return CutSpec(
             engagement,
             float(angle),
             None if self.feed_per_tooth_mm is None else self.feed_per_tooth_mm * 1e-3,
             self.material,
-            tuple((name, value * unit) for name, value, unit in values if value is not None),
+            {name: value * unit for name, value, unit in values if value is not None},
             None if self.runout_um is None else tuple(offset * 1e-6 for offset in self.runout_um),
             damping,
         )
@@ -124,12 +125,12 @@ class Speeds(Body):
     to_rpm: Rpm = 20_000.0
     step_rpm: Annotated[float, Field(ge=0.1, le=100_000.0)] = 50.0
 
-    def question(self) -> tuple[float, ...]:
+    def rising(self) -> tuple[float, ...]:
         """Return the speeds [rad/s], rising."""
         count = math.floor((self.to_rpm - self.from_rpm) / self.step_rpm + 1e-9) + 1
         if not 1 <= count <= MOST_SPEEDS:
             raise InputError("speeds.to_rpm", f"{max(count, 0)} speeds", f"1 to {MOST_SPEEDS} of them, from_rpm at most to_rpm")
-        return tuple((self.from_rpm + self.step_rpm * k) * _RPM for k in range(count))
+        return tuple(from_rpm(self.from_rpm + self.step_rpm * k) for k in range(count))
 
 
 class TestedCut(Body):
@@ -148,17 +149,20 @@ class Milled(Body):
     cut: Cut = Field(default_factory=Cut)
     speeds: Speeds = Field(default_factory=Speeds)
     max_depth_mm: Depth = 10.0
-    method: Annotated[Method, Field(description="Methods other than zero-order answer for few speeds only.")] = "zero-order"
+    # not strict: JSON has no names of its own, only their text
+    method: Annotated[MethodName, Field(strict=False, description="Methods other than zero-order answer for few speeds only.")] = (
+        MethodName.ZERO_ORDER
+    )
     bands: bool = True
     stiffness_spread_percent: Spread = 0.05
 
-    def question(self, work_seconds: float) -> LobeQuestion:
+    def request(self, work_seconds: float) -> LobeRequest:
         """Return the query in SI, for one of its toolings."""
-        return LobeQuestion(
-            self.cut.question(),
-            self.speeds.question(),
+        return LobeRequest(
+            self.cut.spec(),
+            self.speeds.rising(),
             self.max_depth_mm * 1e-3,
-            self.method,
+            str(self.method),
             self.bands,
             self.stiffness_spread_percent / 100.0,
             work_seconds / len(self.toolings),
@@ -184,17 +188,26 @@ class LobeQuery(Milled):
 
     tested: list[TestedCut] = Field(default=[], max_length=MOST_TESTED, description="Cuts that were tried: how many are told right?")
 
-    def question(self, work_seconds: float) -> LobeQuestion:
+    def request(self, work_seconds: float) -> LobeRequest:
         """Return the query in SI, for one of its toolings."""
-        tested = tuple((each.spindle_speed_rpm * _RPM, each.axial_depth_mm * 1e-3, each.verdict) for each in self.tested)
-        return replace(super().question(work_seconds), tested=tested)
+        tested = tuple((from_rpm(each.spindle_speed_rpm), each.axial_depth_mm * 1e-3, each.verdict) for each in self.tested)
+        return replace(super().request(work_seconds), tested=tested)
 
 
 class BestSpeed(Answer):
-    """A pocket of the lobes."""
+    """A speed with a high stability limit, one for each pocket of the lobes."""
 
     spindle_speed_rpm: float
-    limit_depth_mm: float | None = Field(description="null: stable up to the depth that was asked for.")
+    limit_depth_mm: float | None = Field(description="Stability limit; null: stable up to the depth that was asked for.")
+    recommended_depth_mm: float = Field(description="The limit less what a recommendation holds back.")
+
+
+class RecommendedCut(Answer):
+    """A cut that is recommended: its depth is the stability limit less tolerance of the speed, probability and reserve."""
+
+    spindle_speed_rpm: float
+    recommended_depth_mm: float
+    limit_depth_mm: float | None = Field(description="Stability limit there; null: none up to the depth that was asked for.")
 
 
 class TestedTally(Answer):
@@ -218,12 +231,15 @@ class ToolingLobes(Answer):
     limit_depth_mm: list[float | None]
     limit_depth_low_mm: list[float | None] | None = Field(description="95 % of the machines that the records allow lie above it.")
     limit_depth_high_mm: list[float | None] | None
+    recommended_depth_mm: list[float]
     chatter_frequency_hz: list[float | None]
     lobe: list[int | None]
     flip: list[bool]
     absolute_limit_mm: float | None
     absolute_frequency_hz: float | None
     best_speeds: list[BestSpeed]
+    recommended: list[RecommendedCut]
+    flip_speeds: int = Field(description="Speeds at which stability is lost by period doubling.")
     tested: TestedTally | None = Field(None, description="null: no tested cuts were given.")
     warnings: list[str]
 
@@ -262,31 +278,30 @@ class AdviceQuery(Milled):
     depth_mm: Depth | None = Field(None, description="At which speeds may one cut so deep?")
     planned: list[PlannedQuery] = Field(default=[], max_length=20, description="How far are these cuts from chatter?")
 
-    def advice(self, work_seconds: float) -> AdviceQuestion:
+    def advice(self, work_seconds: float) -> AdviceRequest:
         """Return the query in SI, for one of its toolings."""
         if self.cut.feed_per_tooth_mm is None:
             raise InputError("cut.feed_per_tooth_mm", "nothing", "the feed per tooth [mm]: power and removal rate grow with it")
         for i, cut in enumerate(self.planned):
             if cut.axial_depth_mm > self.max_depth_mm:
                 raise InputError(f"planned.{i}.axial_depth_mm", cut.axial_depth_mm, f"at most max_depth_mm, {self.max_depth_mm:g}")
-        return AdviceQuestion(
-            self.question(work_seconds),
+        return AdviceRequest(
+            self.request(work_seconds),
             None if self.max_power_kw is None else self.max_power_kw * 1e3,
             self.max_torque_nm,
-            None if self.max_speed_rpm is None else self.max_speed_rpm * _RPM,
+            None if self.max_speed_rpm is None else from_rpm(self.max_speed_rpm),
             self.tolerance_percent / 100.0,
             self.probability_percent / 100.0,
             self.reserve_percent / 100.0,
             None if self.depth_mm is None else self.depth_mm * 1e-3,
-            tuple((cut.spindle_speed_rpm * _RPM, cut.axial_depth_mm * 1e-3) for cut in self.planned),
+            tuple((from_rpm(cut.spindle_speed_rpm), cut.axial_depth_mm * 1e-3) for cut in self.planned),
         )
 
 
-class OperatingPoint(Answer):
-    """A cut that one may make."""
+class OperatingPoint(RecommendedCut):
+    """A recommended cut with what it takes from the spindle."""
 
-    spindle_speed_rpm: float
-    axial_depth_mm: float
+    axial_depth_mm: float = Field(description="As recommended_depth_mm.")
     removal_rate_cm3_per_min: float
     power_kw: float
     torque_nm: float
@@ -326,6 +341,8 @@ class ToolingAdvice(Answer):
 
     tooling: str
     stickout_mm: float
+    lowest_limit_mm: float
+    common_stable_depth_mm: float | None = Field(description="Stable at every speed on all machines that the records allow.")
     highest_removal: list[OperatingPoint]
     windows: list[Window]
     planned: list[PlannedAnswer]

@@ -1,4 +1,4 @@
-"""Toolings: the keys of a tooling file. What they may hold is checked by the reader of such files; here stands their form."""
+"""Toolings: the keys of a tooling file and their types; their values are checked by the reader of such files."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class ToolingAnswer(Answer):
 
 
 class ToolingSummary(Answer):
-    """A tooling in short."""
+    """Summary of a tooling."""
 
     name: str
     teeth: int

@@ -1,1 +1,1 @@
-"""What the service keeps: keys, machines with their identification, toolings; every row belongs to a group."""
+"""The store: keys, machines with their identifications, toolings, campaigns and jobs; every row belongs to a group."""

@@ -1,4 +1,4 @@
-"""Campaigns and the recordings that were uploaded for them: what is kept, and how a store is asked for it."""
+"""Campaigns and their recordings: entities, and protocols of their stores."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Protocol
 
 @dataclass(frozen=True, slots=True)
 class Campaign:
-    """A campaign of a machine, as it was declared; what was uploaded for it are its recordings.
+    """A declared campaign of a machine.
 
     Parameters
     ----------
@@ -17,7 +17,7 @@ class Campaign:
     text : str
         The keys of campaign.toml as JSON: toolings by their texts, recordings by the last part of their paths.
     cuts : int
-        So many are declared.
+        Number of declared cuts.
     created : str
         UTC, ISO 8601.
     """
@@ -38,7 +38,7 @@ class Recording:
     Parameters
     ----------
     group, campaign, name : str
-        The name as the campaign tells it.
+        `name` is that of the campaign's declaration.
     role : str
         cut or air.
     size : int [bytes]
@@ -67,13 +67,13 @@ class Recording:
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """How far the uploads of a campaign are: cuts whose recording is there, and those among them that are usable."""
+    """Uploads of a campaign: numbers of cuts with a recording, and of those that are usable."""
 
     uploaded: int
     usable: int
 
 
-#: What names a file: whether it is the upload itself or the samples read from it, and its key.
+#: Kind of a file (upload or samples) and its key.
 FileKey = tuple[str, str]
 
 
@@ -81,12 +81,12 @@ class Campaigns(Protocol):
     """Campaigns of all groups."""
 
     def add(self, campaign: Campaign, repeat: tuple[str, str] | None = None) -> Campaign:
-        """Keep a campaign and return it; the same again for an idempotency key that was there, with the same digest.
+        """Store a campaign and return it; for a repeated idempotency key with the same digest, return the first one.
 
         Raises
         ------
         Taken
-            The idempotency key came with another content.
+            The idempotency key was used with other content.
         KeyError
             The machine is not there.
         """
@@ -98,39 +98,39 @@ class Campaigns(Protocol):
         """Return group and id of campaigns whose verdicts may be older than their recordings."""
 
     def list(self, group: str, machine: str, after: str, limit: int) -> list[Campaign]:
-        """Return campaigns of a machine behind an id, in the order of ids."""
+        """Return campaigns of a machine after an id, in the order of ids."""
 
     def counts(self, group: str, ids: Sequence[str]) -> dict[str, Counts]:
-        """Return how far the uploads of campaigns are; one without any is left out."""
+        """Return the counts of campaigns that have uploads."""
 
     def delete(self, group: str, id: str) -> bool:
-        """Return whether there was one; its recordings go with it."""
+        """Delete a campaign with its recordings, and return whether there was one."""
 
     def changes(self, group: str, id: str) -> int:
-        """Return how often recordings of a campaign have come or gone."""
+        """Return the number of changes of a campaign's recordings."""
 
     def settle(self, group: str, id: str, changes: int) -> None:
-        """Note that every verdict stands with what was there after so many changes."""
+        """Record that all verdicts are up to date with the recordings after so many changes."""
 
 
 class Recordings(Protocol):
     """Recordings of all groups."""
 
     def put(self, recording: Recording, replace: bool) -> Recording | None:
-        """Keep a recording unless another content is there under its name; return what was there before.
+        """Store a recording unless one with other content has its name; return the previous one.
 
-        The same content again changes nothing. With `replace` it takes the place of another.
+        The same content again changes nothing; with `replace` other content is replaced.
 
         Raises
         ------
         Taken
-            Another content is there.
+            A recording with other content exists.
         KeyError
             The campaign is not there.
         """
 
     def judge(self, before: Recording, after: Recording) -> bool:
-        """Keep another verdict if the recording is still the same, and return whether it is."""
+        """Store a new verdict if the recording is still the same, and return whether it is."""
 
     def get(self, group: str, campaign: str, name: str) -> Recording | None:
         """Return a recording."""
@@ -139,10 +139,10 @@ class Recordings(Protocol):
         """Return the files of all campaigns of a machine."""
 
     def list(self, group: str, campaign: str, after: str, limit: int) -> list[Recording]:
-        """Return recordings behind a name, in the order of names."""
+        """Return recordings after a name, in the order of names."""
 
     def delete(self, group: str, campaign: str, name: str) -> Recording | None:
-        """Return what was there."""
+        """Delete a recording and return it."""
 
     def kept(self, group: str) -> set[FileKey]:
         """Return the files that recordings of a group refer to."""

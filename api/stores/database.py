@@ -1,4 +1,4 @@
-"""A database and its transactions: SQLite in WAL mode beside the service, or PostgreSQL by URL, through the same statements."""
+"""The database and its transactions: SQLite in WAL mode, or PostgreSQL by URL, through the same statements."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _BUSY_MS = 5000
 
 
 def open_engine(url: str) -> Engine:
-    """Return the database of a URL, its tables made or brought to today's version where need be."""
+    """Return the engine of a database whose tables have been made or migrated."""
     try:
         parsed = make_url(url)
         engine = create_engine(parsed, pool_pre_ping=not url.startswith("sqlite"))
     except (ArgumentError, NoSuchModuleError, ModuleNotFoundError) as error:
-        # the URL may hold a password: only what is wrong with it is told
+        # the URL may hold a password: the message names the error only
         allowed = "a URL as sqlite:///FILE or postgresql+psycopg://USER@HOST/NAME, with its driver installed"
         raise InputError("RCSA_IDENT_DATABASE", type(error).__name__, allowed) from None
     if engine.dialect.name == "sqlite":
@@ -32,7 +32,7 @@ def open_engine(url: str) -> Engine:
     try:
         with engine.begin() as connection:
             if engine.dialect.name == "postgresql":
-                # service and workers may meet a new database in the same moment
+                # service and workers may find a new database at the same moment
                 connection.execute(text("SELECT pg_advisory_xact_lock(7243451)"))
             tables.migrate(connection)
     except OperationalError:
@@ -41,8 +41,8 @@ def open_engine(url: str) -> Engine:
 
 
 def _sqlite(connection: Any, _record: Any) -> None:
-    """Readers do not wait for a writer; what is committed is on the disk, also after a loss of power."""
-    # transactions begin where SQLAlchemy says so, not before the first write
+    """Set WAL mode (readers do not wait for a writer) and full synchronisation (commits survive a loss of power)."""
+    # transactions begin where SQLAlchemy begins them, not at the first write
     connection.isolation_level = None
     for pragma in ("journal_mode=WAL", "synchronous=FULL", f"busy_timeout={_BUSY_MS}", "foreign_keys=ON"):
         connection.execute(f"PRAGMA {pragma}")
@@ -61,13 +61,13 @@ class Database:
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:
-        """A transaction that writes; on SQLite one at a time."""
+        """Writing transaction; on SQLite one at a time."""
         with self._answering(), self.engine.begin() as connection:
             yield connection
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
-        """A transaction that only reads."""
+        """Reading transaction."""
         with self._answering(), self.engine.connect() as connection:
             yield connection.execution_options(writes=False)
 

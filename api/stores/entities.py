@@ -1,4 +1,4 @@
-"""What is kept, and how a store is asked for it; routes see nothing else of it."""
+"""Entities of the store and the protocols of its parts; nothing else of it is visible to routes."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from typing import Protocol
 from api.stores.campaigns import Campaigns, Recordings
 from api.stores.jobs import Jobs
 
-#: A digest that stands for "nothing must be there yet".
+#: Expected digest of a document that must not exist yet.
 ABSENT = "*absent"
 
 
 class Stale(Exception):
-    """What is there is not what the writer had seen."""
+    """The stored document is not the one that the writer expected."""
 
 
 class Taken(Exception):
-    """The name, or the idempotency key with another content, is in use."""
+    """The name, or the idempotency key with other content, is already in use."""
 
 
 class Unavailable(Exception):
-    """The store does not answer now."""
+    """The database does not answer."""
 
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """A key to the service; of its secret only the hash is kept.
+    """An API key; only the hash of its secret is stored.
 
     Parameters
     ----------
@@ -59,15 +59,15 @@ class Machine:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A text that somebody wrote under a name: a tooling, or the identification of a machine.
+    """A named text: a tooling, or the identification of a machine.
 
     Parameters
     ----------
     name : str
-        Of the tooling; of the machine where it is an identification.
+        Of the tooling, or id of the machine.
     text : str
     summary : str
-        What lists tell of it, JSON.
+        Content of list entries, JSON.
     digest : str
         Of the text: its entity tag.
     changed : str
@@ -82,7 +82,7 @@ class Document:
 
 
 def digest_of(text: str) -> str:
-    """Return what tells one text from another."""
+    """Return the digest of a text."""
     return hashlib.sha256(text.encode("utf-8")).hexdigest()[:32]
 
 
@@ -90,67 +90,67 @@ class Keys(Protocol):
     """Keys of all groups."""
 
     def add(self, key: Key) -> None:
-        """Keep a key."""
+        """Store a key."""
 
     def get(self, id: str) -> Key | None:
-        """Return a key whatever its group is: with it the group becomes known."""
+        """Return a key of any group."""
 
     def list(self, group: str, after: str, limit: int) -> list[Key]:
-        """Return keys of a group behind an id, in the order of ids."""
+        """Return keys of a group after an id, in the order of ids."""
 
     def delete(self, group: str, id: str) -> bool:
-        """Return whether there was one."""
+        """Delete a key and return whether there was one."""
 
 
 class Machines(Protocol):
     """Machines of all groups."""
 
     def add(self, machine: Machine, repeat: tuple[str, str] | None = None) -> Machine:
-        """Keep a machine and return it; the same again for an idempotency key that was there, with the same digest.
+        """Store a machine and return it; for a repeated idempotency key with the same digest, return the first one.
 
         Raises
         ------
         Taken
-            The group has one of that name, or the idempotency key came with another content.
+            The group has a machine of that name, or the idempotency key was used with other content.
         """
 
     def get(self, group: str, id: str) -> Machine | None:
         """Return a machine."""
 
     def list(self, group: str, after: str, limit: int) -> list[Machine]:
-        """Return machines of a group behind an id, in the order of ids."""
+        """Return machines of a group after an id, in the order of ids."""
 
     def delete(self, group: str, id: str) -> bool:
-        """Return whether there was one; its identification, campaigns and jobs go with it."""
+        """Delete a machine with its identification, campaigns and jobs, and return whether there was one."""
 
 
 class Documents(Protocol):
     """Named texts of all groups."""
 
     def put(self, document: Document, expected: str | None = None) -> bool:
-        """Keep a text in the place of what is there, and return whether nothing was.
+        """Store a text, replacing an existing one, and return whether it is new.
 
         Raises
         ------
         Stale
-            What is there has not the expected digest; `ABSENT` expects nothing.
+            The stored text does not have the expected digest; `ABSENT` expects none.
         """
 
     def get(self, group: str, name: str) -> Document | None:
         """Return a text."""
 
     def brief(self, group: str, name: str) -> Document | None:
-        """Return everything but the text."""
+        """Return a document without its text."""
 
     def list(self, group: str, after: str, limit: int) -> list[Document]:
-        """Return everything but the texts behind a name, in the order of names."""
+        """Return the documents after a name without their texts, in the order of names."""
 
     def delete(self, group: str, name: str, expected: str | None = None) -> bool:
-        """Return whether there was one; raises `Stale` as `put` does."""
+        """Delete a text and return whether there was one; raises `Stale` as `put` does."""
 
 
 class Store(Protocol):
-    """Everything that is kept."""
+    """The store as a whole."""
 
     keys: Keys
     machines: Machines
@@ -161,7 +161,7 @@ class Store(Protocol):
     jobs: Jobs
 
     def check(self) -> None:
-        """Raise `Unavailable` unless the store answers."""
+        """Raise `Unavailable` unless the database answers."""
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the connections."""

@@ -1,4 +1,4 @@
-"""Calls that come again: an idempotency key is answered as the first time, for a day."""
+"""Idempotency keys: a repeated call gets the first answer, for a day."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sqlalchemy import Connection, Table, delete, select
 
 from api.stores.entities import Taken
 
-#: How long a key is remembered.
+#: Lifetime of an idempotency key.
 REMEMBERED = timedelta(days=1)
 
 
@@ -19,12 +19,12 @@ def earlier(connection: Connection, table: Table, group: str, repeat: tuple[str,
     Parameters
     ----------
     repeat : (str, str)
-        The key, and the digest of the call.
+        Key, and digest of the call.
 
     Raises
     ------
     Taken
-        That call was another.
+        The first call had other content.
     """
     row = connection.execute(select(table).where(table.c.group == group, table.c.key == repeat[0])).first()
     if row is not None and row.digest != repeat[1]:
@@ -33,5 +33,5 @@ def earlier(connection: Connection, table: Table, group: str, repeat: tuple[str,
 
 
 def forget_old(connection: Connection, table: Table) -> None:
-    """Remove the keys that are no longer remembered."""
+    """Remove expired keys."""
     connection.execute(delete(table).where(table.c.created < (datetime.now(UTC) - REMEMBERED).isoformat()))

@@ -1,4 +1,4 @@
-"""Jobs: what was accepted, how far it is, what it has told and found; and the workers that carry jobs out."""
+"""Jobs, their events and results, and the workers that carry them out: entities, and the protocol of their store."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ STATES = (*OPEN, "done", "failed", "cancelled")
 
 
 class Full(Exception):
-    """As many jobs of the group wait as are allowed."""
+    """The limit of the group's open jobs is reached."""
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """Work that was accepted.
+    """An accepted job.
 
     Parameters
     ----------
     id, group, kind, machine : str
     campaign : str or None
     request : str
-        What was asked for, JSON.
+        Body of the request, JSON.
     state : str
         One of `STATES`.
     created : str
@@ -33,7 +33,7 @@ class Job:
     status : str or None
         Of an identification that is done: converged, suspect or failed.
     problem : str or None
-        Why it failed, JSON.
+        Reason of a failure, JSON.
     started, finished : str or None
     seconds : float [s]
         That it took, waiting left out.
@@ -66,18 +66,18 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What a job has told.
+    """An event of a job.
 
     Parameters
     ----------
     number : int
-        Rises within the job, with gaps.
+        Increases within the job, with gaps.
     kind : str
         progress, trace, fit, note or end.
     data : str
-        JSON; empty for progress and end, which the job itself tells.
+        JSON; empty for progress and end, whose content is the job itself.
     topic : str
-        A later event of the same topic takes the place of an earlier one; empty where all are kept.
+        A later event replaces an earlier one of the same topic; empty where all are stored.
     """
 
     number: int
@@ -88,7 +88,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Applied:
-    """The identification that a finished job gives to its machine: text, summary (JSON) and digest."""
+    """The identification that a finished job writes to its machine: text, summary (JSON) and digest."""
 
     text: str
     summary: str
@@ -97,7 +97,7 @@ class Applied:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a job ended.
+    """Outcome of a job.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class Outcome:
     seconds : float [s]
     status, problem : str or None
     texts : mapping of name to text
-        What was found.
+        Results.
     applied : Applied or None
     """
 
@@ -127,15 +127,15 @@ class Worker:
     Parameters
     ----------
     id : str
-        The durable engine's name for it: one that takes the place of a dead one has the same.
+        Its name as executor of the durable engine; the successor of a dead worker takes the same name.
     place : str
-        The machine since its start; processes of one place see each other.
+        Id of the machine since its boot; processes of one place see each other.
     process : str
-        Which process of the place.
+        Identity of the process at its place.
     token : str
-        Its own alone.
+        Unique to this worker.
     beats : int
-        Rises while it lives.
+        Heartbeats; increases while the worker lives.
     """
 
     id: str
@@ -149,14 +149,14 @@ class Jobs(Protocol):
     """Jobs of all groups."""
 
     def add(self, job: Job, texts: Mapping[str, str], most: int, repeat: tuple[str, str] | None = None) -> Job:
-        """Keep a job with what it works on and return it; the same again for an idempotency key that was there, with the same digest.
+        """Store a job with its inputs and return it; for a repeated idempotency key with the same digest, return the first one.
 
         Raises
         ------
         Taken
             The idempotency key came with another content.
         Full
-            So many of the group are open already.
+            The limit of the group's open jobs is reached.
         KeyError
             The machine is not there.
         """
@@ -165,55 +165,55 @@ class Jobs(Protocol):
         """Return a job."""
 
     def find(self, id: str) -> Job | None:
-        """Return a job whatever its group is: for those who carry it out."""
+        """Return a job of any group, for the workers."""
 
     def list(self, group: str, wanted: Mapping[str, str], before: str, limit: int) -> list[Job]:
-        """Return jobs of a group whose columns have the wanted values, before an id, newest first; before "" means all."""
+        """Return jobs of a group with the wanted values, before an id ("" for all), newest first."""
 
     def cancel(self, group: str, id: str, when: str) -> tuple[Job, bool] | None:
-        """End a job that is open, and return it and whether it was."""
+        """Cancel an open job, and return the job and whether it was open."""
 
     def open(self) -> Sequence[Job]:
         """Return all jobs that are queued or running, oldest first."""
 
     def begin(self, id: str, worker: str, when: str) -> Job | None:
-        """Let a worker take a job up, and return it as it is then; None where it is over."""
+        """Assign a job to a worker and return it; None where it is over."""
 
     def take(self, id: str, dead: str | None, worker: str) -> bool:
-        """Note that a worker sees to it that a job of a dead one goes on; False where somebody else was first."""
+        """Transfer a job from a dead worker to another; False where a third was first."""
 
     def tell(self, id: str, worker: str, events: Sequence[Event], progress: str | None = None, further: bool = False) -> bool:
-        """Add events (their numbers are given here) and the progress, and return whether the job is still this worker's to carry out.
+        """Store events, which are numbered here, and progress; return whether the job still belongs to this worker.
 
         Parameters
         ----------
         further : bool
-            It has come to a new checkpoint.
+            Whether the job has reached a new checkpoint.
         """
 
     def finish(self, id: str, worker: str | None, outcome: Outcome) -> bool:
-        """End a job, with all that it found in the same moment; False where it is over, or another worker's. None is whosever."""
+        """Store the outcome of a job in one transaction; False where it is over or another worker's. Worker None matches any."""
 
     def events(self, id: str, after: int, limit: int) -> Sequence[Event]:
-        """Return events behind a number."""
+        """Return the events after a number."""
 
     def numbers(self, ids: Sequence[str]) -> dict[str, int]:
         """Return the number of the last event of each job."""
 
     def text(self, id: str, name: str) -> str | None:
-        """Return what a job works on, or has found."""
+        """Return an input or result of a job."""
 
     def counts(self) -> Sequence[tuple[str, str, int, float]]:
         """Return (kind, state, jobs, seconds that they took) over all groups."""
 
     def workers(self) -> Sequence[Worker]:
-        """Return all workers, those that have died without a word among them."""
+        """Return all workers, including those that have died without notice."""
 
     def claim(self, worker: Worker, dead: str | None) -> bool:
-        """Take a name that nobody has, or that of a dead one with this token; False where somebody else was first."""
+        """Claim a free name, or that of the dead worker with this token; False where another was first."""
 
     def beat(self, id: str, token: str) -> bool:
-        """Live on; False where the name is another's."""
+        """Send a heartbeat; False where another worker has the name."""
 
     def leave(self, id: str, token: str) -> None:
-        """Give the name back; that its jobs go on elsewhere says nothing against them."""
+        """Release the name; its jobs continue elsewhere, which does not count as an attempt."""

@@ -1,4 +1,4 @@
-"""The store in a database: every noun in a table of its own."""
+"""The store in a SQL database: one table per entity."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from api.stores.sql_jobs import SqlJobs, forget_jobs
 
 
 def open_store(url: str) -> SqlStore:
-    """Return the store of a URL, made or brought to today's version where need be."""
+    """Return the store of a database, made or migrated where needed."""
     return SqlStore(open_engine(url))
 
 
 class SqlStore(Database):
-    """Everything in one database."""
+    """The store in one database."""
 
     def __init__(self, engine: Engine) -> None:
         super().__init__(engine)
@@ -92,7 +92,7 @@ class SqlMachines:
                 connection.execute(insert(tables.machines).values(asdict(machine)))
                 return machine
         except IntegrityError:
-            # somebody else was first between look and write, or has the name
+            # another writer was first, or has the name
             with self.store.reading() as connection:
                 first = None if repeat is None else earlier(connection, r, machine.group, repeat)
             if first is None:
@@ -114,7 +114,7 @@ class SqlMachines:
     def delete(self, group: str, id: str) -> bool:
         t, i, c = tables.machines, tables.identifications, tables.campaigns
         with self.store.writing() as connection:
-            # the machine first: nothing new is added to it from now on
+            # the machine first: nothing can be added to it from now on
             there = connection.execute(delete(t).where(t.c.group == group, t.c.id == id)).rowcount > 0
             connection.execute(delete(i).where(i.c.group == group, i.c.name == id))
             delete_campaigns(connection, select(c.c.id).where(c.c.group == group, c.c.machine == id))
@@ -142,7 +142,7 @@ class SqlDocuments:
                     connection.execute(update(t).where(*here).values(data))
                 return there is None
         except IntegrityError:
-            # the first text of that name came from somebody else in the same moment
+            # another writer stored the first text of that name at the same moment
             return self.put(document, expected)
 
     def get(self, group: str, name: str) -> Document | None:

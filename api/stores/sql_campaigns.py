@@ -37,7 +37,7 @@ class SqlCampaigns:
                         return Campaign(**connection.execute(select(*_CAMPAIGN).where(_C.c.id == first.id)).one()._asdict())
                     row = {"group": campaign.group, "key": repeat[0], "digest": repeat[1], "id": campaign.id, "created": campaign.created}
                     connection.execute(insert(_K).values(row))
-                # held until the campaign is there: a machine that is deleted meanwhile takes it along
+                # locks the machine until the campaign is stored: a deletion meanwhile waits and includes it
                 m = tables.machines
                 machine = select(m.c.id).where(m.c.group == campaign.group, m.c.id == campaign.machine).with_for_update(read=True)
                 if connection.execute(machine).first() is None:
@@ -45,7 +45,7 @@ class SqlCampaigns:
                 connection.execute(insert(_C).values(asdict(campaign) | {"changes": 0, "settled": 0}))
                 return campaign
         except IntegrityError:
-            # the same idempotency key came twice in one moment
+            # the same idempotency key arrived twice at the same moment
             return self.add(campaign, repeat)
 
     def get(self, group: str, id: str) -> Campaign | None:
@@ -103,7 +103,7 @@ class SqlRecordings:
     def put(self, recording: Recording, replace: bool) -> Recording | None:
         here = (_R.c.campaign == recording.campaign, _R.c.name == recording.name)
         with self.store.writing() as connection:
-            # also holds the campaign: two uploads of one name come one after the other
+            # also locks the campaign: two uploads of one name follow each other
             _changed(connection, recording.group, recording.campaign)
             row = connection.execute(select(*_RECORDING).where(*here)).first()
             there = None if row is None else Recording(**row._asdict())
@@ -160,7 +160,7 @@ class SqlRecordings:
 
 
 def files_of(recording: Recording) -> list[FileKey]:
-    """Return what a recording refers to."""
+    """Return the files of a recording."""
     return [("uploads", recording.sha256), ("normalised", recording.normalised)]
 
 

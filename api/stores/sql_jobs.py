@@ -1,4 +1,4 @@
-"""Jobs in tables: every change is one transaction, and none of a worker that the job is no longer given to."""
+"""Jobs in tables: every change is one transaction, and a worker changes only the jobs it still has."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class SqlJobs:
                     first = self._first(connection, job.group, repeat)
                     if first is not None:
                         return first
-                # nobody forgets the machine between this look and the end
+                # locks the machine: it cannot be deleted until the job is stored
                 there = select(m.c.id).where(m.c.group == job.group, m.c.id == job.machine).with_for_update()
                 if connection.execute(there).first() is None:
                     raise KeyError(job.machine)
@@ -45,7 +45,7 @@ class SqlJobs:
                     connection.execute(insert(x).values(job=job.id, name=name, text=text))
                 return job
         except IntegrityError:
-            # the same key came twice in one moment
+            # the same key arrived twice at the same moment
             with self.store.reading() as connection:
                 first = None if repeat is None else self._first(connection, job.group, repeat)
             if first is None:
@@ -137,7 +137,7 @@ class SqlJobs:
                 connection.execute(delete(x).where(x.c.job == id, x.c.name == name))
                 connection.execute(insert(x).values(job=id, name=name, text=text))
             _append(connection, id, found.events, [Event(0, "end", "")])
-            # a machine that was forgotten meanwhile stays so
+            # a machine that was deleted meanwhile stays deleted
             if outcome.applied is not None and connection.execute(select(m.c.id).where(m.c.id == found.machine).with_for_update()).first():
                 _apply(connection, found.group, found.machine, outcome)
             return True
@@ -205,7 +205,7 @@ def _append(connection: Connection, job: str, last: int, events: Sequence[Event]
         return
     for topic in {event.topic for event in events if event.topic}:
         connection.execute(delete(e).where(e.c.job == job, e.c.topic == topic))
-    # of a topic only the last is worth a row
+    # only the last event of a topic is stored
     lasting = [event for i, event in enumerate(events) if not event.topic or all(event.topic != later.topic for later in events[i + 1 :])]
     rows = [asdict(event) | {"job": job, "number": last + 1 + i} for i, event in enumerate(lasting)]
     connection.execute(insert(e), rows)
@@ -221,7 +221,7 @@ def _apply(connection: Connection, group: str, machine: str, outcome: Outcome) -
 
 
 def forget_jobs(connection: Connection, group: str, machine: str) -> None:
-    """Forget all jobs of a machine, with what they told and found."""
+    """Delete all jobs of a machine with their events and results."""
     t = tables.jobs
     of = select(t.c.id).where(t.c.group == group, t.c.machine == machine)
     for table in (tables.job_events, tables.job_texts):

@@ -1,4 +1,4 @@
-"""Tables, and how a store of an earlier version becomes one of today."""
+"""Tables, and migrations of earlier versions."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from sqlalchemy import (
 from rcsa_ident.errors import InputError
 
 metadata = MetaData()
-# names compare by their bytes everywhere: the order of a list must not depend on the database's language
+# names compare by their bytes: the order of lists must not depend on the database's locale
 _Name = String(128).with_variant(String(128, collation="C"), "postgresql")
 
 meta = Table("meta", metadata, Column("schema_version", Integer, nullable=False))
@@ -52,7 +52,7 @@ machines = Table(
 
 
 def _repeats(name: str, *further: Column) -> Table:
-    """Idempotency keys of one kind of call: what the first of them has made."""
+    """Idempotency keys of one kind of call, with the id that the first call made."""
     return Table(
         name,
         metadata,
@@ -169,13 +169,13 @@ def _missing_tables(connection: Connection) -> None:
     metadata.create_all(connection)
 
 
-#: What turns a store of version k + 1 into one of version k + 2, in order; a released step is never edited.
+#: Migrations from version k + 1 to k + 2, in order; a released one is never edited.
 MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_missing_tables,)
 SCHEMA_VERSION = 1 + len(MIGRATIONS)
 
 
 def migrate(connection: Connection) -> None:
-    """Bring the store to today's version within one transaction; a store of a later version is refused."""
+    """Migrate the store to the current version in one transaction; a later version is refused."""
     if not inspect(connection).has_table("meta"):
         metadata.create_all(connection)
         connection.execute(insert(meta).values(schema_version=SCHEMA_VERSION))

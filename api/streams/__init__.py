@@ -1,1 +1,1 @@
-"""Live forces: a process of its own holds the observers, frames come and go over WebSockets."""
+"""Live forces: sessions of WebSocket clients, and the process that runs their observers."""

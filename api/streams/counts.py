@@ -1,4 +1,4 @@
-"""What became of every sample of a stream: nothing comes in or goes without being counted."""
+"""Accounting of the samples of a stream: each is counted once, as computed, dropped, lost or waiting."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(slots=True)
 class Counts:
-    """Samples of a session.
+    """Counts of the samples of a session.
 
     At any time, of all indices from the first to the one before `following`:
     following - origin = samples + dropped + lost + backlog.
@@ -15,17 +15,17 @@ class Counts:
     Parameters
     ----------
     origin, following : int
-        Index of the first sample, and the one that should come now; -1 before the first frame.
+        Index of the first sample, and the next one expected; -1 before the first frame.
     samples : int
-        With a force.
+        Whose forces have been computed.
     lost : int
-        That never came.
+        That never arrived.
     late : int
-        That came once more, or behind later ones; thrown away, and no part of the sum.
+        That arrived twice or after later ones; discarded, and not part of the sum.
     dropped : int
-        That came, and were thrown away since the service was behind.
+        That arrived and were discarded because the service lagged behind.
     backlog : int
-        That wait.
+        That are waiting.
     """
 
     origin: int = -1
@@ -37,7 +37,7 @@ class Counts:
     backlog: int = 0
 
     def take(self, first: int, count: int) -> int:
-        """Count a frame in, and return how many of its first samples are late."""
+        """Count a frame, and return the number of its leading samples that are late."""
         if self.origin < 0:
             self.origin = self.following = first
         late = min(max(self.following - first, 0), count)
@@ -50,11 +50,11 @@ class Counts:
         return late
 
     def drop(self, count: int) -> None:
-        """Count samples that wait no longer, since they were thrown away."""
+        """Count waiting samples as dropped."""
         self.backlog -= count
         self.dropped += count
 
     def done(self, count: int) -> None:
-        """Count samples that wait no longer, since they have a force."""
+        """Count waiting samples as computed."""
         self.backlog -= count
         self.samples += count

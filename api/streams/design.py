@@ -1,8 +1,7 @@
-"""The observer of a stream, made by a worker from the stream's first second, or from the recording that is replayed."""
+"""Design of a stream's observer in a worker, from the first second of the stream or from the replayed recording."""
 
 from __future__ import annotations
 
-import math
 import pickle
 from dataclasses import dataclass
 from typing import Any
@@ -12,17 +11,16 @@ import numpy as np
 from api.streams.engine import Column, Plan
 from api.work.forces import ReadPair, observed
 from api.work.machine_cache import read
-from api.work.requests import MachineText, ToolingText
-from api.work.toolings import tooling_of
+from api.work.requests import MachineText, ToolingSource
+from api.work.toolings import tooling_from
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
-
-_RPM = 30.0 / math.pi
+from rcsa_ident.units import to_hz, to_rpm
 
 
 @dataclass(frozen=True, slots=True)
 class StreamQuestion:
-    """What a stream brings.
+    """Properties of a stream.
 
     Parameters
     ----------
@@ -32,9 +30,9 @@ class StreamQuestion:
     sensors : tuple of Sensor
         Of the channels, in their order.
     axes : tuple of str
-        In the order of the answer's columns.
+        In the order of the columns of the forces.
     begins : str
-        air: the spindle turns in air at first, which shows its run-out; cut: it does not.
+        air: the spindle first turns in air, which shows its run-out; cut: the stream begins in the cut.
     method : str
     """
 
@@ -47,16 +45,16 @@ class StreamQuestion:
 
 
 def design(
-    machine: MachineText, tooling: ToolingText, question: StreamQuestion, first: int, raw: bytes, air: ReadPair | None
+    machine: MachineText, tooling: ToolingSource, question: StreamQuestion, first: int, raw: bytes, air: ReadPair | None
 ) -> tuple[bytes, dict[str, Any]]:
-    """Return the plan of a stream, pickled for the process of the streams, and what its client is told.
+    """Return the pickled plan of a stream for the stream process, and the content of the client's event `ready`.
 
     Parameters
     ----------
     first : int
         Index of the first sample.
     raw : bytes
-        float64[samples, channels], as they came.
+        float64[samples, channels], as received.
     air : callable or None
         Reads an uploaded air cut.
     """
@@ -66,8 +64,8 @@ def design(
     return _planned(machine, tooling, question, first, recording, still, follow=True)
 
 
-def design_replay(machine: MachineText, tooling: ToolingText, question: StreamQuestion, source: ReadPair) -> tuple[bytes, dict[str, Any]]:
-    """Return the same for a recording: its forces are those of the recording as a whole, to the last digit.
+def design_replay(machine: MachineText, tooling: ToolingSource, question: StreamQuestion, source: ReadPair) -> tuple[bytes, dict[str, Any]]:
+    """Return the same for a recording, whose streamed forces equal those of the whole recording to the last digit.
 
     Parameters
     ----------
@@ -82,7 +80,7 @@ def design_replay(machine: MachineText, tooling: ToolingText, question: StreamQu
 
 def _planned(
     machine: MachineText,
-    tooling: ToolingText,
+    tooling: ToolingSource,
     question: StreamQuestion,
     first: int,
     recording: Recording,
@@ -91,7 +89,7 @@ def _planned(
 ) -> tuple[bytes, dict[str, Any]]:
     from rcsa_ident.workflows.stream_forces import live_observer
 
-    known, tool = read(machine.text), tooling_of(tooling.text)
+    known, tool = read(machine.text), tooling_from(tooling)
     found = observed(known, tool, recording, air, question.speed, question.method)
     axes = tuple(axis.upper() for axis in found.estimate.axes)
     if set(axes) != set(question.axes):
@@ -99,7 +97,7 @@ def _planned(
     kinds = [(sensor.quantity, None if sensor.axis is None else sensor.axis.upper()) for sensor in question.sensors]
 
     def column(quantity: Quantity, axis: str) -> Column | None:
-        # a replay's samples are in SI already
+        # the samples of a replay are already in SI
         place = next((i for i, kind in enumerate(kinds) if kind == (quantity, axis)), None)
         return None if place is None else Column(place, question.sensors[place].sensitivity if follow else 1.0)
 
@@ -109,14 +107,14 @@ def _planned(
     plan = Plan(live_observer(found, recording, follow), gap, shaken, len(kinds), first, order)
     deviation = found.estimate.standard_deviation
     delay = max(found.response[axis].delay_at_lines for axis in found.response) * recording.rate
-    told = {
+    ready = {
         "axes": list(question.axes),
         "sampling_rate_hz": recording.rate,
-        "spindle_speed_rpm": found.spindle_speed * _RPM,
-        "band_hz": [w / (2.0 * math.pi) for w in found.band],
+        "spindle_speed_rpm": to_rpm(found.spindle_speed),
+        "band_hz": [to_hz(w) for w in found.band],
         "delay_samples": round(float(delay), 3),
         "std_n": {axis: float(deviation[-1, axes.index(axis)]) for axis in question.axes},
         "first": first,
         "notes": list(found.notes),
     }
-    return pickle.dumps(plan), told
+    return pickle.dumps(plan), ready

@@ -1,31 +1,35 @@
-"""What the process of the streams computes: a live observer for each session, blocks in, forces out."""
+"""Computation of the stream process: one live observer per session, blocks of samples in, forces out."""
 
 from __future__ import annotations
 
 import pickle
 import struct
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 
-#: kind, session, first index, time of arrival [s], two numbers of the answer, bytes that follow.
+if TYPE_CHECKING:
+    # not at run time: the service itself does not load the observers
+    from rcsa_ident.workflows.stream_forces import LiveObserver, LiveState
+
+#: Kind, session, first index, time of arrival [s], drift, known, length of the content.
 HEADER = struct.Struct("<BQQdddI")
-#: To the process.
+#: Messages to the process.
 OPEN, BLOCK, CLOSE = 1, 2, 3
-#: From the process.
+#: Messages from the process.
 READY, FORCES, REFUSED, FAILED = 11, 12, 13, 14
 
 
 class Endless(Exception):
-    """Signals whose forces are not finite."""
+    """The forces of the signals are not finite."""
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """What crosses between service and process.
+    """A message between the service and the stream process.
 
     Parameters
     ----------
@@ -36,7 +40,7 @@ class Message:
     session : int
     first : int
     arrived : float [s]
-        Clock of the whole machine; goes back with the forces.
+        By the machine's monotonic clock; returned with the forces.
     drift, known : float
     content : bytes
     """
@@ -57,7 +61,7 @@ class Message:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """Where a quantity stands in a frame: channel, and the signal of one metre or metre per second squared."""
+    """Column of a quantity in a frame: its channel, and its sensitivity per m or m/s^2."""
 
     channel: int
     sensitivity: float
@@ -65,7 +69,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """How a session's forces are found.
+    """Plan of a session: its observer and the layout of its frames.
 
     Parameters
     ----------
@@ -78,10 +82,10 @@ class Plan:
     origin : int
         Index of the sample at which the observer begins.
     order : tuple of int
-        Places of the observer's axes in the answer's columns.
+        Indices of the observer's axes, in the order of the answer's columns.
     """
 
-    observer: Any
+    observer: LiveObserver
     gap: tuple[Column, ...]
     acceleration: tuple[Column | None, ...]
     channels: int
@@ -97,16 +101,16 @@ class Plan:
 
 
 class Engine:
-    """All sessions of the process."""
+    """The observers of all sessions and their states."""
 
     def __init__(self) -> None:
-        self.sessions: dict[int, tuple[Plan, Any]] = {}
+        self.sessions: dict[int, tuple[Plan, LiveState]] = {}
 
     def answer(self, message: Message) -> Message | None:
-        """Return what a message is answered with; what fails ends its session alone."""
+        """Return the answer to a message; an error ends its own session only."""
         try:
             if message.kind == OPEN:
-                plan = pickle.loads(message.content)
+                plan: Plan = pickle.loads(message.content)
                 self.sessions[message.session] = plan, plan.observer.init()
             elif message.kind == CLOSE:
                 self.sessions.pop(message.session, None)

@@ -1,4 +1,4 @@
-"""Lowest and highest of so many samples: what a picture needs of a fast stream."""
+"""Envelope of a fast stream for plots: minimum and maximum over buckets of samples."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rcsa_ident.arrays import FloatArray
 
 
 def envelope(values: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
-    """Return lowest and highest values of every `size` samples, the last bucket as it comes, shape (b, c) each.
+    """Return minima and maxima over buckets of `size` samples, the last one possibly shorter, shape (b, c) each.
 
     Parameters
     ----------
@@ -22,12 +22,12 @@ def envelope(values: FloatArray, size: int) -> tuple[FloatArray, FloatArray]:
 
 
 class Envelope:
-    """Buckets of a stream. A bucket begins at a multiple of its size, whatever the blocks; one without any sample is left out.
+    """Running envelope of a stream. Buckets begin at multiples of their size, whatever the blocks; empty buckets are omitted.
 
     Parameters
     ----------
     size : int
-        Samples of a bucket.
+        Samples per bucket.
     axes : int
     """
 
@@ -36,7 +36,7 @@ class Envelope:
         self.low = self.high = np.zeros(axes)
 
     def add(self, first: int, values: FloatArray) -> list[tuple[int, FloatArray]]:
-        """Return the buckets that are complete with these samples, as runs without gaps: first sample, shape (b, a, 2)."""
+        """Return the buckets that these samples complete, as runs without gaps: first index, and values of shape (b, a, 2)."""
         count, size = values.shape[0], self.size
         if count == 0:
             return []
@@ -46,7 +46,7 @@ class Envelope:
         if first // size == self.bucket:
             low[0], high[0] = np.minimum(low[0], self.low), np.maximum(high[0], self.high)
         elif self.bucket >= 0:
-            # what was lost has taken the rest of the last bucket
+            # the rest of the last bucket was lost
             runs.append((self.bucket * size, np.stack([self.low, self.high], axis=1)[None]))
         self.bucket, self.low, self.high = -1, low[-1], high[-1]
         if (first + count) % size:

@@ -1,4 +1,4 @@
-"""Bytes of a force stream: what a data logger sends, what comes back; little endian throughout.
+"""Binary frames of a force stream in both directions, little endian.
 
 In: uint64 index of the first sample, uint32 samples, uint32 channels, float32[samples, channels].
 Out: uint64 index of the first sample, uint32 rows, uint32 axes, float32[rows, axes] newtons; with an envelope a row is a bucket,
@@ -18,16 +18,16 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 
 HEADER = struct.Struct("<QII")
-#: Samples of one frame, and the highest index: what a double counts exactly, as JSON's readers do.
+#: Most samples of a frame, and the highest index: the largest integer that doubles, and so JSON readers, count exactly.
 MOST_SAMPLES, MOST_INDEX = 65_536, 2**53
 
 
 class TooLarge(InputError):
-    """A frame that is larger than is allowed."""
+    """A frame or message that is too large."""
 
 
 class WrongKind(InputError):
-    """A message of another kind than the session's."""
+    """A message of the wrong kind for its session."""
 
 
 def packed(first: int, values: FloatArray) -> bytes:
@@ -63,7 +63,7 @@ def samples_of(raw: bytes, channels: int) -> tuple[int, FloatArray]:
 
 
 def samples_of_text(text: str, channels: int) -> tuple[int, FloatArray]:
-    """Return the same of a frame in JSON."""
+    """Return the same for a frame in JSON."""
     data = object_of(text)
     first, rows = data.get("first"), data.get("samples")
     if not isinstance(first, int) or isinstance(first, bool) or not 0 <= first <= MOST_INDEX:
@@ -72,7 +72,7 @@ def samples_of_text(text: str, channels: int) -> tuple[int, FloatArray]:
         raise InputError("samples", rows, "a list of lists of numbers")
     _size(first, len(rows), max((len(row) for row in rows), default=channels), channels)
     if not all(len(row) == channels and all(type(v) in (int, float) for v in row) for row in rows):
-        raise InputError("samples", "rows of other lengths, or not of numbers", f"{channels} numbers in every row")
+        raise InputError("samples", "rows of unequal length, or entries that are not numbers", f"{channels} numbers in every row")
     try:
         values = np.array(rows, dtype=float).reshape(len(rows), channels)
     except OverflowError:
@@ -81,7 +81,7 @@ def samples_of_text(text: str, channels: int) -> tuple[int, FloatArray]:
 
 
 def object_of(text: str) -> dict[str, Any]:
-    """Return a JSON object; bad text is told as such."""
+    """Return the JSON object of a text; raises `InputError` for any other text."""
 
     def no_number(word: str) -> None:
         raise InputError("message", word, "finite numbers")
@@ -89,7 +89,7 @@ def object_of(text: str) -> dict[str, Any]:
     try:
         data = json.loads(text, parse_constant=no_number)
     except RecursionError:
-        raise InputError("message", "lists in lists without end", "a JSON object") from None
+        raise InputError("message", "lists nested too deeply", "a JSON object") from None
     except ValueError:
         raise InputError("message", "no JSON", "a JSON object") from None
     if not isinstance(data, dict):
@@ -99,7 +99,7 @@ def object_of(text: str) -> dict[str, Any]:
 
 def _size(first: int, count: int, width: int, channels: int) -> None:
     if width != channels:
-        raise InputError("channels", width, f"{channels}, as the hello says")
+        raise InputError("channels", width, f"{channels}, as declared in the first message")
     if count == 0:
         raise InputError("samples", 0, "one or more")
     if count > MOST_SAMPLES:
@@ -109,7 +109,7 @@ def _size(first: int, count: int, width: int, channels: int) -> None:
 
 
 def _finite(values: FloatArray) -> FloatArray:
-    # beyond this squares overflow, and no sensor shows it
+    # larger values, which no sensor has, would overflow when squared
     if not np.all(np.abs(values) < 1e30):
-        raise InputError("samples", "a value that is not finite", "finite numbers; what was lost is left out, the index goes on")
+        raise InputError("samples", "a value that is not finite", "finite numbers; lost samples are omitted, and the index continues")
     return values

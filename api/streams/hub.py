@@ -1,4 +1,4 @@
-"""All sessions of the service: opened, fed, told about each second, and ended."""
+"""All sessions of the service: opened, fed, reported on each second, and ended."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import logging
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
+from api.metrics import Metrics
 from api.streams.engine import BLOCK, CLOSE, FAILED, FORCES, OPEN, REFUSED, Message
 from api.streams.listener import Listener
 from api.streams.process import Host
@@ -20,33 +21,23 @@ from api.streams.session import About, End, Session, Stage
 from rcsa_ident.arrays import FloatArray
 
 log = logging.getLogger("rcsa_ident.service")
-#: Frames of a session in a second: each costs the service as much as hundreds of samples.
+#: Most frames of a session per second: each costs as much as hundreds of samples.
 MOST_FRAMES = 2000
-_UNEXPECTED = "something unexpected happened; the log has it under this session"
-
-
-class Told(Protocol):
-    """Who counts."""
-
-    def streamed(self, samples: int, delay: float) -> None:
-        """So many samples have got a force, the newest so long after it came [s]."""
-
-    def missed(self, lost: int, dropped: int) -> None:
-        """So many samples never came, or were thrown away."""
+_UNEXPECTED = "an internal error occurred; it is logged under this session's id"
 
 
 @dataclass(frozen=True, slots=True)
 class StreamLimits:
-    """What is allowed.
+    """Limits of streams.
 
     Parameters
     ----------
     sessions, sessions_per_group, listeners : int
-        Of the service, of a group, of a session.
+        Most sessions of the service and of a group, most listeners of a session.
     idle : float [s]
-        Without a new sample, after which a session ends.
+        Time without a new sample after which a session ends.
     drift : float
-        Share of the speed beyond which forces are told to be less true.
+        Relative deviation of the spindle speed beyond which a note warns of less accurate forces.
     """
 
     sessions: int = 16
@@ -57,35 +48,35 @@ class StreamLimits:
 
 
 class Full(Exception):
-    """No more sessions, or listeners, are allowed."""
+    """The limit of sessions or listeners is reached."""
 
 
 class Hub:
-    """Sessions by id.
+    """Registry of sessions, between their connections and the stream process.
 
     Parameters
     ----------
     host : Host
     limits : StreamLimits
-    told : Told
+    metrics : Metrics
     """
 
-    def __init__(self, host: Host, limits: StreamLimits, told: Told) -> None:
-        self.host, self.limits, self.told = host, limits, told
+    def __init__(self, host: Host, limits: StreamLimits, metrics: Metrics) -> None:
+        self.host, self.limits, self.metrics = host, limits, metrics
         self.sessions: dict[str, Session] = {}
         self.numbers = itertools.count(1)
         self.by_number: dict[int, Session] = {}
         self.ticking: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
-        """Start the process."""
+        """Start the stream process."""
         await self.host.start(self._deliver, self._anew)
         self.ticking = asyncio.create_task(self._tick())
 
     async def stop(self) -> None:
-        """End all sessions, and the process."""
+        """End all sessions and the stream process."""
         for session in list(self.sessions.values()):
-            self.close(session, End(1001, 503, "the service ends"))
+            self.close(session, End(1001, 503, "the service is shutting down"))
         if self.ticking is not None:
             self.ticking.cancel()
             with contextlib.suppress(asyncio.CancelledError):
@@ -97,47 +88,47 @@ class Hub:
         return [session for session in self.sessions.values() if session.about.group == group]
 
     def get(self, group: str, id: str) -> Session | None:
-        """Return a session, where it is this group's."""
+        """Return a session of a group, or None."""
         found = self.sessions.get(id)
         return found if found is not None and found.about.group == group else None
 
     def open(self, about: About) -> Session:
         """Return a new session; raises `Full`."""
         if len(self.sessions) >= self.limits.sessions:
-            raise Full(f"{self.limits.sessions} streams are open, more are not served")
+            raise Full(f"{self.limits.sessions} streams are open, which is the limit of the service")
         if len(self.list(about.group)) >= self.limits.sessions_per_group:
-            raise Full(f"{self.limits.sessions_per_group} streams of this group are open, more are not served")
+            raise Full(f"{self.limits.sessions_per_group} streams of this group are open, which is its limit")
         session = Session(about, next(self.numbers))
         self.sessions[about.id] = self.by_number[session.number] = session
         return session
 
     def listen(self, session: Session, listener: Listener) -> None:
-        """Let somebody hear a session; raises `Full`."""
+        """Add a listener to a session; raises `Full`."""
         if len(session.listeners) > self.limits.listeners:
-            raise Full(f"{self.limits.listeners} listen to this stream, more are not served")
+            raise Full(f"{self.limits.listeners} clients watch this stream, which is its limit")
         session.listeners.append(listener)
 
     def close(self, session: Session, end: End) -> None:
-        """End a session and forget it."""
+        """End a session and remove it."""
         session.finish(end)
         if self.sessions.pop(session.about.id, None) is not None:
             self.by_number.pop(session.number, None)
             self.host.post(Message(CLOSE, session.number))
-            self.told.missed(0, session.held)
+            self.metrics.missed(0, session.held)
 
     def offer(self, session: Session, first: int, samples: FloatArray) -> None:
-        """Take a frame of a session's client."""
+        """Take a frame from a session's client."""
         session.frames += 1
         lost = session.counts.lost
         dropped = session.offer(first, samples, time.monotonic())
-        self.told.missed(session.counts.lost - lost, dropped)
+        self.metrics.missed(session.counts.lost - lost, dropped)
         self._feed(session)
 
     def begin(self, session: Session, plan: bytes, origin: int, ready: Mapping[str, Any]) -> None:
-        """Stream: an observer is there, and begins at a sample that waits."""
+        """Start the observer of a session at a waiting sample."""
         if session.stage is Stage.ENDED:
             return
-        self.told.missed(0, session.skip(origin))
+        self.metrics.missed(0, session.skip(origin))
         session.plan, session.stage, session.ready = plan, Stage.LIVE, dict(ready)
         session.notes = list(ready.get("notes", ()))
         self.host.post(Message(OPEN, session.number, content=plan))
@@ -166,41 +157,41 @@ class Hub:
             delay = time.monotonic() - message.arrived
             session.drift, session.known = message.drift, message.known > 0.0
             session.forces(message.first, values, delay)
-            self.told.streamed(values.shape[0], delay)
+            self.metrics.streamed(values.shape[0], delay)
             self._feed(session)
 
     def _anew(self) -> None:
         for session in list(self.sessions.values()):
             if session.stage is Stage.LIVE:
-                self.told.missed(0, session.lost_process())
+                self.metrics.missed(0, session.lost_process())
                 self.host.post(Message(OPEN, session.number, content=session.plan))
                 for listener in session.listeners:
-                    listener.tell("restarted", detail="the observer begins anew")
+                    listener.tell("restarted", detail="the observer starts again")
                 self._feed(session)
 
     async def _tick(self) -> None:
-        """Tell everybody each second; end what nobody feeds."""
+        """Send the status each second; end sessions without samples."""
         while True:
             await asyncio.sleep(1.0)
             for session in list(self.sessions.values()):
                 if time.monotonic() - session.touched > self.limits.idle and not session.finishing:
-                    self.close(session, End(1008, 408, f"no new sample in {self.limits.idle:g} s"))
+                    self.close(session, End(1008, 408, f"no new sample for {self.limits.idle:g} s"))
                     continue
                 if session.frames > MOST_FRAMES:
-                    detail = f"{session.frames} frames in a second, at most {MOST_FRAMES} are taken: put more samples into each"
+                    detail = f"{session.frames} frames in one second, at most {MOST_FRAMES} are accepted: send more samples per frame"
                     self.close(session, End(1008, 429, detail))
                     continue
                 session.frames = 0
                 self.tell_status(session)
 
     def tell_status(self, session: Session, event: str = "status") -> None:
-        """Tell all who listen how a session stands."""
+        """Send the status of a session to its listeners."""
         session.notes = [*session.ready.get("notes", ())]
         if abs(session.drift) > self.limits.drift:
             percent = f"{100.0 * session.drift:+.2f} %"
-            session.notes.append(f"the spindle's speed is {percent} from the one that the observer was made for: open a new stream")
+            session.notes.append(f"the spindle speed deviates by {percent} from the one the observer was designed for: open a new stream")
         if not session.known:
-            session.notes.append("the spindle's angle is not told by the signals now: run-out may be left in")
+            session.notes.append("the signals do not show the spindle's angle at present: run-out may remain in the forces")
         status = session.status()
         for listener in session.listeners:
             listener.tell(event, **status, unread=listener.unread)

@@ -1,4 +1,4 @@
-"""Who hears a stream: what waits for a reader, bounded."""
+"""Listener of a stream: a bounded queue of events and forces for one client."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from api.streams.envelope import Envelope
 from api.streams.frames import packed
 from rcsa_ident.arrays import FloatArray
 
-#: Bytes and texts that wait for a slow reader.
+#: Most bytes of frames and most texts that wait for a slow reader.
 WAITING_BYTES, WAITING_TEXTS = 4_000_000, 32
 
 
 class Listener:
-    """Who gets a session's forces, never more of them than fit.
+    """Receiver of a session's events and forces.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class Listener:
     text : bool
         JSON in place of bytes.
     size : int or None
-        Samples of a bucket, in place of every sample.
+        Samples per bucket of the envelope; None for every sample.
     """
 
     def __init__(self, axes: int, text: bool, size: int | None) -> None:
@@ -35,7 +35,7 @@ class Listener:
         self.awake = asyncio.Event()
 
     def forces(self, first: int, values: FloatArray) -> None:
-        """Take forces; the oldest that nobody has read make way and are counted."""
+        """Queue forces; the oldest unread ones are discarded and counted where the queue is full."""
         runs = [(first, values)] if self.envelope is None else self.envelope.add(first, values)
         for begin, rows in runs:
             frame = json.dumps({"first": begin, "samples": rows.tolist()}) if self.text else packed(begin, rows)
@@ -49,7 +49,7 @@ class Listener:
         self.awake.set()
 
     def tell(self, event: str, **further: Any) -> None:
-        """Take an event; the end comes behind all forces, others before them."""
+        """Queue an event: `end` behind all forces, others ahead of them."""
         text = json.dumps({"event": event, **further}, allow_nan=False)
         if event == "end":
             self.last = text
@@ -59,14 +59,14 @@ class Listener:
 
     @property
     def pending(self) -> bool:
-        """Whether something waits."""
+        """Whether the queue holds anything."""
         return bool(self.frames or self.texts or self.last)
 
     def taken(self) -> list[str | bytes]:
-        """Return some of what waits, and forget it."""
+        """Take the next texts and at most one frame from the queue."""
         found: list[str | bytes] = [*self.texts]
         self.texts.clear()
-        # one frame at a time, so that the rest can still make way
+        # one frame at a time, so that the others can still be discarded
         if self.frames:
             frame = self.frames.popleft()[1]
             self.bytes -= len(frame)

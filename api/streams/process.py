@@ -1,29 +1,27 @@
-"""The process of the streams: spawned, at the priority of the service, warm before it is asked."""
+"""The stream process: spawned, at the priority of the service, with its kernels compiled before the first session."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import logging
-import multiprocessing
-import os
 import socket
-import time
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Protocol
 
+from api.processes import BackOff, Child
 from api.streams.engine import HEADER, READY, Engine, Message
 
 log = logging.getLogger("rcsa_ident.service")
-#: A process that ends so often in so many seconds is not started again.
-MOST_STARTS, STARTS_WITHIN = 5, 60.0
+#: Restarts in succession without a pause, and time for the process to end by itself [s].
+AT_ONCE, FAREWELL = 4, 5.0
 
 
 class Host(Protocol):
-    """Where sessions are computed."""
+    """Where the observers of sessions run."""
 
     async def start(self, deliver: Callable[[Message], None], anew: Callable[[], None]) -> None:
-        """Begin; `deliver` takes every answer, `anew` is called where all sessions have been lost and must be opened again."""
+        """Start; `deliver` takes every answer, `anew` is called after a restart, when all sessions must be opened again."""
 
     def post(self, message: Message) -> None:
         """Send a message."""
@@ -33,14 +31,14 @@ class Host(Protocol):
 
     @property
     def ready(self) -> bool:
-        """Whether it answers."""
+        """Whether the process answers."""
 
 
 class StreamProcess:
-    """A spawned process behind a pair of sockets; where it dies it is started again."""
+    """A spawned process behind a socket pair, restarted when it dies."""
 
     def __init__(self) -> None:
-        self.process: Any = None
+        self.process: Child | None = None
         self.writer: asyncio.StreamWriter | None = None
         self.task: asyncio.Task[None] | None = None
         self.ready = False
@@ -51,17 +49,13 @@ class StreamProcess:
 
     async def _spawned(self) -> asyncio.StreamReader:
         ours, theirs = socket.socketpair()
-        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-            os.environ.setdefault(name, "1")
-        context = multiprocessing.get_context("spawn")
-        self.process = context.Process(target=serve, args=(theirs,), name="rcsa-ident-streams", daemon=True)
-        await asyncio.get_running_loop().run_in_executor(None, self.process.start)
+        self.process = await asyncio.to_thread(Child, serve, theirs, name="rcsa-ident-streams")
         theirs.close()
         reader, self.writer = await asyncio.open_connection(sock=ours)
         return reader
 
     async def _follow(self, reader: asyncio.StreamReader, deliver: Callable[[Message], None], anew: Callable[[], None]) -> None:
-        starts = [time.monotonic()]
+        back_off = BackOff(AT_ONCE)
         while True:
             with contextlib.suppress(asyncio.IncompleteReadError, ConnectionError):
                 while True:
@@ -74,11 +68,10 @@ class StreamProcess:
             if self.writer is not None:
                 self.writer.close()
                 self.writer = None
-            starts = [t for t in starts if time.monotonic() - t < STARTS_WITHIN]
-            log.error("the process of the streams has ended", extra={"fields": {"starts": len(starts)}})
-            if len(starts) >= MOST_STARTS:
-                await asyncio.sleep(STARTS_WITHIN)
-            starts.append(time.monotonic())
+            assert self.process is not None
+            pause = back_off.pause(self.process)
+            log.error("the process of the streams has ended", extra={"fields": {"failures": back_off.failures}})
+            await asyncio.sleep(pause)
             reader = await self._spawned()
             anew()
 
@@ -93,13 +86,11 @@ class StreamProcess:
             with contextlib.suppress(asyncio.CancelledError):
                 await self.task
         if self.writer is not None:
-            # its end of the connection is where the process learns of it
+            # the process ends at the end of its input
             self.writer.close()
             self.writer = None
         if self.process is not None:
-            await asyncio.get_running_loop().run_in_executor(None, self.process.join, 5.0)
-            if self.process.is_alive():
-                self.process.kill()
+            await asyncio.to_thread(self.process.end, FAREWELL)
             self.process = None
 
 
@@ -109,13 +100,9 @@ async def _received(reader: asyncio.StreamReader) -> Message:
 
 
 def serve(connection: socket.socket) -> None:
-    """Answer messages until the service ends, however it does."""
-    import signal
-
-    # whoever stops the service with a key stops this process through it
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Answer messages until the service closes its end."""
     with contextlib.suppress(OSError), open("/proc/self/comm", "w") as name:
-        # what a list of processes calls it
+        # its name in `ps` and `top`
         name.write("rcsa-streams")
     from rcsa_ident.workflows.compile_kernels import STEPS
 

@@ -1,4 +1,4 @@
-"""A session: samples that wait, blocks that are computed, and those who listen."""
+"""A session: its waiting samples, blocks under computation, and listeners."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from api.streams.counts import Counts
 from api.streams.listener import Listener
 from rcsa_ident.arrays import FloatArray
 
-#: Samples of a block that is computed at once, and blocks that are on their way at once: nobody waits long behind another.
+#: Samples per block, and blocks of a session under computation at once: no session waits long for another.
 BLOCK, FLYING = 4096, 4
 
 
 class Stage(StrEnum):
-    """How far a session is."""
+    """Stages of a session."""
 
     SETTLING = "settling"
     DESIGNING = "designing"
@@ -36,9 +36,9 @@ class End:
     Parameters
     ----------
     code : int
-        Of the WebSocket's close.
+        Close code of the WebSocket.
     status : int
-        Of the problem document; 0: nothing went wrong.
+        Status of the problem document; 0 without an error.
     detail : str
     errors : tuple of {field, found, allowed}
     """
@@ -51,7 +51,7 @@ class End:
 
 @dataclass(frozen=True, slots=True)
 class About:
-    """What a session is of.
+    """Description of a session.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class About:
     axes : tuple of str
     channels : int
     most_waiting : int
-        Samples that may wait; older ones are dropped.
+        Samples that may wait; beyond that the oldest are dropped.
     """
 
     id: str
@@ -77,7 +77,7 @@ class About:
 
 @dataclass(slots=True, eq=False)
 class Second:
-    """What was seen since the last status.
+    """Statistics since the last status.
 
     Parameters
     ----------
@@ -93,18 +93,18 @@ class Second:
 
     @classmethod
     def of(cls, axes: int) -> Second:
-        """Return one that has seen nothing."""
+        """Return empty statistics."""
         return cls(np.zeros(axes), np.zeros(axes))
 
 
 class Session:
-    """A stream of one client.
+    """The stream of one client.
 
     Parameters
     ----------
     about : About
     number : int
-        Its name towards the process.
+        Id of the session towards the stream process.
     """
 
     def __init__(self, about: About, number: int) -> None:
@@ -124,11 +124,11 @@ class Session:
 
     @property
     def held(self) -> int:
-        """Samples that wait here, those on their way not among them."""
+        """Samples that wait here, without those under computation."""
         return self.counts.backlog - sum(self.flying)
 
     def offer(self, first: int, samples: FloatArray, now: float) -> int:
-        """Take a frame, shape (n, c), and return how many older samples had to make way."""
+        """Take a frame, shape (n, c), and return the number of older samples dropped for it."""
         late = self.counts.take(first, samples.shape[0])
         if late == samples.shape[0]:
             return 0
@@ -156,7 +156,7 @@ class Session:
         return None
 
     def skip(self, index: int) -> int:
-        """Throw away what waits before an index, and return how many samples that was."""
+        """Drop waiting samples before an index, and return their number."""
         dropped = 0
         while self.waiting and self.waiting[0][0] < index:
             first, samples, arrived = self.waiting.popleft()
@@ -169,7 +169,7 @@ class Session:
         return dropped
 
     def block(self) -> tuple[int, FloatArray, float] | None:
-        """Return the next block for the process without gaps, or None where nothing waits or enough is on its way."""
+        """Return the next block without gaps, or None where nothing waits or enough blocks are under computation."""
         if not self.waiting or len(self.flying) >= FLYING:
             return None
         first, samples, arrived = self.waiting.popleft()
@@ -188,7 +188,7 @@ class Session:
         return first, whole, arrived
 
     def forces(self, first: int, values: FloatArray, delay: float) -> None:
-        """Take the forces of the block that was on its way longest."""
+        """Take the forces of the oldest block under computation."""
         self.counts.done(self.flying.popleft())
         self.second.delays.append(delay)
         self.second.count += values.shape[0]
@@ -200,14 +200,14 @@ class Session:
             self.drained.set()
 
     def lost_process(self) -> int:
-        """Count what was on its way to a process that has died as dropped, and return how many samples that was."""
+        """Count the samples under computation in a dead process as dropped, and return their number."""
         count = sum(self.flying)
         self.flying.clear()
         self.counts.drop(count)
         return count
 
     def status(self) -> dict[str, Any]:
-        """Return what was so in the last second, and forget it."""
+        """Return the status of the last second, and reset the statistics."""
         seen, self.second = self.second, Second.of(len(self.about.axes))
         n, counts, delays = max(seen.count, 1), self.counts, np.array(seen.delays or [0.0]) * 1e3
         rms = np.sqrt(np.maximum(seen.square / n - (seen.total / n) ** 2, 0.0))
@@ -227,7 +227,7 @@ class Session:
         }
 
     def finish(self, end: End) -> None:
-        """End; the first reason stands."""
+        """End the session; the first reason stands."""
         if self.stage is not Stage.ENDED:
             self.stage, self.end = Stage.ENDED, end
             for event in (self.over, self.room, self.arrived, self.drained):

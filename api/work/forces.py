@@ -1,4 +1,4 @@
-"""What a worker answers of forces: those of a recording, and the observer that a stream begins with."""
+"""Tasks about forces: those of a recording, and the observer of a stream."""
 
 from __future__ import annotations
 
@@ -10,25 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from api.work.machine_cache import Known, read
-from api.work.requests import MachineText, ToolingText
-from api.work.toolings import tooling_of, weigh
+from api.work.machine_cache import is_result, read
+from api.work.requests import MachineText, ToolingSource
+from api.work.toolings import tooling_from, weigh
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.errors import InputError
+from rcsa_ident.machine.machine import Machine
 from rcsa_ident.signals.recording import Recording, Sensor
+from rcsa_ident.units import to_hz, to_rpm
 
-_RPM = 30.0 / math.pi
-#: Buckets of an answer's picture, and samples that one answer may take.
+#: Buckets of an answer's envelope, and most samples of one answer.
 BUCKETS, MOST_SAMPLES = 2000, 8_000_000
-#: The commands' options are other fields here.
-_FIELDS = {"--speed-rpm": "spindle_speed_rpm", "speed": "spindle_speed_rpm", "--idle-percent": "idle_percent", "idle share": "idle_percent"}
 
 ReadPair = Callable[[], tuple[Recording, Recording | None]]
 
 
 @dataclass(frozen=True, slots=True)
 class WornQuestion:
-    """Of which cut the cutting coefficients are asked, revolution by revolution: depth and feed [m], angles [rad]."""
+    """Cut whose cutting coefficients are estimated revolution by revolution: depth and feed [m], angles [rad]."""
 
     axial_depth: float
     feed_per_tooth: float
@@ -38,7 +37,7 @@ class WornQuestion:
 
 @dataclass(frozen=True, slots=True)
 class ForceQuestion:
-    """Forces of a recording.
+    """Query for the forces of a recording.
 
     Parameters
     ----------
@@ -48,7 +47,7 @@ class ForceQuestion:
         resonators or paper.
     smooth : bool
     idle : float or None
-        Share of the time in which no tooth cuts, at least.
+        Least share of the time in which no tooth cuts.
     wear : WornQuestion or None
     """
 
@@ -60,13 +59,13 @@ class ForceQuestion:
 
 
 def sensors_of(text: str) -> tuple[Sensor, ...]:
-    """Return the sensors that a RESULT.json remembers."""
+    """Return the sensors of a RESULT.json."""
     import json
 
     from rcsa_ident.io.forces import sensors_of_result
 
     try:
-        return sensors_of_result(json.loads(text), "")
+        return sensors_of_result(json.loads(text) if is_result(text) else {"sensors": {}}, "")
     except InputError as error:
         if error.field != "sensors":
             raise
@@ -74,7 +73,7 @@ def sensors_of(text: str) -> tuple[Sensor, ...]:
         raise InputError("sensors", found, "a table of sensors, as in campaign.toml") from None
 
 
-def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, source: ReadPair, csv: Path | None = None) -> Any:
+def forces(machine: MachineText, tooling: ToolingSource, question: ForceQuestion, source: ReadPair, csv: Path | None = None) -> Any:
     """Return the forces of a recording as an answer, or write FORCES.csv and return None.
 
     Parameters
@@ -86,7 +85,7 @@ def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, 
     from rcsa_ident.io.forces import write_forces_csv
     from rcsa_ident.observer.force import restore_mean_force
 
-    known, tool = read(machine.text), tooling_of(tooling.text)
+    known, tool = read(machine.text), tooling_from(tooling)
     cut, air = source()
     found = observed(known, tool, cut, air, question.speed, question.method, question.smooth)
     estimate, level = found.estimate, None
@@ -115,10 +114,10 @@ def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, 
         }
         lines[axis.upper()] = _harmonics(force, cut.rate, found.spindle_speed, found.band)
     answer = {
-        "spindle_speed_rpm": found.spindle_speed * _RPM,
+        "spindle_speed_rpm": to_rpm(found.spindle_speed),
         "sampling_rate_hz": cut.rate,
-        "band_hz": [w / (2.0 * math.pi) for w in found.band],
-        "notes": [*_doubts(known), *found.notes],
+        "band_hz": [to_hz(w) for w in found.band],
+        "notes": [*known.remarks, *found.notes],
         "axes": axes,
         "time_s": (begin * estimate.step).tolist(),
         "harmonics": lines,
@@ -128,35 +127,32 @@ def forces(machine: MachineText, tooling: ToolingText, question: ForceQuestion, 
     return answer
 
 
-def observed(known: Known, tool: Any, cut: Recording, air: Recording | None, speed: float | None, method: str, smooth: bool = False) -> Any:
-    """Return a `MonitoredCut`; errors name fields of the query."""
+def observed(
+    machine: Machine, tool: Any, cut: Recording, air: Recording | None, speed: float | None, method: str, smooth: bool = False
+) -> Any:
+    """Return the estimated forces of a cut, a `MonitoredCut`."""
     from rcsa_ident.observer.tuning import PaperWalk, Resonators
     from rcsa_ident.workflows.estimate_forces import observe
 
     samples = cut.samples.shape[0] + (0 if air is None else air.samples.shape[0])
     if samples > MOST_SAMPLES:
         raise InputError("recording", f"{samples} samples", f"at most {MOST_SAMPLES} in one answer, the air cut's among them")
-    low, high = known.data["band_hz"]
-    weigh(tool.assembly, 1.3 * high)
-    band = 2.0 * math.pi * low, 2.0 * math.pi * high
+    assert machine.band is not None
+    weigh(tool.assembly, 1.3 * to_hz(machine.band[1]))
     how = PaperWalk() if method == "paper" else Resonators()
-    try:
-        return observe(known.machine, tool.assembly, tool.cutter.teeth, cut, air, band, speed, how, None, smooth)
-    except InputError as error:
-        allowed = error.allowed.replace(" with --speed-rpm", "")
-        raise type(error)(_FIELDS.get(error.field, error.field), error.found, allowed, error.where) from None
+    return observe(machine, tool.assembly, tool.cutter.teeth, cut, air, speed, how, None, smooth)
 
 
 def _harmonics(force: Any, rate: float, speed: float, band: tuple[float, float]) -> list[dict[str, Any]]:
-    """Amplitudes at the spindle's orders in the band."""
+    """Amplitudes at the harmonics of the spindle frequency in the band."""
     from rcsa_ident.signals.spectra import line_spectrum
 
     if force.size < 4.0 * 2.0 * np.pi / speed * rate:
         return []
-    amplitude = np.abs(line_spectrum(force[:, None], rate, speed, band[1] / (2.0 * np.pi)).amplitude[:, 0])
+    amplitude = np.abs(line_spectrum(force[:, None], rate, speed, to_hz(band[1])).amplitude[:, 0])
     order = np.arange(amplitude.size)
     inside = order[(order * speed >= band[0]) & (order * speed <= band[1])]
-    return [{"order": int(m), "frequency_hz": float(m * speed / (2.0 * np.pi)), "amplitude_n": float(amplitude[m])} for m in inside]
+    return [{"order": int(m), "frequency_hz": float(to_hz(m * speed)), "amplitude_n": float(amplitude[m])} for m in inside]
 
 
 def _wear(found: Any, tool: Any, question: WornQuestion) -> dict[str, Any]:
@@ -165,7 +161,7 @@ def _wear(found: Any, tool: Any, question: WornQuestion) -> dict[str, Any]:
     from rcsa_ident.workflows.estimate_forces import wear_of
 
     if set(found.estimate.axes) != {Dof.X, Dof.Y}:
-        raise InputError("cut", f"forces of axis {', '.join(found.estimate.axes)} alone", "wear from forces of both axes, X and Y")
+        raise InputError("cut", f"forces of axis {', '.join(found.estimate.axes)} only", "forces of both axes, X and Y")
     cut = CuttingConditions(found.spindle_speed, question.axial_depth, question.feed_per_tooth, question.engagement, question.feed_angle)
     worn = wear_of(found, tool.cutter, cut)
     slope, slope_std = worn.trend()
@@ -180,11 +176,6 @@ def _wear(found: Any, tool: Any, question: WornQuestion) -> dict[str, Any]:
             "unit": unit,
         }
     return {"coefficients": rows, "separable": bool(worn.separable), "misfit": float(worn.misfit)}
-
-
-def _doubts(known: Known) -> list[str]:
-    data = known.data
-    return [] if data["status"] == "converged" else [f"the identification is {data['status']}: {'; '.join(data['reasons'])}"]
 
 
 def _check_finite(value: Any) -> None:

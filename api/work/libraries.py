@@ -1,4 +1,4 @@
-"""Tool libraries of CAM programs as toolings of the library here."""
+"""Import of tool libraries of CAM programs."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from api.work.toolings import tooling_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.tool_libraries import Assumptions, import_tools
 
-#: Largest library, and most entries in one.
+#: Largest library [bytes], and most entries in one.
 LARGEST_LIBRARY, MOST_TOOLS = 8_000_000, 2000
 
 
 def imported(raw: bytes, assumptions: Assumptions, contact: str | None) -> list[tuple[str, str, tuple[str, ...], str]]:
-    """Return name, text, assumptions, and the reason where there is no text, of every entry of a library.
+    """Return for every entry of a library its name, text and assumptions, and the reason where it has no text.
 
     Parameters
     ----------
     raw : bytes
-        JSON, or the container that it comes in.
+        JSON, or a .tools container.
     assumptions : Assumptions
     contact : str or None
-        Text of a tooling whose contact joins all tools and holders.
+        Text of the tooling whose contact parameters all toolings get.
     """
     if contact is not None:
         known = tooling_of(contact).assembly.contact
@@ -35,7 +35,7 @@ def imported(raw: bytes, assumptions: Assumptions, contact: str | None) -> list[
 
 
 def library_names(names: list[str]) -> list[str]:
-    """Return names as the library of toolings takes them, no two alike.
+    """Return unique names that the library of toolings accepts.
 
     Examples
     --------

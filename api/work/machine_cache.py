@@ -1,96 +1,53 @@
-"""Identified machines that a worker knows: read once, checked, and kept while they are asked for."""
+"""Machines that a worker knows: read once, checked, and kept while they are asked for."""
 
 from __future__ import annotations
 
 import json
 from collections import OrderedDict
-from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
 import numpy as np
 
-from api.work.machine_side import MachineSide
 from api.work.requests import MachineText
-from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
+from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.io.identifications import machine_from_json, speed_bands_from_json
+from rcsa_ident.io.flanges import flange_machine_of
+from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import check_result
-from rcsa_ident.workflows.speeds import MachineOverSpeed
+from rcsa_ident.machine.machine import LOWEST, Machine
+from rcsa_ident.units import from_hz, to_hz
 
-#: As with `lobes`: lower end of the receptances that limits are computed from, and their step [Hz].
-LOWEST, STEP = 100.0, 1.0
-#: Seconds for a line and an unknown, and how many of both together are kept (100 bytes each).
-SPREAD_COST, MOST_KEPT = 1e-5, 1_000_000
 #: What the service takes; the largest campaigns stay far below.
 HIGHEST_HZ, MOST_MODES, MOST_UNKNOWNS, MOST_RIVALS, MOST_BANDS = 20_000.0, 60, 600, 20, 20
 
 
-@dataclass(slots=True, eq=False)
-class Known:
-    """A machine, with what is kept of it.
+class MachineCache:
+    """The machines that were asked for last.
 
     Parameters
     ----------
-    machine : MachineOverSpeed
-    data : dict
-        The content of RESULT.json.
-    sides : dict of bool to MachineSide
-        With and without the posterior.
+    most : int
     """
-
-    machine: MachineOverSpeed
-    data: dict[str, Any]
-    sides: dict[bool, MachineSide] = field(default_factory=dict)
-
-    @property
-    def steady(self) -> bool:
-        """Whether it is the same at all speeds."""
-        return not self.machine.bands and self.machine.speed_range is None
-
-    @property
-    def unknowns(self) -> int:
-        """Directions of the posterior of all axes of the machine that has most of them."""
-        machines = (self.machine.whole, *(band for _, band in self.machine.bands))
-        return max(sum(0 if part.posterior is None else part.posterior.theta.size for part in each.values()) for each in machines)
-
-    def spread_seconds(self, lines: int) -> float:
-        """Return about how long the posterior takes to a tip's receptance of so many lines without anything kept [s]."""
-        return SPREAD_COST * self.unknowns * lines
-
-    @property
-    def quick(self) -> bool:
-        """Whether the machine's side of the coupling can be kept: it is the same at all speeds, and not too large."""
-        return self.steady and self.unknowns * self.omega().size <= MOST_KEPT
-
-    def omega(self, beyond: float = 1.0) -> FloatArray:
-        """Return the frequencies [rad/s] of the receptances, up to so many times the highest that was identified."""
-        low, high = self.data["band_hz"]
-        return 2.0 * np.pi * np.arange(min(LOWEST, low), beyond * high + 0.5 * STEP, STEP)
-
-    def side(self, bands: bool) -> MachineSide:
-        """Return the machine's side of the coupling; of a steady machine only."""
-        if bands not in self.sides:
-            self.sides[bands] = MachineSide.of(self.machine.whole, self.omega(), bands)
-        return self.sides[bands]
-
-
-class Shelf:
-    """The machines that were asked for last."""
 
     def __init__(self, most: int) -> None:
         self.most = most
-        self.machines: OrderedDict[str, Known] = OrderedDict()
+        self.machines: OrderedDict[str, Machine] = OrderedDict()
 
-    def get(self, machine: MachineText) -> Known:
-        """Return a machine, read if it is not known."""
-        if machine.digest not in self.machines:
-            self.machines[machine.digest] = read(machine.text)
+    def get(self, machine: MachineText, spread: bool = True) -> Machine:
+        """Return a machine, read if it is not known, with what many toolings share worked out; of its spread only where it is wanted."""
+        known = self.machines.get(machine.digest) or read(machine.text)
+        self.machines[machine.digest] = known = known.kept(spread)
         self.machines.move_to_end(machine.digest)
         while len(self.machines) > self.most:
             self.machines.popitem(last=False)
-        return self.machines[machine.digest]
+        return known
+
+
+def is_result(text: str) -> bool:
+    """Return whether a text is a RESULT.json; else it is a FLANGE.csv."""
+    return text.lstrip()[:1] == "{"
 
 
 def parsed(text: str) -> dict[str, Any]:
@@ -124,41 +81,46 @@ def parsed(text: str) -> dict[str, Any]:
     return data
 
 
-def read(text: str) -> Known:
-    """Return a machine whose receptances are finite."""
-    data = parsed(text)
-    machine = MachineOverSpeed(machine_from_json(data, ""), speed_bands_from_json(data, ""))
-    known = Known(machine, data)
-    ends = 2.0 * np.pi * np.array([LOWEST, 0.5 * data["band_hz"][1] + 1.0, data["band_hz"][1]])
-    for each in (machine.whole, *(band for _, band in machine.bands)):
-        try:
-            with np.errstate(all="ignore"):
-                axes = MachineSide.of(each, ends).axes.values()
-            finite = all(
-                np.all(np.isfinite(part)) for side in axes for part in (side.nominal, side.ahead, side.behind, side.rivals, side.weight)
-            )
-        except (ArithmeticError, np.linalg.LinAlgError, InputError):
-            finite = False
-        if not finite:
-            raise InputError("axes", "unknowns or modes without a finite receptance", "a machine that the reader of results can compute")
-    return known
+def read(text: str) -> Machine:
+    """Return a machine whose receptances are finite, of a RESULT.json or a FLANGE.csv."""
+    if not is_result(text):
+        machine = flange_machine_of(text)
+        if to_hz(machine.band[1]) > HIGHEST_HZ:
+            raise InputError("frequency_hz", f"up to {to_hz(machine.band[1]):g} Hz", f"at most {HIGHEST_HZ:g} Hz")
+        return machine
+    identified = machine_from_json(parsed(text), "")
+    ends = np.array([from_hz(LOWEST), 0.5 * identified.band[1] + 1.0, identified.band[1]])
+    speeds = [None, *(0.5 * (low + high) for (low, high), _ in identified.speed_models)]
+    if not all(_finite(identified.at(speed), ends) for speed in speeds):
+        raise InputError("axes", "unknowns or modes without a finite receptance", "a machine that the reader of results can compute")
+    return identified
 
 
-def posteriors(data: dict[str, Any]) -> dict[Dof, Posterior]:
-    """Return what an identification may go on from.
+def posteriors(text: str) -> dict[Dof, Posterior]:
+    """Return what an identification may go on from, axis by axis.
 
     Raises
     ------
     InputError
-        There is none, as with the published method.
+        There is none: a measured flange, or a result of the published method.
     """
-    found = {}
-    for axis, part in machine_from_json(data, "").items():
-        if part.posterior is None:
-            allowed = "a result of the default method, with unknowns and covariance of each axis"
-            raise InputError("start", f"axis {axis.upper()} without a covariance (method {data['method']})", allowed)
-        found[axis] = part.posterior
-    return found
+    if not is_result(text):
+        raise InputError("start", "a measured flange", "a machine with an identification by the default method")
+    try:
+        return machine_from_json(json.loads(text), "").posteriors()
+    except InputError as error:
+        raise InputError("start", f"{error.field}: {error.found}", error.allowed) from None
+
+
+def _finite(machine: IdentifiedMachine, omega: np.ndarray) -> bool:
+    try:
+        with np.errstate(all="ignore"):
+            sides = [side.kept() for side in machine.sides(omega)]
+    except (ArithmeticError, np.linalg.LinAlgError, InputError):
+        return False
+    ends = [part for side in sides if side.ends is not None for part in (side.ends.ahead, side.ends.behind)]
+    kept = [*ends, *(part for side in sides for part in (side.nominal, side.rivals))]
+    return all(np.all(np.isfinite(part)) for part in kept)
 
 
 def _limits(data: dict[str, Any]) -> None:

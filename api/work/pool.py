@@ -1,54 +1,53 @@
-"""Worker processes for what computes: the event loop never does, and a full queue says so at once."""
+"""Worker processes for computations, which never run in the event loop; a full queue refuses at once."""
 
 from __future__ import annotations
 
 import asyncio
-import multiprocessing
-import os
-import threading
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Protocol, TypeVar
 
+from api.processes import follow_parent, spawn_context
+
 T = TypeVar("T")
 
 
 class Busy(Exception):
-    """More work waits than is allowed, or a worker has just died."""
+    """The queue is full, or a worker has just died."""
 
 
 class Work(Protocol):
-    """Where questions are computed."""
+    """Executor of calls in processes of its own."""
 
     async def run(self, call: Callable[..., T], *arguments: Any) -> T:
-        """Return what a call answers; raises `Busy` where too many wait."""
+        """Return the answer of a call; raises `Busy` where the queue is full, `InputError` where the input is at fault."""
 
     @property
     def waiting(self) -> int:
-        """Questions that have no answer yet."""
+        """Number of calls without an answer yet."""
 
     @property
     def ready(self) -> bool:
-        """Whether workers are there."""
+        """Whether there is a process that answers."""
 
     def start(self) -> None:
-        """Start workers."""
+        """Start the processes."""
 
     def stop(self) -> None:
-        """End workers."""
+        """End the processes."""
 
 
 class Pool:
-    """Spawned processes: nothing of the server's threads or locks is inherited.
+    """Pool of spawned worker processes.
 
     Parameters
     ----------
     workers : int
     queue : int
-        Questions that may wait beyond those at work.
+        Calls that may wait beyond the running ones.
     machines : int
-        That each worker keeps.
+        Machines that each worker caches.
     """
 
     def __init__(self, workers: int, queue: int, machines: int) -> None:
@@ -62,15 +61,11 @@ class Pool:
         return self.warm > 0
 
     def start(self) -> None:
-        # each worker computes on one core; read by the libraries when they are first imported there
-        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-            os.environ.setdefault(name, "1")
-        context = multiprocessing.get_context("spawn")
-        self.executor = ProcessPoolExecutor(self.workers, context, initializer=_begin, initargs=(self.machines,))
+        self.executor = ProcessPoolExecutor(self.workers, spawn_context(), initializer=_begin, initargs=(self.machines,))
         self.warm = 0
         for _ in range(self.workers):
             self.executor.submit(warm).add_done_callback(self._warmed)
-        # behind what is asked for meanwhile, so that nobody waits for it
+        # queued last, so that nobody waits for it
         for _ in range(self.workers):
             self.executor.submit(warm_observer)
 
@@ -86,7 +81,7 @@ class Pool:
         try:
             return await asyncio.wrap_future(executor.submit(guarded, call, *arguments))
         except BrokenProcessPool as error:
-            # a worker was killed, perhaps for its memory: all that waited is lost, and told so
+            # a worker was killed, perhaps for its memory: all waiting calls fail, and the pool is replaced
             if self.executor is executor:
                 executor.shutdown(wait=False, cancel_futures=True)
                 self.start()
@@ -102,22 +97,15 @@ class Pool:
 
 
 def _begin(machines: int) -> None:
-    """In a new worker: import what answers, and end with the service, however that ends."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def follow() -> None:
-        parent.join()
-        os._exit(1)
-
-    threading.Thread(target=follow, daemon=True).start()
+    """In a new worker: follow the service, and import the tasks."""
+    follow_parent()
     from api.work import tasks
 
     tasks.keep(machines)
 
 
 def guarded(call: Callable[..., T], *arguments: Any) -> T:
-    """Return what a call answers; numbers that are each allowed but lead nowhere together are told as bad input."""
+    """Return the answer of a call; numbers that are valid each but have no finite answer together are bad input."""
     import numpy as np
 
     from rcsa_ident.errors import InputError
@@ -134,7 +122,7 @@ def guarded(call: Callable[..., T], *arguments: Any) -> T:
 
 
 def warm() -> None:
-    """Run a small job through every kernel that a quick answer needs, so that they are compiled, or read from the cache."""
+    """Compile the kernels of quick answers, or load them from the cache."""
     from rcsa_ident.workflows.compile_kernels import STEPS
 
     for step in ("tool-holder", "lobes"):
@@ -142,7 +130,7 @@ def warm() -> None:
 
 
 def warm_observer() -> None:
-    """The same for what an observer of forces is made with: a stream waits for it."""
+    """Compile the kernels of the design of force observers, which a stream waits for."""
     from rcsa_ident.workflows.compile_kernels import STEPS
 
     STEPS["force observer"]()

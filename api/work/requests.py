@@ -1,12 +1,20 @@
-"""What a query asks, in SI: plain nouns that cross processes."""
+"""What a query asks, in SI: plain nouns that cross processes and outlive them in a job."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
-from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.cutting.process import ProcessDamping
+import numpy as np
+
 from rcsa_ident.errors import InputError
+from rcsa_ident.machine.machine import TipSource
+from rcsa_ident.machining_setup import CutSpec, Tooling
+from rcsa_ident.stability.lobes import DRAWS
+from rcsa_ident.stability.methods import method_named
+from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict
+from rcsa_ident.workflows.tool_change import ToolChange
 
 
 class TooLong(InputError):
@@ -26,27 +34,25 @@ class TooLong(InputError):
         return type(self), (self.field, self.found, self.allowed, self.where, self.seconds)
 
 
-METHODS = ("zero-order", "multi-frequency", "semi-discretisation", "full-discretisation", "time-domain")
-
-
 @dataclass(frozen=True, slots=True)
 class MachineText:
-    """An identification as it is kept; the digest tells a worker whether it knows it already."""
+    """What is known of a machine, as it is kept: RESULT.json or FLANGE.csv; the digest tells a worker whether it knows it already."""
 
     digest: str
     text: str
 
 
 @dataclass(frozen=True, slots=True)
-class ToolingText:
-    """A tooling's TOML, and what the answer calls it."""
+class ToolingSource:
+    """A tooling as a file's text or as the keys of one, and what the answer calls it."""
 
     name: str
-    text: str
+    text: str = ""
+    keys: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class TipQuestion:
+class TipRequest:
     """Tooltip FRF.
 
     Parameters
@@ -72,42 +78,16 @@ class TipQuestion:
 
 
 @dataclass(frozen=True, slots=True)
-class CutQuestion:
-    """What cuts, and how.
-
-    Parameters
-    ----------
-    engagement : Engagement
-    feed_angle : float [rad]
-    feed_per_tooth : float or None [m]
-    material : str or None
-        Of the library; None is the identification's workpiece.
-    coefficients : tuple of (field of CuttingCoefficients, value in SI)
-        Over those.
-    runout : tuple of float or None [m]
-    damping : ProcessDamping or None
-    """
-
-    engagement: Engagement
-    feed_angle: float = 0.0
-    feed_per_tooth: float | None = None
-    material: str | None = None
-    coefficients: tuple[tuple[str, float], ...] = ()
-    runout: tuple[float, ...] | None = None
-    damping: ProcessDamping | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class LobeQuestion:
+class LobeRequest:
     """Stability limits.
 
     Parameters
     ----------
-    cut : CutQuestion
+    cut : CutSpec
     speeds : tuple of float [rad/s], rising
     max_depth : float [m]
     method : str
-        One of `METHODS`.
+        One of `stability.methods.METHODS`.
     bands : bool
     stiffness_spread : float
     work_seconds : float [s]
@@ -116,7 +96,7 @@ class LobeQuestion:
         Cuts that were tried.
     """
 
-    cut: CutQuestion
+    cut: CutSpec
     speeds: tuple[float, ...]
     max_depth: float
     method: str
@@ -125,14 +105,28 @@ class LobeQuestion:
     work_seconds: float
     tested: tuple[tuple[float, float, str], ...] = ()
 
+    def change(self, machine: TipSource, tooling: Tooling) -> ToolChange:
+        """Return the question for a machine and a tooling."""
+        draws = DRAWS if self.bands else 0
+        method = method_named(self.method)
+        return ToolChange(machine, tooling, self.cut, np.array(self.speeds), self.max_depth, method, draws, self.stiffness_spread)
+
+    @property
+    def tested_cuts(self) -> TestedCuts | None:
+        """The cuts that were tried, if there are some."""
+        if not self.tested:
+            return None
+        speed, depth, verdict = zip(*self.tested, strict=True)
+        return TestedCuts(np.array(speed), np.array(depth), tuple(Verdict(each) for each in verdict))
+
 
 @dataclass(frozen=True, slots=True)
-class AdviceQuestion:
+class AdviceRequest:
     """What a machinist asks of lobes.
 
     Parameters
     ----------
-    lobes : LobeQuestion
+    lobes : LobeRequest
     max_power : float or None [W]
     max_torque : float or None [N m]
     max_speed : float or None [rad/s]
@@ -143,7 +137,7 @@ class AdviceQuestion:
     planned : tuple of (speed [rad/s], depth [m])
     """
 
-    lobes: LobeQuestion
+    lobes: LobeRequest
     max_power: float | None = None
     max_torque: float | None = None
     max_speed: float | None = None
@@ -151,4 +145,4 @@ class AdviceQuestion:
     probability: float = 0.95
     reserve: float = 0.1
     depth: float | None = None
-    planned: tuple[tuple[float, float], ...] = field(default=())
+    planned: tuple[tuple[float, float], ...] = ()

@@ -6,16 +6,15 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
+from api.work.requests import ToolingSource
 from rcsa_ident.errors import InputError
 from rcsa_ident.io import setups
 from rcsa_ident.machining_setup import Tooling
-from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
-from rcsa_ident.tool_holder.model import ELEMENTS_PER_DIAMETER, ELEMENTS_PER_TAPER, ELEMENTS_PER_WAVELENGTH
-from rcsa_ident.tool_holder.timoshenko import cowper, section
+from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.tool_holder.model import expected_elements
 
 #: Largest text of a tooling.
 LARGEST = 256_000
@@ -26,6 +25,12 @@ MOST_ELEMENTS = 400
 def tooling_of(text: str) -> Tooling:
     """Return the tooling of a TOML text; errors name key or line."""
     return setups.tooling_of(parsed(text), "", "tooling")
+
+
+def tooling_from(source: ToolingSource) -> Tooling:
+    """Return a tooling of a query, called as there; errors name key or line."""
+    tooling = tooling_of(source.text) if source.keys is None else setups.tooling_of(source.keys, "", "tooling")
+    return replace(tooling, name=source.name)
 
 
 def parsed(text: str) -> dict[str, Any]:
@@ -40,18 +45,10 @@ def parsed(text: str) -> dict[str, Any]:
 
 def weigh(assembly: ToolAssembly, highest_hz: float) -> None:
     """Refuse a tooling whose finite elements at the highest frequency would be too many."""
-    count = sum(_elements(segment, highest_hz) for segment in (*assembly.tool, *assembly.holder))
+    count = expected_elements(assembly, highest_hz)
     if not count <= MOST_ELEMENTS:
         found = f"about {count:.3g} finite elements up to {highest_hz:.0f} Hz"
         raise InputError("segments", found, f"at most {MOST_ELEMENTS}: fewer tapers, or nothing so thin for its length")
-
-
-def _elements(segment: BeamSegment, highest_hz: float) -> float:
-    beam = section(segment.part(0.0, segment.length), cowper)
-    wavelength = 2.0 * np.pi * float((beam.bending / beam.mass) ** 0.25) / np.sqrt(2.0 * np.pi * highest_hz)
-    # a taper is as fine as its thinner end asks for
-    density = max(ELEMENTS_PER_WAVELENGTH / wavelength, ELEMENTS_PER_DIAMETER / min(segment.diameter, segment.end))
-    return max(segment.length * density, 2.0 if segment.end_diameter is None else ELEMENTS_PER_TAPER)
 
 
 def toml_of(data: Mapping[str, Any]) -> str:

@@ -39,9 +39,9 @@ app = typer.Typer(
 #: In the order of the work, under headings.
 _COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
     "Identification": (demo.demo, identify.check, identify.identify, plan.plan, export.export),
-    "Any tool": (lobes.tooltip, lobes.lobes, advice.advise, cases.cases, forces.forces, tools.import_tools, tools.draw),
-    "Measurements beside": (calibrate.calibrate, calibrate.materials, compare.compare, decouple.decouple, contact.contact),
-    "Virtual machine, set-up": (machine.simulate, machine.warm),
+    "Tool change": (lobes.tooltip, lobes.lobes, advice.advise, cases.cases, forces.forces, tools.import_tools, tools.draw),
+    "Further measurements": (calibrate.calibrate, calibrate.materials, compare.compare, decouple.decouple, contact.contact),
+    "Virtual machine and set-up": (machine.simulate, machine.warm),
 }
 for _title, _commands in _COMMANDS.items():
     for _command in _commands:
@@ -50,7 +50,7 @@ for _title, _commands in _COMMANDS.items():
 
 def _version(asked: bool) -> None:
     if asked:
-        from rcsa_ident import __version__
+        from rcsa_ident.version import __version__
 
         typer.echo(f"rcsa-ident {__version__}")
         raise typer.Exit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
@@ -44,10 +45,10 @@ def calibrate(
         CalibrationMethod, typer.Option(help="Mean forces over the feed, or the whole force over time.")
     ] = CalibrationMethod.mean,
     plot: Annotated[Path | None, typer.Option(help="Figure of the mean forces (png, svg, pdf).", show_default=False)] = None,
-    max_frequency: Annotated[float, typer.Option(help="Highest line of the signal's fit, Hz.")] = 2000.0,
-    dynamometer: Annotated[SensorModel, typer.Option(help="What to find of the dynamometer, with the signal's fit.")] = SensorModel.none,
-    resonance: Annotated[float, typer.Option(help="Its bandwidth or resonance to start from, Hz.")] = 3000.0,
-    free_helix: Annotated[bool, typer.Option(help="Find the helix, too (signal).")] = False,
+    max_frequency: Annotated[float, typer.Option(help="Highest line that method signal fits, Hz.")] = 2000.0,
+    dynamometer: Annotated[SensorModel, typer.Option(help="Model of the dynamometer that method signal fits.")] = SensorModel.none,
+    resonance: Annotated[float, typer.Option(help="First guess of the dynamometer's bandwidth or resonance, Hz.")] = 3000.0,
+    free_helix: Annotated[bool, typer.Option(help="Fit the helix angle as well (method signal).")] = False,
     json_: Json = False,
 ) -> None:
     """Find cutting and edge coefficients from dynamometer records of cuts at several feeds."""
@@ -127,7 +128,7 @@ def _summary(found: Calibrated) -> dict[str, Any]:
         data["signal"] = {
             "sensor_axes": signal.axes.tolist(),
             "runout_um": {name: (1e6 * offsets).tolist() for name, offsets in signal.runout.items()},
-            "helix_deg": None if signal.helix is None else signal.helix * 57.29577951308232,
+            "helix_deg": None if signal.helix is None else math.degrees(signal.helix),
             "dynamometer": signal.sensor.tolist(),
         }
     return data
@@ -147,7 +148,7 @@ def _show(found: Calibrated) -> None:
         table.add_row(name, f"{value * factor:.5g}", f"{width * factor:.2g}", unit)
     out = console()
     out.print(table)
-    out.print(f"left unexplained: {100.0 * forces.misfit:.2g} % of the force")
+    out.print(f"unexplained: {100.0 * forces.misfit:.2g} % of the force")
     if found.signal is not None:
         for name, offsets in found.signal.runout.items():
             out.print(f"run-out of {name}: {', '.join(f'{1e6 * o:+.2f}' for o in offsets)} µm", markup=False)

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn
-from rcsa_ident.cli.conditions import Subject, coefficients, idle_tip, speeds_of
-from rcsa_ident.cli.lobes import Plot, ResultFile, check_plot, judged
+from rcsa_ident.cli.conditions import change_of, cut_of, idle_tip
+from rcsa_ident.cli.lobes import Plot, ResultFile, check_plot
 from rcsa_ident.cli.options import CutOptions, SpeedOptions, takes_groups
-from rcsa_ident.cli.results import read_machine_over_speed
+from rcsa_ident.cli.results import read_machine
 
 if TYPE_CHECKING:
     from rcsa_ident.arrays import FloatArray
     from rcsa_ident.io.cases import Case
-    from rcsa_ident.report.lobes import Judged, Panel
-    from rcsa_ident.workflows.lobes import LobeConditions
+    from rcsa_ident.report.lobes import Panel
+    from rcsa_ident.stability.tested_cuts import Tally
+    from rcsa_ident.workflows.tool_change import ToolChange
 
 
 @answers
@@ -35,40 +36,38 @@ def cases(
     json_: Json = False,
 ) -> None:
     """Count tested cuts of several toolings and cuts beside the lobes, and draw all of them in one figure."""
-    from rcsa_ident.cutting.process import MillingProcess
     from rcsa_ident.io.cases import read_cases
-    from rcsa_ident.report.lobes import Panel, cases_figure, save_figure
+    from rcsa_ident.report.lobes import Judged, Panel, cases_figure, save_figure
+    from rcsa_ident.report.summaries import tally_summary
+    from rcsa_ident.workflows.tool_change import classify_tested_cuts
 
     check_plot(plot)
     found = read_cases(file)
-    machine, data = read_machine_over_speed(result)
-    known = coefficients(CutOptions(ktc_mpa=ktc_mpa, krc=krc), (data, str(result)))
+    machine = read_machine(result)
+    coefficients = cut_of(CutOptions(ktc_mpa=ktc_mpa, krc=krc))
     stages = Stages(quiet=json_)
     panels: list[Panel] = []
-    rows: list[tuple[str, Judged | None, Judged | None]] = []
-    doubts: list[str] = []
+    rows: list[tuple[str, Tally | None, Tally | None]] = []
+    remarks: list[str] = []
     with stages.stage("lobes") as line:
         for i, case in enumerate(found):
             line(i, len(found))
-            subject = Subject(case.tooling, machine, data, None, 0.0)
-            process = MillingProcess(case.tooling.cutter, known, case.engagement, case.feed_angle, case.feed_per_tooth)
-            conditions = speeds_of(speeds, process)
-            limits = subject.limits(conditions, False)
-            doubts += [f"{case.name}: {doubt}" for doubt in subject.doubts(limits)]
-            own = None if case.cuts is None else judged(case.cuts, subject, conditions)
-            idle, others = _idle(case, subject, conditions) if case.idle else (None, {})
-            panels.append(Panel(case.name, limits.lobes, conditions.max_depth, others, own))
+            cut = replace(coefficients, engagement=case.engagement, feed_angle=case.feed_angle, feed_per_tooth=case.feed_per_tooth)
+            change = change_of(machine, case.tooling, cut, speeds, False, 0.0)
+            lobes = change.limits()
+            remarks += [f"{case.name}: {remark}" for remark in change.remarks(lobes)]
+            own = None if case.cuts is None else classify_tested_cuts(change, case.cuts)
+            idle, others = _idle(case, change) if case.idle else (None, {})
+            panels.append(Panel(case.name, lobes, others, None if case.cuts is None or own is None else Judged(case.cuts, own)))
             rows.append((case.name, own, idle))
     if plot is not None:
         save_figure(cases_figure(panels), str(plot))
     if json_:
+        told = [(name, (("tested", own), ("tested_idle", idle))) for name, own, idle in rows]
         emit(
             {
-                "cases": [
-                    {"name": name, **{key: _summary(each) for key, each in (("tested", own), ("tested_idle", idle)) if each is not None}}
-                    for name, own, idle in rows
-                ],
-                "warnings": doubts,
+                "cases": [{"name": name, **{key: tally_summary(t) for key, t in tallies if t is not None}} for name, tallies in told],
+                "warnings": remarks,
                 "seconds": stages.seconds,
                 **({} if plot is None else {"plot": str(plot)}),
             }
@@ -76,19 +75,23 @@ def cases(
         return
     from rcsa_ident.cli.tables import show_cases
 
-    show_cases([(name, None if own is None else own.tally, None if idle is None else idle.tally) for name, own, idle in rows])
-    for doubt in doubts:
-        warn(doubt)
+    show_cases(rows)
+    for remark in remarks:
+        warn(remark)
     if plot is not None:
         say(f"drawn: {plot}")
 
 
-def _idle(case: Case, subject: Subject, conditions: LobeConditions) -> tuple[Judged | None, dict[str, FloatArray]]:
+def _idle(case: Case, change: ToolChange) -> tuple[Tally | None, dict[str, FloatArray]]:
     """What tap tests of the same tooling say of its cuts."""
-    other = replace(subject, machine=None, data={}, tip=idle_tip(case.idle))
-    limit = other.limits(conditions, False).lobes.limit_depth
-    return None if case.cuts is None else judged(case.cuts, other, conditions), {"from tap tests": limit}
+    from rcsa_ident.machine.known_tip import KnownTip
+    from rcsa_ident.workflows.tool_change import classify_tested_cuts
 
-
-def _summary(each: Judged) -> dict[str, float]:
-    return asdict(each.tally) | {"share_right": each.tally.share_right}
+    # the cut's coefficients are the identified workpiece's where the case names none
+    process = change.process
+    cut = replace(
+        change.cut, coefficients={"tangential": process.coefficients.tangential, "radial_ratio": process.coefficients.radial_ratio}
+    )
+    idle = replace(change, machine=KnownTip(idle_tip(case.idle)), cut=cut)
+    tally = None if case.cuts is None else classify_tested_cuts(idle, case.cuts)
+    return tally, {"from tap tests": idle.limits().limit_depth}

@@ -7,7 +7,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -25,6 +25,20 @@ FAILED, BAD_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object for machines instead of tables.")]
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same answer, on any number of processes.")]
 
+#: The library's fields, the parameter of a command that gives each, and how its option is written where that needs words.
+_OPTIONS = {
+    "spindle_speed": ("speed_rpm", ""),
+    "idle share": ("idle_percent", ""),
+    "speed_bands": ("speed_bands", ""),
+    "frf": ("frf", "X=FILE, Y=FILE, XY=FILE for a response in X and a force in Y; FILE#3 is record 3 of the file"),
+    "frf_units": ("frf_units", ""),
+    "stickout": ("stickout_mm", ""),
+    "tangential coefficient": ("ktc_mpa", "in MPa"),
+    "radial ratio": ("krc", ""),
+    "runout": ("runout_um", "in um"),
+    "feed_per_tooth": ("feed_per_tooth_mm", "in mm"),
+}
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
@@ -35,18 +49,26 @@ def answers(command: Command) -> Command:
     def wrapped(*args: Any, **kwargs: Any) -> Any:
         try:
             return command(*args, **kwargs)
-        except InputError as error:
+        except InputError as found:
+            error = _in_options(found, kwargs)
             _refuse(str(error), BAD_INPUT, kwargs.get("json_"), {"field": error.field, "where": error.where})
         except RcsaIdentError as error:
             _refuse(str(error), FAILED, kwargs.get("json_"), {})
         except BrokenProcessPool:
-            _refuse(
-                "a worker process was ended from outside (out of memory?); fewer --processes need less", FAILED, kwargs.get("json_"), {}
-            )
+            _refuse("a worker process was killed (out of memory?); use fewer --processes", FAILED, kwargs.get("json_"), {})
         except KeyboardInterrupt:
             _refuse("interrupted: nothing was written", INTERRUPTED, kwargs.get("json_"), {})
 
     return wrapped  # type: ignore[return-value]
+
+
+def _in_options(error: InputError, given: Mapping[str, Any]) -> InputError:
+    """Return an error of the library with the option that the user wrote, if the command has one for its field."""
+    parameter, form = _OPTIONS.get(error.field, ("", ""))
+    if parameter not in given:
+        return error
+    allowed = f"{error.allowed} ({form})" if form else error.allowed
+    return InputError("--" + parameter.replace("_", "-"), error.found, allowed, error.where)
 
 
 def _refuse(sentence: str, code: int, as_json: bool | None, details: dict[str, Any]) -> None:
@@ -143,18 +165,3 @@ def writable(path: Path, option: str = "--out") -> Path:
     if not os.access(path.parent, os.W_OK):
         raise InputError(option, "a folder without permission to write", "a file that can be written", str(path))
     return path
-
-
-def inclusive(first: float, last: float, step: float, names: tuple[str, str, str], unit: str) -> Any:
-    """Return first, first + step, ... up to last, which is one of them if the steps meet it."""
-    import numpy as np
-
-    for name, value in zip(names, (first, last, step), strict=True):
-        if not (value > 0.0 and value - value == 0.0):
-            raise InputError(name, value, f"a finite number above 0 [{unit}]")
-    if last < first:
-        raise InputError(names[1], last, f"{names[0]} ({first:g}) or more [{unit}]")
-    count = int(np.floor((last - first) / step * (1.0 + 1e-12) + 1e-9)) + 1
-    if count > 1_000_000:
-        raise InputError(names[2], step, f"a step that gives at most 1000000 values [{unit}]")
-    return first + step * np.arange(count)

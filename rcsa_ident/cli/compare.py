@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +9,7 @@ import typer
 
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.lobes import ResultFile, ToolingFile
+from rcsa_ident.units import from_hz, from_rpm, to_hz
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,7 +32,7 @@ def compare(
         list[str],
         typer.Option(
             help="FRF file of a hammer test (CSV, UFF 58, text columns), or PLACE=FILE with PLACE tip (default), cross (force at the tip, "
-            "response at the spindle's flange), spindle (at the flange, tooling clamped) or flange (no tooling). May be given again.",
+            "response at the spindle's flange), spindle (at the flange, tooling clamped) or flange (no tooling). May be repeated.",
             show_default=False,
         ),
     ],
@@ -48,7 +48,7 @@ def compare(
     """Show a hammer test of the idle machine beside the dynamics identified in process."""
     import numpy as np
 
-    from rcsa_ident.cli.results import read_machine_over_speed
+    from rcsa_ident.cli.results import read_machine, tell
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.errors import InputError, positive
     from rcsa_ident.io.hammer import labelled, read_hammer
@@ -65,15 +65,16 @@ def compare(
             key = (Place(place), Dof(axis.lower()))
             if key in tests:
                 raise InputError("--hammer", f"two tests {place} {axis}", "one for each place and axis", str(path))
-            tests[key] = (2.0 * np.pi * np.asarray(frequency), values)
-    machine, data = read_machine_over_speed(result)
-    omega = None if speed is None else positive("--speed", speed, "rev/min") * math.pi / 30.0
-    band = data["band_hz"][0] * 2.0 * math.pi, data["band_hz"][1] * 2.0 * math.pi
+            tests[key] = (from_hz(np.asarray(frequency)), values)
+    machine = read_machine(result)
+    tell(machine, result)
+    omega = None if speed is None else from_rpm(positive("--speed", speed, "rev/min"))
     stages = Stages(quiet=json_)
     with stages.stage("comparison"):
-        found = run(machine.at(omega), tests, read_tooling(tooling).assembly, band, omega)
+        found = run(machine, tests, read_tooling(tooling).assembly, omega)
     if out is not None:
-        _draw(found, out, (data["band_hz"][0], data["band_hz"][1]), real_imaginary)
+        assert machine.band is not None
+        _draw(found, out, (to_hz(machine.band[0]), to_hz(machine.band[1])), real_imaginary)
     if json_:
         emit({"responses": [_row(each) for each in found], "seconds": stages.seconds, "out": None if out is None else str(out)})
         return
@@ -86,22 +87,19 @@ def compare(
 
 
 def _draw(found: Sequence[ResponseComparison], out: Path, band: tuple[float, float], real_imaginary: bool) -> None:
-    import numpy as np
-
     from rcsa_ident.report.comparison import FrfPair, frf_comparison, save
 
-    hertz = 1.0 / (2.0 * np.pi)
     pairs = [
         FrfPair(
             f"{_TITLES[each.place]}, {each.axis.upper()}",
             each.axis.upper(),
-            each.omega * hertz,
+            to_hz(each.omega),
             each.identified,
-            each.omega * hertz,
+            to_hz(each.omega),
             each.hammer,
             each.deviation,
-            [(h.frequency * hertz, None if i is None else i.frequency * hertz) for h, i in each.modes],
-            (each.band_frac[0] * hertz, each.band_frac[1]),
+            [(to_hz(h.frequency), None if i is None else to_hz(i.frequency)) for h, i in each.modes],
+            (to_hz(each.band_frac[0]), each.band_frac[1]),
         )
         for each in found
     ]
@@ -109,12 +107,11 @@ def _draw(found: Sequence[ResponseComparison], out: Path, band: tuple[float, flo
 
 
 def _row(each: ResponseComparison) -> dict[str, Any]:
-    hertz = 1.0 / (2.0 * math.pi)
     modes = []
     for h, i in each.modes:
-        row = {"hammer_hz": h.frequency * hertz, "hammer_damping": h.damping, "hammer_peak_m_per_n": h.compliance}
+        row = {"hammer_hz": to_hz(h.frequency), "hammer_damping": h.damping, "hammer_peak_m_per_n": h.compliance}
         if i is not None:
-            row |= {"identified_hz": i.frequency * hertz, "identified_damping": i.damping, "identified_peak_m_per_n": i.compliance}
+            row |= {"identified_hz": to_hz(i.frequency), "identified_damping": i.damping, "identified_peak_m_per_n": i.compliance}
         modes.append(row)
     return {"place": str(each.place), "axis": each.axis.upper(), "frac": each.frac, "relative_difference": each.error, "modes": modes}
 
@@ -130,7 +127,7 @@ def _show(found: Sequence[ResponseComparison]) -> None:
         column.justify = "right"
     for each in found:
         for h, i in each.modes:
-            left = (f"{each.place} {each.axis.upper()}", f"{h.frequency / (2 * math.pi):.1f}")
+            left = (f"{each.place} {each.axis.upper()}", f"{to_hz(h.frequency):.1f}")
             damping, size = f"{100 * h.damping:.2f}", f"{1e6 * h.compliance:.3g}"
             if i is None:
                 table.add_row(*left, "not found", damping, "", size, "")

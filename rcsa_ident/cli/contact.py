@@ -10,6 +10,7 @@ import typer
 
 from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.errors import InputError
+from rcsa_ident.units import from_hz, to_hz
 
 if TYPE_CHECKING:
     from rcsa_ident.dynamics.coordinates import Dof
@@ -25,7 +26,7 @@ def contact(
         list[str],
         typer.Option(
             help="FRF file of a tap test at the tip (CSV, UFF 58, text columns), or OTHER.toml=FILE for another stickout of the same "
-            "holder. May be given again: several stickouts tell more.",
+            "holder. May be repeated: several stickouts determine the contact better.",
             show_default=False,
         ),
     ],
@@ -39,8 +40,10 @@ def contact(
         float | None,
         typer.Option("--to", help="Highest frequency that is used, Hz; default: all, or the identified band.", show_default=False),
     ] = None,
-    modulus_spread: Annotated[float, typer.Option(help="How well the moduli of tool and holder are known, %; one factor for all.")] = 1.0,
-    gain_spread: Annotated[float, typer.Option(help="How well hammer and sensor are calibrated, %.")] = 2.0,
+    modulus_spread: Annotated[
+        float, typer.Option(help="Standard deviation of the moduli of tool and holder, %; one factor for all.")
+    ] = 1.0,
+    gain_spread: Annotated[float, typer.Option(help="Standard deviation of the calibration of hammer and sensor, %.")] = 2.0,
     plot: Annotated[Path | None, typer.Option(help="Figure of taps and model (png, svg, pdf).", show_default=False)] = None,
     json_: Json = False,
 ) -> None:
@@ -101,8 +104,8 @@ def _taps(tooling: Path, texts: list[str], on: Path | None, low: float, high: fl
             support = supports.get(Dof(axis.lower()))
             kept = np.asarray(frequency) > 0.0
             name = path.name if len(values) == 1 else f"{path.name} {axis}"
-            band = (2.0 * math.pi * low, 2.0 * math.pi * last)
-            taps.append(TapTest(name, assembly, 2.0 * np.pi * frequency[kept], receptance[kept], support, band=band))
+            band = (from_hz(low), from_hz(last))
+            taps.append(TapTest(name, assembly, from_hz(frequency[kept]), receptance[kept], support, band=band))
     return taps
 
 
@@ -118,12 +121,13 @@ def _supports(path: Path) -> tuple[dict[Dof, Support], tuple[float, float]]:
         # a decoupled flange holds its joint already
         rigid = LumpedJoint(1e18, 1e18)
         edges = [f.band for f in flanges.values()]
-        band = max(e[0] for e in edges) / (2.0 * math.pi), min(e[1] for e in edges) / (2.0 * math.pi)
+        band = to_hz(max(e[0] for e in edges)), to_hz(min(e[1] for e in edges))
         return {axis: Support(flange, rigid) for axis, flange in flanges.items()}, band
-    from rcsa_ident.cli.results import read_machine
+    from rcsa_ident.cli.results import read_identified, tell
 
-    machine, data = read_machine(path)
-    return {axis: Support(part.spindle, part.joint) for axis, part in machine.items()}, (data["band_hz"][0], data["band_hz"][1])
+    machine, data = read_identified(path)
+    tell(machine, path)
+    return {axis: Support(part.spindle, part.joint) for axis, part in machine.identified.items()}, (data["band_hz"][0], data["band_hz"][1])
 
 
 def _remarks(found: ContactCalibration, taps: list[TapTest]) -> list[str]:
@@ -176,7 +180,7 @@ def _draw(found: ContactCalibration, taps: list[TapTest], path: Path) -> None:
 
     pairs = []
     for tap in taps:
-        hertz = tap.omega / (2.0 * math.pi)
+        hertz = to_hz(tap.omega)
         model = tap_model(tap, found.contact, found.modulus)
         pairs.append(FrfPair(f"{tap.name}, stickout {1e3 * tap.assembly.stickout:g} mm", "X", hertz, model, hertz, tap.values))
     save(frf_comparison(pairs, names=("tap test", "calibrated contact")), path)

@@ -10,8 +10,11 @@ import typer
 
 from rcsa_ident.cli.common import NOT_CONVERGED, Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.errors import InputError
+from rcsa_ident.units import from_hz, to_hz
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rcsa_ident.coupling.flange_fit import DecoupledFlange
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.posterior import MachineAxis
@@ -27,13 +30,14 @@ def decouple(
         list[str],
         typer.Option(
             help="TOOLING.toml=FRF of a hammer test at the tip, or PLACE:TOOLING.toml=FRF with PLACE tip, cross (force at the tip, "
-            "response at the spindle's flange) or spindle. Three toolings at least; those at the spindle tell most.",
+            "response at the spindle's flange) or spindle. At least three toolings; tests at the spindle contribute most.",
             show_default=False,
         ),
     ],
     out: Annotated[Path, typer.Option(help="FLANGE.csv to write.", show_default=False)],
     beside: Annotated[
-        Path | None, typer.Option(help="RESULT.json whose joint is taken out, too, and whose flange is drawn beside.", show_default=False)
+        Path | None,
+        typer.Option(help="RESULT.json whose joint is removed as well, and whose flange is drawn for comparison.", show_default=False),
     ] = None,
     from_: Annotated[float, typer.Option("--from", help="Lowest frequency that is used, Hz.")] = 200.0,
     to: Annotated[float | None, typer.Option("--to", help="Highest frequency that is used, Hz; default: all.", show_default=False)] = None,
@@ -52,19 +56,21 @@ def decouple(
     if plot is not None:
         writable(plot, "--plot")
     share = positive("--least-damping", least_damping, "%") / 100.0
-    machine: dict[Dof, MachineAxis] = {}
+    machine: Mapping[Dof, MachineAxis] = {}
     if beside is not None:
-        from rcsa_ident.cli.results import read_machine
+        from rcsa_ident.cli.results import read_identified, tell
 
-        machine = read_machine(beside)[0]
+        identified = read_identified(beside)[0]
+        tell(identified, beside)
+        machine = identified.identified
     taps = _taps(tap, positive("--from", from_, "Hz"), math.inf if to is None else positive("--to", to, "Hz"))
     stages = Stages(quiet=json_)
     with stages.stage("decoupling"):
         found = {axis: flange_from_taps(own, axis, machine[axis].joint if axis in machine else None, share) for axis, own in taps.items()}
     omega = next(iter(found.values())).receptance.omega
     if any(not np.array_equal(f.receptance.omega, omega) for f in found.values()):
-        raise InputError("frequencies", "other ones for X than for Y", "the same for both axes")
-    write_flange_csv(out, omega / (2.0 * np.pi), {a: f.receptance.values for a, f in found.items()}, {a: f.std for a, f in found.items()})
+        raise InputError("frequencies", "different ones for X and Y", "the same for both axes")
+    write_flange_csv(out, to_hz(omega), {a: f.receptance.values for a, f in found.items()}, {a: f.std for a, f in found.items()})
     if plot is not None:
         _draw(found, machine, plot)
     if json_:
@@ -74,9 +80,9 @@ def decouple(
             row = _summary(each)
             known = ", ".join(f"{100 * share:.2g} %" for share in row["relative_std"])
             conditions = (
-                f"condition number {row['condition_median']:.3g} in the median, {100 * row['regularised']:.0f} % lean on neighbours"
+                f"median condition number {row['condition_median']:.3g}, {100 * row['regularised']:.0f} % regularised by neighbours"
             )
-            say(f"{axis.upper()}: {row['frequencies']} frequencies, {conditions}; tF, tM, rM known to {known}")
+            say(f"{axis.upper()}: {row['frequencies']} frequencies, {conditions}; standard deviations of tF, tM, rM {known}")
             for note in each.notes:
                 warn(f"{axis.upper()}: {note}")
         say(f"written: {out}" + (f", {plot}" if plot is not None else ""))
@@ -107,7 +113,7 @@ def _taps(texts: list[str], low: float, high: float) -> dict[Dof, list[FlangeTap
             assemblies[tooling] = read_tooling(tooling).assembly
         for axis, (frequency, values) in read_hammer(path).values.items():
             kept = (np.asarray(frequency) >= low) & (np.asarray(frequency) <= high)
-            own = FlangeTap(Path(path).name, assemblies[tooling], Place(place), 2.0 * np.pi * frequency[kept], values[kept])
+            own = FlangeTap(Path(path).name, assemblies[tooling], Place(place), from_hz(frequency[kept]), values[kept])
             found.setdefault(Dof(axis.lower()), []).append(own)
     complete = {axis: own for axis, own in found.items() if len(own) == len(texts)}
     if not complete:
@@ -131,7 +137,7 @@ def _summary(found: DecoupledFlange) -> dict[str, Any]:
     }
 
 
-def _draw(found: dict[Dof, DecoupledFlange], machine: dict[Dof, MachineAxis], path: Path) -> None:
+def _draw(found: dict[Dof, DecoupledFlange], machine: Mapping[Dof, MachineAxis], path: Path) -> None:
     from rcsa_ident.report.comparison import FlangePair, flange_comparison, save
 
     axis, first = next(iter(found.items()))
@@ -139,4 +145,4 @@ def _draw(found: dict[Dof, DecoupledFlange], machine: dict[Dof, MachineAxis], pa
     if axis in machine:
         curves["identified in process"] = machine[axis].spindle.receptance(first.receptance.omega).values
     title = f"spindle flange, {axis.upper()}"
-    save(flange_comparison(FlangePair(title, first.receptance.omega / (2.0 * math.pi), curves)), path)
+    save(flange_comparison(FlangePair(title, to_hz(first.receptance.omega), curves)), path)

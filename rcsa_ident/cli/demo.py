@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,15 +10,16 @@ import typer
 
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn
 from rcsa_ident.cli.identify import Method, exit_by_status, read_and_judge, result_of, search, warn_left_out
-from rcsa_ident.cli.lobes import lobes_summary, tip_response, write_lobes, write_response
 from rcsa_ident.cli.processes import Processes, workers
 from rcsa_ident.errors import InputError
+from rcsa_ident.units import from_rpm, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rcsa_ident.arrays import FloatArray
     from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.identification.machine import IdentifiedMachine
     from rcsa_ident.identification.result import Identification
     from rcsa_ident.machining_setup import Campaign, Tooling
     from rcsa_ident.report.html import ToolingPage
@@ -33,7 +33,7 @@ MAX_DEPTH = 0.01
 @answers
 def demo(
     data: Annotated[Path, typer.Option(help="Campaign folder.")] = Path("data/sample_runs"),
-    out: Annotated[Path, typer.Option(help="Folder for the results; it is made if need be.")] = Path("report"),
+    out: Annotated[Path, typer.Option(help="Folder for the results; created if it is missing.")] = Path("report"),
     tooling: Annotated[
         list[Path] | None, typer.Option(help="Further TOOLING.toml; default: those in DATA/../machines/toolings.", show_default=False)
     ] = None,
@@ -62,7 +62,8 @@ def demo(
         write_result(out / "RESULT.json", result)
         pages: list[ToolingPage] = []
         if found.axes:
-            task = partial(_page, found, campaign, (result["band_hz"][0], result["band_hz"][1]), _truth_of(data), out)
+            recorded = frozenset(cut.tooling for cut in campaign.cuts)
+            task = partial(_page, found.machine, recorded, _truth_of(data), out)
             wanted = [*campaign.toolings.items(), *extra.items()]
             with stages.stage("tooltips and lobes") as progress:
                 for page in pool.map(task, wanted):
@@ -88,7 +89,7 @@ def _folder(out: Path) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError("--out", error.strerror or "an error", "a folder that can be made", str(out)) from None
+        raise InputError("--out", error.strerror or "an error", "a folder that can be created", str(out)) from None
 
 
 def _further_toolings(campaign: Campaign, data: Path, given: list[Path] | None) -> dict[str, Tooling]:
@@ -105,62 +106,52 @@ def _truth_of(data: Path) -> Path:
     return data.with_name(data.resolve().name + ".truth")
 
 
-def _page(
-    found: Identification, campaign: Campaign, band_hz: tuple[float, float], truth: Path, out: Path, named: tuple[str, Tooling]
-) -> ToolingPage:
+def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out: Path, named: tuple[str, Tooling]) -> ToolingPage:
     """Compute, write and collect what there is to say of one tooling."""
     import numpy as np
 
-    from rcsa_ident.cutting.conditions import Engagement
-    from rcsa_ident.cutting.process import MillingProcess
     from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.identification.posterior import MachineAxis
-    from rcsa_ident.machine.spindle import Spindle
+    from rcsa_ident.io.curves import write_tip_csv
+    from rcsa_ident.io.lobes import write_lobes
+    from rcsa_ident.machine.known_tip import measured_tip
+    from rcsa_ident.machining_setup import CutSpec
     from rcsa_ident.report.html import ToolingPage
-    from rcsa_ident.workflows.lobes import LobeConditions, band_warning, best_speeds, lobe_bands, measured_tip, tooling_lobes
-    from rcsa_ident.workflows.speeds import MachineOverSpeed, lobes_over_speed
+    from rcsa_ident.stability.lobes import stability_lobes
+    from rcsa_ident.workflows.tool_change import ToolChange, advise, tooltip
 
     name, tooling = named
-    machine = {axis: MachineAxis(Spindle(part.modes), part.joint, part.posterior) for axis, part in found.axes.items()}
-    frequency = np.arange(100.0, band_hz[1] + 0.5, 1.0)
-    response = tip_response(machine, tooling.assembly, frequency, bands=True)
-    speeds = np.arange(SPEEDS[0], SPEEDS[1] + 0.5 * SPEEDS[2], SPEEDS[2]) * (np.pi / 30.0)
-    coefficients = campaign.workpiece.coefficients
-    conditions = LobeConditions(MillingProcess(tooling.cutter, coefficients, Engagement.from_immersion(0.5, "down")), speeds, MAX_DEPTH)
-    over_speed = MachineOverSpeed(machine)
-    if over_speed.speed_range is None:
-        lobes, spread = tooling_lobes(response, conditions), lobe_bands(response, conditions)
-    else:
-        lobes, spread = lobes_over_speed(over_speed, tooling.assembly, 2.0 * np.pi * frequency, conditions)
+    response = tooltip(machine, tooling).tip
+    frequency = to_hz(response.omega)
+    speeds = from_rpm(np.arange(SPEEDS[0], SPEEDS[1] + 0.5 * SPEEDS[2], SPEEDS[2]))
+    change = ToolChange(machine, tooling, CutSpec(), speeds, MAX_DEPTH)
+    advice = advise(change)
     safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
-    write_response(out / f"FRF_{safe}.csv", frequency, response)
-    write_lobes(out / f"LOBES_{safe}.csv", lobes, spread)
-    tip = {axis.upper(): response.tip(axis) for axis in response.coupled}
-    deviation = {axis.upper(): each for axis, each in response.deviation.items()}
+    write_tip_csv(out / f"FRF_{safe}.csv", response)
+    write_lobes(out / f"LOBES_{safe}.csv", advice.lobes, recommended=advice.usable.stable)
+    tip = {c.dof.upper(): response.between(str(c), str(c)) for c in response.rows}
+    deviation = {row.dof.upper(): each for (row, col), each in response.deviation().items() if row == col}
     true, error, coverage = _truth(truth / "tip" / f"{name}.csv", frequency, tip, deviation)
     limit = None
     if true is not None and len(true) == len(tip):
-        limit = conditions.lobes(measured_tip({Dof(axis.lower()): (frequency, value) for axis, value in true.items()})).limit_depth
-    doubt = band_warning(lobes, band_hz)
+        true_tip = measured_tip({Dof(axis.lower()): (frequency, value) for axis, value in true.items()})
+        limit = stability_lobes(true_tip, change.process, speeds, MAX_DEPTH).limit_depth
     # a page needs no more than what an eye resolves
     shown = slice(None, None, 4)
+    workpiece = "" if machine.workpiece is None else f"{machine.workpiece.name}, "
     return ToolingPage(
         name,
-        name in {cut.tooling for cut in campaign.cuts},
+        name in recorded,
         frequency[shown],
         {axis: value[shown] for axis, value in tip.items()},
         {axis: (real[shown], imaginary[shown]) for axis, (real, imaginary) in deviation.items()},
         None if true is None else {axis: value[shown] for axis, value in true.items()},
         error,
         coverage,
-        lobes,
-        MAX_DEPTH,
-        spread,
-        best_speeds(lobes),
+        advice,
         limit,
-        band_hz,
-        f"half-immersion down-milling, feed +X, {tooling.cutter.teeth} teeth, {campaign.workpiece.name}, {lobes.method} method",
-        [*lobes.warnings, *([doubt] if doubt else [])],
+        None if machine.band is None else (to_hz(machine.band[0]), to_hz(machine.band[1])),
+        f"half-immersion down-milling, feed +X, {tooling.cutter.teeth} teeth, {workpiece}{advice.lobes.method} method",
+        advice.remarks,
     )
 
 
@@ -198,13 +189,21 @@ def _show(pages: list[ToolingPage], found: Identification, deviations: Mapping[D
 
     show_identification(found, deviations)
     known = any(page.error for page in pages)
-    headers = ["tooling", "recorded", *(["error X\n%", "error Y\n%"] if known else []), "stable\nanywhere\nmm", "best speeds\nrev/min (mm)"]
+    headers = [
+        "tooling",
+        "recorded",
+        *(["error X\n%", "error Y\n%"] if known else []),
+        "stable\nanywhere\nmm",
+        "recommended cuts\nrev/min: mm (limit mm)",
+    ]
     table = Table(*headers, title="tooltip and stability, half-immersion down-milling", title_justify="left")
     for page in pages:
         errors = [f"{100 * page.error[axis]:.1f}" if axis in page.error else "" for axis in ("X", "Y")] if known else []
-        assert page.lobes is not None
-        best = "\n".join(f"{s * 30 / math.pi:.0f} ({1e3 * d:.2f})" for s, d in page.best)
-        table.add_row(page.name, "yes" if page.recorded else "no", *errors, f"{1e3 * page.lobes.absolute_limit:.2f}", best)
+        assert page.advice is not None
+        lobes = page.advice.lobes
+        best = "\n".join(f"{to_rpm(p.spindle_speed):.0f}: {1e3 * p.depth:.2f} ({1e3 * p.limit:.2f})" for p in page.advice.recommended)
+        anywhere = "" if lobes.absolute_limit is None else f"{1e3 * lobes.absolute_limit:.2f}"
+        table.add_row(page.name, "yes" if page.recorded else "no", *errors, anywhere, best)
     console().print(table)
     for page in pages:
         for doubt in page.warnings:
@@ -212,9 +211,11 @@ def _show(pages: list[ToolingPage], found: Identification, deviations: Mapping[D
 
 
 def _summary(found: Identification, pages: list[ToolingPage], stages: Stages, out: Path) -> dict[str, Any]:
+    from rcsa_ident.report.summaries import lobes_summary
+
     toolings = {
         page.name: {"recorded": page.recorded, "error": dict(page.error), "coverage": dict(page.coverage), "warnings": list(page.warnings)}
-        | (lobes_summary(page.lobes, list(page.best)) if page.lobes is not None else {})
+        | ({} if page.advice is None else lobes_summary(page.advice))
         for page in pages
     }
     return {

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rcsa_ident.cli.common import Json, answers, emit, inclusive, say, warn, writable
+from rcsa_ident import units
+from rcsa_ident.cli.common import Json, answers, emit, say, warn, writable
 from rcsa_ident.cli.lobes import ResultFile
-from rcsa_ident.cli.results import read_machine_over_speed
+from rcsa_ident.cli.results import read_identified, tell
 from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
-    from rcsa_ident.dynamics.receptance import Receptance
+    pass
 
 
 class Format(StrEnum):
@@ -62,40 +63,39 @@ def export(
     json_: Json = False,
 ) -> None:
     """Write tip FRFs, flange FRFs or modes for other programs."""
-    import numpy as np
-
     from rcsa_ident.errors import positive
     from rcsa_ident.io import exports
     from rcsa_ident.io.setups import read_tooling
-    from rcsa_ident.workflows.tip import tooltip
 
     writable(out)
     what = (Part.flange if tooling is None else Part.tip) if what is None else what
     if (what is Part.tip) != (tooling is not None):
-        raise InputError("--tooling", "nothing" if tooling is None else str(tooling), "a TOOLING.toml with --what tip, and only there")
+        raise InputError("--tooling", "nothing" if tooling is None else str(tooling), "a TOOLING.toml with --what tip, and only then")
     if what is Part.modes and to not in (Format.csv, Format.json):
         raise InputError("--to", str(to), "csv or json for modes")
-    omega = None if speed is None else positive("--speed", speed, "rev/min") * math.pi / 30.0
-    machine, data = read_machine_over_speed(result)
-    axes = machine.at(omega)
+    omega = None if speed is None else units.from_rpm(positive("--speed", speed, "rev/min"))
+    machine, data = read_identified(result)
+    tell(machine, result)
+    here = machine.at(omega)
+    axes = here.identified
     if what is Part.modes:
         exports.write_modes(out, {axis.upper(): part.at(axis, omega)[0] for axis, part in axes.items()}, to is Format.json)
         written = f"modes of {len(axes)} axes"
     else:
         band = data["band_hz"]
         low, high = math.ceil(band[0]) if from_hz is None else from_hz, band[1] if to_hz is None else to_hz
-        frequency = inclusive(low, high, step_hz, ("--from-hz", "--to-hz", "--step-hz"), "Hz")
+        frequency = units.inclusive(low, high, step_hz, ("--from-hz", "--to-hz", "--step-hz"), "Hz")
         if frequency[-1] > 1.001 * band[1] or frequency[0] < 0.999 * band[0]:
             warn(f"the machine was identified from {band[0]:.0f} to {band[1]:.0f} Hz; outside the FRF is extrapolated")
-        grid = 2.0 * np.pi * frequency
+        grid = units.from_hz(frequency)
         if tooling is not None:
             setup = read_tooling(tooling)
             title = f"{data['campaign']['name']}, {setup.name}"
-            response = tooltip(axes, setup.assembly, grid, bands=False, speed=omega)
-            found = {axis.upper(): _tip(whole) for axis, whole in response.coupled.items()}
+            tip = here.tip(setup, grid, spread=False)
+            found = {c.dof.upper(): tip.block((c,)) for c in tip.rows}
         else:
             title = f"{data['campaign']['name']}, flange"
-            found = {axis.upper(): part.at(axis, omega)[0].receptance(grid) for axis, part in axes.items()}
+            found = {axis.upper(): here.receptance(grid, (axis,)) for axis in axes}
         if to is Format.csv:
             exports.write_receptances_csv(out, found)
         elif to is Format.json:
@@ -109,12 +109,3 @@ def export(
         emit({"what": str(what), "format": str(to), "out": str(out)})
         return
     say(f"written: {out} ({written})")
-
-
-def _tip(whole: Receptance) -> Receptance:
-    """The tip's own motion under its own force."""
-    from rcsa_ident.dynamics.receptance import Receptance
-
-    rows = tuple(c for c in whole.rows if c.point == "tip" and not c.dof.is_slope)
-    places = [whole.rows.index(c) for c in rows]
-    return Receptance(whole.omega, whole.values[:, places][:, :, places], rows, rows)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -13,13 +12,14 @@ import typer
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import Strategy
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.units import from_hz, from_rpm, to_hz, to_rpm
 
 if TYPE_CHECKING:
+    from rcsa_ident.machine.machine import Machine
     from rcsa_ident.machining_setup import Tooling
     from rcsa_ident.observer.wear import WearIndicators
+    from rcsa_ident.signals.recording import Sensor
     from rcsa_ident.workflows.estimate_forces import MonitoredCut
-
-_RPM = 30.0 / math.pi
 
 
 class ObserverName(StrEnum):
@@ -31,34 +31,46 @@ class ObserverName(StrEnum):
 
 @answers
 def forces(
-    result: Annotated[Path, typer.Argument(help="RESULT.json of an identification.", show_default=False)],
-    tooling: Annotated[Path, typer.Argument(help="TOOLING.toml that was cut with.", show_default=False)],
+    result: Annotated[
+        Path, typer.Argument(help="RESULT.json of an identification, or FLANGE.csv of a measured flange.", show_default=False)
+    ],
+    tooling: Annotated[Path, typer.Argument(help="TOOLING.toml of the tool that was cutting.", show_default=False)],
     recording: Annotated[Path, typer.Argument(help="Recording of the cut; channels as in the campaign.", show_default=False)],
     out: Annotated[Path, typer.Option(help="FORCES.csv to write, N.", show_default=False)],
     air: Annotated[
-        Path | None, typer.Option(help="Recording of an air cut at the same speed: its run-out is taken out.", show_default=False)
+        Path | None, typer.Option(help="Recording of an air cut at the same speed: its run-out is subtracted.", show_default=False)
     ] = None,
     speed_rpm: Annotated[
         float | None, typer.Option(help="Programmed spindle speed, rev/min; default: from the trigger.", show_default=False)
     ] = None,
     observer: Annotated[
-        ObserverName, typer.Option(help="Oscillators at the harmonics of the teeth, or the paper's random walk.")
+        ObserverName, typer.Option(help="Force model: oscillators at the spindle's orders, or the published random walk.")
     ] = ObserverName.resonators,
     bandwidth_hz: Annotated[
         float | None,
-        typer.Option(help="Up to where the observer follows the force, Hz; default: end of the identified band.", show_default=False),
+        typer.Option(help="Bandwidth of the observer, Hz; default: upper end of the identified band.", show_default=False),
     ] = None,
-    smooth: Annotated[bool, typer.Option(help="Each sample given the whole record, instead of as it would be live.")] = False,
-    plot: Annotated[Path | None, typer.Option(help="Picture of the forces and of the observer's response.", show_default=False)] = None,
+    smooth: Annotated[
+        bool, typer.Option(help="Estimate each sample from the whole recording, not only from the samples before it.")
+    ] = False,
+    plot: Annotated[
+        Path | None, typer.Option(help="Figure of the forces and of the observer's frequency response.", show_default=False)
+    ] = None,
     idle_percent: Annotated[
         float | None,
         typer.Option(
-            help="Share of the time in which no tooth cuts, at least, %: there the force is zero, which gives the mean. "
+            help="Least share of the time in which no tooth cuts, %: the force is zero then, which gives its mean. "
             "Default: forces without their mean.",
             show_default=False,
         ),
     ] = None,
-    sampling_rate_hz: Annotated[float | None, typer.Option(help="Of a recording that carries no rate, Hz.", show_default=False)] = None,
+    sensors: Annotated[
+        Path | None,
+        typer.Option(metavar="CAMPAIGN", help="Folder of a campaign whose sensors recorded it; default: the result's.", show_default=False),
+    ] = None,
+    sampling_rate_hz: Annotated[
+        float | None, typer.Option(help="Sampling rate of a recording that does not state it, Hz.", show_default=False)
+    ] = None,
     wear: Annotated[
         Path | None,
         typer.Option(help="Cutting coefficients of each revolution; needs --axial-depth-mm and --feed-mm.", show_default=False),
@@ -71,8 +83,8 @@ def forces(
     json_: Json = False,
 ) -> None:
     """Estimate the cutting forces of a recording from the flange's vibration."""
-    from rcsa_ident.cli.results import read_machine_over_speed
-    from rcsa_ident.io.forces import sensors_of_result, write_forces_csv
+    from rcsa_ident.cli.results import read_machine, tell
+    from rcsa_ident.io.forces import write_forces
     from rcsa_ident.io.recordings import read_recording
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.observer.force import restore_mean_force
@@ -86,20 +98,20 @@ def forces(
         raise InputError("--plot", f"suffix '{plot.suffix}'", "one of .png, .svg, .pdf", str(plot))
     if wear is not None and (axial_depth_mm is None or feed_mm is None):
         raise InputError("--wear", "no depth or no feed", "--axial-depth-mm and --feed-mm beside it")
-    programmed = None if speed_rpm is None else positive("--speed-rpm", speed_rpm, "rev/min") / _RPM
-    bandwidth = None if bandwidth_hz is None else 2.0 * math.pi * positive("--bandwidth-hz", bandwidth_hz, "Hz")
+    programmed = None if speed_rpm is None else from_rpm(positive("--speed-rpm", speed_rpm, "rev/min"))
+    bandwidth = None if bandwidth_hz is None else from_hz(positive("--bandwidth-hz", bandwidth_hz, "Hz"))
     rate = None if sampling_rate_hz is None else positive("--sampling-rate-hz", sampling_rate_hz, "Hz")
-    machine, data = read_machine_over_speed(result)
-    setup, sensors = read_tooling(tooling), sensors_of_result(data, str(result))
+    machine = read_machine(result)
+    tell(machine, result)
+    setup, known = read_tooling(tooling), _sensors(machine, sensors, result)
     stages = Stages(quiet=json_)
     with stages.stage("recordings"):
-        cut = read_recording(recording, sensors, rate)
-        still = None if air is None else read_recording(air, sensors, rate)
+        cut = read_recording(recording, known, rate)
+        still = None if air is None else read_recording(air, known, rate)
     method = Resonators() if observer is ObserverName.resonators else PaperWalk()
     with stages.stage("forces"):
-        low, high = (2.0 * math.pi * f for f in data["band_hz"])
         try:
-            found = observe(machine, setup.assembly, setup.cutter.teeth, cut, still, (low, high), programmed, method, bandwidth, smooth)
+            found = observe(machine, setup.assembly, setup.cutter.teeth, cut, still, programmed, method, bandwidth, smooth)
         except InputError as error:
             raise error if error.where else error.at(str(recording)) from None
     level = None
@@ -108,12 +120,7 @@ def forces(
         raised, level = restore_mean_force(found.estimate, idle_percent / 100.0, min(settled, found.estimate.force.shape[0] // 2))
         found = replace(found, estimate=raised)
     estimate = found.estimate
-    write_forces_csv(
-        out,
-        estimate.time,
-        {axis.upper(): estimate.force[:, i] for i, axis in enumerate(estimate.axes)},
-        {axis.upper(): estimate.standard_deviation[:, i] for i, axis in enumerate(estimate.axes)},
-    )
+    write_forces(out, estimate)
     if plot is not None:
         _draw(plot, found)
     worn = None
@@ -143,8 +150,20 @@ def forces(
         trend = f"{row['trend_per_s']:+.2g} ± {row['trend_std_per_s']:.1g} a second"
         say(f"{name}: {row['mean']:.4g} ± {row['std']:.2g} {row['unit']}, {trend}")
     if worn and not worn["separable"]:
-        warn("the harmonics in the band do not tell the coefficients from each other: only their sum means something")
+        warn("the harmonics in the band do not separate the coefficients: only their sum is meaningful")
     say(f"written: {out} ({estimate.force.shape[0]} samples, {stages.seconds['forces']:.2f} s)")
+
+
+def _sensors(machine: Machine, campaign: Path | None, result: Path) -> tuple[Sensor, ...]:
+    """The sensors of the recording: those of a campaign, else those that the machine was identified with."""
+    from rcsa_ident.identification.machine import IdentifiedMachine
+    from rcsa_ident.io.setups import read_campaign
+
+    if campaign is not None:
+        return read_campaign(campaign).sensors
+    if isinstance(machine, IdentifiedMachine) and machine.sensors:
+        return machine.sensors
+    raise InputError("sensors", "none", "--sensors CAMPAIGN, or a result that says which sensors it was identified with", str(result))
 
 
 def _summary(found: MonitoredCut, observer: str, smooth: bool) -> dict[str, Any]:
@@ -155,15 +174,15 @@ def _summary(found: MonitoredCut, observer: str, smooth: bool) -> dict[str, Any]
     settled = slice(min(estimate.force.shape[0] // 4, 4096), None)
     for i, axis in enumerate(estimate.axes):
         force, response = estimate.force[settled, i], found.response[axis]
-        hz = [float(w) / (2.0 * math.pi) if w == w else None for w in response.usable(float(response.line[0]), at_lines=True)]
-        anywhere = [float(w) / (2.0 * math.pi) if w == w else None for w in response.usable(1.3 * found.band[0])]
+        hz = [to_hz(float(w)) if w == w else None for w in response.usable(float(response.line[0]), at_lines=True)]
+        anywhere = [to_hz(float(w)) if w == w else None for w in response.usable(1.3 * found.band[0])]
         axes[axis.upper()] = {
             "rms_n": float(np.std(force)),
             "lowest_n": float(force.min()),
             "highest_n": float(force.max()),
             "std_n": float(np.median(estimate.standard_deviation[settled, i])),
             "model_std_n": found.model_error[axis],
-            "innovation_over_expected": float(estimate.consistency[i]),
+            "innovation_over_expected": None if estimate.consistency is None else float(estimate.consistency[i]),
             "usable_at_lines_hz": hz,
             "usable_hz": anywhere,
             "delay_s": response.delay_at_lines,
@@ -174,8 +193,8 @@ def _summary(found: MonitoredCut, observer: str, smooth: bool) -> dict[str, Any]
         "observer": observer,
         "smoothed": smooth,
         "mean_force": "removed: the sensors do not show it",
-        "spindle_speed_rpm": found.spindle_speed * _RPM,
-        "band_hz": [w / (2.0 * math.pi) for w in found.band],
+        "spindle_speed_rpm": to_rpm(found.spindle_speed),
+        "band_hz": [to_hz(w) for w in found.band],
         "samples": int(estimate.force.shape[0]),
         "axes": axes,
         "warnings": list(found.notes),

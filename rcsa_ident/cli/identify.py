@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
 from enum import StrEnum
 from functools import partial
@@ -25,6 +24,7 @@ from rcsa_ident.cli.common import (
 )
 from rcsa_ident.cli.processes import Dask, Processes, Workers, workers_or_cluster
 from rcsa_ident.errors import InputError
+from rcsa_ident.units import to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -79,10 +79,12 @@ def identify(
     dask: Dask = None,
     start: Annotated[
         Path | None,
-        typer.Option(help="RESULT.json of the same machine: its modes are refined with this campaign's cuts.", show_default=False),
+        typer.Option(
+            help="RESULT.json of the same machine to start from: its modes are refined with this campaign's cuts.", show_default=False
+        ),
     ] = None,
     speed_bands: Annotated[
-        int, typer.Option(min=1, max=50, help="More than 1: also a model for each of so many equal ranges of spindle speed.")
+        int, typer.Option(min=1, max=50, help="Number of equal spindle speed ranges that also get a model of their own, if above 1.")
     ] = 1,
     report: Annotated[Path | None, typer.Option(help="Also write an HTML report.", show_default=False)] = None,
     json_: Json = False,
@@ -131,7 +133,7 @@ def identify(
 
         show_identification(found, deviations)
         for band in bands:
-            low, high = (speed * 30.0 / math.pi for speed in band.speeds)
+            low, high = (to_rpm(speed) for speed in band.speeds)
             say(f"{low:.0f} to {high:.0f} rev/min: {band.found.status}, {len(band.found.cut_ids)} cuts")
         warn_left_out(data)
         say(", ".join(f"{name} {seconds:.1f} s" for name, seconds in stages.seconds.items()))
@@ -163,14 +165,10 @@ def read_start(path: Path) -> Mapping[Dof, Posterior]:
     from rcsa_ident.io.identifications import machine_from_json
     from rcsa_ident.io.results import read_result
 
-    data = read_result(path)
-    machine = machine_from_json(data, str(path))
-    found = {axis: part.posterior for axis, part in machine.items() if part.posterior is not None}
-    if len(found) < len(machine):
-        missing = next(axis.upper() for axis in machine if axis not in found)
-        allowed = "a result of the default method, with unknowns and covariance of each axis"
-        raise InputError(f"axes.{missing}", f"no covariance (method {data['method']})", allowed, str(path))
-    return found
+    try:
+        return machine_from_json(read_result(path), str(path)).posteriors()
+    except InputError as error:
+        raise error if error.where else error.at(str(path)) from None
 
 
 def search(

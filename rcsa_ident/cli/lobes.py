@@ -9,30 +9,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rcsa_ident.cli.common import Json, Stages, answers, emit, inclusive, say, warn, writable
-from rcsa_ident.cli.conditions import process_of, speeds_of, subjects_of, warn_outside
+from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
+from rcsa_ident.cli.conditions import change_of, cut_of, share_of, subjects_of
 from rcsa_ident.cli.options import Bands, CutOptions, SpeedOptions, StiffnessSpread, TipOptions, takes_groups
-from rcsa_ident.cli.results import read_machine as read_machine
-from rcsa_ident.cli.results import read_machine_over_speed as read_machine_over_speed
+from rcsa_ident.cli.results import read_machine
 from rcsa_ident.errors import InputError
+from rcsa_ident.units import from_hz, from_rpm, inclusive, to_hz
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from rcsa_ident.arrays import FloatArray
-    from rcsa_ident.cli.conditions import Subject
-    from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.identification.posterior import MachineAxis
-    from rcsa_ident.report.lobes import Judged
-    from rcsa_ident.stability.result import StabilityLobes
-    from rcsa_ident.stability.stability_map import StabilityMap
-    from rcsa_ident.stability.surface_error import SurfaceError
-    from rcsa_ident.stability.tested_cuts import TestedCuts
-    from rcsa_ident.workflows.lobes import LobeConditions
-    from rcsa_ident.workflows.tip import TooltipResponse
+    from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+    from rcsa_ident.dynamics.uncertain import UncertainReceptance
 
-ResultFile = Annotated[Path, typer.Argument(help="RESULT.json of an identification.", show_default=False)]
-ToolingFile = Annotated[Path, typer.Argument(help="TOOLING.toml; it need not have been cut with.", show_default=False)]
+    Deviation = Mapping[tuple[Coordinate, Coordinate], tuple[FloatArray, FloatArray]]
+
+ResultFile = Annotated[
+    Path, typer.Argument(help="RESULT.json of an identification, or FLANGE.csv of a measured flange.", show_default=False)
+]
+ToolingFile = Annotated[Path, typer.Argument(help="TOOLING.toml of any tool, also of one that has never cut.", show_default=False)]
 Plot = Annotated[Path | None, typer.Option(metavar="FILE.png|svg", help="Draw a figure.", show_default=False)]
 
 
@@ -57,42 +53,33 @@ def tooltip(
     json_: Json = False,
 ) -> None:
     """Predict the tooltip FRF of any tooling on the identified machine."""
-
     from rcsa_ident.errors import positive
+    from rcsa_ident.io.curves import write_tip_csv
     from rcsa_ident.io.setups import read_tooling
+    from rcsa_ident.workflows.tool_change import tooltip as ask
 
     writable(out)
-    omega = None if speed is None else positive("--speed", speed, "rev/min") * math.pi / 30.0
-    share = _share(stiffness_spread)
-    machine, data = read_machine_over_speed(result)
-    assembly = read_tooling(tooling).assembly
-    last = data["band_hz"][1] if to is None else to
+    spindle_speed = None if speed is None else from_rpm(positive("--speed", speed, "rev/min"))
+    share = share_of(stiffness_spread, "--stiffness-spread", 50.0)
+    machine = read_machine(result)
+    tool = read_tooling(tooling)
+    last = to_hz(machine.band[1]) if to is None else to  # type: ignore[index]
     frequency = inclusive(from_, last, step, ("--from", "--to", "--step"), "Hz")
-    if to is not None and to > 1.001 * data["band_hz"][1]:
-        warn(f"the machine was identified up to {data['band_hz'][1]:.0f} Hz; above that the FRF is extrapolated")
-    if omega is not None:
-        known = machine.speed_range
-        if known is not None and not known[0] * (1.0 - 1e-9) <= omega <= known[1] * (1.0 + 1e-9):
-            low, high = (each * 30.0 / math.pi for each in known)
-            warn(f"the machine was identified from {low:.0f} to {high:.0f} rev/min; outside it stays what it is at the nearest of them")
     stages = Stages(quiet=json_)
     with stages.stage("tooltip"):
-        response = tip_response(machine.at(omega), assembly, frequency, bands, omega, share)
-    write_response(out, frequency, response)
-    peaks = peaks_of(frequency, response)
+        found = ask(machine, tool, from_hz(frequency), spindle_speed, bands, share)
+        deviation = found.tip.deviation()
+    write_tip_csv(out, found.tip)
+    peaks = peaks_of(frequency, found.tip, deviation)
     if json_:
-        emit(
-            {
-                "frequencies": len(frequency),
-                "peaks": {a.upper(): asdict(p) for a, (p, _) in peaks.items()},
-                "seconds": stages.seconds,
-                "out": str(out),
-            }
-        )
+        summary = {"frequencies": len(frequency), "peaks": {a.upper(): asdict(p) for a, (p, _) in peaks.items()}}
+        emit(summary | {"warnings": list(found.remarks), "seconds": stages.seconds, "out": str(out)})
         return
     from rcsa_ident.cli.tables import show_peaks
 
     show_peaks({a: (p.frequency_hz, p.magnitude, p.lowest_real_part, band) for a, (p, band) in peaks.items()})
+    for remark in found.remarks:
+        warn(remark)
     say(f"written: {out} ({len(frequency)} frequencies, {stages.seconds['tooltip']:.2f} s)")
 
 
@@ -133,53 +120,53 @@ def lobes(
     json_: Json = False,
 ) -> None:
     """Compute stability lobes of a tooling: on an identified machine, from a modal model or from tap tests."""
-    from rcsa_ident.workflows.lobes import best_speeds
+    from rcsa_ident.io.lobes import write_lobes, write_map
+    from rcsa_ident.io.tested_cuts import read_tested_cuts
+    from rcsa_ident.report.lobes import Judged
+    from rcsa_ident.workflows.tool_change import advise, map_of, surface_of
 
     writable(out)
     check_plot(plot)
     if map_ is not None:
         writable(map_, "--map")
-    (subject,) = subjects_of(files, tip, stiffness_spread)
-    process = process_of(cut, speeds, subject)
-    conditions = speeds_of(speeds, process)
-    if surface_depth_mm is not None and process.feed_per_tooth is None:
+    machine, (tooling,) = subjects_of(files, tip)
+    change = change_of(machine, tooling, cut_of(cut, speeds.speed_variation), speeds, bands, stiffness_spread)
+    if surface_depth_mm is not None and change.cut.feed_per_tooth is None:
         raise InputError("--surface-depth-mm", surface_depth_mm, "given together with --feed-per-tooth-mm")
-    warn_outside(subject, conditions.speeds)
     stages = Stages(quiet=json_)
     with stages.stage("lobes"):
-        limits = subject.limits(conditions, bands)
-        found, doubts = limits.lobes, subject.doubts(limits)
-        tested = None if tests is None else tested_cuts(tests, subject, conditions)
-        surface = None if surface_depth_mm is None else subject.surface(process, found.spindle_speed, surface_depth_mm * 1e-3)
+        cuts = None if tests is None else read_tested_cuts(tests)
+        advice = advise(change, tested=cuts)
+        surface = None if surface_depth_mm is None else surface_of(change, surface_depth_mm * 1e-3)
+    found, remarks = advice.lobes, [*advice.remarks, *([] if surface is None else surface.warnings)]
     chart = None
     if map_ is not None:
         with stages.stage("map"):
-            chart = subject.map(conditions, map_depths, map_full)
+            chart = map_of(change, map_depths, map_full)
         write_map(map_, chart)
-    doubts += [] if surface is None else list(surface.warnings)
-    write_lobes(out, found, limits.band, surface)
-    best = best_speeds(found)
+    write_lobes(out, found, surface, advice.usable.stable)
     if plot is not None:
         from rcsa_ident.report.lobes import save_figure, stability_figure
 
+        tested = None if cuts is None or advice.tested is None else Judged(cuts, advice.tested)
         save_figure(
-            stability_figure(found, conditions.max_depth, limits.band, best, tested=tested, surface=surface, chart=chart), str(plot)
+            stability_figure(found, advice.recommended, tested=tested, surface=surface, chart=chart, usable=advice.usable), str(plot)
         )
     if json_:
-        summary = lobes_summary(found, best) | (
-            {} if tested is None else {"tested": asdict(tested.tally) | {"share_right": tested.tally.share_right}}
-        )
+        from rcsa_ident.report.summaries import lobes_summary
+
+        summary = lobes_summary(advice)
         if chart is not None:
             summary |= {"map": {"multipliers": chart.evaluations, "error": chart.error, "out": str(map_)}}
-        emit(summary | {"warnings": doubts, "seconds": stages.seconds, "out": str(out)} | ({} if plot is None else {"plot": str(plot)}))
+        emit(summary | {"warnings": remarks, "seconds": stages.seconds, "out": str(out)} | ({} if plot is None else {"plot": str(plot)}))
         return
     from rcsa_ident.cli.tables import show_lobes, show_tally
 
-    show_lobes(found, best, conditions.max_depth)
-    if tested is not None:
-        show_tally(tested.tally)
-    for doubt in doubts:
-        warn(doubt)
+    show_lobes(advice)
+    if advice.tested is not None:
+        show_tally(advice.tested)
+    for remark in remarks:
+        warn(remark)
     if plot is not None:
         say(f"drawn: {plot}")
     if chart is not None:
@@ -189,7 +176,7 @@ def lobes(
 
 
 def check_plot(path: Path | None) -> None:
-    """Refuse a figure that can not be written before the work, not after it."""
+    """Refuse a figure that cannot be written before the work, not after it."""
     if path is None:
         return
     if path.suffix.lower() not in (".png", ".svg"):
@@ -197,109 +184,20 @@ def check_plot(path: Path | None) -> None:
     writable(path, "--plot")
 
 
-def tested_cuts(path: Path, subject: Subject, conditions: LobeConditions) -> Judged:
-    """Return the tested cuts of a file with what the lobes say of them."""
-    from rcsa_ident.io.tested_cuts import read_tested_cuts
-
-    return judged(read_tested_cuts(path), subject, conditions)
-
-
-def judged(cuts: TestedCuts, subject: Subject, conditions: LobeConditions) -> Judged:
-    """Return tested cuts with what the lobes say of them, each at its own speed."""
-    from rcsa_ident.report.lobes import Judged
-    from rcsa_ident.workflows.limits import classify_tested_cuts
-
-    return Judged(cuts, classify_tested_cuts(cuts, conditions, lambda own: subject.limits(own, False)))
-
-
-def _share(percent: float) -> float:
-    if not 0.0 <= percent <= 50.0:
-        raise InputError("--stiffness-spread", percent, "a number from 0 to 50 [%]")
-    return percent / 100.0
-
-
-def tip_response(
-    machine: Mapping[Dof, MachineAxis],
-    assembly: Any,
-    frequency: FloatArray,
-    bands: bool,
-    speed: float | None = None,
-    stiffness_spread: float | None = None,
-) -> TooltipResponse:
-    """Return the tip's response at frequencies in Hz and a spindle speed in rad/s."""
-    import numpy as np
-
-    from rcsa_ident.workflows.tip import STIFFNESS_SPREAD
-    from rcsa_ident.workflows.tip import tooltip as run
-
-    return run(machine, assembly, 2.0 * np.pi * frequency, bands, speed, STIFFNESS_SPREAD if stiffness_spread is None else stiffness_spread)
-
-
-def write_response(path: Path, frequency: FloatArray, response: TooltipResponse) -> None:
-    """Write FRF.csv with standard deviations in further columns."""
-    from rcsa_ident.io.curves import write_frf_csv
-
-    columns: dict[str, FloatArray] = {}
-    for axis, (real, imaginary) in response.deviation.items():
-        columns |= {f"{axis.upper()}_re_std": real, f"{axis.upper()}_im_std": imaginary}
-    write_frf_csv(path, frequency, {axis.upper(): response.tip(axis) for axis in response.coupled}, columns)
-
-
-def peaks_of(frequency: FloatArray, response: TooltipResponse) -> dict[Dof, Any]:
+def peaks_of(frequency: FloatArray, tip: UncertainReceptance, deviation: Deviation) -> dict[Dof, Any]:
     """Return, per axis, the peak and two standard deviations of the magnitude there (NaN without bands)."""
     import numpy as np
 
     from rcsa_ident.report.summaries import peak_row
 
     peaks = {}
-    for axis in response.coupled:
-        values = response.tip(axis)
+    for coordinate in tip.rows:
+        values = tip.between(str(coordinate), str(coordinate))
         k = int(np.argmax(np.abs(values)))
         band = math.nan
-        if axis in response.deviation:
-            real, imaginary = (part[k] for part in response.deviation[axis])
+        if (coordinate, coordinate) in deviation:
+            real, imaginary = (part[k] for part in deviation[coordinate, coordinate])
             unit = values[k] / abs(values[k])
             band = 2.0 * math.hypot(real * unit.real, imaginary * unit.imag)
-        peaks[axis] = (peak_row(frequency, values), band)
+        peaks[coordinate.dof] = (peak_row(frequency, values), band)
     return peaks
-
-
-def write_map(path: Path, chart: StabilityMap) -> None:
-    """Write MAP.csv."""
-    import numpy as np
-
-    from rcsa_ident.io.curves import write_map_csv
-
-    write_map_csv(path, np.round(chart.spindle_speed * (30.0 / np.pi), 9), np.round(chart.depth * 1e3, 9), chart.growth)
-
-
-def write_lobes(
-    path: Path, found: StabilityLobes, spread: tuple[FloatArray, FloatArray] | None, surface: SurfaceError | None = None
-) -> None:
-    """Write LOBES.csv; the band's columns are empty where even its edge is beyond the largest depth."""
-    import numpy as np
-
-    from rcsa_ident.io.curves import write_lobes_csv
-
-    extra = {} if spread is None else {"limit_depth_low_mm": spread[0] * 1e3, "limit_depth_high_mm": spread[1] * 1e3}
-    assert found.flip is not None
-    extra["flip"] = np.where(found.stable, np.nan, found.flip.astype(float))
-    if surface is not None:
-        extra |= {"surface_error_um": surface.largest * 1e6, "surface_error_mean_um": surface.mean * 1e6}
-    lobe = np.where(found.lobe < 0, np.nan, found.lobe.astype(float))
-    chatter = found.chatter_frequency / (2.0 * np.pi)
-    # rad/s and back leaves a last digit that nobody asked for
-    speed = np.round(found.spindle_speed * (30.0 / np.pi), 9)
-    write_lobes_csv(path, speed, found.limit_depth * 1e3, chatter, lobe, extra, whole=("flip",))
-
-
-def lobes_summary(found: StabilityLobes, best: Sequence[tuple[float, float]]) -> dict[str, Any]:
-    """Return what a machine wants to know of lobes without reading the curve."""
-    rpm = 30.0 / math.pi
-    return {
-        "method": found.method,
-        "absolute_limit_mm": found.absolute_limit * 1e3,
-        "absolute_frequency_hz": found.absolute_frequency / (2.0 * math.pi),
-        "best_speeds": [{"spindle_speed_rpm": s * rpm, "limit_depth_mm": d * 1e3} for s, d in best],
-        "flip_speeds": 0 if found.flip is None else int(found.flip.sum()),
-    }

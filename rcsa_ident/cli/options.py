@@ -12,22 +12,14 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
+from rcsa_ident.stability.methods import MethodName
+
 
 class Strategy(StrEnum):
     """Which way the teeth enter."""
 
     up = "up"
     down = "down"
-
-
-class LobeMethod(StrEnum):
-    """Stability methods by name."""
-
-    zero_order = "zero-order"
-    multi_frequency = "multi-frequency"
-    semi_discretisation = "semi-discretisation"
-    full_discretisation = "full-discretisation"
-    time_domain = "time-domain"
 
 
 def takes_groups(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -58,15 +50,15 @@ def takes_groups(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 _TIP, _CUT, _SPEEDS, _SPINDLE = "The tip", "The cut", "Speeds and method", "The spindle"
-Bands = Annotated[bool, typer.Option(help="Add columns with what the records leave open.")]
+Bands = Annotated[bool, typer.Option(help="Add columns with uncertainty bands.")]
 StiffnessSpread = Annotated[
-    float, typer.Option(help="How well the tool-holder's stiffness is known, %: part of the bands. 1 for a modulus from a handbook.")
+    float, typer.Option(help="Standard deviation of the tool-holder's stiffness, %: part of the bands. 1 for a modulus from a handbook.")
 ]
 
 
 @dataclass(frozen=True, slots=True)
 class TipOptions:
-    """Where the tip's dynamics come from, beside RESULT.json."""
+    """Where the tip's dynamics come from, in place of a machine."""
 
     modes: Annotated[
         Path | None,
@@ -76,7 +68,7 @@ class TipOptions:
         list[str] | None,
         typer.Option(
             metavar="[X=]FILE[#RECORD]",
-            help="Tap-test FRF instead of a result, once an axis: FRF.csv, UFF 58, text columns. XY= is a cross FRF (response X, force Y).",
+            help="Tap-test FRF instead of a result, one per axis: FRF.csv, UFF 58, text columns. XY= is a cross FRF (response X, force Y).",
             show_default=False,
             rich_help_panel=_TIP,
         ),
@@ -84,7 +76,7 @@ class TipOptions:
     frf_units: Annotated[
         str | None,
         typer.Option(
-            help="Unit of the FRFs, as um/N, g/N, (m/s^2)/N; default: what the file says.", show_default=False, rich_help_panel=_TIP
+            help="Unit of the FRFs, as um/N, g/N, (m/s^2)/N; default: as the file states.", show_default=False, rich_help_panel=_TIP
         ),
     ] = None
 
@@ -122,13 +114,14 @@ class CutOptions:
         str | None, typer.Option(metavar="A,B,...", help="Radial offset of each edge, um.", show_default=False, rich_help_panel=_CUT)
     ] = None
     wear_land_um: Annotated[
-        float | None, typer.Option(help="Width of the flat behind the edge, um: process damping.", show_default=False, rich_help_panel=_CUT)
+        float | None,
+        typer.Option(help="Width of the wear land behind the edge, um: adds process damping.", show_default=False, rich_help_panel=_CUT),
     ] = None
     indentation: Annotated[
         float | None,
         typer.Option(help="Indentation coefficient, N/m^3 (1e14 aluminium, 4e13 steel).", show_default=False, rich_help_panel=_CUT),
     ] = None
-    friction: Annotated[float, typer.Option(help="Friction of the flank, with --wear-land-um.", rich_help_panel=_CUT)] = 0.3
+    friction: Annotated[float, typer.Option(help="Coefficient of friction of the flank, with --wear-land-um.", rich_help_panel=_CUT)] = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,13 +135,13 @@ class SpeedOptions:
         str | None,
         typer.Option(
             metavar="AMPLITUDE:RATIO",
-            help="The speed swings by this share of it, so many times a revolution: 0.1:0.2.",
+            help="Spindle speed variation: relative amplitude, and cycles per revolution, as 0.1:0.2.",
             show_default=False,
             rich_help_panel=_SPEEDS,
         ),
     ] = None
-    max_depth_mm: Annotated[float, typer.Option(help="Depths beyond it are not of interest, mm.", rich_help_panel=_SPEEDS)] = 10.0
-    method: Annotated[LobeMethod, typer.Option(help="How the limit is found.", rich_help_panel=_SPEEDS)] = LobeMethod.zero_order
+    max_depth_mm: Annotated[float, typer.Option(help="Largest axial depth that is searched, mm.", rich_help_panel=_SPEEDS)] = 10.0
+    method: Annotated[MethodName, typer.Option(help="Stability method.", rich_help_panel=_SPEEDS)] = MethodName.ZERO_ORDER
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,15 +14,15 @@ import typer
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.conditions import Strategy, engagement, feed_angle
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.units import from_rpm, to_rpm
 
 if TYPE_CHECKING:
     from rcsa_ident.cutting.coefficients import CuttingCoefficients
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.experiment_design import Goal
-    from rcsa_ident.identification.posterior import MachineAxis
+    from rcsa_ident.identification.machine import IdentifiedMachine
     from rcsa_ident.workflows.plan import PlannedCut, PlannedCuts
 
-_RPM = 30.0 / math.pi
 #: Recordings of a campaign that its noise is learned from.
 MOST_READ = 8
 
@@ -40,13 +40,17 @@ def plan(
     toolings: Annotated[list[Path], typer.Option(help="TOOLING.toml to cut with; once each.", show_default=False)],
     target: Annotated[list[Path], typer.Option(help="TOOLING.toml whose tooltip is wanted; once each.", show_default=False)],
     out: Annotated[Path, typer.Option(help="PLAN.toml to write: [[cuts]] for a campaign.toml.", show_default=False)],
-    depths_mm: Annotated[str, typer.Option(help="Axial depths to choose from, mm, with commas between them.")] = "0.4",
-    cuts: Annotated[int, typer.Option(min=1, max=500, help="Most cuts.")] = 16,
+    depths_mm: Annotated[str, typer.Option(help="Axial depths to choose from, mm, separated by commas.")] = "0.4",
+    cuts: Annotated[int, typer.Option(min=1, max=500, help="Largest number of cuts.")] = 16,
     band: Annotated[
         float | None,
-        typer.Option(help="Wanted standard deviation of the tooltip FRF, percent: the fewest cuts that reach it.", show_default=False),
+        typer.Option(
+            help="Standard deviation of the tooltip FRF that is wanted, %: plans the fewest cuts that reach it.", show_default=False
+        ),
     ] = None,
-    goal: Annotated[GoalName, typer.Option(help="Narrow bands of the targets, or most information on all unknowns.")] = GoalName.tooltip,
+    goal: Annotated[
+        GoalName, typer.Option(help="Smallest variance of the targets' tooltip FRFs, or most information on all unknowns.")
+    ] = GoalName.tooltip,
     speed_from: Annotated[
         float | None, typer.Option(help="Lowest spindle speed, rev/min; default: the campaign's.", show_default=False)
     ] = None,
@@ -59,25 +63,29 @@ def plan(
     exit_deg: Annotated[float | None, typer.Option(help="Exit angle.", show_default=False)] = None,
     feed_direction: Annotated[str, typer.Option(help="+X -X +Y -Y, or degrees from +X.")] = "+X",
     feed_per_tooth_mm: Annotated[float, typer.Option(help="Feed per tooth, mm.")] = 0.1,
-    margin: Annotated[float, typer.Option(help="The stability limit is at least so many times the depth.")] = 1.5,
+    margin: Annotated[float, typer.Option(help="Least ratio of the stability limit to the depth.")] = 1.5,
     from_: Annotated[
-        float | None, typer.Option("--from", help="Where the tooltip is wanted, Hz; default: the identified band.", show_default=False)
+        float | None,
+        typer.Option(
+            "--from", help="Lowest frequency of the tooltip FRF that is wanted, Hz; default: the identified band.", show_default=False
+        ),
     ] = None,
     to: Annotated[float | None, typer.Option("--to", help="Highest frequency, Hz.", show_default=False)] = None,
     noise_nm: Annotated[float, typer.Option(help="Standard deviation of a displacement line's real and imaginary part, nm.")] = 0.1,
     campaign: Annotated[
-        Path | None, typer.Option(help="Campaign to learn the noise from, instead of --noise-nm.", show_default=False)
+        Path | None, typer.Option(help="Campaign whose recordings give the noise, instead of --noise-nm.", show_default=False)
     ] = None,
     json_: Json = False,
 ) -> None:
     """Choose the stable cuts that tell most about the tooltips that are wanted, and say what they will be good for."""
-    from rcsa_ident.cli.results import read_machine
+    from rcsa_ident.cli.results import read_identified, tell
     from rcsa_ident.io.files import write_text
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.workflows.plan import CutConstraints, plan_cuts
 
     writable(out)
-    machine, data = read_machine(result)
+    machine, data = read_identified(result)
+    tell(machine, result)
     wanted = None if band is None else 1e-2 * positive("--band", band, "%")
     allowed = CutConstraints(
         *_speeds(machine, speed_from, speed_to),
@@ -123,7 +131,7 @@ def plan_text(planned: PlannedCuts) -> str:
             "[[cuts]]",
             f"id = {_quoted(name)}",
             f"tooling = {_quoted(cut.tooling)}",
-            f"spindle_speed_rpm = {float(f'{c.spindle_speed * _RPM:.9g}')}",
+            f"spindle_speed_rpm = {float(f'{to_rpm(c.spindle_speed):.9g}')}",
             f"axial_depth_mm = {float(f'{c.axial_depth * 1e3:.9g}')}",
             f"feed_per_tooth_mm = {float(f'{c.feed_per_tooth * 1e3:.9g}')}",
             f"entry_angle_deg = {float(f'{math.degrees(c.engagement.entry):.9g}')}",
@@ -158,19 +166,19 @@ def _depths(text: str) -> tuple[float, ...]:
     except ValueError as error:
         if isinstance(error, InputError):
             raise
-        raise InputError("--depths-mm", text, "numbers with commas between them [mm]") from None
+        raise InputError("--depths-mm", text, "numbers separated by commas [mm]") from None
 
 
-def _speeds(machine: dict[Dof, MachineAxis], lowest: float | None, highest: float | None) -> tuple[float, float]:
+def _speeds(machine: IdentifiedMachine, lowest: float | None, highest: float | None) -> tuple[float, float]:
     """The speeds asked for, those of the campaign where nothing is said [rad/s]."""
-    middle, half = next((p.posterior.speed_range for p in machine.values() if p.posterior is not None), (0.0, 0.0))
+    middle, half = next((p.posterior.speed_range for p in machine.identified.values() if p.posterior is not None), (0.0, 0.0))
     found = []
     for name, given, known in (("--speed-from", lowest, middle - half), ("--speed-to", highest, middle + half)):
         if given is None and known <= 0.0:
             raise InputError(name, "nothing", "a spindle speed [rev/min]: the result does not say which ones were cut")
-        found.append(known if given is None else positive(name, given, "rev/min") / _RPM)
+        found.append(known if given is None else from_rpm(positive(name, given, "rev/min")))
     if found[1] < found[0]:
-        raise InputError("--speed-to", found[1] * _RPM, f"--speed-from ({found[0] * _RPM:g}) or more [rev/min]")
+        raise InputError("--speed-to", to_rpm(found[1]), f"--speed-from ({to_rpm(found[0]):g}) or more [rev/min]")
     return found[0], found[1]
 
 
@@ -179,9 +187,10 @@ def _coefficients(data: dict[str, Any], where: str) -> CuttingCoefficients:
     from dataclasses import replace
 
     from rcsa_ident.cutting.force import SLOPES
-    from rcsa_ident.io.identifications import workpiece_from_json
+    from rcsa_ident.io.validated_table import Table
+    from rcsa_ident.io.workpieces import workpiece_of
 
-    given = workpiece_from_json(data, where).coefficients
+    given = workpiece_of(Table(data, where).table("workpiece")).coefficients
     found = data.get("coefficients", {})
     known = {}
     for name, spread in zip(SLOPES, ("tangential_spread", "ratio_spread"), strict=False):
@@ -190,8 +199,8 @@ def _coefficients(data: dict[str, Any], where: str) -> CuttingCoefficients:
     return replace(given, **known)
 
 
-def _model_errors(machine: dict[Dof, MachineAxis], data: dict[str, Any]) -> dict[Dof, float]:
-    return {axis: float(data["axes"][axis.upper()].get("model_error", 0.0)) for axis in machine}
+def _model_errors(machine: IdentifiedMachine, data: dict[str, Any]) -> dict[Dof, float]:
+    return {axis: float(data["axes"][axis.upper()].get("model_error", 0.0)) for axis in machine.identified}
 
 
 def _goal(name: GoalName) -> Goal:
@@ -222,7 +231,7 @@ def _row(name: str, cut: PlannedCut) -> dict[str, Any]:
     return {
         "id": name,
         "tooling": cut.tooling,
-        "spindle_speed_rpm": float(f"{c.spindle_speed * _RPM:.9g}"),
+        "spindle_speed_rpm": float(f"{to_rpm(c.spindle_speed):.9g}"),
         "axial_depth_mm": float(f"{c.axial_depth * 1e3:.9g}"),
         "limit_depth_mm": cut.limit_depth * 1e3,
     }
@@ -259,7 +268,7 @@ def _show(planned: PlannedCuts) -> None:
     table.add_row("", "before", "", "", "", *(f"{100.0 * v:.3f}" for v in planned.band[0]))
     for i, (cut, after) in enumerate(zip(planned.cuts, planned.band[1:], strict=True), start=1):
         c, limit = cut.conditions, f"{cut.limit_depth * 1e3:.2f}" if math.isfinite(cut.limit_depth) else "more"
-        numbers = (f"{c.spindle_speed * _RPM:.0f}", f"{c.axial_depth * 1e3:g}", limit, *(f"{100.0 * v:.3f}" for v in after))
+        numbers = (f"{to_rpm(c.spindle_speed):.0f}", f"{c.axial_depth * 1e3:g}", limit, *(f"{100.0 * v:.3f}" for v in after))
         table.add_row(str(i), escape(cut.tooling), *numbers)
     out = Console(highlight=False)
     out.print(table)

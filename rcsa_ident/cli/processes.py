@@ -6,6 +6,7 @@ import importlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,6 +14,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.reduction import ForkingPickler
+from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -32,8 +34,10 @@ EARLY = ("rcsa_ident.io.recordings", "rcsa_ident.workflows.identify", "rcsa_iden
 #: Seconds between two steps of one process that are shown.
 PAUSE = 0.1
 
-Processes = Annotated[int | None, typer.Option(min=1, max=64, help="Processes; by default one a core, at most 8.", show_default=False)]
-DASK_HELP = "Scheduler of a Dask cluster that works instead of processes here (tcp://host:8786); it sees the campaign under the same path."
+Processes = Annotated[
+    int | None, typer.Option(min=1, max=64, help="Number of processes; default: one per core, at most 8.", show_default=False)
+]
+DASK_HELP = "Dask scheduler (tcp://host:8786) to use instead of local processes; its workers find the campaign under the same path."
 Dask = Annotated[str | None, typer.Option(metavar="ADDRESS", help=DASK_HELP, show_default=False)]
 #: Takes axis, stage and cost of a search.
 Show = Callable[[str, str, float], None]
@@ -196,7 +200,7 @@ def workers_or_cluster(processes: int | None, dask: str | None) -> Iterator[Work
             yield pool
         return
     if processes is not None:
-        raise InputError("--dask", f"--processes {processes} beside it", "one of both: the cluster has its own")
+        raise InputError("--dask", f"given together with --processes {processes}", "one of the two: a cluster has its own processes")
     with cluster_map(dask) as cluster:
         yield Workers(cluster=cluster)
 
@@ -219,7 +223,7 @@ def workers(processes: int | None, early: Sequence[str] = EARLY) -> Iterator[Wor
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(helpers, context, initializer=_import, initargs=(tuple(early),))
     try:
-        with _no_interrupts():
+        with _no_interrupts(), _no_script():
             for _ in range(helpers):
                 pool.submit(_nothing)
         yield Workers(helpers, pool)
@@ -242,6 +246,17 @@ def _no_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _no_script() -> Iterator[None]:
+    """Let processes that start here not run the script again that starts them: they need nothing of it, and it may have no guard."""
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
 
 
 def _import(early: Sequence[str]) -> None:

@@ -1,4 +1,4 @@
-"""Identified machines from result files."""
+"""Machines from files: identified ones, and measured or decoupled flanges."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from typing import TYPE_CHECKING, Any
 from rcsa_ident.cli.common import warn
 
 if TYPE_CHECKING:
-    from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.identification.posterior import MachineAxis
-    from rcsa_ident.workflows.speeds import MachineOverSpeed
+    from rcsa_ident.identification.machine import IdentifiedMachine
+    from rcsa_ident.machine.machine import Machine
 
 
-def read_machine(path: Path) -> tuple[dict[Dof, MachineAxis], dict[str, Any]]:
+def read_machine(path: Path) -> Machine:
+    """Return the machine of a RESULT.json or of a FLANGE.csv."""
+    from rcsa_ident.io.flanges import read_flange_machine
+
+    return read_flange_machine(path) if path.suffix.lower() == ".csv" else read_identified(path)[0]
+
+
+def read_identified(path: Path) -> tuple[IdentifiedMachine, dict[str, Any]]:
     """Return the machine of a result file beside the file's content."""
     from rcsa_ident.io.identifications import machine_from_json
     from rcsa_ident.io.results import read_result
 
     data = read_result(path)
-    machine = machine_from_json(data, str(path))
-    if data["status"] != "converged":
-        warn(f"{path} is {data['status']}: {'; '.join(data['reasons'])}")
-    return machine, data
+    return machine_from_json(data, str(path)), data
 
 
-def read_machine_over_speed(path: Path) -> tuple[MachineOverSpeed, dict[str, Any]]:
-    """Return the machine of a result file, with the models of single speed bands, beside the file's content."""
-    from rcsa_ident.io.identifications import speed_bands_from_json
-    from rcsa_ident.workflows.speeds import MachineOverSpeed
-
-    machine, data = read_machine(path)
-    return MachineOverSpeed(machine, speed_bands_from_json(data, str(path))), data
+def tell(machine: Machine, path: Path) -> None:
+    """Say what speaks against a machine, where no answer says it."""
+    for remark in machine.remarks:
+        warn(f"{path}: {remark}")

@@ -12,11 +12,10 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.report.summaries import RecordingRow, coefficient_rows, mode_rows, two_digits
-from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.advice import Advice, PlannedCut, SpeedWindow
 from rcsa_ident.stability.tested_cuts import Tally
-from rcsa_ident.workflows.advice import OperatingPoint, PlannedCut, SpeedWindow
+from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
 
-_RPM = 9.549296585513721
 _COLOURS = {"converged": "green", "suspect": "yellow", "failed": "red"}
 
 
@@ -86,22 +85,27 @@ def show_identification(found: Identification, deviations: Mapping[Dof, tuple[Fl
         out.print(f"note: {escape(note)}", soft_wrap=True)
 
 
-def show_lobes(lobes: StabilityLobes, best: Sequence[tuple[float, float]], max_depth: float) -> None:
-    """Print the absolute limit and the best speeds."""
-    out = console()
-    if lobes.absolute_limit < float("inf"):
-        frequency = lobes.absolute_frequency / 6.283185307179586
+def show_lobes(advice: Advice) -> None:
+    """Print the absolute limit, and the stability limit and the recommended depth of the best speeds."""
+    out, lobes = console(), advice.lobes
+    if lobes.absolute_limit is not None and lobes.absolute_frequency is not None:
+        frequency = to_hz(lobes.absolute_frequency)
         out.print(f"stable at any speed up to {1e3 * lobes.absolute_limit:.3f} mm (chatter would start at {frequency:.0f} Hz)")
-    table = Table("spindle speed\nrev/min", "stable up to\nmm", title="best speeds of the range", title_justify="left")
-    for column in table.columns:
-        column.justify = "right"
-    for speed, depth in best:
-        table.add_row(f"{speed * _RPM:.0f}", f"{1e3 * depth:.2f}" if depth < float("inf") else f"more than {1e3 * max_depth:g}")
+    heads = ("spindle speed\nrev/min", "recommended\ndepth mm", "stability\nlimit mm")
+    table = _table(*heads, title="recommended cuts of the range")
+    for point in advice.recommended:
+        table.add_row(f"{to_rpm(point.spindle_speed):.0f}", f"{1e3 * point.depth:.2f}", _limit(point.limit, lobes.max_depth))
     out.print(table)
+    peaks = ", ".join(f"{_limit(p.limit_depth, lobes.max_depth)} mm at {to_rpm(p.spindle_speed):.0f} rev/min" for p in lobes.best_speeds())
+    out.print(f"highest stability limits: {peaks}")
+
+
+def _limit(depth: float, most: float) -> str:
+    return f"{1e3 * depth:.2f}" if depth < most else f"more than {1e3 * most:g}"
 
 
 def show_tally(tally: Tally) -> None:
-    """Print how many tested cuts the lobes tell right: the four cases, and the marginal ones apart."""
+    """Print how many tested cuts the lobes classify correctly: the four cases, and the marginal ones apart."""
     table = Table("predicted", "seen\nstable", "seen\nchatter", "marginal", title="tested cuts", title_justify="left")
     for column in table.columns[1:]:
         column.justify = "right"
@@ -110,12 +114,12 @@ def show_tally(tally: Tally) -> None:
     out = console()
     out.print(table)
     if tally.decided:
-        out.print(f"told right: {tally.stable_stable + tally.chatter_chatter} of {tally.decided}, {100.0 * tally.share_right:.1f} %")
+        out.print(f"classified correctly: {_right(tally)}, {100.0 * tally.share_right:.1f} %")
 
 
 def show_cases(rows: Sequence[tuple[str, Tally | None, Tally | None]]) -> None:
-    """Print how many cuts of each case are told right, in process and, where there are tap tests, at standstill."""
-    columns = ("case", "told right", "unexpected\nchatter", "stable above\nthe limit", "marginal", "told right\nby tap tests")
+    """Print how many cuts of each case are classified correctly, in process and, where there are tap tests, at standstill."""
+    columns = ("case", "correct", "unexpected\nchatter", "stable above\nthe limit", "marginal", "correct\nby tap tests")
     table = _table(*columns, title="tested cuts")
     table.columns[0].justify = "left"
     for name, own, idle in rows:
@@ -138,27 +142,36 @@ def _table(*columns: str, title: str) -> Table:
     return table
 
 
-def show_points(points: Sequence[OperatingPoint]) -> None:
-    """Print the cuts that remove most."""
-    heads = ("spindle speed\nrev/min", "depth\nmm", "removal\ncm³/min", "power\nkW", "torque\nN m", "more is\nended by")
-    table = _table(*heads, title="highest removal rate")
-    for p in points:
-        numbers = (f"{p.spindle_speed * _RPM:.0f}", f"{1e3 * p.depth:.2f}", f"{6e7 * p.removal_rate:.0f}", f"{1e-3 * p.power:.2f}")
-        table.add_row(*numbers, f"{p.torque:.1f}", str(p.bound))
+def show_points(advice: Advice) -> None:
+    """Print the recommended cuts: those that remove most."""
+    heads = (
+        "spindle speed\nrev/min",
+        "recommended\ndepth mm",
+        "stability\nlimit mm",
+        "removal\ncm³/min",
+        "power\nkW",
+        "torque\nN m",
+        "limited\nby",
+    )
+    table = _table(*heads, title="recommended cuts: highest removal rate")
+    for p in advice.recommended:
+        cells = f"{to_rpm(p.spindle_speed):.0f}", f"{1e3 * p.depth:.2f}", _limit(p.limit, advice.lobes.max_depth)
+        load = f"{to_cm3_per_min(p.removal_rate or 0.0):.0f}", f"{1e-3 * (p.power or 0.0):.2f}", f"{p.torque or 0.0:.1f}"
+        table.add_row(*cells, *load, str(p.bound))
     console().print(table)
 
 
 def show_windows(windows: Sequence[SpeedWindow], depth_mm: float, name: str) -> None:
-    """Print the speeds at which a depth is allowed."""
+    """Print the speeds at which a depth is recommended."""
     out = console()
     about = f"{escape(name)}: " if name else ""
     if not windows:
-        out.print(f"{about}{depth_mm:g} mm is allowed at no speed of the range")
+        out.print(f"{about}a depth of {depth_mm:g} mm is not recommended at any speed of the range")
         return
-    heads = ("best at\nrev/min", "from\nrev/min", "to\nrev/min", "allowed there\nmm")
+    heads = ("best at\nrev/min", "from\nrev/min", "to\nrev/min", "recommended\ndepth mm")
     table = _table(*heads, title=f"{about}speeds for a depth of {depth_mm:g} mm")
     for w in windows[:8]:
-        table.add_row(*(f"{speed * _RPM:.0f}" for speed in (w.best, w.low, w.high)), f"{1e3 * w.allowed:.2f}")
+        table.add_row(*(f"{to_rpm(speed):.0f}" for speed in (w.best, w.low, w.high)), f"{1e3 * w.allowed:.2f}")
     out.print(table)
 
 
@@ -168,12 +181,12 @@ def show_planned(cuts: Sequence[PlannedCut], name: str) -> None:
     for cut in cuts:
         about = f"{escape(name)}: " if name else ""
         verdict = "[green]stable[/]" if cut.stable else "[red]chatter[/]"
-        limit = f"limit {1e3 * cut.limit:.2f} mm, margin {100.0 * cut.margin:+.0f} %" if cut.limit < float("inf") else "no limit in reach"
-        words = [f"{about}{cut.spindle_speed * _RPM:.0f} rev/min, {1e3 * cut.depth:.2f} mm: {verdict}, {limit}"]
+        limit = f"limit {1e3 * cut.limit:.2f} mm, margin {100.0 * cut.margin:+.0f} %" if cut.limit < float("inf") else "no limit found"
+        words = [f"{about}{to_rpm(cut.spindle_speed):.0f} rev/min, {1e3 * cut.depth:.2f} mm: {verdict}, {limit}"]
         if cut.probability is not None:
             words.append(f"stable with a probability of {100.0 * cut.probability:.0f} %")
-        words.append(f"{1e3 * cut.robust_limit:.2f} mm with tolerance and probability")
-        near = [f"{speed * _RPM:.0f} rev/min" for speed in (cut.slower, cut.faster) if speed is not None]
+        words.append(f"limit with tolerance and probability {1e3 * cut.robust_limit:.2f} mm")
+        near = [f"{to_rpm(speed):.0f} rev/min" for speed in (cut.slower, cut.faster) if speed is not None]
         if near:
             words.append(f"{'chatter begins at' if cut.stable else 'the nearest stable speeds are'} {' and '.join(near)}")
         words.append(
@@ -182,17 +195,18 @@ def show_planned(cuts: Sequence[PlannedCut], name: str) -> None:
         out.print("; ".join(words), soft_wrap=True)
 
 
-def show_comparison(rows: Sequence[tuple[str, float, Sequence[OperatingPoint]]]) -> None:
-    """Print the lowest limit [m] and the best cut of several toolings."""
-    heads = ("tooling", "lowest limit\nmm", "best at\nrev/min", "depth\nmm", "removal\ncm³/min", "more is\nended by")
+def show_comparison(answers: Sequence[Advice]) -> None:
+    """Print the lowest limit and the first recommended cut of several toolings."""
+    heads = ("tooling", "lowest limit\nmm", "recommended\nrev/min", "recommended\ndepth mm", "removal\ncm³/min", "limited\nby")
     table = _table(*heads, title="comparison")
     table.columns[0].justify = "left"
-    for name, lowest, points in rows:
+    for answer in answers:
         cells = ["", "", "", ""]
-        if points:
-            p = points[0]
-            cells = [f"{p.spindle_speed * _RPM:.0f}", f"{1e3 * p.depth:.2f}", f"{6e7 * p.removal_rate:.0f}", str(p.bound)]
-        table.add_row(escape(name), f"{1e3 * lowest:.3f}", *cells)
+        if answer.recommended:
+            p = answer.recommended[0]
+            removal = to_cm3_per_min(p.removal_rate or 0.0)
+            cells = [f"{to_rpm(p.spindle_speed):.0f}", f"{1e3 * p.depth:.2f}", f"{removal:.0f}", str(p.bound)]
+        table.add_row(escape(answer.tooling), f"{1e3 * float(answer.lobes.nominal.min()):.3f}", *cells)
     console().print(table)
 
 

@@ -14,18 +14,18 @@ if TYPE_CHECKING:
     from rcsa_ident.io.tool_libraries import Imported
     from rcsa_ident.tool_holder.geometry import Contact
 
-_ASSUMED = "What the library cannot tell"
+_ASSUMED = "What the library does not state"
 
 
 @answers
 def import_tools(
     library: Annotated[Path, typer.Argument(help="Tool library of Fusion 360 or HSM: .json, or .tools with it.", show_default=False)],
     out: Annotated[
-        Path | None, typer.Option(help="Folder for one TOOLING.toml a tool; made where it is missing.", show_default=False)
+        Path | None, typer.Option(help="Folder for one TOOLING.toml per tool; created if it is missing.", show_default=False)
     ] = None,
-    list_: Annotated[bool, typer.Option("--list", help="Only say what the library holds.")] = False,
+    list_: Annotated[bool, typer.Option("--list", help="Only list the tools of the library.")] = False,
     tool: Annotated[
-        list[str] | None, typer.Option(help="Name or number of a tool to import, as often as wanted; default: all.", show_default=False)
+        list[str] | None, typer.Option(help="Name or number of a tool to import; may be repeated; default: all.", show_default=False)
     ] = None,
     holder: Annotated[
         str | None,
@@ -38,22 +38,26 @@ def import_tools(
     insertion_mm: Annotated[
         float | None,
         typer.Option(
-            help="Length in the holder's bore, mm; default: all that is behind its nose.", show_default=False, rich_help_panel=_ASSUMED
+            help="Length in the holder's bore, mm; default: all of the tool behind the holder's nose.",
+            show_default=False,
+            rich_help_panel=_ASSUMED,
         ),
     ] = None,
     flute_ratio: Annotated[
         float, typer.Option(help="Equivalent diameter of the fluted part over the cutting diameter.", rich_help_panel=_ASSUMED)
     ] = 0.8,
-    helix_deg: Annotated[float, typer.Option(help="Helix, degrees, where the library gives none.", rich_help_panel=_ASSUMED)] = 30.0,
+    helix_deg: Annotated[float, typer.Option(help="Helix angle, degrees, where the library has none.", rich_help_panel=_ASSUMED)] = 30.0,
     material: Annotated[
         str | None,
-        typer.Option(help="Of the tools: carbide, steel; default: the library's.", show_default=False, rich_help_panel=_ASSUMED),
+        typer.Option(help="Tool material: carbide, steel; default: the library's.", show_default=False, rich_help_panel=_ASSUMED),
     ] = None,
     contact: Annotated[
         Path | None,
-        typer.Option(help="TOOLING.toml whose contact of tool and holder counts here, too.", show_default=False, rich_help_panel=_ASSUMED),
+        typer.Option(
+            help="TOOLING.toml whose contact between tool and holder is used here as well.", show_default=False, rich_help_panel=_ASSUMED
+        ),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace files that are there.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Overwrite existing files.")] = False,
     json_: Json = False,
 ) -> None:
     """Make toolings from the tool library of a CAM program; each file says what was assumed."""
@@ -61,7 +65,7 @@ def import_tools(
     from rcsa_ident.io.tool_libraries import Assumptions, file_names, read_tool_library
 
     if (out is None) != list_:
-        raise InputError("--out", "nothing" if out is None else "--out beside --list", "a folder, or --list")
+        raise InputError("--out", "nothing" if out is None else "given together with --list", "a folder, or --list")
     assumed = Assumptions(flute_ratio, helix_deg, stickout_mm, insertion_mm, material, _contact(contact), holder)
     entries = _chosen(read_tool_library(library, assumed), tool or [], str(library))
     made = [entry for entry in entries if entry.tooling is not None]
@@ -87,10 +91,10 @@ def import_tools(
     else:
         _show(entries)
         if out is not None:
-            say(f"written: {len(paths)} toolings to {out}; each begins with what was assumed")
+            say(f"written: {len(paths)} toolings to {out}; each begins with its assumptions")
     if not made:
         if not json_:
-            warn("no tool of the library became a tooling")
+            warn("no tool of the library could be imported")
         raise typer.Exit(BAD_INPUT)
 
 

@@ -20,6 +20,8 @@ def assemble(tool_holder: Structure, spindle: Structure, joint: LumpedJoint) -> 
         Coordinates at ``tip`` and ``flange``.
     spindle : Structure
         Coordinates at ``flange``.
+    joint : LumpedJoint
+        Its springs and dampers tie the two flanges in every direction that the spindle has.
     """
     d = tool_holder.mass.shape[0]
     mass = scipy.linalg.block_diag(tool_holder.mass, spindle.mass)

@@ -1,4 +1,4 @@
-"""Decoupling: a known tool-holder taken out of a measured assembly leaves the spindle's flange."""
+"""Decoupling [park2003]: a known tool-holder taken out of a measured assembly leaves the spindle's flange."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def decouple(measured: Receptance, tool_holder: Receptance, joint: LumpedJoint |
     """Return the spindle's flange from an assembly whose receptances are known with rotations, exactly.
 
     With D = A22 + K^-1: B33 = A21 (A11 - C11)^-1 A12 - D where the tip was measured, else B33 = (C33^-1 - D^-1)^-1 at the
-    spindle's end of the joint, or B33 = (I - G)^-1 G D with G = C31 A21^-1 across: eq. 10 of the paper turned round.
+    spindle's end of the joint, or B33 = (I - G)^-1 G D with G = C31 A21^-1 across: [inprocess], eq. 10, turned round.
 
     Parameters
     ----------
@@ -56,7 +56,17 @@ def decouple(measured: Receptance, tool_holder: Receptance, joint: LumpedJoint |
 
 
 def interface_receptance(tool_holder: Receptance, directions: tuple[Dof, ...], joint: LumpedJoint | None) -> ComplexArray:
-    """Return A22 + K^-1, shape (n, d, d)."""
+    """Return A22 + K^-1, shape (n, d, d): what the spindle's flange is coupled to.
+
+    Parameters
+    ----------
+    tool_holder : Receptance
+        Point ``flange`` among its points.
+    directions : tuple of Dof, length d
+        Of the flange, in the tool-holder's order.
+    joint : LumpedJoint or None
+        None is a rigid connection.
+    """
     interface = np.array(tool_holder["flange", "flange"])
     if joint is not None:
         i = np.arange(len(directions))
@@ -73,7 +83,7 @@ def with_slope(translations: ComplexArray, positions: FloatArray) -> ComplexArra
     Parameters
     ----------
     translations : complex array, shape (n, k, k) [m/N]
-        Between all pairs of points, two at least.
+        Receptances between all pairs of points, two at least.
     positions : array, shape (k,) [m]
         Along z from the tip towards the spindle.
 

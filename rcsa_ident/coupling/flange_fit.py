@@ -74,14 +74,15 @@ class DecoupledFlange:
     std : array, shape (n, 2, 2)
         Standard deviation of the real and of the imaginary part each; the prior's share is in it where there is one.
     condition : array, shape (n,) [-]
-        Of each frequency's equations, noise-weighted and scaled to the entries' own size.
+        Condition number of each frequency's equations, noise-weighted and scaled to the entries' own size.
     chi2 : array, shape (n,)
         Sum of squared residuals in standard deviations; `freedom` is expected where measurements outnumber unknowns.
     freedom : int
+        Real measurements less real unknowns at a frequency.
     regularised : array of bool, shape (n,)
-        Where neighbouring frequencies were needed as a prior.
+        True where neighbouring frequencies were needed as a prior.
     ambiguous : array of bool, shape (n,)
-        Where another passive solution explains the measurements as well.
+        True where another passive solution explains the measurements as well.
     dissipation : array, shape (n,) [-]
         Below zero the result feeds energy in: noise, or a tool-holder that is not as modelled.
     notes : tuple of str
@@ -122,17 +123,17 @@ def least_squares_flange(
     and of several solutions the one with the best misfit, then a passive one, then the one nearest to its neighbour is taken.
     """
     if len(observations) < 3:
-        raise InputError("observations", len(observations), "three at least: the flange has three independent entries")
+        raise InputError("observations", len(observations), "at least three: the flange has three independent entries")
     omega = observations[0].tool_holder.omega
     flange = tuple(c for c in observations[0].tool_holder.rows if c.point == "flange")
     for each in observations:
         if not np.array_equal(each.tool_holder.omega, omega):
             raise InputError("tool-holders", f"{each.tool_holder.omega.size} frequencies", f"the same {omega.size} frequencies for all")
         if tuple(c for c in each.tool_holder.rows if c.point == "flange") != flange or len(flange) != 2:
-            raise InputError("tool-holders", "other directions", "one bending plane, the same for all")
+            raise InputError("tool-holders", "different directions", "one bending plane, the same for all")
     model = _Assemblies.of(observations, joint)
     if sum(o.row == o.col == "tip" for o in observations) < 3:
-        raise InputError("observations", "fewer than three at the tip", "three tip receptances at least, from which the solution starts")
+        raise InputError("observations", "fewer than three at the tip", "at least three tip receptances, from which the solution starts")
     starts = [_tamed(start) for start in model.starts()]
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         solved = [_tamed(model.polish(start)) for start in starts]
@@ -382,15 +383,19 @@ def _notes(
     notes = []
     if regularised.any():
         worst = f"condition number up to {condition[regularised].max():.2g}"
-        notes.append(f"{np.mean(regularised) * 100.0:.0f} % of the frequencies are ill-conditioned ({worst}) and lean on their neighbours")
+        notes.append(
+            f"{np.mean(regularised) * 100.0:.0f} % of the frequencies are ill-conditioned ({worst}) and regularised by their neighbours"
+        )
     if np.median(condition) > POOR_CONDITION:
         notes.append(
             f"half of the frequencies have a condition number above {np.median(condition):.0f}: receptances measured at the spindle "
-            "with the same toolings tell more than further tips"
+            "with the same toolings contribute more than further tip receptances"
         )
     if ambiguous.any():
         share = np.mean(ambiguous) * 100.0
-        notes.append(f"at {share:.0f} % of the frequencies two passive flanges explain the measurements: a fourth tooling would tell")
+        notes.append(
+            f"at {share:.0f} % of the frequencies two passive flanges explain the measurements: a fourth tooling would decide between them"
+        )
     active = loss < -1e-3
     if active.any():
         notes.append(
@@ -398,6 +403,6 @@ def _notes(
         )
     if freedom > 0 and np.median(chi2) > 3.0 * freedom:
         notes.append(
-            f"misfit {np.median(chi2):.3g} where {freedom} is expected: tool-holders or joint are not as modelled, or noise is larger"
+            f"misfit {np.median(chi2):.3g} where {freedom} is expected: tool-holders or joint differ from their models, or noise is larger"
         )
     return tuple(notes)

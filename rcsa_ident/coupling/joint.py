@@ -14,7 +14,7 @@ from rcsa_ident.errors import non_negative, positive
 
 @dataclass(frozen=True, slots=True)
 class LumpedJoint:
-    """Springs and dampers in translation and rotation (the paper's eq. 11).
+    """Springs and dampers in translation and rotation ([inprocess], eq. 11).
 
     Parameters
     ----------
@@ -22,6 +22,12 @@ class LumpedJoint:
     rotational_stiffness : float [N m/rad]
     translational_damping : float [N s/m]
     rotational_damping : float [N m s/rad]
+
+    Examples
+    --------
+    >>> joint = LumpedJoint(translational_stiffness=5e8, rotational_stiffness=2e6)
+    >>> joint.compliance_along([0.0], [Dof.X, Dof.SLOPE_X]).real.tolist()
+    [[2e-09, 5e-07]]
     """
 
     translational_stiffness: float
@@ -36,7 +42,7 @@ class LumpedJoint:
         non_negative("joint rotational_damping", self.rotational_damping, "N m s/rad")
 
     def compliance_along(self, omega: FloatArray, directions: Sequence[Dof]) -> ComplexArray:
-        """Return the diagonal of K(omega)^-1 over the given directions, shape (n, d)."""
+        """Return the diagonal of K(omega)^-1 over the given directions, shape (n, d) [m/N, rad/(N m)]."""
         omega = np.asarray(omega, dtype=float)
         translation = 1.0 / (self.translational_stiffness + 1j * omega * self.translational_damping)
         slope = 1.0 / (self.rotational_stiffness + 1j * omega * self.rotational_damping)

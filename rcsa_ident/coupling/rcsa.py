@@ -1,4 +1,4 @@
-"""Receptance coupling of a tool-holder and a spindle through a lumped joint (the paper's eqs. 10 and 12)."""
+"""Receptance coupling [schmitz2000] of a tool-holder and a spindle through a lumped joint ([inprocess], eqs. 10 and 12)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rcsa_ident.errors import InputError
 SPINDLE = "spindle"
 
 
-def couple(tool_holder: Receptance, spindle: Receptance, joint: LumpedJoint) -> Receptance:
+def couple(tool_holder: Receptance, spindle: Receptance, joint: LumpedJoint | None) -> Receptance:
     """Return the receptances of the coupled machine at the tip (point 1) and at the spindle's flange (point 3).
 
     C11 = A11 - A12 Z A21,  C31 = B33 Z A21,  C33 = B33 - B33 Z B33,  Z = [A22 + K^-1 + B33]^-1.
@@ -23,11 +23,26 @@ def couple(tool_holder: Receptance, spindle: Receptance, joint: LumpedJoint) -> 
         Points ``tip`` and ``flange``; per point translation and slope of one bending plane, or of both (4 x 4 blocks).
     spindle : Receptance
         Point ``flange`` with the same directions in the same order, at the same frequencies.
+    joint : LumpedJoint or None
+        None is a rigid connection, or one whose compliance the spindle's receptance holds already.
 
     Returns
     -------
     Receptance
         Points ``tip`` and ``spindle``.
+
+    Examples
+    --------
+    Two free rigid bodies of 1 kg, whose tip and flange move alike, on a stiff joint move as one of 2 kg:
+
+    >>> from rcsa_ident.dynamics.coordinates import plane
+    >>> omega = np.array([50.0])
+    >>> body = np.diag([-1.0 / omega[0] ** 2, -1000.0 / omega[0] ** 2])[None]
+    >>> holder = Receptance(omega, np.kron(np.ones((2, 2)), body), plane("tip") + plane("flange"), plane("tip") + plane("flange"))
+    >>> spindle = Receptance(omega, body, plane("flange"), plane("flange"))
+    >>> machine = couple(holder, spindle, LumpedJoint(5e8, 2e6))
+    >>> round(float((machine.between("tip.x", "tip.x")[0] * -(omega[0] ** 2)).real), 4)
+    0.5
     """
     if tool_holder.omega.shape != spindle.omega.shape or not np.array_equal(tool_holder.omega, spindle.omega):
         raise InputError("spindle receptance", f"{spindle.omega.size} frequencies", "the tool-holder's frequencies")
@@ -41,8 +56,9 @@ def couple(tool_holder: Receptance, spindle: Receptance, joint: LumpedJoint) -> 
                 f"directions at the flange ({name})", " ".join(found), f"the tool-holder's, {' '.join(directions)}, in that order"
             )
     interface = a22 + b33
-    i = np.arange(len(directions))
-    interface[:, i, i] += joint.compliance_along(tool_holder.omega, directions)
+    if joint is not None:
+        i = np.arange(len(directions))
+        interface[:, i, i] += joint.compliance_along(tool_holder.omega, directions)
     tips = a21.shape[2]
     carried = np.linalg.solve(interface, np.concatenate([a21, b33], axis=2))
     from_tip, from_spindle = carried[:, :, :tips], carried[:, :, tips:]

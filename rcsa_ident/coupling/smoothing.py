@@ -15,6 +15,15 @@ def bending(omega: FloatArray, size: FloatArray, least_damping: float) -> Bend:
     """Return weights of the second differences at inner frequencies, shape (n - 2, 3), and one over their standard deviation, (n - 2, 3).
 
     The peak of a mode with damping zeta bends by 2 |h| (step / (zeta omega))^2 from one frequency to the next.
+
+    Parameters
+    ----------
+    omega : array, shape (n,) [rad/s]
+        Ascending.
+    size : array, shape (n, 3)
+        Usual size |h| of the three entries.
+    least_damping : float [-]
+        Damping ratio below which no mode is expected.
     """
     before, after = np.diff(omega)[:-1], np.diff(omega)[1:]
     weights = np.stack([2.0 * after, -2.0 * (before + after), 2.0 * before], axis=1) / (before + after)[:, None]
@@ -53,7 +62,20 @@ def _banded(precision: ComplexArray, bend: Bend, size: FloatArray) -> ComplexArr
 
 
 def band_solve(precision: ComplexArray, right: ComplexArray, bend: Bend, size: FloatArray, at: ComplexArray | None = None) -> ComplexArray:
-    """Solve (precision + prior) x = right - prior at, shape (n, 3)."""
+    """Return the solution x of (precision + prior) x = right - prior at, shape (n, 3).
+
+    Parameters
+    ----------
+    precision : complex array, shape (n, 3, 3)
+        What the measurements say at each frequency, Hermitian.
+    right : complex array, shape (n, 3)
+    bend : tuple of arrays
+        The prior, from `bending`.
+    size : array, shape (n, 3)
+        Scale of the unknowns: the equations are solved in units of it.
+    at : complex array, shape (n, 3), optional
+        Point of linearisation from which the prior already pulls; by default 0.
+    """
     n = right.shape[0]
     target = right * size
     if at is not None:
@@ -70,6 +92,16 @@ def band_covariance(precision: ComplexArray, bend: Bend, size: FloatArray, windo
     """Return the diagonal blocks of the inverse of precision + prior, shape (n, 3, 3).
 
     Window by window: what lies farther away than the margin no longer matters.
+
+    Parameters
+    ----------
+    precision : complex array, shape (n, 3, 3)
+    bend : tuple of arrays
+        The prior, from `bending`.
+    size : array, shape (n, 3)
+        Scale of the unknowns.
+    window, margin : int
+        Frequencies whose blocks come from one inverse, and how many more stand on each side of them.
     """
     n = precision.shape[0]
     band = _banded(precision, bend, size)

@@ -1,4 +1,4 @@
-"""Cutting coefficients from measured mean forces, with intervals."""
+"""Cutting coefficients from measured mean forces [altintas2012], with intervals."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rcsa_ident.errors import InputError
 #: Coefficients in the order of `ForceCalibration.value`; the last two of three belong to a dynamometer that measures along the axis.
 NAMES = ("K_tc", "K_rc", "K_te", "K_re", "K_ac", "K_ae")
 UNITS = {"K_tc": "N/m^2", "K_rc": "N/m^2", "K_ac": "N/m^2", "K_te": "N/m", "K_re": "N/m", "K_ae": "N/m"}
-#: ShortestPlan cuts from which a scatter between cuts can be told.
+#: Fewest cuts from which a scatter between cuts can be told.
 LEAST_CUTS = 3
 _NORMAL_95 = 1.959964
 #: Condition number of the scaled regression from which on coefficients cannot be told apart.
@@ -32,12 +32,13 @@ class ForceCalibration:
     Parameters
     ----------
     method : str
+        ``mean`` or ``signal``.
     names : tuple of str, length p
-        Of `NAMES`.
+        The coefficients that were fitted, out of `NAMES`.
     value : array, shape (p,) [N/m^2 or N/m]
     covariance : array, shape (p, p)
     half_width : array, shape (p,)
-        Of the 95 % intervals, by a t-distribution.
+        Half widths of the 95 % intervals, by a t-distribution.
     misfit : float [-]
         Root mean square of what is left over that of the forces.
     reasons, notes : tuples of str
@@ -137,7 +138,7 @@ def calibrate_mean_force(
     """
     force = np.asarray(force, dtype=float)
     if len(cuts) < LEAST_CUTS:
-        raise InputError("cuts", len(cuts), f"at least {LEAST_CUTS}, so that their scatter can be told")
+        raise InputError("cuts", len(cuts), f"at least {LEAST_CUTS}, so that their scatter can be estimated")
     count = force.shape[1]
     names = NAMES if count == 3 else NAMES[:4]
     design = np.concatenate([mean_force_matrix(*cut)[:count, : len(names)] for cut in cuts])
@@ -148,7 +149,9 @@ def calibrate_mean_force(
         scale = np.linalg.norm(design[:, kept], axis=0)
         if not np.all(scale > 0.0) or np.linalg.cond(design[:, kept] / scale) > _WORST_CONDITION:
             found = ", ".join(f"{1e3 * f:g}" for f in sorted({c.feed_per_tooth for _, c in cuts}))
-            raise InputError("feed_per_tooth_mm of the cuts", found, "two or more different feeds per tooth, so that edges can be told")
+            raise InputError(
+                "feed_per_tooth_mm of the cuts", found, "two or more different feeds per tooth, so that edge forces can be separated"
+            )
         solution = np.linalg.lstsq(design[:, kept] / scale, observed)[0] / scale
         negative = [i for i, k in enumerate(kept) if names[k].endswith("e") and solution[i] < 0.0]
         if not negative:
@@ -184,14 +187,22 @@ def _runout_effect(cutter: Cutter, conditions: CuttingConditions, solution: Floa
 
 
 def plausible(names: Sequence[str], value: FloatArray, half_width: FloatArray) -> tuple[str, ...]:
-    """Return what speaks against a set of coefficients."""
+    """Return what speaks against a set of coefficients, in words.
+
+    Parameters
+    ----------
+    names : sequence of str, length p
+        Out of `NAMES`.
+    value, half_width : arrays, shape (p,) [N/m^2 or N/m]
+        Coefficients and half widths of their 95 % intervals.
+    """
     known = dict(zip(names, zip(value.tolist(), half_width.tolist(), strict=True), strict=True))
     reasons = []
     tangential, width = known["K_tc"]
     if tangential <= 0.0:
         reasons.append("K_tc is below zero: the force is not the one on the tool in the machine's axes (sign or axes of the sensors?)")
     elif width > 0.5 * tangential:
-        reasons.append(f"K_tc is known to {100.0 * width / tangential:.0f} % only: more feeds, or feeds farther apart")
+        reasons.append(f"K_tc is known only to {100.0 * width / tangential:.0f} %: use more feeds, or feeds farther apart")
     if tangential > 0.0 and not -0.2 <= known["K_rc"][0] / tangential <= 2.0:
         reasons.append(f"K_rc / K_tc is {known['K_rc'][0] / tangential:.2g}: unusual; are axes or engagement as the campaign says?")
     return tuple(reasons)

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.shown import Shown
 
 
-@dataclass(frozen=True, slots=True)
-class CuttingCoefficients:
-    """Linear force model: F = K_c h b + K_e b for each direction, b the width of cut.
+@dataclass(frozen=True, slots=True, repr=False)
+class CuttingCoefficients(Shown):
+    """Linear force model [altintas2012]: F = K_c h b + K_e b for each direction, b the width of cut.
 
     Parameters
     ----------
@@ -18,8 +19,15 @@ class CuttingCoefficients:
     radial_ratio, axial_ratio : float [-]
         k_rc and k_ac, times K_tc.
     tangential_edge, radial_edge, axial_edge : float [N/m]
+        K_te, K_re and K_ae, force per width of cut that does not depend on the chip.
     tangential_spread, ratio_spread, edge_spread : float [-]
         Standard deviations of the logarithms of K_tc, of k_rc and of the edge forces: how well they are known. 0 means exactly.
+
+    Examples
+    --------
+    >>> aluminium = CuttingCoefficients(tangential=902e6, radial_ratio=0.26, tangential_edge=12e3, radial_edge=10e3)
+    >>> round(aluminium.tangential * aluminium.radial_ratio / 1e6, 1)  # K_rc [MPa]
+    234.5
     """
 
     tangential: float
@@ -42,3 +50,9 @@ class CuttingCoefficients:
         for name in ("tangential_spread", "ratio_spread", "edge_spread"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise InputError(name, getattr(self, name), "a share from 0 to 1")
+
+    def __str__(self) -> str:
+        ratios = {"rc": self.radial_ratio, "ac": self.axial_ratio}
+        edges = {"te": self.tangential_edge, "re": self.radial_edge, "ae": self.axial_edge}
+        parts = [f"K_tc {1e-6 * self.tangential:.4g} MPa", *(f"k_{name} {value:.3g}" for name, value in ratios.items() if value)]
+        return ", ".join([*parts, *(f"K_{name} {1e-3 * value:.3g} N/mm" for name, value in edges.items() if value)])

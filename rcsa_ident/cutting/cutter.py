@@ -8,10 +8,11 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.shown import Shown
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Cutter:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Cutter(Shown):
     """A cylindrical end mill.
 
     Parameters
@@ -24,6 +25,14 @@ class Cutter:
         `pitch[j]` is the angle from tooth j to tooth j + 1, which runs ahead of it and has cut there before.
     runout : array, shape (teeth,) [m], default none
         Radial offset of each edge.
+
+    Examples
+    --------
+    Three teeth, unequally spaced:
+
+    >>> cutter = Cutter(3, diameter=0.012, helix=np.radians(30.0), pitch=np.radians([110.0, 120.0, 130.0]))
+    >>> np.degrees(cutter.tooth_angle).round(6).tolist(), cutter.equally_spaced
+    ([0.0, 110.0, 230.0], False)
     """
 
     teeth: int
@@ -57,3 +66,10 @@ class Cutter:
     def equally_spaced(self) -> bool:
         """True where all teeth are alike, so that only multiples of the tooth-passing frequency are excited."""
         return bool(np.ptp(self.pitch) < 1e-9 and np.ptp(self.runout) == 0.0)
+
+    def __str__(self) -> str:
+        parts = [f"{self.teeth} {'tooth' if self.teeth == 1 else 'teeth'}", f"Ø{1e3 * self.diameter:.4g} mm"]
+        parts += [f"helix {np.degrees(self.helix):.3g}°"] if self.helix else []
+        parts += [] if np.ptp(self.pitch) < 1e-9 else ["pitch " + "/".join(f"{angle:.4g}" for angle in np.degrees(self.pitch)) + "°"]
+        parts += [f"run-out {1e6 * np.ptp(self.runout):.2g} µm"] if np.any(self.runout) else []
+        return ", ".join(parts)

@@ -10,9 +10,18 @@ from rcsa_ident.cutting.conditions import Engagement
 
 
 def mean_directional_matrix(teeth: int, engagement: Engagement, coefficients: CuttingCoefficients, feed_angle: float = 0.0) -> FloatArray:
-    """Return the mean over a revolution of the directional matrix [alpha] (the paper's eq. 3), in machine axes.
+    """Return the mean over a revolution of the directional matrix [alpha] ([inprocess], eq. 3), in machine axes.
 
     F = a K_tc [alpha] {X(t) - X(t - tau)}; closed form, exact.
+
+    Parameters
+    ----------
+    teeth : int
+    engagement : Engagement
+    coefficients : CuttingCoefficients
+        Only the radial ratio counts.
+    feed_angle : float [rad]
+        Direction of the feed in the machine's X-Y plane, from +X towards +Y.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Milling force in a stable cut: Fourier lines and time histories (the paper's eqs. 2-4, with edges and helix)."""
+"""Milling force in a stable cut: Fourier lines and time histories ([inprocess], eqs. 2-4, with edges and helix)."""
 
 from __future__ import annotations
 
@@ -57,6 +57,7 @@ def tooth_force(phi: FloatArray, chip: FloatArray, coefficients: CuttingCoeffici
         Immersion, clockwise from the normal direction.
     chip : array, shape (n,) [m]
         Chip thickness; the tooth is taken to be in the material.
+    coefficients : CuttingCoefficients
 
     Returns
     -------
@@ -78,6 +79,9 @@ def force_lines(cutter: Cutter, conditions: CuttingConditions, coefficients: Cut
 
     Parameters
     ----------
+    cutter : Cutter
+    conditions : CuttingConditions
+    coefficients : CuttingCoefficients
     orders : array of int, shape (m,)
         Multiples of the spindle frequency; tooth-passing harmonics are multiples of the number of teeth. Order 0
         gives the mean.
@@ -85,7 +89,7 @@ def force_lines(cutter: Cutter, conditions: CuttingConditions, coefficients: Cut
     Returns
     -------
     complex array, shape (m, 2) [N]
-        In machine axes X, Y.
+        Amplitudes in machine axes X, Y.
 
     Notes
     -----
@@ -112,6 +116,14 @@ def force_and_slope(
     cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, orders: np.ndarray
 ) -> tuple[ComplexArray, ComplexArray]:
     """Return the lines of `force_lines`, and how their logarithms change with what is never known exactly.
+
+    Parameters
+    ----------
+    cutter : Cutter
+    conditions : CuttingConditions
+    coefficients : CuttingCoefficients
+    orders : array of int, shape (m,)
+        Multiples of the spindle frequency.
 
     Returns
     -------
@@ -149,7 +161,7 @@ def _forms(coefficients: CuttingCoefficients) -> tuple[ComplexArray, ComplexArra
 
 
 def _sine_form(tangential: float, radial: float) -> ComplexArray:
-    """Of forces along the edge that are as sin phi, shape (5, 2)."""
+    """Return the form of forces along the edge that are as sin phi, shape (5, 2)."""
     # rows q = -2..2 of sin cos, sin^2
     sin_cos = np.array([0.25j, 0, 0, 0, -0.25j])
     sin_sin = np.array([-0.25, 0, 0.5, 0, -0.25])
@@ -157,7 +169,7 @@ def _sine_form(tangential: float, radial: float) -> ComplexArray:
 
 
 def _constant_form(tangential: float, radial: float) -> ComplexArray:
-    """Of forces along the edge that do not depend on phi, shape (5, 2)."""
+    """Return the form of forces along the edge that do not depend on phi, shape (5, 2)."""
     cos = np.array([0, 0.5, 0, 0.5, 0])
     sin = np.array([0, 0.5j, 0, -0.5j, 0])
     return np.stack([-tangential * cos - radial * sin, tangential * sin - radial * cos], axis=1)
@@ -183,6 +195,9 @@ def force_history(
 
     Parameters
     ----------
+    cutter : Cutter
+    conditions : CuttingConditions
+    coefficients : CuttingCoefficients
     angle : array, shape (n,) [rad]
         Immersion of tooth 1 at the tip.
     slices : int
@@ -191,7 +206,7 @@ def force_history(
     Returns
     -------
     array, shape (n, 3) [N]
-        X, Y, axial.
+        Force along X, Y and the spindle's axis.
     """
     angle = np.asarray(angle, dtype=float)
     total = np.zeros((angle.size, 3))
@@ -222,7 +237,11 @@ def runout_force_lines(
 
     Parameters
     ----------
+    cutter : Cutter
+    conditions : CuttingConditions
+    coefficients : CuttingCoefficients
     orders : array of int, shape (m,)
+        Multiples of the spindle frequency.
 
     Returns
     -------
@@ -242,7 +261,10 @@ def unit_lines(cutter: Cutter, conditions: CuttingConditions, orders: np.ndarray
 
     Parameters
     ----------
+    cutter : Cutter
+    conditions : CuttingConditions
     orders : array of int, shape (m,)
+        Multiples of the spindle frequency.
     runout : bool
         Whether teeth may cut deeper, late or not at all, as with `runout_force_lines`.
 
@@ -291,6 +313,12 @@ def regenerations(cutter: Cutter, feed_per_tooth: float, engagement: Engagement)
     """Return which surface each tooth cuts into, with run-out: (tooth, start angle [rad], end angle [rad], teeth back).
 
     A tooth cuts what the tooth so many teeth back left; where it is not named it cuts nothing.
+
+    Parameters
+    ----------
+    cutter : Cutter
+    feed_per_tooth : float [m]
+    engagement : Engagement
     """
     feed = feed_per_tooth * cutter.teeth * cutter.pitch / (2.0 * np.pi)
     found = []

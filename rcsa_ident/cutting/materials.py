@@ -28,7 +28,7 @@ class CuttingMaterial:
     condition : str
         Cutter, lubrication, feed: what the coefficients hold for.
     coefficients : CuttingCoefficients
-        Its spreads are what the user of another cutter has to expect.
+        Their spreads are what the user of another cutter has to expect.
     source : str
     notes : str
     """
@@ -54,7 +54,7 @@ def material(name: str) -> CuttingMaterial:
     Raises
     ------
     InputError
-        With the nearest names.
+        If there is none; it holds the nearest names.
 
     Examples
     --------

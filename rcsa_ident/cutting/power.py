@@ -11,11 +11,13 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.shown import Shown
+from rcsa_ident.units import to_rpm
 
 
 @dataclass(frozen=True, slots=True)
 class SpindleLoad:
-    """Means over a revolution.
+    """What a cut takes from the spindle, as means over a revolution.
 
     Parameters
     ----------
@@ -40,6 +42,12 @@ def spindle_load(cutter: Cutter, conditions: CuttingConditions, coefficients: Cu
     T = a D / (4 pi) (K_tc N c (cos phi_entry - cos phi_exit) + K_te N (phi_exit - phi_entry)) with the feed per tooth c;
     power T Omega, of which the chips take K_tc times the removal rate a a_e N c Omega / (2 pi). Pitch, helix and, for the
     chips' part, run-out change none of it.
+
+    Parameters
+    ----------
+    cutter : Cutter
+    conditions : CuttingConditions
+    coefficients : CuttingCoefficients
     """
     engagement, teeth = conditions.engagement, cutter.teeth
     chips = coefficients.tangential * conditions.feed_per_tooth * (np.cos(engagement.entry) - np.cos(engagement.exit))
@@ -49,8 +57,8 @@ def spindle_load(cutter: Cutter, conditions: CuttingConditions, coefficients: Cu
     return SpindleLoad(torque, torque * conditions.spindle_speed, conditions.axial_depth * radial_depth(cutter, engagement) * per_second)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SpindleDrive:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SpindleDrive(Shown):
     """What a spindle's motor has at each speed; between the given speeds straight lines, outside the nearest of them.
 
     Parameters
@@ -74,13 +82,20 @@ class SpindleDrive:
             if getattr(self, name).shape != self.speed.shape or not np.all(getattr(self, name) > 0.0):
                 raise InputError(name, getattr(self, name).tolist(), f"{self.speed.size} numbers above 0")
         if not np.all(np.isfinite(self.speed)) or np.any(np.diff(self.speed) <= 0.0):
-            raise InputError("speed", self.speed.tolist(), "finite speeds that rise [rad/s]")
+            raise InputError("speed", self.speed.tolist(), "finite, increasing speeds [rad/s]")
         if not self.max_speed > 0.0:
             raise InputError("max_speed", self.max_speed, "a speed above 0 [rad/s]")
 
     @classmethod
     def flat(cls, power: float | None = None, torque: float | None = None, max_speed: float | None = None) -> SpindleDrive:
-        """Return a drive with the same power [W] and torque [N m] at all speeds; None is no limit."""
+        """Return a drive with the same power and torque at all speeds; None is no limit.
+
+        Parameters
+        ----------
+        power : float or None [W]
+        torque : float or None [N m]
+        max_speed : float or None [rad/s]
+        """
         numbers = (("power", power, "W"), ("torque", torque, "N m"), ("max_speed", max_speed, "rad/s"))
         values = [np.inf if value is None else positive(name, value, unit) for name, value, unit in numbers]
         return cls(np.ones(1), np.array([values[0]]), np.array([values[1]]), values[2])
@@ -107,6 +122,10 @@ class SpindleDrive:
     def torque_at(self, speed: FloatArray) -> FloatArray:
         """Return the torque at some speeds [N m], 0 beyond the highest speed."""
         return np.where(np.asarray(speed) <= self.max_speed * (1.0 + 1e-12), _between(speed, self.speed, self.torque), 0.0)
+
+    def __str__(self) -> str:
+        parts = ((1e-3 * float(self.power.max()), "kW"), (float(self.torque.max()), "N m"), (to_rpm(self.max_speed), "rev/min"))
+        return ", ".join(f"up to {value:.5g} {unit}" for value, unit in parts if np.isfinite(value)) or "no limit"
 
 
 def _between(at: FloatArray, speed: FloatArray, values: FloatArray) -> FloatArray:

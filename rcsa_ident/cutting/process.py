@@ -7,14 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
-from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, EngagementProfile, feed_direction
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.shown import Shown
 
 
-@dataclass(frozen=True, slots=True)
-class ProcessDamping:
-    """The flank rubs on the wave that it leaves: a viscous force, the indentation model for small waves (Ahmadi & Ismail 2012).
+@dataclass(frozen=True, slots=True, repr=False)
+class ProcessDamping(Shown):
+    """The flank rubs on the wave that it leaves: a viscous force, the indentation model for small waves [ahmadi2012].
 
     A width b of edge that moves into the workpiece with the velocity u feels F_r = K_sp w^2 b u / (4 v), v its cutting speed, and
     the friction mu F_r against the cut.
@@ -26,7 +27,7 @@ class ProcessDamping:
     wear_land : float [m]
         w, width of the flat behind the edge.
     friction : float [-]
-        mu.
+        mu, coefficient of friction between flank and workpiece.
     """
 
     indentation: float
@@ -44,9 +45,12 @@ class ProcessDamping:
         """K_sp w^2 / 4: viscous damping per width of edge, times the cutting speed [N/m]."""
         return 0.25 * self.indentation * self.wear_land**2
 
+    def __str__(self) -> str:
+        return f"wear land {1e6 * self.wear_land:.3g} µm"
 
-@dataclass(frozen=True, slots=True)
-class SpeedVariation:
+
+@dataclass(frozen=True, slots=True, repr=False)
+class SpeedVariation(Shown):
     """A spindle whose speed swings about its mean: Omega(t) = Omega_0 (1 + amplitude sin(ratio Omega_0 t)).
 
     Parameters
@@ -66,9 +70,12 @@ class SpeedVariation:
         if not 0.001 <= self.ratio <= 10.0:
             raise InputError("ratio", self.ratio, "swings per revolution, 0.001 to 10")
 
+    def __str__(self) -> str:
+        return f"speed swings by {100.0 * self.amplitude:.3g} %, {self.ratio:.3g} times a revolution"
 
-@dataclass(frozen=True, slots=True)
-class MillingProcess:
+
+@dataclass(frozen=True, slots=True, repr=False)
+class MillingProcess(Shown):
     """What cuts what, and how.
 
     Parameters
@@ -82,6 +89,17 @@ class MillingProcess:
         Matters to stability only with run-out: it decides which teeth cut, and what they regenerate.
     damping : ProcessDamping or None
     speed_variation : SpeedVariation or None
+    engagement_profile : EngagementProfile or None
+        How the engagement changes along the edge, as with a deflected tool; `engagement` is then the programmed one.
+
+    Examples
+    --------
+    A two-tooth end mill of 12 mm in EN AW-6082, half-immersion down-milling:
+
+    >>> cutter, coefficients = Cutter(2, 0.012), CuttingCoefficients(902e6, 0.26)
+    >>> process = MillingProcess(cutter, coefficients, Engagement.from_immersion(0.5, "down"), feed_per_tooth=0.1e-3)
+    >>> process.conditions(speed=1000.0, depth=0.002).axial_depth
+    0.002
     """
 
     cutter: Cutter
@@ -91,6 +109,7 @@ class MillingProcess:
     feed_per_tooth: float | None = None
     damping: ProcessDamping | None = None
     speed_variation: SpeedVariation | None = None
+    engagement_profile: EngagementProfile | None = None
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.feed_angle):
@@ -105,5 +124,18 @@ class MillingProcess:
         return np.array([[c, -s], [s, c]])
 
     def conditions(self, speed: float, depth: float) -> CuttingConditions:
-        """Return the cut at a speed [rad/s] and a depth [m]; without a feed it is 0."""
+        """Return the cut at a speed [rad/s] and a depth [m]; without a feed it is 0.
+
+        Raises
+        ------
+        InputError
+            If the engagement changes along the edge.
+        """
+        if self.engagement_profile is not None:
+            raise InputError("engagement_profile", "an engagement that changes along the edge", "one engagement for the whole edge")
         return CuttingConditions(speed, depth, self.feed_per_tooth or 0.0, self.engagement, self.feed_angle)
+
+    def __str__(self) -> str:
+        parts = [f"{self.cutter}; {self.coefficients}; {self.engagement}", f"feed {feed_direction(self.feed_angle)}"]
+        parts += [] if self.feed_per_tooth is None else [f"{1e3 * self.feed_per_tooth:.3g} mm per tooth"]
+        return ", ".join([*parts, *(str(each) for each in (self.damping, self.speed_variation) if each is not None)])

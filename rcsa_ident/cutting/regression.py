@@ -19,7 +19,7 @@ def cluster_covariance(design: FloatArray, residual: FloatArray, cluster: np.nda
     design : array, shape (n, p)
         Full rank; whitened where the fit was.
     residual : array, shape (n,)
-        Of the least-squares fit.
+        What the least-squares fit leaves.
     cluster : array of int, shape (n,)
         Rows of one cluster may be correlated in any way and have any variance; clusters are independent.
 
@@ -29,7 +29,7 @@ def cluster_covariance(design: FloatArray, residual: FloatArray, cluster: np.nda
 
     Notes
     -----
-    Bias-reduced linearisation (Bell and McCaffrey 2002, "CR2"): V = B sum_g X_g' A_g e_g e_g' A_g X_g B with B = (X'X)^-1 and
+    Bias-reduced linearisation ([bell2002], "CR2"): V = B sum_g X_g' A_g e_g e_g' A_g X_g B with B = (X'X)^-1 and
     A_g = (I - H_gg)^-1/2, exact in the mean for equal independent errors; the degrees of freedom are Satterthwaite's for
     each parameter under them, (sum_g G_gg)^2 / sum_gh G_gh^2. With one row a cluster this is the heteroscedastic-robust HC2.
     """

@@ -36,13 +36,13 @@ class ForceRecord:
     ----------
     cutter : Cutter
     conditions : CuttingConditions
-        With the spindle speed found in the record.
+        The cut as programmed, with the spindle speed that was found in the record.
     clamping : str
         Records of one clamping share the run-out.
     lines : complex array, shape (m + 1, 2) [N]
         Orders 0 to m; X and Y. Sensors with a known response are undone.
     variance : array, shape (m + 1, 2) [N^2]
-        Of the real and of the imaginary part each, noise only.
+        Variance of the real and of the imaginary part each, noise only.
     blocks : complex array, shape (b, m + 1, 2) [N]
         What each block of whole revolutions says more or less than all of them: their mean is near zero.
     """
@@ -74,7 +74,7 @@ class Dynamometer:
     frequency : float [Hz]
         Bandwidth or natural frequency to start from.
     damping : float
-        To start from, with order 2.
+        Damping ratio to start from, with order 2.
     """
 
     order: int = 0
@@ -102,7 +102,7 @@ class SignalCalibration:
         Sensors' X and Y over the force on the tool: a signed permutation.
     runout : dict of clamping to array, shape (teeth,) [m]
     helix : float or None [rad]
-        Where it was an unknown.
+        The helix angle found, where it was an unknown.
     angle : array, shape (k,) [rad]
         Immersion of tooth 1 at each record's start, up to the pitch where teeth are alike.
     sensor : array, shape (2, order)
@@ -430,13 +430,16 @@ def _answer(problem: _Problem, theta: FloatArray, notes: list[str]) -> SignalCal
         cut_width = student_quantile(dof) * np.sqrt(np.diag(between)) * scale
         covariance = between
     else:
-        notes = [*notes, f"{len(problem.records)} cuts do not tell how cuts differ: the intervals hold for these records' noise only"]
+        notes = [
+            *notes,
+            f"{len(problem.records)} cuts are too few to estimate their scatter: the intervals contain these recordings' noise only",
+        ]
     covariance = (covariance * scale[:, None] * scale)[:4, :4]
     width = np.maximum(noise_width, np.where(np.isfinite(cut_width), cut_width, 0.0))[:4]
     value = theta[:4] * problem.scale
     for i in (2, 3):
         if value[i] < 0.0 and -value[i] > width[i]:
-            notes = [*notes, f"{NAMES[i]} is below zero, {value[i] * 1e-3:.2g} N/mm: the model misses something; taken as 0"]
+            notes = [*notes, f"{NAMES[i]} is below zero, {value[i] * 1e-3:.2g} N/mm: the model is incomplete; set to 0"]
     data = slice(0, edges[-1])
     weight = np.concatenate([np.tile(problem.weights(k).ravel(), 2) for k in range(len(count))])
     force = np.sqrt(sum(np.sum(np.abs(r.lines[o]) ** 2) for r, o in zip(problem.records, problem.orders, strict=True)))
@@ -444,7 +447,7 @@ def _answer(problem: _Problem, theta: FloatArray, notes: list[str]) -> SignalCal
     reasons = plausible(NAMES[:4], value, width)
     if misfit > WORST_MISFIT:
         more = "a dynamometer that does not follow (its resonance can be an unknown)? vibration?"
-        reasons = (*reasons, f"{100.0 * misfit:.0f} % of the force over time stays unexplained: {more}")
+        reasons = (*reasons, f"{100.0 * misfit:.0f} % of the force over time remains unexplained: {more}")
     forces = ForceCalibration("signal", NAMES[:4], value, covariance, width, misfit, reasons, tuple(notes))
     runout = {
         name: eccentric(next(r.cutter for r in problem.records if r.clamping == name), theta[problem.ecc][2 * i : 2 * i + 2])

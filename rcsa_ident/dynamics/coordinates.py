@@ -1,4 +1,4 @@
-"""Where and in which direction something moves."""
+"""Coordinates: where and in which direction something moves."""
 
 from __future__ import annotations
 
@@ -25,6 +25,11 @@ class Dof(StrEnum):
     def is_slope(self) -> bool:
         """True for a rotation."""
         return self in (Dof.SLOPE_X, Dof.SLOPE_Y)
+
+    @property
+    def plane(self) -> Dof:
+        """The translation of the bending plane that it belongs to; a direction without one stands for itself."""
+        return {Dof.SLOPE_X: Dof.X, Dof.SLOPE_Y: Dof.Y}.get(self, self)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics._kernels import pole_sum
 from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.poles import PoleResidue, pair_sum
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.shown import Shown
+from rcsa_ident.units import to_hz
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,9 +61,9 @@ class PoleModel:
         return found
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ModalModel:
-    """Complex modes and a residual compliance (the paper's eq. 13, plus the modes above the band).
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ModalModel(Shown):
+    """Complex modes and a residual compliance ([inprocess], eq. 13, plus the modes above the band).
 
     h_pq = sum_n phi_pn phi_qn / (i omega - lambda_n) + conj(phi_pn phi_qn) / (i omega - conj(lambda_n)) + R_pq,
     lambda_n = -zeta_n omega_n + i omega_n sqrt(1 - zeta_n^2).
@@ -68,12 +72,21 @@ class ModalModel:
     ----------
     omega_n : array, shape (m,) [rad/s]
     zeta : array, shape (m,) [-]
-        In (0, 1]; at 1 the pole is real and the pair coincides.
+        Damping ratios in (0, 1]; at 1 the pole is real and the pair coincides.
     phi : complex array, shape (m, d) [sqrt(s/kg), sqrt(s/(kg m^2))]
         A normal mode with mass-normalised shape psi has phi = psi (1 - i) / (2 sqrt(omega_d)).
     residual : array, shape (d, d) [m/N, rad/N, m/(N m), rad/(N m)]
         Symmetric; positive semidefinite where the model is passive.
     coordinates : tuple of Coordinate, length d
+
+    Examples
+    --------
+    `normal_modes` makes the complex shapes of ordinary, mass-normalised ones:
+
+    >>> from rcsa_ident.dynamics.coordinates import plane
+    >>> modes = normal_modes([5000.0], [0.03], [[0.7, 4.0]], plane("flange"))
+    >>> modes.phi.shape, modes.pole.round(1).tolist()
+    ((1, 2), [(-150+4997.7j)])
     """
 
     omega_n: FloatArray
@@ -102,13 +115,21 @@ class ModalModel:
 
     def receptance(self, omega: FloatArray) -> Receptance:
         """Return the receptance between all coordinates."""
-        omega = frozen(omega)
-        m, d = self.phi.shape
-        residues = np.einsum("mp,mq->mpq", self.phi, self.phi).reshape(m, d * d)
-        both = np.concatenate([residues, residues.conj()])
-        values = pole_sum(omega, np.concatenate([self.pole, self.pole.conj()]), both)
-        values = values.reshape(omega.size, d, d) + self.residual
+        values = pair_sum(omega, self.pole, np.einsum("mp,mq->mpq", self.phi, self.phi)) + self.residual
         return Receptance(omega, values, self.coordinates, self.coordinates)
+
+    def pole_residue(self) -> PoleResidue:
+        """Return the same as poles and residues between all coordinates."""
+        return PoleResidue(self.pole, self.phi.T, self.phi, self.residual)
+
+    def to_control(self) -> Any:
+        """Return the model as python-control's ``StateSpace``: forces in, displacements out, both named after the coordinates."""
+        names = [str(each) for each in self.coordinates]
+        return self.pole_residue().to_control(names, names)
+
+    def __str__(self) -> str:
+        low, high = (float(to_hz(w)) for w in (self.omega_n.min(initial=np.inf), self.omega_n.max(initial=-np.inf)))
+        return f"{self.omega_n.size} modes, {low:.0f} to {high:.0f} Hz, at {', '.join(str(c) for c in self.coordinates)}"
 
 
 def normal_modes(
@@ -122,6 +143,20 @@ def normal_modes(
     zeta : array, shape (m,) [-], below 1
     psi : array, shape (m, d) [1/sqrt(kg), 1/sqrt(kg m^2)]
         Mass-normalised shapes.
+    coordinates : tuple of Coordinate, length d
+    residual : array, shape (d, d), optional [m/N, rad/N, m/(N m), rad/(N m)]
+        Static compliance of the modes above the band; by default none.
+
+    Examples
+    --------
+    A mode of 800 Hz, 3 % damping and a modal mass of 2 kg, that is a stiffness of 50.5 N/um:
+
+    >>> from rcsa_ident.dynamics.coordinates import Coordinate
+    >>> omega_n = 2 * np.pi * 800.0
+    >>> modes = normal_modes([omega_n], [0.03], [[1 / np.sqrt(2.0)]], (Coordinate.parse("tip.x"),))
+    >>> h = modes.receptance([1.0, omega_n]).between("tip.x", "tip.x")
+    >>> [f"{value:.3g} m/N" for value in abs(h)]
+    ['1.98e-08 m/N', '3.3e-07 m/N']
     """
     omega_n, zeta, psi = (np.asarray(a, dtype=float) for a in (omega_n, zeta, psi))
     if not np.all((zeta > 0.0) & (zeta < 1.0)):
@@ -138,16 +173,18 @@ def damped_modes(
     """Return the complex modes of real modes coupled by a full damping matrix.
 
     Solves q'' + D q' + diag(omega_n^2) q = psi f, w = psi^T q, exactly; a real pole becomes a mode with zeta = 1 and
-    half its residue, so that the pair of eq. 13 sums to it.
+    half its residue, so that the pair of poles sums to it.
 
     Parameters
     ----------
     omega_n : array, shape (m,) [rad/s]
     damping : array, shape (m, m) [rad/s]
         Symmetric positive semidefinite.
-    psi : array, shape (m, d)
+    psi : array, shape (m, d) [1/sqrt(kg), 1/sqrt(kg m^2)]
         Mass-normalised shapes.
-    residual : array, shape (d, d)
+    residual : array, shape (d, d) [m/N, rad/N, m/(N m), rad/(N m)]
+        Static compliance of the modes above the band.
+    coordinates : tuple of Coordinate, length d
     """
     values, q, norm = _free_motions(omega_n, damping)
     # where a pair of poles is about to become real it has no two shapes: a few millionths more damping tell it apart

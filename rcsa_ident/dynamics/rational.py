@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.dynamics._kernels import pole_sum
-from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.dynamics.poles import PoleResidue, pair_sum
 from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.dynamics.vector_fitting import Candidate, Problem, growing, order_of
 from rcsa_ident.errors import InputError
@@ -26,57 +25,6 @@ class FitStatus(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RankOneModes:
-    """Receptances as sum of outputs inputs / (s - pole), with the conjugates of all: what modal methods work on.
-
-    Parameters
-    ----------
-    pole : complex array, shape (m,) [rad/s]
-        Imaginary parts not negative, real parts negative.
-    outputs : complex array, shape (r, m)
-    inputs : complex array, shape (m, c)
-    constant : array, shape (r, c)
-        Residual compliance.
-
-    Notes
-    -----
-    H(s) = sum_k outputs[:, k] inputs[k] / (s - pole[k]) + conj(outputs[:, k] inputs[k]) / (s - conj(pole[k])) + constant; a
-    real pole stands with half its residue, so that the sum holds for it, too (as in `ModalModel`).
-    """
-
-    pole: ComplexArray
-    outputs: ComplexArray
-    inputs: ComplexArray
-    constant: FloatArray
-
-    def __post_init__(self) -> None:
-        for name, dtype in (("pole", complex), ("outputs", complex), ("inputs", complex), ("constant", float)):
-            object.__setattr__(self, name, frozen(getattr(self, name), dtype))
-
-    def response(self, omega: FloatArray) -> ComplexArray:
-        """Return the receptances, shape (n, r, c)."""
-        residues = np.einsum("rm,mc->mrc", self.outputs, self.inputs)
-        return _pair_sum(np.asarray(omega, dtype=float), self.pole, residues) + self.constant
-
-    def state_space(self) -> StateSpace:
-        """Return the real state space in modal form: two states for each pair of poles, one for a real pole."""
-        order = int(np.sum(np.where(self.pole.imag > 0.0, 2, 1)))
-        r, c = self.constant.shape
-        a, b, output, k = np.zeros((order, order)), np.zeros((order, c)), np.zeros((r, order)), 0
-        for pole, u, v in zip(self.pole, self.outputs.T, self.inputs, strict=True):
-            if pole.imag > 0.0:
-                # z' = pole z + v f, y = 2 Re(u z) in the real and imaginary part of z
-                a[k : k + 2, k : k + 2] = [[pole.real, -pole.imag], [pole.imag, pole.real]]
-                b[k], b[k + 1] = v.real, v.imag
-                output[:, k], output[:, k + 1] = 2.0 * u.real, -2.0 * u.imag
-                k += 2
-            else:
-                a[k, k], b[k], output[:, k] = pole.real, v.real, 2.0 * u.real
-                k += 1
-        return StateSpace(a, b, output, self.constant)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class RationalFit:
     """A stable rational function with real coefficients: common poles, a residue matrix for each.
 
@@ -85,7 +33,7 @@ class RationalFit:
     pole : complex array, shape (m,) [rad/s]
         Imaginary parts not negative, real parts negative.
     residue : complex array, shape (m, r, c)
-        Of H(s) = sum_k residue[k] / (s - pole[k]) + conj(residue[k]) / (s - conj(pole[k])) + constant; a real pole's is half.
+        In H(s) = sum_k residue[k] / (s - pole[k]) + conj(residue[k]) / (s - conj(pole[k])) + constant; a real pole's is half.
     constant : array, shape (r, c)
         Residual compliance; 0 where the fit is strictly proper.
     error : float [-]
@@ -111,9 +59,9 @@ class RationalFit:
 
     def response(self, omega: FloatArray) -> ComplexArray:
         """Return the function over frequency, shape (n, r, c)."""
-        return _pair_sum(np.asarray(omega, dtype=float), self.pole, self.residue) + self.constant
+        return pair_sum(omega, self.pole, self.residue) + self.constant
 
-    def modes(self, rank: float = _RANK) -> RankOneModes:
+    def modes(self, rank: float = _RANK) -> PoleResidue:
         """Return the function with each residue as a sum of rank-one parts, by singular values.
 
         Parameters
@@ -129,7 +77,7 @@ class RationalFit:
             kept = max(int(np.sum(size > rank * size[0])), 1)
             parts += [(pole, left[:, j] * np.sqrt(size[j]), right[j] * np.sqrt(size[j])) for j in range(kept)]
         r, c = self.constant.shape
-        return RankOneModes(
+        return PoleResidue(
             np.array([p for p, _, _ in parts]),
             np.array([u for _, u, _ in parts]).reshape(-1, r).T,
             np.array([v for _, _, v in parts]).reshape(-1, c),
@@ -169,7 +117,7 @@ def rational_fit(
     weight : array of the values' shape (or broadcast to it), optional
         Further factor on each misfit.
     constant : bool
-        With a real constant (the modes above the band), else strictly proper.
+        Whether a real constant (the modes above the band) is fitted too; without it the function is strictly proper.
     highest_order : int
         Where the search ends. If no order is good enough, Bayes's information criterion chooses, and the status says so.
 
@@ -181,8 +129,8 @@ def rational_fit(
     Notes
     -----
     With sigma(s) = sum_k c~_k phi_k(s) + d~ and the poles of the last step, sigma h = sum_k c_k phi_k + d is solved by linear
-    least squares; zeros of sigma are the next poles (Gustavsen and Semlyen 1999; relaxed: Gustavsen 2006; each entry
-    condensed by its own QR: Deschrijver et al. 2008). An unstable pole is mirrored. The next higher order starts from the poles
+    least squares; zeros of sigma are the next poles ([gustavsen1999]; relaxed: [gustavsen2006]; each entry
+    condensed by its own QR: [deschrijver2008]). An unstable pole is mirrored. The next higher order starts from the poles
     of the last and a pair where the misfit is largest, and from evenly spaced poles.
     """
     problem = Problem.of(omega, values, tolerance, noise, weight, constant)
@@ -204,35 +152,61 @@ def rational_fit(
     return _finished(problem, min(found, key=problem.criterion).pole)
 
 
-def tip_modes(receptance: Receptance, **options: float | int | bool | None) -> RankOneModes:
-    """Return modal shapes for the whole receptance; planes that do not couple keep their own poles.
+def fitted_poles(
+    omega: FloatArray, values: ComplexArray, tolerance: float = 1e-3, damped_outside: float = 0.0
+) -> tuple[PoleResidue, float]:
+    """Return the poles of a square receptance, and the norm of what is left as a share; planes that do not couple keep their own poles.
 
     Parameters
     ----------
-    receptance : Receptance
-        Square; where all entries off the diagonal are 0, each diagonal entry is fitted for itself.
-    options
-        Of `rational_fit`.
+    omega : array, shape (n,) [rad/s]
+        Others than those above 0 are left aside.
+    values : complex array, shape (n, r, r)
+        Where all entries off the diagonal are 0, each diagonal entry is fitted for itself; one that is 0, too, has no poles.
+    tolerance : float
+        As in `rational_fit`.
+    damped_outside : float
+        Least damping ratio of poles outside the band: they stand for many modes and are nobody's.
+
+    Raises
+    ------
+    InputError
+        If the receptance is zero at every frequency.
     """
-    values = receptance.values
-    r, c = values.shape[1:]
-    positive = receptance.omega > 0.0
-    omega, values = receptance.omega[positive], values[positive]
-    if r != c or np.any(values[:, ~np.eye(r, dtype=bool)]):
-        return rational_fit(omega, values, **options).modes()  # type: ignore[arg-type]
-    poles, outputs, inputs, rest = [], [], [], np.zeros((r, r))
-    for i in range(r):
-        if not np.any(values[:, i, i]):
-            continue
-        part = rational_fit(omega, values[:, i, i], **options).modes()  # type: ignore[arg-type]
-        unit = np.eye(r)[i]
-        poles.append(part.pole)
-        outputs.append(unit[:, None] * part.outputs)
-        inputs.append(part.inputs * unit)
-        rest[i, i] = part.constant[0, 0]
-    if not poles:
-        raise InputError("receptance", "zero at every frequency", "at least one entry that is not")
-    return RankOneModes(np.concatenate(poles), np.hstack(outputs), np.vstack(inputs), rest)
+    above = omega > 0.0
+    omega, values = omega[above], values[above]
+    r = values.shape[1]
+    coupled = bool(np.any(values[:, ~np.eye(r, dtype=bool)]))
+    parts = []
+    for rows in [list(range(r))] if coupled else [[i] for i in range(r) if np.any(values[:, i, i])]:
+        block = values[:, rows][:, :, rows]
+        fit = rational_fit(omega, block, tolerance=tolerance)
+        unit = np.eye(r)[:, rows]
+        parts.append(_damped_outside(fit, omega, block, damped_outside).modes().projected(unit, unit.T))
+    if not parts:
+        raise InputError("tip receptance", "zero at every frequency", "at least one flexible direction")
+    found = PoleResidue.joined(parts)
+    return found, float(np.linalg.norm(found.response(omega) - values) / np.linalg.norm(values))
+
+
+def _damped_outside(fit: RationalFit, omega: FloatArray, values: ComplexArray, zeta: float) -> RationalFit:
+    """The fit with well damped poles outside the band: residues by least squares, so that the peaks of the band stay what they are."""
+    size = np.abs(fit.pole)
+    outside = ((size < omega[0]) | (size > omega[-1])) & (-fit.pole.real < zeta * size)
+    if not outside.any():
+        return fit
+    pole = np.where(outside, size * complex(-zeta, np.sqrt(1.0 - zeta**2)), fit.pole)
+    first, second = (1.0 / (1j * omega[:, None] - p) for p in (pole, pole.conj()))
+    # the columns differ by many powers of ten
+    basis = np.hstack([first + second, 1j * (first - second), np.ones((omega.size, 1))])
+    scale = np.linalg.norm(basis, axis=0) + 1e-300
+    residue, constant = np.empty(fit.residue.shape, dtype=complex), np.empty(fit.constant.shape)
+    for place in np.ndindex(fit.constant.shape):
+        value = values[:, *place]
+        columns, right = basis / scale, value
+        both = np.linalg.lstsq(np.vstack([columns.real, columns.imag]), np.concatenate([right.real, right.imag]), rcond=1e-13)[0] / scale
+        residue[:, *place], constant[place] = both[: pole.size] + 1j * both[pole.size : -1], both[-1]
+    return replace(fit, pole=pole, residue=residue, constant=constant)
 
 
 def _finished(problem: Problem, pole: ComplexArray) -> RationalFit:
@@ -262,10 +236,3 @@ def _finished(problem: Problem, pole: ComplexArray) -> RationalFit:
         order=order,
         status=FitStatus.CONVERGED if error <= problem.goal(order) else FitStatus.TOLERANCE_NOT_MET,
     )
-
-
-def _pair_sum(omega: FloatArray, pole: ComplexArray, residue: ComplexArray) -> ComplexArray:
-    m, r, c = residue.shape
-    flat = np.ascontiguousarray(residue.reshape(m, r * c))
-    both = np.concatenate([flat, flat.conj()])
-    return pole_sum(omega, np.concatenate([pole, pole.conj()]), both).reshape(omega.size, r, c)

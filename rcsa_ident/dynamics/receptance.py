@@ -2,32 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.errors import InputError
+from rcsa_ident.shown import Drawn
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Receptance:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Receptance(Drawn):
     """Displacements of `rows` per unit force on `cols`.
 
     Parameters
     ----------
     omega : array, shape (n,) [rad/s]
     values : complex array, shape (n, r, c) [m/N, rad/N, m/(N m), rad/(N m)]
-        Time dependence e^{+i omega t}.
+        The time dependence is e^{+i omega t}.
     rows, cols : tuple of Coordinate, lengths r and c
+        Where and in which direction motion is seen, and where a force (for a slope, a moment) acts.
 
     Examples
     --------
-    >>> h = Receptance([1.0], [[[2.0]]], (Coordinate.parse("tip.x"),), (Coordinate.parse("tip.x"),))
-    >>> h["tip", "tip"].shape
-    (1, 1, 1)
+    Two frequencies between tip and flange, a force at the tip:
+
+    >>> tip, flange = Coordinate.parse("tip.x"), Coordinate.parse("flange.x")
+    >>> h = Receptance([100.0, 200.0], [[[2e-6], [1e-6]], [[3e-6], [1e-6]]], rows=(tip, flange), cols=(tip,))
+    >>> h["flange", "tip"].shape
+    (2, 1, 1)
+    >>> abs(h.between("tip.x", "tip.x")).tolist()
+    [2e-06, 3e-06]
     """
 
     omega: FloatArray
@@ -59,6 +67,63 @@ class Receptance:
             raise InputError("coordinate", f"{row} or {col}", f"one of {known}") from None
         return self.values[:, i, j]
 
+    def block(self, coordinates: Sequence[Coordinate]) -> Receptance:
+        """Return the receptance between some of its coordinates, which are rows as well as columns."""
+        rows, cols = ([side.index(c) for c in coordinates] for side in (self.rows, self.cols))
+        return Receptance(self.omega, self.values[:, rows][:, :, cols], tuple(coordinates), tuple(coordinates))
+
+    @classmethod
+    def block_diagonal(cls, parts: Sequence[Receptance]) -> Receptance:
+        """Return the receptance of parts that do not feel each other, with zeros between them.
+
+        Raises
+        ------
+        InputError
+            If the parts' frequencies differ, or there is no part.
+        """
+        if not parts:
+            raise InputError("receptances", "none", "at least one")
+        omega = parts[0].omega
+        if any(not np.array_equal(part.omega, omega) for part in parts[1:]):
+            raise InputError("receptances", "frequencies that differ", f"the {omega.size} frequencies of the first")
+        rows, cols = tuple(c for p in parts for c in p.rows), tuple(c for p in parts for c in p.cols)
+        values = np.zeros((omega.size, len(rows), len(cols)), dtype=complex)
+        row = col = 0
+        for part in parts:
+            values[:, row : row + len(part.rows), col : col + len(part.cols)] = part.values
+            row, col = row + len(part.rows), col + len(part.cols)
+        return cls(omega, values, rows, cols)
+
+    def __str__(self) -> str:
+        low, high = (w / (2.0 * np.pi) for w in (self.omega.min(initial=np.inf), self.omega.max(initial=-np.inf)))
+        between = ", ".join(str(c) for c in self.rows) + ("" if self.rows == self.cols else " over " + ", ".join(str(c) for c in self.cols))
+        return f"{between}: {self.omega.size} frequencies, {low:.0f} to {high:.0f} Hz"
+
+    def to_control(self, tolerance: float = 1e-3) -> Any:
+        """Return a rational fit as python-control's ``StateSpace``: forces in, displacements out, both named after the coordinates.
+
+        Parameters
+        ----------
+        tolerance : float
+            Norm of the misfit, as a share of the values' own.
+
+        Raises
+        ------
+        InputError
+            If rows and columns differ, or no fit is within the tolerance.
+        """
+        # late: whoever reads receptances needs no compiled kernels
+        from rcsa_ident.dynamics.rational import fitted_poles
+
+        if self.rows != self.cols:
+            raise InputError("receptance", "rows that are not its columns", "displacements where the forces act")
+        # each value counts relative to its own size in the fit, the largest most in the norm
+        fit, error = fitted_poles(self.omega, self.values, 0.5 * tolerance)
+        if error > tolerance:
+            raise InputError("tolerance", tolerance, f"{error:.2g} or more: no fit with 60 poles or fewer comes nearer")
+        names = [str(each) for each in self.rows]
+        return fit.to_control(names, names)
+
 
 def _at(coordinates: tuple[Coordinate, ...], point: str) -> np.ndarray:
     found = np.array([i for i, c in enumerate(coordinates) if c.point == point], dtype=int)
@@ -85,6 +150,12 @@ def dissipation(omega: FloatArray, values: ComplexArray) -> FloatArray:
 
     A structure without an inner source of energy has none below zero: the mean power that a harmonic force f feeds
     in is f^H (Y + Y^H) f / 4 with the mobility Y = i omega H.
+
+    Parameters
+    ----------
+    omega : array, shape (n,) [rad/s]
+    values : complex array, shape (n, d, d)
+        A square receptance, rows as columns.
     """
     mobility = 1j * omega[:, None, None] * values
     hermitian = 0.5 * (mobility + np.conj(np.swapaxes(mobility, 1, 2)))

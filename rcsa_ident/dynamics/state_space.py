@@ -1,15 +1,15 @@
-"""Linear systems in state space: in continuous time or sampled, and in real modal form."""
+"""Linear systems in state space, in continuous time or sampled; the door to python-control."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.errors import InputError, positive
+from rcsa_ident.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,13 +23,13 @@ class StateSpace:
     C : array, shape (o, n)
     D : array, shape (o, i)
     step : float [s]
-        Of the samples; 0 in continuous time.
+        Time between samples; 0 in continuous time.
 
     Examples
     --------
     >>> lag = StateSpace([[-2.0]], [[2.0]], [[1.0]], [[0.0]])
-    >>> lag.sampled(0.1).pole.real.round(4).tolist()
-    [0.8187]
+    >>> abs(lag.response([2.0])).round(4).item()
+    0.7071
     """
 
     A: FloatArray
@@ -72,57 +72,35 @@ class StateSpace:
         point = np.exp(1j * omega * self.step) if self.step else 1j * omega
         return self.C @ np.linalg.solve(point[:, None, None] * np.eye(self.order) - self.A, self.B) + self.D
 
-    def sampled(self, step: float, hold: str = "first-order") -> StateSpace:
-        """Return the system between samples, exact for an input that is constant or linear between them.
-
-        Parameters
-        ----------
-        step : float [s]
-        hold : str
-            ``zero-order``: the input keeps its last sample. ``first-order``: it runs straight from one sample to the next; the
-            state is then x[k] less the part that the sample u[k] itself has caused, and D is not 0 even where the system's is.
-        """
-        if self.step:
-            raise InputError("step", f"{self.step:g} s", "0: a system in continuous time")
-        step = positive("step", step, "s")
-        n, inputs = self.B.shape
-        # e^{M} of the chained system u' = v / step, v' = 0 holds the integrals of both holds
-        chain = np.zeros((n + 2 * inputs,) * 2)
-        chain[:n, :n], chain[:n, n : n + inputs] = self.A * step, self.B * step
-        chain[n : n + inputs, n + inputs :] = np.eye(inputs)
-        moved = scipy.linalg.expm(chain)
-        decay, kept, ramp = moved[:n, :n], moved[:n, n : n + inputs], moved[:n, n + inputs :]
-        if hold == "zero-order":
-            return StateSpace(decay, kept, self.C, self.D, step)
-        if hold == "first-order":
-            return StateSpace(decay, decay @ ramp + kept - ramp, self.C, self.D + self.C @ ramp, step)
-        raise InputError("hold", hold, "zero-order or first-order")
-
-    def modal(self) -> StateSpace:
-        """Return the same system with A in blocks of one (real pole) or two (pair of poles) states.
+    @classmethod
+    def from_control(cls, system: Any) -> StateSpace:
+        """Return a linear system of python-control: a state space, or a transfer function of one input and one output.
 
         Raises
         ------
         InputError
-            If poles coincide so closely that their states cannot be told apart.
+            If it is sampled, and nobody knows how fast.
         """
-        values, right = np.linalg.eig(self.A)
-        keep = values.imag >= 0.0
-        values, right = values[keep], right[:, keep]
-        columns = [part for value, shape in zip(values, right.T, strict=True) for part in _real_columns(value, shape)]
-        basis = np.stack(columns, axis=1) if columns else np.zeros((0, 0))
-        if basis.shape[1] != self.order or (self.order and np.linalg.cond(basis) > 1e12):
-            raise InputError("poles", values.tolist(), "poles that differ")
-        return StateSpace(np.linalg.solve(basis, self.A @ basis), np.linalg.solve(basis, self.B), self.C @ basis, self.D, self.step)
-
-    def to_control(self) -> Any:
-        """Return the system as python-control's ``StateSpace``, for its plots, its transfer functions and its design methods."""
         import control
 
-        return control.ss(self.A, self.B, self.C, self.D, self.step) if self.step else control.ss(self.A, self.B, self.C, self.D)
+        if system.dt is True:
+            raise InputError("dt", "not known", "0, or the time between samples [s]")
+        found = control.ss(system)
+        return cls(found.A, found.B, found.C, found.D, float(found.dt or 0.0))
 
+    def to_control(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> Any:
+        """Return the system as python-control's ``StateSpace``, for its feedback, its plots and its design methods.
 
-def _real_columns(value: complex, shape: ComplexArray) -> tuple[FloatArray, ...]:
-    if value.imag == 0.0:
-        return (shape.real,)
-    return shape.real, -shape.imag
+        Parameters
+        ----------
+        inputs, outputs : sequence of str, optional
+            Names of the signals; a dot becomes an underscore, since python-control reserves it.
+        """
+        import control
+
+        names = {
+            key: [name.replace(".", "_") for name in given]
+            for key, given in (("inputs", inputs), ("outputs", outputs))
+            if given is not None
+        }
+        return control.ss(self.A, self.B, self.C, self.D, self.step, **names)

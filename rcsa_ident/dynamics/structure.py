@@ -111,6 +111,7 @@ def rigid_body_modes(structure: Structure, max_omega: float) -> FloatArray:
 
     Parameters
     ----------
+    structure : Structure
     max_omega : float [rad/s]
         A frequency of the elastic motion; a thousandth of it shifts the inverse iteration.
     """
@@ -145,6 +146,7 @@ def poles(structure: Structure, max_omega: float, snapshots: int = 6, tolerance:
 
     Parameters
     ----------
+    structure : Structure
     max_omega : float [rad/s]
     snapshots : int
         Frequencies at which the full equations are solved, Chebyshev points of the band.

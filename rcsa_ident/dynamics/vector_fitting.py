@@ -1,4 +1,4 @@
-"""Vector fitting: poles of a rational function that several responses share, by relocation."""
+"""Vector fitting [gustavsen1999]: poles of a rational function that several responses share, by relocation."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ class Candidate:
 
     @property
     def order(self) -> int:
+        """Number of poles, both of each pair counted."""
         return order_of(self.pole)
 
 
@@ -58,6 +59,18 @@ class Problem:
         weight: FloatArray | None,
         constant: bool,
     ) -> Problem:
+        """Return the scaled problem; the parameters are those of `rational_fit`, checked here.
+
+        Parameters
+        ----------
+        omega : array, shape (n,) [rad/s]
+        values : complex array, shape (n,), (n, r) or (n, r, c)
+        tolerance : float
+            Relative rms misfit that counts as 1 where no noise is given.
+        noise, weight : arrays of the values' shape (or broadcast to it), or None
+        constant : bool
+            Whether a real constant is fitted, too.
+        """
         omega, values = np.asarray(omega, dtype=float), np.asarray(values, dtype=complex)
         if values.shape[:1] != omega.shape or omega.ndim != 1 or values.ndim not in (1, 2, 3):
             raise InputError("values", values.shape, f"one to three axes, the first with {omega.size} frequencies")
@@ -92,12 +105,12 @@ class Problem:
 
     @property
     def highest(self) -> int:
-        """The order that leaves a point for each unknown."""
+        """The highest order that leaves a point for each unknown."""
         n, e = self.values.shape
         return max((2 * n * e - e) // (2 + e) - 1, 1)
 
     def thinned(self, order: int) -> Problem:
-        """The problem on fewer frequencies, evenly left out."""
+        """Return the problem on fewer frequencies, evenly left out."""
         n = self.omega.size
         wanted = max(_THINNED * order, 400)
         if n <= 2 * wanted:
@@ -106,10 +119,11 @@ class Problem:
         return replace(self, omega=self.omega[keep], values=self.values[keep], weight=self.weight[keep])
 
     def unknowns(self, order: int) -> int:
+        """Return the number of real unknowns of a fit of this order."""
         return order + self.values.shape[1] * (order + self.constant)
 
     def target(self, order: int) -> float:
-        """Weighted rms misfit that is good enough."""
+        """Return the weighted rms misfit that is good enough for an order."""
         if not self.noisy:
             return 1.0
         points = 2 * self.values.size
@@ -117,15 +131,16 @@ class Problem:
         return float(np.sqrt(free / points) * (1.0 + 3.0 / np.sqrt(2.0 * free)))
 
     def goal(self, order: int) -> float:
-        """The same in the unit of `RationalFit.error`."""
+        """Return the same in the unit of `RationalFit.error`."""
         return 1.0001 * self.target(order) * self.tolerance
 
     def criterion(self, candidate: Candidate) -> float:
+        """Return Bayes's information criterion: less is better."""
         points = 2 * self.values.size
         return points * float(np.log(candidate.rms**2)) + self.unknowns(candidate.order) * float(np.log(points))
 
     def relocated(self, pole: ComplexArray) -> tuple[ComplexArray, float]:
-        """The zeros of the best sigma for these poles, mirrored where unstable, one of each pair; the rms misfit with these poles."""
+        """Return the zeros of the best sigma for these poles, mirrored where unstable, one of each pair; and the rms misfit."""
         basis = _basis(self.omega, pole)
         m = basis.shape[1]
         extended = np.hstack([basis, np.ones((basis.shape[0], 1))]) if self.constant else basis
@@ -160,7 +175,7 @@ class Problem:
         return zeros[np.argsort(np.abs(zeros), kind="stable")], rms
 
     def residues(self, pole: ComplexArray) -> tuple[FloatArray, ComplexArray]:
-        """Coefficients of the real basis, shape (m + constant, e), and the weighted misfit, shape (n, e)."""
+        """Return the coefficients of the real basis, shape (m + constant, e), and the weighted misfit, shape (n, e)."""
         basis = _basis(self.omega, pole)
         if self.constant:
             basis = np.hstack([basis, np.ones((basis.shape[0], 1))])
@@ -173,7 +188,7 @@ class Problem:
         return coefficients, self.weight * (basis @ coefficients - self.values)
 
     def settled(self, pole: ComplexArray) -> Candidate:
-        """The best poles on the way that starts from these."""
+        """Return the best poles on the way that starts from these."""
         best, least, idle = pole, np.inf, 0
         for _ in range(_RELOCATIONS):
             moved, rms = self.relocated(pole)
@@ -189,7 +204,7 @@ class Problem:
 
 
 def growing(problem: Problem, highest: int) -> Iterator[Candidate]:
-    """Candidates of ascending order."""
+    """Yield the best fit of each order, ascending up to the highest."""
     low, high = float(problem.omega.min()), 1.0
     last: Candidate | None = None
     for order in range(2 - highest % 2 if highest < 3 else 2, highest + 1, 1 if highest < 4 else 2):
@@ -216,6 +231,7 @@ def _spaced(order: int, low: float, high: float) -> ComplexArray:
 
 
 def order_of(pole: ComplexArray) -> int:
+    """Return the number of poles, both of each pair counted."""
     return int(np.sum(np.where(pole.imag > 0.0, 2, 1)))
 
 

@@ -27,10 +27,11 @@ class AxisData:
 
     Parameters
     ----------
-    omega, order : arrays, shape (n,)
-        [rad/s], [-].
+    axis : Dof
+    omega, order : arrays, shape (n,) [rad/s], [-]
+        Frequency of each point, and that over the spindle's.
     variance : array, shape (n, o) [m^2/N^2]
-        Of the real and imaginary part each.
+        Variance of the real and imaginary part each.
     lines : complex array, shape (n, o, 2) [m/N]
         Cut and turned air cut over the simulated force.
     cut : array of int, shape (n,)
@@ -168,7 +169,7 @@ class IdentificationData:
 
     @property
     def relative_speed(self) -> FloatArray:
-        """Speed of each cut, from -1 at the lowest to 1 at the highest, shape (k,)."""
+        """Spindle speed of each cut, from -1 at the lowest to 1 at the highest, shape (k,) [-]."""
         middle, half = self.speed_range
         return (self.spindle_speed - middle) / half if half > 0.0 else np.zeros(self.spindle_speed.size)
 

@@ -7,18 +7,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.cutting.force import ForceTerm
-from rcsa_ident.dynamics.coordinates import plane
-from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import JOINT
-from rcsa_ident.identification.posterior import Posterior, spread
-from rcsa_ident.identification.result import Identification, IdentificationCode, Status
+from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.identification.result import Identification, IdentificationCode
+from rcsa_ident.identification.status import Status
+from rcsa_ident.machine.flange_part import JointedFlange
 from rcsa_ident.remarks import Remark
 
 #: Above this share of unexplained signal the force model or the recordings are wrong.
@@ -64,63 +63,84 @@ def failed(data: IdentificationData, seed: int, method: str) -> Identification:
 def diagnose(
     data: IdentificationData, searched: list[AxisSearch], solution: Solution, misfit: Misfit, posteriors: Sequence[Posterior]
 ) -> list[Remark]:
-    """Return the reasons for `suspect`; `posteriors` are those of the axes."""
+    """Return the reasons for `suspect`.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    searched : list of AxisSearch
+        One for each axis.
+    solution : Solution
+        All axes together.
+    misfit : Misfit
+        The one whose minimum it is.
+    posteriors : sequence of Posterior
+        One for each axis.
+    """
     reasons: list[Remark] = []
 
     def doubt(code: IdentificationCode, sentence: str) -> None:
         reasons.append(Remark(code, sentence))
 
     if not solution.converged:
-        doubt(IdentificationCode.NOT_CONVERGED, f"not converged: the polish still gained after {solution.steps} steps")
+        words = f"not converged: the joint fit was still improving after {solution.steps} steps"
+        doubt(IdentificationCode.NOT_CONVERGED, words)
     for axis in data.axes:
         noise = np.sqrt(2.0 * axis.noise)
         signal = float(np.median(np.abs(axis.measured) / np.where(noise > 0.0, noise, 1e-300)))
         if signal < LEAST_SIGNAL:
-            doubt(IdentificationCode.WEAK_SIGNAL, f"{str(axis.axis).upper()}: half of the lines are below {signal:.2g} times their noise")
+            words = f"{str(axis.axis).upper()}: the median signal-to-noise ratio of the lines is {signal:.2g} (at least {LEAST_SIGNAL:g})"
+            doubt(IdentificationCode.WEAK_SIGNAL, words)
     for axis, share in zip(data.axes, misfit.model_error, strict=True):
         if share > WORST_MODEL_ERROR:
             doubt(
                 IdentificationCode.UNEXPLAINED,
-                f"{str(axis.axis).upper()}: {100 * share:.1f} % of each line stay unexplained (at most {100 * WORST_MODEL_ERROR:g} %): "
-                "cutting coefficients, toolings, tooth count or sensor signs may be wrong, or the dynamics change with speed",
+                f"{str(axis.axis).upper()}: the model leaves {100 * share:.1f} % of each line unexplained "
+                f"(limit {100 * WORST_MODEL_ERROR:g} %): cutting coefficients, toolings, tooth count or sensor signs may be wrong, "
+                "or the dynamics change with speed",
             )
     bad = misfit.cut_weight < 1.0
     if np.mean(bad) > MOST_BAD_CUTS:
-        doubt(
-            IdentificationCode.CONTRADICTING_CUTS,
-            f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, {_named(data, bad, misfit)}",
-        )
+        words = f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, namely {_named(data, bad, misfit)}"
+        doubt(IdentificationCode.CONTRADICTING_CUTS, words)
     for axis, found in zip(data.axes, searched, strict=True):
         if len(found.candidates) > 1 and found.evidences[1] - found.evidences[0] < EVIDENCE_TIE:
             difference, band = _difference(axis, *found.candidates[:2])
             if difference > max(LARGEST_DIFFERENCE, 3.0 * band):
                 doubt(
                     IdentificationCode.TWO_SOLUTIONS,
-                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.1f} % in what a tooltip "
-                    f"feels of the machine, more than their deviation of {100 * band:.1f} %",
+                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.1f} % in the machine's "
+                    f"contribution to the tooltip FRF, more than its standard deviation of {100 * band:.1f} % explains",
                 )
     for axis, posterior in zip(data.axes, posteriors, strict=True):
         band = _band(posterior, axis)
         if band > LARGEST_BAND:
             doubt(
                 IdentificationCode.WIDE_POSTERIOR,
-                f"{str(axis.axis).upper()}: what a tooltip feels of the machine is known to {100 * band:.1f} % only (at most "
-                f"{100 * LARGEST_BAND:g} %), and with tools that were never cut to several times that: more or quieter cuts are wanted",
+                f"{str(axis.axis).upper()}: the machine's contribution to the tooltip FRF has a standard deviation of {100 * band:.1f} % "
+                f"(limit {100 * LARGEST_BAND:g} %), several times that with tools that were never cut: more or quieter cuts are needed",
             )
     if len(data.toolings) < 2:
-        doubt(
-            IdentificationCode.ONE_TOOLING,
-            "one tooling only: flange translation and slope can't be told apart; cut with a second, different holder",
-        )
+        words = "only one tooling: translation and slope of the flange cannot be separated; cut with a second, different holder"
+        doubt(IdentificationCode.ONE_TOOLING, words)
     for t, name in enumerate(data.toolings):
         count = int(np.sum(data.cut_tooling == t))
         if count < FEWEST_CUTS:
-            doubt(IdentificationCode.FEW_CUTS, f"few cuts: {count} with {name}, at least {FEWEST_CUTS} are wanted")
+            doubt(IdentificationCode.FEW_CUTS, f"too few cuts: {count} with {name}, at least {FEWEST_CUTS} are needed")
     return reasons
 
 
 def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covariance: FloatArray) -> list[Remark]:
-    """Return what the data cannot tell, and what was done about single cuts."""
+    """Return what the data cannot tell, and what was done about single cuts.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    solution : Solution
+    misfit : Misfit
+    covariance : array, shape (p, p)
+        Covariance of all unknowns.
+    """
     notes: list[Remark] = []
 
     def note(code: IdentificationCode, sentence: str) -> None:
@@ -132,8 +152,8 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
         if std > INFORMED * priors.joint_spread:
             note(
                 IdentificationCode.JOINT_UNKNOWN,
-                f"joint: its {name} cannot be told from the flange's own compliance (known to a factor of {np.exp(std):.1f}); "
-                "both together are what the tooltip feels",
+                f"joint: the {name} cannot be separated from the flange's own compliance (known to within a factor of {np.exp(std):.1f}); "
+                "the tooltip FRF depends on both together",
             )
     for i, axis in enumerate(data.axes):
         natural = np.exp(solution.theta[layout.axis(i)][: layout.axes[i].modes]) / (2.0 * np.pi)
@@ -144,18 +164,18 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
             note(
                 IdentificationCode.MODES_OUTSIDE_BAND,
                 f"{str(axis.axis).upper()}: modes at {listed} Hz lie outside the excited band of {low:.0f} to {high:.0f} Hz: "
-                "they stand for all that the machine does there",
+                "they represent all dynamics of the machine outside it",
             )
     for c, coefficient in enumerate(data.coefficients):
         std, before = deviation[layout.force][c], data.coefficient_spread[c]
         if std > INFORMED * before and coefficient.term is not ForceTerm.RUNOUT:
-            note(
-                IdentificationCode.COEFFICIENT_UNKNOWN,
-                f"{coefficient}: the cuts say little about it; it is known to {100.0 * min(std, before):.1f} %, nearly as before",
-            )
+            share = 100.0 * min(std, before)
+            words = f"{coefficient}: hardly determined by the cuts; its standard deviation is {share:.1f} %, close to the prior's"
+            note(IdentificationCode.COEFFICIENT_UNKNOWN, words)
     bad = misfit.cut_weight < 1.0
     if 0.0 < np.mean(bad) <= MOST_BAD_CUTS:
-        note(IdentificationCode.CUTS_WEIGHTED_DOWN, f"cuts that contradict the others and count less: {_named(data, bad, misfit)}")
+        words = f"cuts that contradict the others and were given less weight: {_named(data, bad, misfit)}"
+        note(IdentificationCode.CUTS_WEIGHTED_DOWN, words)
     return notes
 
 
@@ -165,15 +185,13 @@ def _named(data: IdentificationData, bad: np.ndarray, misfit: Misfit) -> str:
     return ", ".join(f"{data.cut_ids[k]} ({1.0 / misfit.cut_weight[k]:.0f} times its variance)" for k in worst[:5]) + rest
 
 
-def _machine_contribution(axis: AxisData) -> Callable[[ModalModel, LumpedJoint], ComplexArray]:
+def _machine_contribution(axis: AxisData) -> Callable[[JointedFlange], ComplexArray]:
     """What a tooltip feels of the machine, a^T (A22 + K^-1 + B)^-1 a with a = A21 of the cut toolings, at the axis' lines."""
     lever = np.array([[1.0, LEVER], [LEVER, LEVER**2]])
     flange = axis.flange[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
-    directions = tuple(c.dof for c in plane("flange", axis.axis))
 
-    def contribution(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
-        soft = joint.compliance_along(axis.omega, directions)[:, :, None] * np.eye(2)
-        together = flange + lever * (soft + modes.receptance(axis.omega).values)
+    def contribution(machine: JointedFlange) -> ComplexArray:
+        together = flange + lever * machine.interface(axis.omega)
         return np.einsum("ni,ni->n", axis.tip, np.linalg.solve(together, axis.tip[:, :, None])[:, :, 0])
 
     return contribution
@@ -181,16 +199,16 @@ def _machine_contribution(axis: AxisData) -> Callable[[ModalModel, LumpedJoint],
 
 def _band(posterior: Posterior, axis: AxisData) -> float:
     """Relative standard deviation of what a tooltip feels of the machine."""
-    contribution = _machine_contribution(axis)
-    value = contribution(*posterior.machine(axis.axis))
-    return float(np.linalg.norm(spread(posterior, axis.axis, contribution)) / max(float(np.linalg.norm(value)), 1e-300))
+    value, changes = posterior.part(axis.axis).response(_machine_contribution(axis))
+    assert changes is not None
+    return float(np.linalg.norm(changes) / max(float(np.linalg.norm(value)), 1e-300))
 
 
 def _difference(axis: AxisData, one: Candidate, two: Candidate) -> tuple[float, float]:
-    """Relative difference of two candidates in what a tooltip feels, and the first one's deviation."""
+    """Relative difference of two candidates in the machine's contribution to the tooltip FRF, and the first one's deviation."""
     contribution = _machine_contribution(axis)
     first, second = (_flange_posterior(candidate) for candidate in (one, two))
-    value, other = contribution(*first.machine(axis.axis)), contribution(*second.machine(axis.axis))
+    value, other = (contribution(each.candidate(axis.axis)) for each in (first, second))
     size = np.linalg.norm(value)
     if size == 0.0:
         return 0.0, 0.0

@@ -21,8 +21,9 @@ from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import BOTH, Progress, Stage, Step
-from rcsa_ident.identification.result import AxisResult, Identification, Status
+from rcsa_ident.identification.result import AxisResult, Identification
 from rcsa_ident.identification.search import SearchSettings, explore
+from rcsa_ident.identification.status import Status
 from rcsa_ident.scaleout import Map
 
 #: Share of the lines by which force model, tool-holder or sensors may be wrong alike at neighbouring frequencies.

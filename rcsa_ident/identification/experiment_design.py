@@ -1,4 +1,4 @@
-"""What cuts that were not made yet would tell, and those that tell most.
+"""What cuts that were not made yet would tell, and those that tell most: optimal experiment design [fedorov1972].
 
 Unknowns are whitened: z = S^-1 (theta - theta_0) with S S^T the posterior's covariance, so that C = 1 before any further cut. A
 cut whose lines change by J z, in standard deviations and with its own delay taken out (J = J' - c c^T J' / c^T c, the Schur
@@ -153,7 +153,7 @@ def greedy(prospects: CandidateCuts, count: int, goal: Goal, among: Sequence[int
     count : int
     goal : Goal
     among : sequence of int, optional
-        Only these candidates.
+        Candidates to choose from; by default all.
     """
     state = _State.of(prospects)
     free = np.ones(len(prospects.rows), dtype=bool) if among is None else np.isin(np.arange(len(prospects.rows)), among)
@@ -166,12 +166,16 @@ def greedy(prospects: CandidateCuts, count: int, goal: Goal, among: Sequence[int
 
 
 def exchanged(prospects: CandidateCuts, chosen: Sequence[int], goal: Goal, passes: int = 1) -> list[int]:
-    """Return the cuts after each in turn was put back against all others (Fedorov's exchange), in greedy order.
+    """Return the cuts after each in turn was put back against all others (Fedorov's exchange, [fedorov1972]), in greedy order.
 
     Parameters
     ----------
+    prospects : CandidateCuts
+    chosen : sequence of int
+        The cuts to start from.
+    goal : Goal
     passes : int
-        At most so many rounds; the first without a change is the last.
+        Rounds at most; the first without a change is the last.
     """
     state = _State.of(prospects)
     cuts = list(chosen)
@@ -202,6 +206,7 @@ def expected_cut(
 
     Parameters
     ----------
+    cut_id, tooling : str
     spindle_speed : float [rad/s]
     teeth : int
     force, slope : complex arrays, shapes (m, 2) [N] and (m, 2, 5) [-]
@@ -210,7 +215,7 @@ def expected_cut(
     noise : float [m]
         Standard deviation of a displacement line's real and imaginary part each; it falls with the root of a record's length.
     axes : sequence of Dof
-        X, Y or both.
+        Those that would be measured: X, Y or both.
     """
     positive("noise", noise, "m")
     order = harmonics(teeth, spindle_speed)
@@ -244,7 +249,7 @@ def information(data: IdentificationData, posteriors: Mapping[Dof, Posterior], m
     Parameters
     ----------
     data : IdentificationData
-        Of cuts from `expected_cut`; what their lines hold does not matter.
+        Cuts from `expected_cut`; what their lines hold does not matter.
     posteriors : mapping of Dof to Posterior
     model_error : mapping of Dof to float
         Share of each line that neither model nor noise explains; at least `LEAST_MODEL_ERROR`.
@@ -324,7 +329,7 @@ def _cross(
 ) -> tuple[ComplexArray, ComplexArray]:
     """Cross FRF of an axis and a joint, shape (n,), and its change with the vector where asked for, shape (n, p)."""
     if layout.fixture:
-        raise InputError("layout", "one with fixture", "the flange's own motion: a posterior's layout")
+        raise InputError("layout", "a layout with the fixture's motion", "one of the flange's motion alone, as a posterior has")
     axis, joint = unpack(theta[:-JOINT], layout), scaled_joint(theta[-JOINT:])
     n = points.shape[0]
     values = np.empty((n, 1), dtype=complex)

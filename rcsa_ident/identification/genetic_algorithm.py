@@ -1,6 +1,6 @@
-"""The main paper's method: a genetic algorithm over boxes, with its printed search space and cost (Table 2, eq. 14).
+"""The published identification: a genetic algorithm over boxes, with its printed search space and cost ([inprocess], Table 2, eq. 14).
 
-64 variables a direction: ten complex modes (p1..p6) and the joint (p7..p10). What the paper does not say is how the simulated
+64 variables a direction: ten complex modes (p1..p6) and the joint (p7..p10). What [inprocess] does not say is how the simulated
 force's phase is tied to the record; here each cut is granted its best delay on a grid, for every candidate.
 """
 
@@ -21,7 +21,8 @@ from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.diagnostics import failed, not_finite
 from rcsa_ident.identification.method import Phase, finite, perform
 from rcsa_ident.identification.progress import Progress, Stage, Step
-from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode, Status
+from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
+from rcsa_ident.identification.status import Status
 from rcsa_ident.remarks import Remark
 from rcsa_ident.scaleout import Map
 
@@ -33,7 +34,7 @@ WORST_MISFIT = 4.0
 
 @dataclass(frozen=True, slots=True)
 class SearchSpace:
-    """Boxes of the variables; the defaults are the paper's Table 2.
+    """Boxes of the variables; the defaults are those of [inprocess], Table 2.
 
     Parameters
     ----------
@@ -61,23 +62,34 @@ class SearchSpace:
     c_r: float = 100.0
 
 
-#: Boxes that hold spindles with low, lightly damped modes and real joints, which Table 2 leaves out.
+#: Boxes that hold spindles with low, lightly damped modes and real joints, which Table 2 of [inprocess] leaves out.
 WIDE = SearchSpace((50.0, 5000.0), (0.003, 0.30), 0.02, 1.0, (0.0, 40.0), (8.0, 12.0), (5.0, 9.0), 1e5, 1e3)
 
 
 @dataclass(frozen=True, slots=True)
 class LiteralCost:
-    """kappa sum_j ||E_j|| + nu sum_n |p3,n|, E_j in m/N over the lines of tooling j: the paper's, with its constants."""
+    """kappa sum_j ||E_j|| + nu sum_n |p3,n|, E_j in m/N over the lines of tooling j, with the constants of [inprocess], eq. 14."""
 
     kappa: float = 1.0e6
     nu: float = 700.0
 
     def weights(self, data: AxisData) -> FloatArray:
-        """Return ones: all lines count alike."""
+        """Return the lines' weights, shape (n,): all count alike."""
         return np.ones(data.omega.size)
 
     def value(self, misfit: FloatArray, points: FloatArray, p3: FloatArray, space: SearchSpace) -> FloatArray:
-        """Return the cost, shape (k,), of misfits (k, toolings) and shapes p3 (k, modes)."""
+        """Return the cost of k candidates, shape (k,).
+
+        Parameters
+        ----------
+        misfit : array, shape (k, toolings)
+            Weighted sum of squares of each tooling's lines.
+        points : array, shape (toolings,)
+            Number of lines of each tooling.
+        p3 : array, shape (k, modes) [sqrt(s/kg)]
+            Real parts of the translational shapes.
+        space : SearchSpace
+        """
         return self.kappa * np.sqrt(misfit).sum(axis=1) + self.nu * np.abs(p3).sum(axis=1)
 
 
@@ -97,17 +109,17 @@ class NoiseWeightedCost:
     strength: float = 0.01
 
     def weights(self, data: AxisData) -> FloatArray:
-        """Return the inverse variances of noise and model error together, shape (n,)."""
+        """Return the lines' weights, shape (n,): inverse variances."""
         return 1.0 / (data.noise + 0.5 * self.model_error**2 * np.abs(data.measured) ** 2)
 
     def value(self, misfit: FloatArray, points: FloatArray, p3: FloatArray, space: SearchSpace) -> FloatArray:
-        """Return the cost, shape (k,)."""
+        """Return the cost of k candidates, shape (k,); parameters as in `LiteralCost`."""
         return np.sqrt(misfit / (2.0 * points)).sum(axis=1) + self.strength * np.abs(p3).sum(axis=1) / space.phi_t
 
 
 @dataclass(frozen=True, slots=True)
 class PaperGeneticAlgorithm:
-    """pymoo's genetic algorithm as the paper sets it: population 20, 5000 iterations, each direction for itself.
+    """pymoo's genetic algorithm [blank2020] as [inprocess] sets it: population 20, 5000 iterations, each direction for itself.
 
     Parameters
     ----------
@@ -128,7 +140,18 @@ class PaperGeneticAlgorithm:
         return "paper"
 
     def run(self, data: IdentificationData, seed: int, map: Map = map, progress: Progress | None = None) -> Identification:
-        """Return the identification; each axis gets a seed of its own."""
+        """Return the identification; each axis gets a seed of its own.
+
+        Parameters
+        ----------
+        data : IdentificationData
+        seed : int
+            Same seed, same answer, whatever `map` is.
+        map : callable
+            The builtin, or a pool's.
+        progress : callable, optional
+            Told of every step; with a pool's map it has to be picklable.
+        """
         if not_finite(data):
             return failed(data, seed, self.name)
         sequences = np.random.SeedSequence(seed).spawn(len(data.axes))
@@ -146,12 +169,14 @@ class PaperGeneticAlgorithm:
             trace += [Step(str(axis.axis), Stage.GENERATION, float(c), self.modes) for c in costs]
             name, misfit = str(axis.axis).upper(), axes[axis.axis].chi2_per_point
             if misfit > WORST_MISFIT:
-                words = f"{name}: the modes miss the lines, chi2 per point {misfit:.0f} at 2 % of each line (at most {WORST_MISFIT:g})"
+                words = (
+                    f"{name}: the modes do not fit the lines, chi² per point is {misfit:.0f} at an error of 2 % (limit {WORST_MISFIT:g})"
+                )
                 reasons.append(Remark(IdentificationCode.LINES_MISSED, words))
             omega = np.linspace(axis.omega.min(), axis.omega.max(), 400)
             worst = float(dissipation(omega, axes[axis.axis].modes.receptance(omega).values).min())
             if worst < -1e-9:
-                words = f"{name}: the modes are not passive, they feed energy in (down to {worst:.2f} of the mobility)"
+                words = f"{name}: the modes are not passive, the real part of the mobility falls to {worst:.2f} of its magnitude"
                 reasons.append(Remark(IdentificationCode.NOT_PASSIVE, words))
         assert problem is not None
         delays = problem.delays(axes[data.axes[-1].axis])
@@ -188,7 +213,7 @@ class _Problem:
         self.model = np.empty((2, axis.omega.size))
 
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Lower and upper bounds, shape (6 modes + 4,)."""
+        """Return the lower and the upper bounds of the variables, shape (6 modes + 4,) each."""
         s = self.method.space
         reach = s.slope_ratio[1] - s.slope_ratio[0]
         low = [s.natural_frequency_hz[0], s.damping_ratio[0], -s.phi_t, -s.phase, -reach, -s.phase]
@@ -207,7 +232,7 @@ class _Problem:
         return 2.0 * np.pi * p1, p2, p3 * (1.0 + 1j * p4), p3 * p5 * (1.0 + 1j * p6), joint
 
     def costs(self, x: FloatArray) -> FloatArray:
-        """Return the cost of each candidate, shape (k,)."""
+        """Return the cost of each candidate, shape (k,), of vectors (k, variables)."""
         omega_n, zeta, phi_t, phi_r, joint = self.decode(x)
         fractions = modal_fractions(omega_n, zeta, phi_t, LEVER * phi_r)
         joint = joint / np.array([1.0, LEVER**2, 1.0, LEVER**2])
@@ -269,6 +294,12 @@ def modal_fractions(omega_n: FloatArray, zeta: FloatArray, phi_t: np.ndarray, ph
     """Return conjugate pairs as real fractions (a + i w b) / (w_n^2 - w^2 + 2 i zeta w_n w), shape (..., modes, 8).
 
     a = -2 Re(r conj(lambda)) and b = 2 Re(r) with the residue r = phi_p phi_q, for tt, tr, rr.
+
+    Parameters
+    ----------
+    omega_n, zeta : arrays, shape (..., modes) [rad/s], [-]
+    phi_t, phi_r : complex arrays, shape (..., modes) [sqrt(s/kg)]
+        Shapes: translation, and slope times the lever.
     """
     conjugate = -zeta * omega_n - 1j * omega_n * np.sqrt(1.0 - zeta**2)
     columns = [omega_n**2, 2.0 * zeta * omega_n]

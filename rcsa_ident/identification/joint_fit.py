@@ -81,10 +81,11 @@ def fit_jointly(
     Parameters
     ----------
     data : IdentificationData
-        With both outputs, where they were recorded.
+        All axes, with both outputs where they were recorded.
+    priors : Priors
     searched : list of AxisSearch
         One for each axis.
-    report : callable
+    report : callable of (stage, cost, solution)
     map : callable
         The builtin, or a pool's.
     """

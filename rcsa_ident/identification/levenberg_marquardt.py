@@ -1,4 +1,4 @@
-"""Damped Gauss-Newton steps down to the nearest minimum (Levenberg-Marquardt with Marquardt's scaling)."""
+"""Damped Gauss-Newton steps down to the nearest minimum (Levenberg-Marquardt with Marquardt's scaling, [marquardt1963])."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Solution:
     theta : array, shape (p,)
     layout : Layout
     evaluation : Evaluation
-        With normal equations.
+        Cost and residual there, with normal equations.
     converged : bool
         False where the steps ran out.
     steps : int
@@ -45,7 +45,7 @@ class Solution:
 
     @property
     def cost(self) -> float:
-        """chi2 with priors."""
+        """Sum of squares in standard deviations, those of the priors too."""
         return self.evaluation.cost
 
     @property
@@ -71,8 +71,9 @@ def refine(
     theta : array, shape (p,)
     layout : Layout
     nuisance : array, shape (k, 2)
-        Where the cuts' own fits start.
+        Delay [s] and angle [rad] at which each cut's own fit starts.
     max_steps : int
+        Steps after which the search ends unconverged.
     grid : int
         Delays tried over a tooth-passing period at every step: needed far from the minimum.
     tolerance : float
@@ -107,7 +108,7 @@ def refine(
 
 
 def _step(misfit: Misfit, theta: FloatArray, layout: Layout, here: Evaluation, damping: float) -> FloatArray | None:
-    """Damped step with geodesic acceleration (Transtrum & Sethna, 2012): it bends along the valley, not into its wall."""
+    """Damped step with geodesic acceleration [transtrum2012]: it bends along the valley, not into its wall."""
     linear = here.linear
     assert linear is not None
     scale = np.sqrt(np.maximum(np.diag(linear.hessian), 1e-12))

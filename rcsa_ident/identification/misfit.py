@@ -23,11 +23,11 @@ class Residual:
     Parameters
     ----------
     lines : tuple of arrays, shape (2 n,)
-        Of each axis: real parts of all lines, then imaginary parts.
+        Residuals of each axis: real parts of all lines, then imaginary parts.
     own : array, shape (p,)
-        Of the parameters' priors.
+        Residuals of the parameters' priors.
     cuts : array, shape (k, 2)
-        Of the cuts' priors: delay, angle.
+        Residuals of the cuts' priors: delay, angle.
     """
 
     lines: tuple[FloatArray, ...]
@@ -45,12 +45,12 @@ class Residual:
 
     @property
     def chi2(self) -> tuple[float, ...]:
-        """Sum of the squares of each axis' lines."""
+        """Sum of squares of each axis' lines, in standard deviations."""
         return tuple(float(r @ r) for r in self.lines)
 
     @property
     def cost(self) -> float:
-        """Sum of all squares."""
+        """Sum of all squares, those of the priors too."""
         return sum(self.chi2) + float(self.own @ self.own) + float(np.sum(self.cuts**2))
 
 
@@ -67,7 +67,7 @@ class Evaluation:
     models : tuple of complex arrays, shape (n, o) [m/N]
         The model's cross FRFs on the lines of each axis.
     residual : Residual
-        Whose squares add up to the cost.
+        Its squares add up to the cost.
     linear : Linearisation or None
         Gradient and Gauss-Newton matrix of half the cost, where asked for.
     """
@@ -80,7 +80,7 @@ class Evaluation:
 
     @property
     def chi2(self) -> tuple[float, ...]:
-        """Sum of the squares of each axis' lines."""
+        """Sum of squares of each axis' lines, in standard deviations."""
         return self.residual.chi2
 
     @property
@@ -98,10 +98,11 @@ class Linearisation:
     ----------
     layout : Layout
     jacobians : tuple of arrays, shape (2 n, q + c)
-        Of each axis: the lines' change with its own parameters, the joint's and the coefficients'.
+        Change of each axis' lines with its own parameters, the joint's and the coefficients'.
     columns : tuple of complex arrays, shape (n, 2)
         The lines' change with their cut's delay (in `DELAY_UNIT`) and angle.
     cut : tuple of int arrays, shape (n,)
+        The cut that each line belongs to.
     own : array, shape (p, p)
         The priors' change.
     cut_prior : array, shape (k, 2)
@@ -109,10 +110,13 @@ class Linearisation:
     clamping : (array of int, array), shape (k,) each
         Place in the vector of the tooth angle that a cut's prior depends on, and by how much (0 where by none).
     gradient, hessian : arrays, shapes (p,), (p, p)
+        Of half the cost, the cuts' unknowns eliminated.
     inner : array, shape (k, 2, 2)
+        Normal equations of each cut's delay and angle.
     mixed : array, shape (k, 2, p)
+        What couples them to the parameters.
     compliance : tuple of complex arrays, shape (n, o, 3)
-        Of each axis: the model's change with the flange's receptance tt, tr, rr at its lines, for what may be added to it.
+        Change of each axis' model with the flange's receptance tt, tr, rr at its lines, for what may be added to it.
     """
 
     layout: Layout
@@ -165,6 +169,8 @@ class Linearisation:
 
         Parameters
         ----------
+        i : int
+            Number of the axis.
         rows : array, shape (2 n, 3 q)
             Change of the axis' lines with them.
         residual : Residual
@@ -207,7 +213,7 @@ class Linearisation:
         Parameters
         ----------
         covariance : array, shape (p, p)
-            Of the parameters.
+            Covariance of the parameters.
         """
         follow = np.linalg.solve(self.inner, self.mixed)[:, 0]
         own = np.linalg.inv(self.inner)[:, 0, 0]
@@ -222,7 +228,7 @@ class Misfit:
     data : IdentificationData
     priors : Priors
     model_error : tuple of float [-]
-        Of each axis: standard deviation of what the force model leaves out, as a share of each line.
+        Standard deviation of what the force model leaves out, as a share of each line, for each axis.
     cut_weight : array, shape (k,), optional
         Factor on the weights of each cut's lines: below 1 for one that contradicts the others.
     """
@@ -257,9 +263,11 @@ class Misfit:
             See `parameters`.
         layout : Layout
         nuisance : array, shape (k, 2)
-            Where each cut's fit starts; not changed.
+            Delay [s] and angle [rad] at which each cut's fit starts; not changed.
         grid : int
             Delays tried over a tooth-passing period; 0 stays near `nuisance`.
+        normal : bool
+            Whether gradient and Gauss-Newton matrix are made, too.
         """
         models, gradients, axes = self._models(theta, layout, normal)
         nuisance = nuisance.copy()
@@ -275,7 +283,15 @@ class Misfit:
         return tuple(self._models(theta, layout, False)[0])
 
     def residual_at(self, theta: FloatArray, layout: Layout, nuisance: FloatArray) -> Residual:
-        """Return the residual with the cuts' delays and angles as they are given."""
+        """Return the residual with the cuts' delays and angles as they are given.
+
+        Parameters
+        ----------
+        theta : array, shape (p,)
+        layout : Layout
+        nuisance : array, shape (k, 2)
+            Delay [s] and angle [rad] of each cut.
+        """
         models = self._models(theta, layout, False)[0]
         return self._residual(theta, layout, models, nuisance, self._cut_prior(theta, layout))
 

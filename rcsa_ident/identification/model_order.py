@@ -1,4 +1,4 @@
-"""How many modes: as many as the data pay for, by Laplace's approximation of the evidence."""
+"""How many modes: as many as the data pay for, by Laplace's approximation of the evidence [mackay1992]."""
 
 from __future__ import annotations
 
@@ -60,8 +60,12 @@ def drop_modes(solution: Solution, misfit: Misfit, report: Report | None = None,
     ----------
     solution : Solution
         Polished.
+    misfit : Misfit
+    report : callable of (stage, cost, solution), optional
     smallest : int
         Fewest modes of an axis.
+    give_up : float
+        The walk ends where the evidence lies this far behind the best seen.
     """
     best, best_evidence = solution, evidence(solution, misfit)
     here = solution
@@ -100,8 +104,10 @@ def exchange_modes(
     ----------
     solution : Solution
         Polished.
-    band_hz : (float, float)
+    misfit : Misfit
+    band_hz : (float, float) [Hz]
         Lowest and highest line.
+    report : callable of (stage, cost, solution), optional
     rounds : int
         Most rounds.
     """
@@ -127,6 +133,14 @@ def grow_modes(solution: Solution, misfit: Misfit, band_hz: tuple[float, float])
 
     A machine has more modes than the data can show. A model that leaves them out is sure of what it cannot know; with them the
     posterior is as wide as it should be.
+
+    Parameters
+    ----------
+    solution : Solution
+        Polished.
+    misfit : Misfit
+    band_hz : (float, float) [Hz]
+        Lowest and highest line.
     """
     for i in range(len(solution.layout.axes)):
         trials = []
@@ -143,6 +157,18 @@ def promising(solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, 
     A mode with shape psi adds psi psi^T / (omega_n^2 - omega^2 + 2 i zeta omega_n omega) to the flange's receptance: linear in
     the entries of psi psi^T, so that all frequencies are judged by one least-squares solution each, the other unknowns and the
     cuts' delays following.
+
+    Parameters
+    ----------
+    solution : Solution
+        With normal equations.
+    misfit : Misfit
+    i : int
+        Number of the axis.
+    band_hz : (float, float) [Hz]
+        Lowest and highest line.
+    count : int
+        Number of frequencies that are tried.
     """
     linear = solution.evaluation.linear
     assert linear is not None
@@ -223,6 +249,9 @@ def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> t
 
     Parameters
     ----------
+    solution : Solution
+        With normal equations.
+    misfit : Misfit
     smallest : float
         Floor: no simulated force is better than that.
     """

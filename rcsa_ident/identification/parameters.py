@@ -53,7 +53,7 @@ class AxisLayout:
 
     @property
     def pairs(self) -> int:
-        """Number of entries of a lower triangle."""
+        """Number of entries of a lower triangle over the modes."""
         return self.modes * (self.modes + 1) // 2
 
     @property
@@ -87,7 +87,7 @@ class Layout:
 
     @property
     def tail(self) -> int:
-        """Place of the first unknown that all axes share."""
+        """Place in the vector at which begins what all axes share."""
         return sum(a.size for a in self.axes)
 
     @property
@@ -102,7 +102,7 @@ class Layout:
 
     @property
     def joint(self) -> slice:
-        """Places of the joint's logarithms."""
+        """Places of the logarithms of the joint's stiffnesses and damping."""
         return slice(self.tail, self.tail + JOINT)
 
     @property
@@ -129,12 +129,15 @@ class AxisParameters:
     ----------
     omega_n : array, shape (m,) [rad/s]
     psi : array, shape (m, 2) [1/sqrt(kg)]
+        Mass-normalised shapes at the flange: translation, and slope times the lever.
     factor : array, shape (m, m) [sqrt(rad/s)]
+        L of the damping matrix D = L L^T in modal coordinates.
     residual : array, shape (2, 2) [sqrt(m/N)]
+        Factor R_f of the residual compliance R_f R_f^T, the modes above the band.
     fixture : array, shape (m,) [1/sqrt(kg)]
-        Its shapes; zeros where the flange's motion is the only output.
+        The modes' shapes at the fixture; zeros where the flange's motion is the only output.
     fixture_residual : array, shape (2,) [m/N]
-        Fixture to flange translation and slope.
+        Residual compliance between fixture and the flange's translation and slope.
     softening : array, shape (m, m) or (0, 0) [-]
         Symmetric: K_ij = omega_i omega_j (delta_ij + x softening_ij) at relative speed x.
     """
@@ -167,7 +170,13 @@ class AxisParameters:
 
 
 def simple_axis(omega_n: FloatArray, psi: FloatArray, factor: FloatArray, residual: FloatArray) -> AxisParameters:
-    """Return an axis whose only output is the flange and which does not change with speed."""
+    """Return an axis whose only output is the flange and which does not change with speed.
+
+    Parameters
+    ----------
+    omega_n, psi, factor, residual : arrays, shapes (m,), (m, 2), (m, m), (2, 2)
+        As in `AxisParameters`.
+    """
     return AxisParameters(omega_n, psi, factor, residual, np.zeros(omega_n.size), np.zeros(2), np.zeros((0, 0)))
 
 
@@ -280,7 +289,17 @@ def without_mode(axis: AxisParameters, mode: int) -> AxisParameters:
 
 
 def with_mode(axis: AxisParameters, omega_n: float, psi: tuple[float, float], zeta: float = 0.05) -> AxisParameters:
-    """Return the axis with one more mode in front, uncoupled to the others, which the fixture does not feel."""
+    """Return the axis with one more mode in front, uncoupled to the others, which the fixture does not feel.
+
+    Parameters
+    ----------
+    axis : AxisParameters
+    omega_n : float [rad/s]
+    psi : (float, float) [1/sqrt(kg)]
+        Mass-normalised shape: translation, and slope times the lever.
+    zeta : float [-]
+        Damping ratio.
+    """
     factor = np.zeros((axis.order + 1, axis.order + 1))
     factor[0, 0], factor[1:, 1:] = np.sqrt(2.0 * zeta * omega_n), axis.factor
     softening = np.pad(axis.softening, ((1, 0), (1, 0))) if axis.softening.size else axis.softening
@@ -307,7 +326,7 @@ def joint_of(logs: FloatArray) -> LumpedJoint:
 
 
 def flange_modes(axis: AxisParameters, dof: Dof) -> ModalModel:
-    """Return the axis as complex modes at the flange (the paper's form), in SI, sorted by frequency."""
+    """Return the axis as complex modes at the flange ([inprocess], eq. 13), in SI, sorted by frequency."""
     lever = np.array([1.0, 1.0 / LEVER])
     residual = axis.residual @ axis.residual.T * np.outer(lever, lever)
     return damped_modes(axis.omega_n, axis.factor @ axis.factor.T, axis.psi * lever, residual, plane("flange", dof))

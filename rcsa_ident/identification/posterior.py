@@ -1,19 +1,23 @@
-"""What the posterior says about a derived quantity: linear propagation of the unknowns' covariance."""
+"""What is known of an axis' unknowns after all cuts, and which machines that allows: linear propagation of their covariance."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, flange_modes, joint_of, unpack
+from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation
 from rcsa_ident.machine.spindle import Spindle
+
+#: Longest step along a direction of the covariance from which a change is told: logarithms, or of order one.
+LONGEST_STEP = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,9 +27,10 @@ class Posterior:
     Parameters
     ----------
     theta : array, shape (p,)
+        The most probable unknowns.
     covariance : array, shape (p, p)
     layout : AxisLayout
-        Without fixture.
+        Which unknown stands where; without fixture.
     speed_range : (float, float) [rad/s]
         Middle of the campaign's spindle speeds and half their range; only a layout with softening asks for it.
     rivals : tuple of array
@@ -51,6 +56,14 @@ class Posterior:
         """Return modes and joint at `theta`, by default at the optimum, and at a spindle speed [rad/s], by default the middle one.
 
         Outside the campaign's speeds the machine of the nearest of them answers.
+
+        Parameters
+        ----------
+        axis : Dof
+            Bending plane of the answer.
+        theta : array, shape (p,), optional
+            Unknowns, of this model or of a rival; by default the optimum's.
+        speed : float, optional [rad/s]
         """
         vector = self.theta if theta is None else theta
         layout = self.layout if vector.size == self.theta.size else self.layout_of(vector.size - JOINT)
@@ -65,6 +78,47 @@ class Posterior:
         if found is None:
             raise InputError("rivals", size, "a size that belongs to a whole number of modes")
         return found
+
+    def doubt(self, axis: Dof, speed: float | None = None) -> Doubt:
+        """Return the machines a step to both sides along each of the covariance's own axes, and the rivals, at a speed [rad/s]."""
+        values, vectors = np.linalg.eigh(self.covariance)
+        steps = []
+        for size, direction in zip(np.sqrt(np.maximum(values, 0.0)), vectors.T, strict=True):
+            # stiff directions take a full deviation, loose ones a step that stays linear
+            step = min(size, LONGEST_STEP)
+            if step > 0.0:
+                ahead, behind = (self.candidate(axis, self.theta + sign * step * direction, speed) for sign in (1.0, -1.0))
+                steps.append(Perturbation(ahead, behind, size / (2.0 * step)))
+        return Doubt(tuple(steps), tuple(self.candidate(axis, rival, speed) for rival in self.rivals))
+
+    def part(self, axis: Dof, speed: float | None = None) -> FlangePart:
+        """Return the axis as a part of the flange, with what is not known of it, at a spindle speed [rad/s]."""
+        believed = self.candidate(axis, speed=speed)
+        return FlangePart(plane("flange", axis), believed, _OpenQuestion(self, axis, speed))
+
+    def candidate(self, axis: Dof, theta: FloatArray | None = None, speed: float | None = None) -> JointedFlange:
+        """Return `machine` as what stands behind the flange."""
+        modes, joint = self.machine(axis, theta, speed)
+        return JointedFlange(modes, joint)
+
+
+@dataclass(frozen=True, eq=False)
+class _OpenQuestion:
+    """What a posterior leaves open, worked out when it is asked for; another process works it out for itself."""
+
+    posterior: Posterior
+    axis: Dof
+    speed: float | None
+
+    @cached_property
+    def answer(self) -> Doubt:
+        return self.posterior.doubt(self.axis, self.speed)
+
+    def __call__(self) -> Doubt:
+        return self.answer
+
+    def __reduce__(self) -> tuple[type[_OpenQuestion], tuple[Posterior, Dof, float | None]]:
+        return type(self), (self.posterior, self.axis, self.speed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,30 +141,16 @@ class MachineAxis:
         """Return modes and joint at a spindle speed [rad/s], by default the campaign's middle one."""
         return (self.spindle.modes, self.joint) if self.posterior is None else self.posterior.machine(axis, speed=speed)
 
+    def part(self, axis: Dof, speed: float | None) -> FlangePart:
+        """Return this axis as a part of the flange, with what the posterior leaves open, at a spindle speed [rad/s]."""
+        if self.posterior is not None:
+            return self.posterior.part(axis, speed)
+        return FlangePart(plane("flange", axis), JointedFlange(self.spindle.modes, self.joint))
 
-def spread(
-    posterior: Posterior, axis: Dof, response: Callable[[ModalModel, LumpedJoint], ComplexArray], speed: float | None = None
-) -> ComplexArray:
-    """Return the response's change per standard deviation along each of the covariance's own axes and to each rival, shape (p, n).
-
-    Sums of its rows with independent standard normal weights are draws of the linearised response.
-
-    Parameters
-    ----------
-    response : callable
-        Modes and joint to a complex array, shape (n,).
-    speed : float or None [rad/s]
-    """
-    values, vectors = np.linalg.eigh(posterior.covariance)
-    slopes = []
-    for size, direction in zip(np.sqrt(np.maximum(values, 0.0)), vectors.T, strict=True):
-        # stiff directions take a full deviation, loose ones a step that stays linear
-        step = min(size, 0.05)
-        if step == 0.0:
-            continue
-        ahead = response(*posterior.machine(axis, posterior.theta + step * direction, speed))
-        behind = response(*posterior.machine(axis, posterior.theta - step * direction, speed))
-        slopes.append((ahead - behind) / (2.0 * step) * size)
-    here = response(*posterior.machine(axis, speed=speed))
-    slopes += [response(*posterior.machine(axis, rival, speed)) - here for rival in posterior.rivals]
-    return np.array(slopes) if slopes else np.zeros((1, here.size), dtype=complex)
+    @property
+    def softening_range(self) -> tuple[float, float] | None:
+        """Lowest and highest spindle speed [rad/s] between which it changes; None where it does not change."""
+        if self.posterior is None or not self.posterior.layout.softening:
+            return None
+        middle, half = self.posterior.speed_range
+        return middle - half, middle + half

@@ -20,7 +20,7 @@ class Priors:
     frequency_hz, frequency_spread : float [Hz], [-]
         Centre of the natural frequencies and spread of their logarithm.
     shape : float [1/sqrt(kg)]
-        Of a mass-normalised shape: 1 is a modal mass of 1 kg at the flange.
+        Spread of a mass-normalised shape: 1 is a modal mass of 1 kg at the flange.
     damping_ratio, damping_spread : float [-]
         Centre of a mode's own damping ratio and spread of its logarithm.
     damping_coupling : float [-]
@@ -30,7 +30,7 @@ class Priors:
     joint : tuple of float
         Centres of k_t [N/m], k_r [N m/rad], c_t [N s/m], c_r [N m s/rad].
     joint_spread : float [-]
-        Of their logarithms.
+        Spread of the logarithms of these.
     softening : float [-]
         Spread of the stiffness' change from the middle of the campaign's speeds to its ends, as a share.
     tooth_angle : float [rad]
@@ -61,8 +61,9 @@ class PriorRows:
         Diagonal entries of the damping factors: 2 log L_nn - log(2 zeta omega_n) is what is known, so these rows have a second
         entry, at `frequency`.
     frequency : array of int
+        Places of the modes' frequencies, in the order of `own`.
     jacobian : array, shape (p, p)
-        The same for every vector.
+        Derivative of the residuals; it is the same for every vector.
     """
 
     centre: FloatArray
@@ -84,6 +85,8 @@ def prior_rows(layout: Layout, priors: Priors, coefficients: tuple[float, ...] =
 
     Parameters
     ----------
+    layout : Layout
+    priors : Priors
     coefficients : tuple of float
         Standard deviations of the logarithms of the cutting coefficients' scales.
     """
@@ -121,5 +124,11 @@ def prior_rows(layout: Layout, priors: Priors, coefficients: tuple[float, ...] =
 
 
 def log_volume(layout: Layout, priors: Priors, coefficients: tuple[float, ...] = ()) -> float:
-    """Return log det of the priors' information matrix: the evidence compares it with the posterior's."""
+    """Return log det of the priors' information matrix: the evidence compares it with the posterior's.
+
+    Parameters
+    ----------
+    layout, priors, coefficients
+        As in `prior_rows`.
+    """
     return float(-2.0 * np.sum(np.log(prior_rows(layout, priors, coefficients).spread)))

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+
+import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.cutting.force import ForceCoefficient
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.machine import IdentifiedMachine
+from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.progress import Step
+from rcsa_ident.identification.status import Status
+from rcsa_ident.machine.spindle import Spindle
+from rcsa_ident.machining_setup import Workpiece
 from rcsa_ident.remarks import Remark, says
-
-
-class Status(StrEnum):
-    """May the answer be used? With doubts where it is suspect; one that has failed has no axes."""
-
-    CONVERGED = "converged"
-    SUSPECT = "suspect"
-    FAILED = "failed"
+from rcsa_ident.shown import Shown
+from rcsa_ident.signals.measurement import MAX_FREQUENCY
+from rcsa_ident.signals.recording import Sensor
 
 
 class IdentificationCode(StrEnum):
@@ -51,17 +53,18 @@ class AxisResult:
     Parameters
     ----------
     modes : ModalModel
-        At the flange: translation and slope.
+        Modes of machine and spindle at the flange: translation and slope.
     joint : LumpedJoint
     chi2_per_point : float [-]
         Mean squared residual in standard deviations of noise and model error.
     per_tooling : mapping of str to float
+        The same for each tooling by itself.
     model_error : float [-]
         Share of each line that neither the model nor the records' noise explains, learned from the residuals.
     parameters : tuple of str
         Names of the unknowns of flange and joint, in the posterior's order.
     posterior : Posterior or None
-        Where the method gives one.
+        None where the method gives no covariance.
     measured : mapping with arrays omega, value, model, cut (index), coherence
         Lines without delay beside the model's: what a plot shows.
     """
@@ -75,9 +78,14 @@ class AxisResult:
     posterior: Posterior | None
     measured: Mapping[str, FloatArray]
 
+    @property
+    def machine(self) -> MachineAxis:
+        """This axis as a tip feels it."""
+        return MachineAxis(Spindle(self.modes), self.joint, self.posterior)
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Identification:
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Identification(Shown):
     """Modes of machine and spindle, joint, delays; with status, statistics, seed.
 
     Parameters
@@ -99,6 +107,12 @@ class Identification:
     spindle_speed : array, shape (k,) [rad/s]
     trace : tuple of Step
         The search in order.
+    campaign : str
+        Its name.
+    workpiece : Workpiece or None
+        That it cut.
+    sensors : tuple of Sensor
+        That recorded it.
     """
 
     status: Status
@@ -113,8 +127,62 @@ class Identification:
     trace: tuple[Step, ...]
     notes: tuple[Remark, ...] = ()
     coefficients: Mapping[ForceCoefficient, tuple[float, float]] = field(default_factory=dict)
+    campaign: str = ""
+    workpiece: Workpiece | None = None
+    sensors: tuple[Sensor, ...] = ()
 
     @property
     def at_minimum(self) -> bool:
         """False where the search has failed, or still gained when its steps ran out: there is no answer to be used."""
         return self.status is not Status.FAILED and not says(self.reasons, IdentificationCode.NOT_CONVERGED)
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Lowest and highest identified line [rad/s]; all that a recording may hold where the identification carries no lines."""
+        omega = [axis.measured["omega"] for axis in self.axes.values() if "omega" in axis.measured]
+        if not omega:
+            return 0.0, 2.0 * np.pi * MAX_FREQUENCY
+        return float(min(w.min() for w in omega)), float(max(w.max() for w in omega))
+
+    @property
+    def machine(self) -> IdentifiedMachine:
+        """The machine that was found: it takes any tooling.
+
+        Raises
+        ------
+        InputError
+            If the identification has failed: there is none.
+        """
+        if not self.axes:
+            raise InputError("identification", f"{self.status}: {'; '.join(self.reasons)}", "one that found a machine")
+        return IdentifiedMachine(
+            {axis: part.machine for axis, part in self.axes.items()},
+            self.band,
+            status=self.status,
+            reasons=self.reasons,
+            identified_workpiece=self.workpiece,
+            sensors=self.sensors,
+            name=self.campaign,
+        )
+
+    def __str__(self) -> str:
+        modes = {str(axis): part.modes.omega_n.size for axis, part in self.axes.items()}
+        return in_words(str(self.status), len(self.cut_ids), modes, self.reasons)
+
+
+def in_words(status: str, cuts: int, modes: Mapping[str, int], reasons: Sequence[str]) -> str:
+    """Return what an identification has come to: a line, and a second one where something speaks against it.
+
+    Parameters
+    ----------
+    status : str
+    cuts : int
+        That were used.
+    modes : mapping of axis to int
+        How many each has.
+    reasons : sequence of str
+        Why it is not simply converged.
+    """
+    line = ", ".join([status, f"{cuts} cuts", *(f"{axis.upper()} {count} modes" for axis, count in modes.items())])
+    further = f" (and {len(reasons) - 1} more)" if len(reasons) > 1 else ""
+    return f"{line}\n{reasons[0]}{further}" if reasons else line

@@ -1,4 +1,4 @@
-"""Exploration: pymoo's genetic algorithm over starts, each of which takes a few damped Gauss-Newton steps."""
+"""Exploration: pymoo's genetic algorithm [blank2020] over starts, each of which takes a few damped Gauss-Newton steps."""
 
 from __future__ import annotations
 
@@ -46,6 +46,16 @@ def starts(count: int, modes: int, band_hz: tuple[float, float], misfit: Misfit,
     """Return random vectors, shape (count, p): a mode below the band, one above it, the others in it, light or heavy damping, uncoupled.
 
     Every machine has modes below and above what is excited; a search that starts without them ends without them.
+
+    Parameters
+    ----------
+    count, modes : int
+        Number of vectors, and of modes in each.
+    band_hz : (float, float) [Hz]
+        Lowest and highest line.
+    misfit : Misfit
+        Its priors give the joint's centre.
+    rng : numpy.random.Generator
     """
     low, high = band_hz
     theta = np.zeros((count, flange_layout(modes).size))
@@ -76,9 +86,12 @@ def explore(
     Parameters
     ----------
     misfit : Misfit
-        Of one axis, with a coarse model error (0.3): it smooths the landscape while the delays are found.
-    band_hz : (float, float)
+        The misfit of one axis, with a coarse model error (0.3): it smooths the landscape while the delays are found.
+    settings : SearchSettings
+    band_hz : (float, float) [Hz]
         Lowest and highest line.
+    rng : numpy.random.Generator
+    report : callable of (stage, cost, solution), optional
     """
     from pymoo.algorithms.soo.nonconvex.ga import GA
     from pymoo.core.problem import Problem

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import permutations
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,10 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.text_columns import TextTable, read_table
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.machine.known_tip import measured_tip
+from rcsa_ident.units import to_hz
 
 AXES = ("X", "Y")
 FREQUENCY = "frequency_hz"
@@ -64,6 +70,7 @@ def write_frf_csv(
 
     Parameters
     ----------
+    path : path
     frequency_hz : array, shape (n,)
         Rising.
     values : mapping of axis to complex array, shape (n,)
@@ -81,6 +88,36 @@ def write_frf_csv(
     _write(path, columns, bands or {}, finite=list(columns) + list(bands or {}))
 
 
+def write_tip_csv(path: str | Path, tip: UncertainReceptance) -> None:
+    """Write the receptances of a tip: the direct ones, with standard deviations and cross terms in further columns where there are some."""
+    columns: dict[str, ArrayLike] = {}
+    for (row, col), (real, imaginary) in tip.deviation().items():
+        if row == col:
+            columns |= {f"{row.dof.upper()}_re_std": real, f"{row.dof.upper()}_im_std": imaginary}
+    for row, col in permutations(tip.rows, 2):
+        cross = tip.between(str(row), str(col))
+        if np.any(cross):
+            name = f"{row.dof}{col.dof}".upper()
+            columns |= {f"{name}_re": cross.real, f"{name}_im": cross.imag}
+    curves = {c.dof.upper(): tip.between(str(c), str(c)) for c in tip.rows}
+    # rad/s and back leaves a last digit that nobody asked for
+    write_frf_csv(path, np.round(to_hz(tip.omega), 9), curves, columns)
+
+
+def read_tip(path: str | Path) -> Receptance:
+    """Return the tip's receptance of FRF.csv, cross terms included, taken for exact; a direction that is missing is rigid."""
+    frequency, values, further = read_frf_csv(path)
+    cross = {}
+    for row, col in permutations(AXES, 2):
+        parts = [further.get(f"{row}{col}_{part}") for part in ("re", "im")]
+        if parts[0] is not None and parts[1] is not None:
+            cross[Dof(row.lower()), Dof(col.lower())] = frequency, parts[0] + 1j * parts[1]
+    try:
+        return measured_tip({Dof(axis.lower()): (frequency, value) for axis, value in values.items()}, cross)
+    except InputError as error:
+        raise error.at(str(path)) from None
+
+
 def read_frf_csv(path: str | Path) -> FrfCurves:
     """Return tip receptances and further columns of FRF.csv."""
     table = read_table(path, "FRF")
@@ -94,7 +131,7 @@ def read_frf_csv(path: str | Path) -> FrfCurves:
     row = _first(np.diff(columns[FREQUENCY], prepend=-1.0) <= 0.0)
     if row is not None or columns[FREQUENCY][0] < 0.0:
         row = row or 0
-        raise InputError(f"column {FREQUENCY}", f"{columns[FREQUENCY][row]:g}", "frequencies from 0 that rise [Hz]", table.at(row))
+        raise InputError(f"column {FREQUENCY}", f"{columns[FREQUENCY][row]:g}", "increasing frequencies of 0 or more [Hz]", table.at(row))
     values = {}
     for axis in axes:
         column = np.empty(columns[FREQUENCY].size, dtype=complex)
@@ -116,6 +153,7 @@ def write_lobes_csv(
 
     Parameters
     ----------
+    path : path
     speed_rpm, limit_mm, chatter_hz, lobe : array, shape (n,)
         A chatter frequency or lobe that is not known is NaN; so are stable places in `extra`.
     extra : mapping of column name to array, shape (n,), optional
@@ -142,6 +180,7 @@ def write_speed_csv(path: str | Path, speed_rpm: ArrayLike, columns: Mapping[str
 
     Parameters
     ----------
+    path : path
     speed_rpm : array, shape (n,)
         Above 0.
     columns : mapping of column name to array, shape (n,)
@@ -157,6 +196,7 @@ def write_map_csv(path: str | Path, speed_rpm: FloatArray, depth_mm: FloatArray,
 
     Parameters
     ----------
+    path : path
     speed_rpm : array, shape (n,)
     depth_mm : array, shape (k,)
     growth : array, shape (n, k) [-]
@@ -231,7 +271,7 @@ def _columns(table: TextTable, required: Sequence[str]) -> dict[str, FloatArray]
 def _check_rising(frequency: FloatArray, where: str) -> None:
     row = _first(~(np.diff(frequency, prepend=-1.0) > 0.0)) if frequency.ndim == 1 else None
     if row is not None or (frequency.size and frequency.flat[0] < 0.0):
-        raise InputError(FREQUENCY, float(frequency.flat[row or 0]), "frequencies from 0 that rise [Hz]", where)
+        raise InputError(FREQUENCY, float(frequency.flat[row or 0]), "increasing frequencies of 0 or more [Hz]", where)
 
 
 def _first(wrong: np.ndarray) -> int | None:

@@ -17,6 +17,8 @@ def write_workpiece(path: str | Path, workpiece: Workpiece, remarks: Sequence[st
 
     Parameters
     ----------
+    path : path
+    workpiece : Workpiece
     remarks : sequence of str
         Comments above it, a line each.
     """

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel
@@ -17,6 +15,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import write_frf_csv
 from rcsa_ident.io.files import replacing, write_text
 from rcsa_ident.io.uff import DISPLACEMENT, EXCITATION_FORCE, FRF, UffAxis, UffFunction, write_uff
+from rcsa_ident.units import to_hz
 
 #: Directions as universal files number them; a slope dy/dz is a rotation about -X.
 _DIRECTIONS = {Dof.X: 1, Dof.Y: 2, Dof.Z: 3, Dof.SLOPE_X: 5, Dof.SLOPE_Y: -4}
@@ -31,14 +30,17 @@ def write_receptances_uff(path: str | Path, receptances: Mapping[str, Receptance
 
     Parameters
     ----------
+    path : path
     receptances : mapping of axis (X or Y) to Receptance
+    title : str
+        Written into each header.
     binary : bool
         Dataset 58b.
     """
     functions = [
         UffFunction(
             FRF,
-            receptance.omega / (2.0 * np.pi),
+            to_hz(receptance.omega),
             receptance.values[:, i, j],
             _place(row),
             _place(col),
@@ -69,9 +71,17 @@ def named_entries(receptances: Mapping[str, Receptance]) -> dict[str, ComplexArr
 
 
 def write_receptances_csv(path: str | Path, receptances: Mapping[str, Receptance], further: Mapping[str, FloatArray] | None = None) -> None:
-    """Write FRF.csv with all entries: motion per force first, as every reader of FRF.csv wants it."""
+    """Write FRF.csv with all entries: motion per force first, as every reader of FRF.csv wants it.
+
+    Parameters
+    ----------
+    path : path
+    receptances : mapping of axis (X or Y) to Receptance
+    further : mapping of column name to array, shape (n,), optional
+        Columns behind them.
+    """
     entries = named_entries(receptances)
-    frequency = next(iter(receptances.values())).omega / (2.0 * np.pi)
+    frequency = to_hz(next(iter(receptances.values())).omega)
     rest = {name: values for name, values in entries.items() if name not in receptances}
     columns = {
         f"{name}_{part}": getattr(values, which) for name, values in rest.items() for part, which in (("re", "real"), ("im", "imag"))
@@ -80,8 +90,15 @@ def write_receptances_csv(path: str | Path, receptances: Mapping[str, Receptance
 
 
 def write_receptances_json(path: str | Path, receptances: Mapping[str, Receptance], title: str) -> None:
-    """Write every entry as lists of real and imaginary parts."""
-    frequency = next(iter(receptances.values())).omega / (2.0 * np.pi)
+    """Write every entry as lists of real and imaginary parts.
+
+    Parameters
+    ----------
+    path : path
+    receptances : mapping of axis (X or Y) to Receptance
+    title : str
+    """
+    frequency = to_hz(next(iter(receptances.values())).omega)
     entries = {name: {"re": v.real.tolist(), "im": v.imag.tolist()} for name, v in named_entries(receptances).items()}
     data = {"title": title, "units": _UNITS, "frequency_hz": frequency.tolist(), "receptances": entries}
     write_text(path, json.dumps(data, ensure_ascii=False, allow_nan=False) + "\n")
@@ -91,13 +108,20 @@ _UNITS = {"X, Y": "m/N", "tM": "m/(N m)", "rF": "rad/N", "rM": "rad/(N m)"}
 
 
 def write_receptances_hdf5(path: str | Path, receptances: Mapping[str, Receptance], title: str) -> None:
-    """Write every entry as a complex dataset beside ``frequency_hz``."""
+    """Write every entry as a complex dataset beside ``frequency_hz``.
+
+    Parameters
+    ----------
+    path : path
+    receptances : mapping of axis (X or Y) to Receptance
+    title : str
+    """
     import h5py
 
     with replacing(path) as part, h5py.File(part, "w") as file:
         file.attrs["title"] = title
         file.attrs["units"] = json.dumps(_UNITS)
-        file["frequency_hz"] = next(iter(receptances.values())).omega / (2.0 * np.pi)
+        file["frequency_hz"] = to_hz(next(iter(receptances.values())).omega)
         for name, values in named_entries(receptances).items():
             file[name] = values
 
@@ -107,7 +131,7 @@ def mode_records(axes: Mapping[str, ModalModel]) -> list[dict[str, Any]]:
     return [
         {
             "axis": axis,
-            "natural_frequency_hz": float(omega) / (2.0 * np.pi),
+            "natural_frequency_hz": to_hz(float(omega)),
             "damping_ratio": float(zeta),
             **{
                 f"phi_{_KIND[c.dof.is_slope]}_{part}": float(getattr(value, which))
@@ -121,7 +145,15 @@ def mode_records(axes: Mapping[str, ModalModel]) -> list[dict[str, Any]]:
 
 
 def write_modes(path: str | Path, axes: Mapping[str, ModalModel], as_json: bool) -> None:
-    """Write modes as CSV or JSON: h_pq = sum phi_p phi_q / (i omega - lambda) + its mirror."""
+    """Write modes as CSV or JSON: h_pq = sum phi_p phi_q / (i omega - lambda) + its mirror.
+
+    Parameters
+    ----------
+    path : path
+    axes : mapping of axis (X or Y) to ModalModel
+    as_json : bool
+        JSON, else CSV.
+    """
     records: Sequence[dict[str, Any]] = mode_records(axes)
     if not records:
         raise InputError("modes", "none", "at least one mode", str(path))

@@ -14,7 +14,16 @@ MEGABYTE = 1_000_000
 
 
 def existing_file(path: str | Path, field: str, largest: int) -> Path:
-    """Return `path` if it is a regular file of at most `largest` bytes, else raise `InputError`."""
+    """Return `path` if it is a regular file of at most `largest` bytes, else raise `InputError`.
+
+    Parameters
+    ----------
+    path : path
+    field : str
+        What the file is, for the message.
+    largest : int
+        Bytes that are allowed.
+    """
     path = Path(path)
     try:
         found = "a folder" if path.is_dir() else None if path.is_file() else "no such file"
@@ -26,12 +35,21 @@ def existing_file(path: str | Path, field: str, largest: int) -> Path:
     if size > largest:
         raise InputError(field, f"{size / MEGABYTE:.0f} MB", f"at most {largest / MEGABYTE:.0f} MB", str(path))
     if size == 0:
-        raise InputError(field, "an empty file", "a file with content", str(path))
+        raise InputError(field, "an empty file", "a file that is not empty", str(path))
     return path
 
 
 def read_bytes(path: str | Path, field: str, largest: int) -> bytes:
-    """Return the file's bytes; a file that is missing, empty, too large or not readable raises `InputError`."""
+    """Return the file's bytes; a file that is missing, empty, too large or not readable raises `InputError`.
+
+    Parameters
+    ----------
+    path : path
+    field : str
+        What the file is, for the message.
+    largest : int
+        Bytes that are allowed.
+    """
     path = existing_file(path, field, largest)
     try:
         return path.read_bytes()

@@ -12,8 +12,10 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
-from rcsa_ident.io.text_columns import read_table
+from rcsa_ident.io.text_columns import TextTable, read_table, table_of
+from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.measured import MeasuredFlange
+from rcsa_ident.units import from_hz, to_hz
 
 #: Entries of [[tF, tM], [rF, rM]]; a flange is reciprocal, so rF is tM.
 _ENTRIES = {"tF": (0, 0), "tM": (0, 1), "rM": (1, 1)}
@@ -26,6 +28,8 @@ def write_flange_csv(
 
     Parameters
     ----------
+    path : path
+    frequency_hz : array, shape (n,)
     values : mapping of Dof to complex array, shape (n, 2, 2)
     std : mapping of Dof to array, shape (n, 2, 2), optional
         Columns ``X_tF_std`` and so on: of the real and of the imaginary part each.
@@ -43,6 +47,22 @@ def write_flange_csv(
     write_text(path, "\n".join([",".join(columns), *(",".join(str(v) for v in row) for row in table.tolist())]) + "\n")
 
 
+def write_flange_machine(path: str | Path, machine: FlangeMachine) -> None:
+    """Write the flange of a machine, the joint's compliance with it, as what is decoupled from clamped tool-holders holds it.
+
+    Raises
+    ------
+    InputError
+        If its bending planes feel each other: the file has no columns for that.
+    """
+    omega, values = machine.lines(), {}
+    for part in machine.parts:
+        if len(part.coordinates) > 2:
+            raise InputError("flange", "bending planes that feel each other", "planes apart from each other", str(path))
+        values[part.coordinates[0].dof] = part.believed.interface(omega)
+    write_flange_csv(path, np.round(to_hz(omega), 9), values)
+
+
 def read_flange_csv(path: str | Path) -> dict[Dof, MeasuredFlange]:
     """Return the flange of each axis in a file; further columns are left alone.
 
@@ -51,7 +71,31 @@ def read_flange_csv(path: str | Path) -> dict[Dof, MeasuredFlange]:
     InputError
         A column is missing, or the frequencies do not rise.
     """
-    table = read_table(path, "flange")
+    return _flanges(read_table(path, "flange"))
+
+
+def read_flange_machine(path: str | Path) -> FlangeMachine:
+    """Return a machine that is known by the flange of such a file; what was decoupled holds the joint's compliance already.
+
+    Raises
+    ------
+    InputError
+        As `read_flange_csv`.
+    """
+    return _machine(read_table(path, "flange"), Path(path).stem)
+
+
+def flange_machine_of(text: str, name: str = "flange") -> FlangeMachine:
+    """Return the same of a text; errors name its lines."""
+    return _machine(table_of(text, "flange", ""), name)
+
+
+def _machine(table: TextTable, name: str) -> FlangeMachine:
+    flanges = tuple(_flanges(table).values())
+    return FlangeMachine(flanges, flanges[0].band, name=name, ends=True)
+
+
+def _flanges(table: TextTable) -> dict[Dof, MeasuredFlange]:
     flanges = {}
     for axis in (Dof.X, Dof.Y):
         names = [f"{axis.upper()}_{name}_{part}" for name in _ENTRIES for part in ("re", "im")]
@@ -59,16 +103,16 @@ def read_flange_csv(path: str | Path) -> dict[Dof, MeasuredFlange]:
             continue
         missing = [name for name in ("frequency_hz", *names) if name not in table.header]
         if missing:
-            raise InputError(f"column {missing[0]}", "nothing", "real and imaginary parts of tF, tM and rM", str(path))
+            raise InputError(f"column {missing[0]}", "nothing", "real and imaginary parts of tF, tM and rM", table.where)
         frequency, *parts = table.columns(["frequency_hz", *names])
         block = np.zeros((frequency.size, 2, 2), dtype=complex)
         for k, (i, j) in enumerate(_ENTRIES.values()):
             block[:, i, j] = block[:, j, i] = parts[2 * k] + 1j * parts[2 * k + 1]
         rows = plane("flange", axis)
         try:
-            flanges[axis] = MeasuredFlange(Receptance(2.0 * np.pi * frequency, block, rows, rows))
+            flanges[axis] = MeasuredFlange(Receptance(from_hz(frequency), block, rows, rows))
         except InputError as error:
-            raise error.at(str(path)) from None
+            raise error.at(table.where) from None
     if not flanges:
-        raise InputError("flange", "no columns X_tF_re or Y_tF_re", "a flange's receptances", str(path))
+        raise InputError("flange", "no columns X_tF_re or Y_tF_re", "a flange's receptances", table.where)
     return flanges

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.setups import sensor_of
 from rcsa_ident.io.text_columns import read_table
 from rcsa_ident.io.validated_table import Table, listed
+from rcsa_ident.observer.force import ForceEstimate
 from rcsa_ident.signals.recording import Sensor
 
 TIME = "time_s"
@@ -26,6 +28,7 @@ def write_forces_csv(path: str | Path, time: ArrayLike, force: Mapping[str, Arra
 
     Parameters
     ----------
+    path : path
     time : array, shape (n,)
         Rising.
     force, deviation : mappings of axis to array, shape (n,)
@@ -62,13 +65,29 @@ def read_forces_csv(path: str | Path) -> tuple[FloatArray, dict[str, FloatArray]
     return found[TIME], forces, {axis: found[f"F{axis.lower()}_std_n"] for axis in stds}
 
 
+def write_forces(path: str | Path, estimate: ForceEstimate) -> None:
+    """Write estimated forces with their standard deviations."""
+    force, deviation = (dict(zip(map(str.upper, estimate.axes), v.T, strict=True)) for v in (estimate.force, estimate.standard_deviation))
+    write_forces_csv(path, estimate.time, force, deviation)
+
+
+def read_forces(path: str | Path) -> ForceEstimate:
+    """Return the forces of FORCES.csv; standard deviations that it does not hold are zero."""
+    time, force, deviation = read_forces_csv(path)
+    step = float(np.mean(np.diff(time))) if time.size > 1 else 0.0
+    if step <= 0.0 or np.any(np.abs(np.diff(time) - step) > 1e-3 * step):
+        raise InputError(f"column {TIME}", "steps that differ", "two equal steps or more that rise [s]", str(path))
+    columns = [np.stack([each.get(axis, np.zeros_like(time)) for axis in force], axis=1) for each in (force, deviation)]
+    return ForceEstimate(tuple(Dof(axis.lower()) for axis in force), step, *(frozen(each) for each in columns))
+
+
 def sensors_of_result(data: Mapping[str, Any], where: str) -> tuple[Sensor, ...]:
     """Return the sensors of the campaign that a result came from.
 
     Parameters
     ----------
     data : mapping
-        As `read_result` returns it.
+        The result as `read_result` returns it.
     where : str
         The file, for the messages.
     """

@@ -118,20 +118,28 @@ def pair_name(pair: tuple[str, str]) -> str:
 
 def read_frfs(path: str | Path, units: str | None = None) -> list[TapTest]:
     """Return all FRFs of a file as receptances, whichever of the formats it has; its content decides, not its suffix."""
-    scale = None if units is None else parse_units(units, "--frf-units")
+    scale = None if units is None else parse_units(units, "frf_units")
     head = read_bytes(path, "FRF", _LARGEST)[:20000]
     first = next((line.strip() for line in head.splitlines() if line.strip()), b"")
     if first == b"-1":
         return _from_uff(path, scale)
     if FREQUENCY.encode() in head:
         if units is not None and scale != (1.0, 0):
-            raise InputError("--frf-units", units, "m/N or nothing for an FRF.csv", str(path))
+            raise InputError("frf_units", units, "m/N, or no unit, for an FRF.csv", str(path))
         return _from_csv(path)
     return _from_columns(path, scale)
 
 
 def parse_units(text: str, field: str = "unit", where: str = "") -> tuple[float, int]:
-    """Return SI units per unit and the number of time derivatives of a motion over a force."""
+    """Return SI units per unit and the number of time derivatives of a motion over a force.
+
+    Parameters
+    ----------
+    text : str
+        A motion over a force, such as ``(m/s^2)/N`` or ``mm/N``.
+    field, where : str
+        What the text is and where it stands, for the message.
+    """
     plain = _plain(text)
     for place in (i for i, sign in enumerate(plain) if sign == "/"):
         motion, force = MOTIONS.get(plain[:place]), FORCES.get(plain[place + 1 :])
@@ -148,7 +156,7 @@ def _plain(text: str) -> str:
 def _receptance(frequency: FloatArray, values: ComplexArray, scale: tuple[float, int], where: str) -> tuple[FloatArray, ComplexArray]:
     """Receptance of a mobility or an accelerance; at 0 Hz those say nothing of it, so the line goes."""
     if np.any(np.diff(frequency) <= 0.0) or frequency[0] < 0.0:
-        raise InputError("frequencies", "frequencies that do not rise", "frequencies from 0 that rise [Hz]", where)
+        raise InputError("frequencies", "frequencies that do not increase", "increasing frequencies of 0 or more [Hz]", where)
     if not scale[1]:
         return frequency, values * scale[0]
     kept = frequency > 0.0
@@ -160,11 +168,11 @@ def _wanted(tests: list[TapTest], source: Source) -> dict[tuple[str, str], TapTe
     if source.record is not None:
         tests = [test for test in tests if test.record == source.record]
         if not tests:
-            raise InputError("--frf", f"record {source.record}", "the number of an FRF of the file, from 1", path)
+            raise InputError("frf", f"record {source.record}", "the number of an FRF in the file, counted from 1", path)
     named = [test for test in tests if test.response in ("X", "Y") and test.force in ("X", "Y")]
     if source.pair is None:
         if not named:
-            raise InputError("--frf", "a file that names no axis", "X=FILE, Y=FILE (or XY=FILE: response in X, force in Y)", path)
+            raise InputError("frf", "a file that names no axis", "a file given with the axes of its response and force", path)
         return {
             pair: _only([t for t in named if (t.response, t.force) == pair], pair, path) for pair in {(t.response, t.force) for t in named}
         }
@@ -173,7 +181,7 @@ def _wanted(tests: list[TapTest], source: Source) -> dict[tuple[str, str], TapTe
     silent = [test for test in tests if not test.response and not test.force]
     if not own and not silent:
         known = listed([f"{t.record}: {t.response}{t.force}" for t in tests])
-        raise InputError("--frf", f"no FRF of axis {pair_name(source.pair)}", f"axes that the file holds ({known})", path)
+        raise InputError("frf", f"no FRF of axis {pair_name(source.pair)}", f"an axis that the file holds: {known}", path)
     return {source.pair: _only(own or silent, source.pair, path)}
 
 
@@ -186,7 +194,7 @@ def _only(tests: list[TapTest], pair: tuple[str, str], path: str) -> TapTest:
         return driving[0]
     records = listed([f"{t.record} ({t.point})" for t in driving or tests])
     name = pair_name(pair)
-    raise InputError("--frf", f"{len(tests)} FRFs {name}", f"one of them, chosen as {name}={path}#RECORD: {records}", path)
+    raise InputError("frf", f"{len(tests)} FRFs of axis {name}", f"one of them, chosen by its record: {records}", path)
 
 
 def _from_csv(path: str | Path) -> list[TapTest]:
@@ -248,7 +256,7 @@ def _scale_of(function: UffFunction) -> tuple[float, int]:
         newton = 1.0 / force
     if motion is None or newton is None:
         types = f"data types {function.ordinate.kind} and {function.denominator.kind}, labels {' and '.join(labels) or 'none'}"
-        raise InputError("unit of the FRF", types, f"{UNITS_ALLOWED}; say it with --frf-units", function.where)
+        raise InputError("frf_units", types, UNITS_ALLOWED, function.where)
     return motion[0] / newton, motion[1]
 
 

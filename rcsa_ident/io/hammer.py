@@ -40,6 +40,9 @@ def labelled(text: str, default: str, known: Collection[str] = ()) -> tuple[str,
 
     Parameters
     ----------
+    text : str
+    default : str
+        Label of a text without one.
     known : collection of str
         Labels that are allowed; empty allows any.
     """
@@ -71,16 +74,25 @@ def read_hammer(path: str | Path, label: str = "tip") -> HammerFile:
         if test.response != test.force or axis not in _AXES:
             continue
         if axis in found:
-            raise InputError("FRF", f"two functions {axis} over {axis}", "one for each axis", str(path))
+            raise InputError("FRF", f"two FRFs with response and force in {axis}", "one for each axis", str(path))
         found[axis] = (test.frequency, test.values)
     if not found:
         names = listed([f"{t.response or '?'}/{t.force or '?'}" for t in tests])
-        raise InputError("FRF", names, "X over X, Y over Y, or one function in a file whose name ends in x or y", str(path))
+        raise InputError("FRF", names, "response/force X/X or Y/Y, or a single FRF in a file whose name ends in x or y", str(path))
     return HammerFile(label, path, found)
 
 
 def write_calibrated_tooling(source: str | Path, target: str | Path, contact: Contact, remarks: Sequence[str] = ()) -> None:
     """Write a tooling file again with another contact; everything else stays as it was written, comments included.
+
+    Parameters
+    ----------
+    source, target : path
+        Tooling file that is read, and the one that is written.
+    contact : Contact
+        The new one.
+    remarks : sequence of str
+        Written above it as comments.
 
     Raises
     ------
@@ -120,4 +132,4 @@ def write_calibrated_tooling(source: str | Path, target: str | Path, contact: Co
             Path(target).unlink(missing_ok=True)
         else:
             Path(target).write_bytes(before)
-        raise InputError("contact", "a table written in another way", "a table [contact] with one key a line, or none", str(source))
+        raise InputError("contact", "a table in another form", "a table [contact] with one key per line, or no such table", str(source))

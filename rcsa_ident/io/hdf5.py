@@ -43,6 +43,7 @@ def write_hdf5(path: str | Path, rate: float, channels: Mapping[str, ArrayLike])
 
     Parameters
     ----------
+    path : path
     rate : float [Hz]
     channels : mapping of name to array, shape (n,)
         In the units of the file: signal, not yet divided by a sensitivity. A lost sample is NaN.
@@ -63,7 +64,16 @@ def write_hdf5(path: str | Path, rate: float, channels: Mapping[str, ArrayLike])
 
 
 def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[FloatArray]]:
-    """Return the sampling rate [Hz] and the named channels as they stand in the file, shape (n,) each."""
+    """Return the sampling rate [Hz] and the named channels as they stand in the file, shape (n,) each.
+
+    Parameters
+    ----------
+    path : path
+    names : sequence of str
+        Channels that are wanted.
+    default_rate : float or None [Hz]
+        For a file that carries no rate.
+    """
     where = str(path)
     size = existing_file(path, "recording", LARGEST_FILE).stat().st_size
     try:
@@ -84,8 +94,11 @@ def read_vectors(path: Path, names: Sequence[str], wished: Sequence[str], kinds:
 
     Parameters
     ----------
+    path : path
+    names, wished : sequences of str
+        Vectors that have to be there, and those that are read if they are.
     kinds : sequence of str
-        CutConstraints values of the attribute ``MATLAB_class``; without it the type of the samples decides.
+        Allowed values of the attribute ``MATLAB_class``; without it the type of the samples decides.
     """
     where = str(path)
     size = existing_file(path, "recording", LARGEST_FILE).stat().st_size
@@ -128,7 +141,7 @@ def _hard_links(file: h5py.File, where: str) -> list[str]:
     """Names on the root; a link that is not to an object of this very file is refused, read or not."""
     links = file.id.links
     if len(file.id) > MOST_OBJECTS:
-        raise InputError("recording", f"{len(file.id)} objects", f"at most {MOST_OBJECTS} objects on the root", where)
+        raise InputError("recording", f"{len(file.id)} objects", f"at most {MOST_OBJECTS} objects in the root group", where)
     names = []
     for raw in file.id:
         kind = links.get_info(raw).type
@@ -161,7 +174,7 @@ def _dataset(file: h5py.File, name: str, present: list[str], where: str, vectors
     unknown = [f for f in filters if f not in FILTERS]
     if unknown or len(set(filters)) < len(filters):
         found = f"filter number {unknown[0]}" if unknown else "a filter applied twice"
-        raise InputError(field, found, "none of or each once: " + ", ".join(FILTERS.values()), where)
+        raise InputError(field, found, "none, or at most one each of: " + ", ".join(FILTERS.values()), where)
     if dataset.chunks is not None and (size := math.prod(dataset.chunks) * dataset.dtype.itemsize) > LARGEST_CHUNK:
         raise InputError(field, f"chunks of {size / MEGABYTE:.0f} MB", f"chunks of at most {LARGEST_CHUNK / MEGABYTE:.0f} MB", where)
     return dataset

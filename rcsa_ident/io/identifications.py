@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from rcsa_ident import __version__
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.force import REFERENCE_RUNOUT, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.parameters import JOINT, AxisLayout
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.status import Status
 from rcsa_ident.io.results import AXES, SCHEMA_VERSION, spindle_from_json, spindle_to_json
+from rcsa_ident.io.setups import sensor_of
 from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.io.workpieces import workpiece_keys, workpiece_of
 from rcsa_ident.machine.spindle import Spindle
-from rcsa_ident.machining_setup import Campaign, Workpiece
+from rcsa_ident.machining_setup import Campaign
 from rcsa_ident.signals.recording import Quantity, Sensor
+from rcsa_ident.units import from_hz, to_hz, to_rpm
+from rcsa_ident.version import __version__
 
-_RPM = 30.0 / math.pi
 _MOST_MODES = 200
 #: Standard deviations of natural frequencies [rad/s] and damping ratios, per axis.
 ModeDeviations = Mapping[Dof, tuple[FloatArray, FloatArray]]
@@ -33,7 +36,6 @@ def identification_to_json(
     campaign: Campaign,
     left_out: Sequence[tuple[str, str]],
     deviations: ModeDeviations | None = None,
-    max_frequency_hz: float = 4300.0,
 ) -> dict[str, Any]:
     """Return the content of RESULT.json.
 
@@ -45,16 +47,12 @@ def identification_to_json(
     left_out : sequence of (cut id, reason)
     deviations : mapping of Dof to (array, array), optional
         Standard deviations of each mode's natural frequency [rad/s] and damping ratio.
-    max_frequency_hz : float [Hz]
-        Upper end of the band where the identification carries no lines.
 
     Notes
     -----
     ``delays``: the angle by which the spindle turns from the first sample until a tooth stands at immersion 0, between 0
     and the mean pitch of the teeth; which of the teeth it is, cuts of equal teeth do not tell.
     """
-    omega = [axis.measured["omega"] for axis in identification.axes.values() if "omega" in axis.measured]
-    band = [float(min(w.min() for w in omega)), float(max(w.max() for w in omega))] if omega else [0.0, 2.0 * np.pi * max_frequency_hz]
     return {
         "schema_version": SCHEMA_VERSION,
         "status": str(identification.status),
@@ -71,7 +69,7 @@ def identification_to_json(
         "sensors": {sensor.name: _sensor_to_json(sensor) for sensor in campaign.sensors},
         "workpiece": workpiece_keys(campaign.workpiece, all_spreads=True),
         "coefficients": {str(each): _coefficient(each, *found) for each, found in identification.coefficients.items()},
-        "band_hz": [w / (2.0 * np.pi) for w in band],
+        "band_hz": [to_hz(w) for w in identification.band],
         "axes": _axes_to_json(identification, deviations or {}),
         "delays": _delays(identification, campaign),
     }
@@ -80,9 +78,19 @@ def identification_to_json(
 def speed_band_to_json(
     speeds: tuple[float, float], identification: Identification, deviations: ModeDeviations | None = None
 ) -> dict[str, Any]:
-    """Return one entry of ``speed_bands``: what the cuts of a range of spindle speeds [rad/s] say for themselves."""
+    """Return one entry of ``speed_bands``: what the cuts of a range of spindle speeds [rad/s] say for themselves.
+
+    Parameters
+    ----------
+    speeds : (float, float) [rad/s]
+        Lowest and highest speed.
+    identification : Identification
+        Of the cuts between them.
+    deviations : mapping
+        Standard deviations of its modes, as in `identification_to_json`.
+    """
     return {
-        "speed_range_rpm": [speed * _RPM for speed in speeds],
+        "speed_range_rpm": [to_rpm(speed) for speed in speeds],
         "cuts_used": len(identification.cut_ids),
         "status": str(identification.status),
         "reasons": list(identification.reasons),
@@ -99,12 +107,12 @@ def _axis_to_json(axis: AxisResult, deviation: tuple[FloatArray, FloatArray] | N
     data = spindle_to_json(axis.modes, axis.joint)
     if deviation is not None:
         for mode, omega_n, zeta in zip(data["modes"], *(d.tolist() for d in deviation), strict=True):
-            mode |= {"natural_frequency_std_hz": omega_n / (2.0 * math.pi), "damping_ratio_std": zeta}
+            mode |= {"natural_frequency_std_hz": to_hz(omega_n), "damping_ratio_std": zeta}
     posterior = axis.posterior
     if posterior is not None:
         middle, half = posterior.speed_range
         data["layout"] = {"modes": posterior.layout.modes, "softening": posterior.layout.softening}
-        data["speed_range_rpm"] = [(middle - half) * _RPM, (middle + half) * _RPM]
+        data["speed_range_rpm"] = [to_rpm(middle - half), to_rpm(middle + half)]
         data["unknowns"] = posterior.theta.tolist()
         data["rivals"] = [rival.tolist() for rival in posterior.rivals]
         data["covariance"] = {"parameters": list(axis.parameters), "matrix": posterior.covariance.tolist()}
@@ -147,13 +155,13 @@ def _delays(identification: Identification, campaign: Campaign) -> dict[str, dic
     return delays
 
 
-def machine_from_json(data: Mapping[str, Any], where: str) -> dict[Dof, MachineAxis]:
-    """Return the identified machine, each axis with its posterior where the file holds one.
+def machine_from_json(data: Mapping[str, Any], where: str) -> IdentifiedMachine:
+    """Return the identified machine, each axis with its posterior where the file holds one, and the models of single speed ranges.
 
     Parameters
     ----------
     data : mapping
-        As `read_result` returns it.
+        The result as `read_result` returns it.
     where : str
         The file, for the messages.
 
@@ -162,22 +170,30 @@ def machine_from_json(data: Mapping[str, Any], where: str) -> dict[Dof, MachineA
     InputError
         If the identification has failed and no axis is there, or unknowns and covariance do not belong together.
     """
-    return _machine(Table(data, where))
-
-
-def speed_bands_from_json(data: Mapping[str, Any], where: str) -> list[tuple[tuple[float, float], dict[Dof, MachineAxis]]]:
-    """Return the lowest and highest speed [rad/s] and the machine of each speed band; none where the file has none."""
     top = Table(data, where)
-    tables = top.tables("speed_bands") if data.get("speed_bands") else []
-    found = []
-    for table in tables:
+    axes = _axes(top)
+    low, high = data["band_hz"]
+    return IdentifiedMachine(
+        axes,
+        (from_hz(low), from_hz(high)),
+        tuple(_speed_models(top)),
+        status=Status(data["status"]),
+        reasons=tuple(data["reasons"]),
+        identified_workpiece=workpiece_of(top.table("workpiece")) if "workpiece" in top else None,
+        sensors=tuple(sensor_of(name, table.data, where) for name, table in top.named_tables("sensors", default={}).items()),
+        name=data["campaign"]["name"],
+    )
+
+
+def _speed_models(top: Table) -> Iterator[tuple[tuple[float, float], dict[Dof, MachineAxis]]]:
+    """Lowest and highest speed [rad/s] and the machine of each range of speeds; none where the file has none."""
+    for table in top.tables("speed_bands") if top.data.get("speed_bands") else []:
         low, high = table.numbers("speed_range_rpm", 2, "rev/min")
         if table.table("axes").data:
-            found.append(((low / _RPM, high / _RPM), _machine(table)))
-    return found
+            yield (low / to_rpm(1.0), high / to_rpm(1.0)), _axes(table)
 
 
-def _machine(table: Table) -> dict[Dof, MachineAxis]:
+def _axes(table: Table) -> dict[Dof, MachineAxis]:
     axes = table.named_tables("axes")
     if not axes:
         table.refuse("axes", "no axis: the identification has failed", "a result with axis X, Y or both")
@@ -200,7 +216,7 @@ def _posterior(axis: Table) -> Posterior | None:
     low, high = axis.numbers("speed_range_rpm", 2, "rev/min") if "speed_range_rpm" in axis else (0.0, 0.0)
     if not 0.0 <= low <= high:
         axis.refuse("speed_range_rpm", f"{[low, high]}", "lowest and highest speed, 0 <= lowest <= highest [rev/min]")
-    speed_range = 0.5 * (low + high) / _RPM, 0.5 * (high - low) / _RPM
+    speed_range = 0.5 * (low + high) / to_rpm(1.0), 0.5 * (high - low) / to_rpm(1.0)
     return Posterior(np.array(unknowns), matrix, layout, speed_range, tuple(_rivals(axis, layout)))
 
 
@@ -239,8 +255,3 @@ def _rivals(axis: Table, layout: AxisLayout) -> list[FloatArray]:
 def _layout_of_size(size: int, softening: bool) -> AxisLayout | None:
     layouts = (AxisLayout(m, softening=softening) for m in range(1, _MOST_MODES))
     return next((layout for layout in layouts if layout.size + JOINT == size), None)
-
-
-def workpiece_from_json(data: Mapping[str, Any], where: str) -> Workpiece:
-    """Return the workpiece of a result."""
-    return workpiece_of(Table(data, where).table("workpiece"))

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.io.setups import RPM, beam_segments, feed_angle_of, material_library, read_toml
+from rcsa_ident.io.setups import beam_segments, feed_angle_of, material_library, read_toml
 from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Workpiece
+from rcsa_ident.units import from_rpm, to_rpm
 from rcsa_ident.virtual.machine import Bearing, CutPlan, FlangeJoint, Housing, PerAxis, VirtualSpindle
 from rcsa_ident.virtual.sensors import SensorSuite
 
@@ -82,8 +83,8 @@ def read_machine(path: str | Path) -> MachineFile:
         fastest = max(plan.spindle_speeds)
         for i, bearing in enumerate(spindle.bearings):
             if bearing.softening * fastest >= 1.0:
-                allowed = f"below {1.0 / (fastest / RPM):.3g} at {fastest / RPM:g} rev/min, so that some stiffness is left"
-                top.refuse(f"bearings[{i}].softening_per_rpm", f"{bearing.softening * RPM:g}", allowed)
+                allowed = f"below {1.0 / to_rpm(fastest):.3g} at {to_rpm(fastest):g} rev/min, so that some stiffness is left"
+                top.refuse(f"bearings[{i}].softening_per_rpm", f"{bearing.softening * from_rpm(1.0):g}", allowed)
         return MachineFile(
             name=head.text("name", path.stem),
             spindle=spindle,
@@ -100,7 +101,7 @@ def _bearing(table: Table) -> Bearing:
         table.number("position_mm", "mm", least=0.0, most=5000.0) * 1e-3,
         _pair(table, "stiffness", "N/m"),
         _pair(table, "damping", "N s/m"),
-        table.number("softening_per_rpm", "1/(rev/min)", 0.0, least=-1e-3, most=1e-3) / RPM,
+        table.number("softening_per_rpm", "1/(rev/min)", 0.0, least=-1e-3, most=1e-3) / from_rpm(1.0),
     )
 
 
@@ -149,7 +150,7 @@ def _plan(table: Table) -> CutPlan:
     if exit_ <= entry:
         table.refuse("exit_angle_deg", f"{exit_:g}", f"above entry_angle_deg, {entry:g}, and at most 180 [deg]")
     return CutPlan(
-        spindle_speeds=tuple(float(speed) * RPM for speed in _speeds(table)),
+        spindle_speeds=tuple(from_rpm(float(speed)) for speed in _speeds(table)),
         axial_depth=table.number("axial_depth_mm", "mm", above=0.0, most=500.0) * 1e-3,
         feed_per_tooth=table.number("feed_per_tooth_mm", "mm", above=0.0, most=10.0) * 1e-3,
         engagement=Engagement(float(np.radians(entry)), float(np.radians(exit_))),

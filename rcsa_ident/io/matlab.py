@@ -43,6 +43,14 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     """Return the sampling rate [Hz] and the named vectors as they stand in the file, shape (n,) each.
 
     The rate comes from a vector ``time`` in seconds, else from a number ``sampling_rate_hz`` or ``Fs``, else from the campaign.
+
+    Parameters
+    ----------
+    path : path
+    names : sequence of str
+        Channels that are wanted.
+    default_rate : float or None [Hz]
+        For a file that carries no rate.
     """
     where = str(path)
     with existing_file(path, "recording", 1 << 62).open("rb") as file:
@@ -83,12 +91,12 @@ class _Variable:
     Parameters
     ----------
     start, size : int
-        Of its element in the file.
+        Place and bytes of its element in the file.
     packed : bool
     length : int
         Bytes of the element when unpacked, its tag included.
     data : int
-        Where the samples' own tag stands in these.
+        Place of the samples' own tag in these.
     """
 
     name: str
@@ -164,7 +172,7 @@ def _header(head: bytes, order: str, start: int, size: int, packed: bool, where:
     shape = struct.unpack_from(f"{order}{count // 4}i", head, place)
     _, place, count, after = _tag(head, order, after)
     if place + count > len(head):
-        raise InputError("recording", "a variable with a name without end", COMPLETE, where)
+        raise InputError("recording", "a variable whose name is not terminated", COMPLETE, where)
     name = head[place : place + count].rstrip(b"\0").decode("utf-8", "replace")
     return _Variable(name, kind, shape, bool(flags & _COMPLEX), start, size, packed, length + 8, after)
 

@@ -10,6 +10,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel, normal_modes
 from rcsa_ident.io.setups import read_toml
 from rcsa_ident.io.validated_table import Table
+from rcsa_ident.units import from_hz
 
 _MODE = ("natural_frequency_hz", "damping_ratio", "modal_mass_kg", "stiffness_n_per_m")
 
@@ -31,7 +32,7 @@ def read_modes(path: str | Path) -> dict[Dof, ModalModel]:
 
 def _model(top: Table, axis: Dof) -> ModalModel:
     tables = top.tables(axis, _MODE)
-    omega = 2.0 * np.pi * np.array([t.number("natural_frequency_hz", "Hz", above=0.0, most=1e6) for t in tables])
+    omega = from_hz(np.array([t.number("natural_frequency_hz", "Hz", above=0.0, most=1e6) for t in tables]))
     zeta = np.array([t.number("damping_ratio", "", above=0.0, most=0.999) for t in tables])
     mass = np.array([_mass(t, w) for t, w in zip(tables, omega, strict=True)])
     return normal_modes(omega, zeta, 1.0 / np.sqrt(mass)[:, None], (Coordinate("tip", axis),))

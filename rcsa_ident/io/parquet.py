@@ -54,6 +54,14 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     """Return the sampling rate [Hz] and the named columns as they stand in the file, shape (n,) each; a null is a lost sample.
 
     The rate comes from a column ``time`` in seconds, else from the file's metadata ``sampling_rate_hz``, else from the campaign.
+
+    Parameters
+    ----------
+    path : path
+    names : sequence of str
+        Channels that are wanted.
+    default_rate : float or None [Hz]
+        For a file that carries no rate.
     """
     where = str(path)
     raw = read_bytes(path, "recording", LARGEST_FILE)
@@ -105,7 +113,7 @@ def _checked(described: Struct, names: Sequence[str], default: float | None, raw
     """Columns to read, the time last where there is one, and the rate that the file or the campaign says."""
     schema = _structs(described, 2)
     if not schema or any(column.get((5, _I32)) for column in schema[1:]) or schema[0].get((5, _I32)) != len(schema) - 1:
-        raise InputError("recording", "nested columns", "one number a row in each column", where)
+        raise InputError("recording", "nested columns", "one number per row and column", where)
     columns = schema[1:]
     present = [column[4, _BYTES].decode("utf-8", "replace") for column in columns if (4, _BYTES) in column]
     if len(present) < len(columns):
@@ -170,7 +178,7 @@ def _check_groups(groups: Sequence[Struct], places: Sequence[int], rows: int, ra
                 allowed = f"at most {MOST_PAGES} of {LARGEST_PAGE // MEGABYTE} MB, together {LARGEST_DATA // MEGABYTE} MB"
                 raise InputError("recording", shown, allowed, where)
     if found != rows:
-        raise InputError("recording", f"{found} rows in groups", f"{rows} as the file says", where)
+        raise InputError("recording", f"{found} rows in groups", f"{rows}, as the file states", where)
 
 
 def _page_sizes(raw: bytes, chunk: Struct, where: str) -> list[int]:

@@ -14,7 +14,7 @@ from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 
-__all__ = ["READERS", "in_si", "read_cut", "read_recording", "read_signals", "write_hdf5"]
+__all__ = ["READERS", "in_si", "read_cut", "read_recording", "read_signals", "write_hdf5", "write_recording"]
 
 Reader = Callable[[Path, Sequence[str], float | None], tuple[float, list[FloatArray]]]
 
@@ -42,7 +42,7 @@ def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: 
     sensors : tuple of Sensor
         Signals are divided by the sensor's sensitivity; a trigger stays as it is.
     default_rate : float or None [Hz]
-        For a file that carries no rate.
+        Rate of a file that carries none.
 
     Raises
     ------
@@ -62,13 +62,18 @@ def read_signals(
 
     Parameters
     ----------
+    path : path
+    names : sequence of str
+        Channels that are wanted.
+    default_rate : float or None [Hz]
+        For a file that carries no rate.
     suffix : str or None
-        In place of the path's own.
+        Taken in place of the path's own.
 
     Raises
     ------
     InputError
-        As `read_recording`.
+        As with `read_recording`.
     """
     path = Path(path)
     suffix = path.suffix if suffix is None else suffix
@@ -84,7 +89,15 @@ def read_signals(
 
 
 def in_si(rate: float, signals: Sequence[FloatArray], sensors: tuple[Sensor, ...]) -> Recording:
-    """Return signals, shape (n,) each, divided by their sensors' sensitivities; a trigger stays as it is."""
+    """Return signals, shape (n,) each, divided by their sensors' sensitivities; a trigger stays as it is.
+
+    Parameters
+    ----------
+    rate : float [Hz]
+    signals : sequence of array, shape (n,) each
+        As they stand in the file.
+    sensors : tuple of Sensor
+    """
     samples = np.empty((signals[0].size, len(sensors)))
     with np.errstate(all="ignore"):
         for i, (sensor, values) in enumerate(zip(sensors, signals, strict=True)):
@@ -98,6 +111,21 @@ def in_si(rate: float, signals: Sequence[FloatArray], sensors: tuple[Sensor, ...
 
 
 def read_cut(sensors: tuple[Sensor, ...], default_rate: float | None, cut: Cut) -> tuple[Recording, Recording | None]:
-    """Return the recordings of a cut: the cut itself, and its air cut where there is one."""
+    """Return the recordings of a cut: the cut itself, and its air cut where there is one.
+
+    Parameters
+    ----------
+    sensors : tuple of Sensor
+    default_rate : float or None [Hz]
+        For files that carry no rate.
+    cut : Cut
+    """
     recording = read_recording(cut.recording, sensors, default_rate)
     return recording, None if cut.air is None else read_recording(cut.air, sensors, default_rate)
+
+
+def write_recording(path: str | Path, recording: Recording) -> None:
+    """Write a recording's channels as its sensors gave them; `read_recording` with the same sensors reads it back."""
+    gains = [1.0 if s.quantity is Quantity.TRIGGER else s.sensitivity for s in recording.sensors]
+    channels = zip(recording.sensors, recording.samples.T, gains, strict=True)
+    write_hdf5(path, recording.rate, {sensor.name: samples * gain for sensor, samples, gain in channels})

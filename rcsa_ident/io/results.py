@@ -18,6 +18,7 @@ from rcsa_ident.io.files import MEGABYTE, read_bytes, write_text
 from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.io.workpieces import workpiece_of
 from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.units import from_hz, to_hz
 
 SCHEMA_VERSION = 1
 STATUSES = ("converged", "suspect", "failed")
@@ -40,7 +41,7 @@ def spindle_to_json(modes: ModalModel, joint: LumpedJoint) -> dict[str, Any]:
     return {
         "modes": [
             {
-                "natural_frequency_hz": float(omega / (2.0 * np.pi)),
+                "natural_frequency_hz": float(to_hz(omega)),
                 "damping_ratio": float(zeta),
                 "phi_t": [float(phi[0].real), float(phi[0].imag)],
                 "phi_r": [float(phi[1].real), float(phi[1].imag)],
@@ -58,7 +59,7 @@ def spindle_from_json(data: Any, axis: Dof, where: str, path: str = "") -> tuple
     Parameters
     ----------
     data : mapping
-        As `spindle_to_json` writes it; further keys are left alone.
+        What `spindle_to_json` writes; further keys are left alone.
     axis : Dof
         X or Y.
     where, path : str
@@ -72,7 +73,7 @@ def spindle_from_json(data: Any, axis: Dof, where: str, path: str = "") -> tuple
     residual = _matrix(table, "residual_compliance", 2)
     joint = table.table("joint")
     values = [joint.number(key, above=0.0) if key.endswith("stiffness") else joint.number(key, least=0.0) for key in _JOINT]
-    model = ModalModel(2.0 * np.pi * np.array(frequency), np.array(zeta), np.array(phi), residual, plane("flange", axis))
+    model = ModalModel(from_hz(np.array(frequency)), np.array(zeta), np.array(phi), residual, plane("flange", axis))
     return model, LumpedJoint(**dict(zip(_JOINT, values, strict=True)))
 
 
@@ -121,9 +122,9 @@ def read_json(path: str | Path, field: str) -> Any:
     except json.JSONDecodeError as error:
         raise InputError(field, f"a JSON error ({error.msg})", "JSON", f"{where} line {error.lineno}") from None
     except UnicodeDecodeError:
-        raise InputError(field, "bytes that are no text", "JSON in UTF-8", where) from None
+        raise InputError(field, "bytes that are not text", "JSON in UTF-8", where) from None
     except RecursionError:
-        raise InputError(field, "lists in lists without end", "JSON", where) from None
+        raise InputError(field, "lists nested too deeply", "JSON", where) from None
     except InputError:
         raise
     except ValueError as error:

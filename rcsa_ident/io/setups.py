@@ -20,11 +20,11 @@ from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Campaign, Cut, Tooling
 from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, clamped
+from rcsa_ident.units import from_rpm
 
 CAMPAIGN_FILE = "campaign.toml"
 LARGEST_SETUP = 4 * MEGABYTE
 FEED_DIRECTIONS = {"+X": 0.0, "-X": np.pi, "+Y": 0.5 * np.pi, "-Y": -0.5 * np.pi}
-RPM = np.pi / 30.0
 
 _TOOLING = ("name", "cutter", "tool", "holder", "contact", "materials")
 _CUTTER = ("teeth", "diameter_mm", "helix_deg", "pitch_deg")
@@ -51,7 +51,7 @@ def read_toml(path: str | Path, field: str) -> dict[str, Any]:
         line = raw.count(b"\n", 0, error.start) + 1
         raise InputError(field, "a character that is not UTF-8", "text in UTF-8", f"{path} line {line}") from None
     except RecursionError:
-        raise InputError(field, "lists in lists without end", "TOML", str(path)) from None
+        raise InputError(field, "lists nested too deeply", "TOML", str(path)) from None
     except ValueError as error:
         text = str(error)
         line_found = re.search(r"\(at line (\d+), column \d+\)", text)
@@ -72,7 +72,17 @@ def read_tooling(path: str | Path) -> Tooling:
 
 
 def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
-    """Return the tooling of a table of keys as `read_tooling` finds it in a file; `name` counts where the table has none."""
+    """Return the tooling of a table of keys as `read_tooling` finds it in a file; `name` counts where the table has none.
+
+    Parameters
+    ----------
+    data : mapping
+        The table's keys.
+    where : str
+        The file, for the messages.
+    name : str
+        Counts where the table has none.
+    """
     top = Table(data, where, known=_TOOLING)
     materials = material_library(top)
     tool = top.table("tool", ("stickout_mm", "segments"))
@@ -187,6 +197,10 @@ def campaign_of(
 
     Parameters
     ----------
+    data : mapping
+        The table's keys.
+    where : str
+        The file, for the messages.
     name : str
         Counts where the table has none.
     tooling : callable
@@ -215,7 +229,17 @@ def campaign_of(
 
 
 def sensor_of(name: str, data: Any, where: str) -> Sensor:
-    """Return the sensor of one table, whose key is the channel's name; also a result file carries such tables."""
+    """Return the sensor of one table, whose key is the channel's name; also a result file carries such tables.
+
+    Parameters
+    ----------
+    name : str
+        The channel's.
+    data : mapping
+        The table's keys.
+    where : str
+        The file, for the messages.
+    """
     kind = Table(data, where, f"sensors.{name}", sorted({*_SENSOR, *_TRIGGER}))
     quantity = Quantity(kind.text("quantity", choices=tuple(Quantity)))
     trigger = quantity is Quantity.TRIGGER
@@ -243,7 +267,7 @@ def _cut(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Table,
     if exit_ <= entry:
         table.refuse("exit_angle_deg", f"{exit_:g}", f"above entry_angle_deg, {entry:g}, and at most 180 [deg]")
     conditions = CuttingConditions(
-        table.number("spindle_speed_rpm", "rev/min", above=0.0, most=500000.0) * RPM,
+        from_rpm(table.number("spindle_speed_rpm", "rev/min", above=0.0, most=500000.0)),
         table.number("axial_depth_mm", "mm", above=0.0, most=500.0) * 1e-3,
         table.number("feed_per_tooth_mm", "mm", above=0.0, most=10.0) * 1e-3,
         Engagement(float(np.radians(entry)), float(np.radians(exit_))),
@@ -280,7 +304,7 @@ def _inside(folder: Path, table: Table, key: str) -> Path:
     except (OSError, RuntimeError, ValueError):
         table.refuse(key, describe(text), allowed)
     if not inside:
-        table.refuse(key, f"{describe(text)}, a link out of the folder", allowed)
+        table.refuse(key, f"{describe(text)}, a link that leads out of the folder", allowed)
     if not exists:
         table.refuse(key, f"{describe(text)}, {'no file' if path.exists() else 'which does not exist'}", "an existing file")
     return path

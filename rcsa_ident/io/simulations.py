@@ -16,6 +16,7 @@ from rcsa_ident.io.machines import MachineFile
 from rcsa_ident.io.recordings import write_hdf5
 from rcsa_ident.io.workpieces import workpiece_keys
 from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.units import to_rpm
 from rcsa_ident.virtual.campaign import SimulatedCut, TrueFlange, TrueReceptances
 
 Progress = Callable[[int, int], None]
@@ -54,10 +55,14 @@ def write_simulation(
     ----------
     out : path
         A folder that does not exist yet, or an empty one.
+    setup : MachineFile
+        The virtual machine and its plan of cuts.
     toolings : sequence of Tooling
         Those of the cuts, in the order of ``setup.toolings``.
     cuts : iterable of SimulatedCut
     receptances : iterable of TrueReceptances
+    flange : TrueFlange
+        Receptances of the bare spindle.
     progress : callable of (done, total), optional
     """
     out = Path(out)
@@ -76,7 +81,7 @@ def write_simulation(
         _write_columns(truth / "forces" / f"{cut.id}.csv", ("order",), np.arange(cut.force_lines.shape[0]), cut.force_lines)
         for kind, record in cut.records.items():
             write_hdf5(out / "recordings" / f"{cut.id}_{kind}.h5", setup.sensors.rate, record.channels)
-            rows.append(f"{cut.id}_{kind},{record.spindle_speed * 30.0 / np.pi:.9g},{np.degrees(record.tooth_angle):.9g}")
+            rows.append(f"{cut.id}_{kind},{to_rpm(record.spindle_speed):.9g},{np.degrees(record.tooth_angle):.9g}")
         if progress is not None:
             progress(done, total)
     write_text(truth / "records.csv", "\n".join(rows) + "\n")
@@ -124,7 +129,7 @@ def _campaign_text(setup: MachineFile, toolings: Sequence[Tooling]) -> str:
                 "[[cuts]]",
                 f"id = {_quoted(cut)}",
                 f"tooling = {_quoted(tooling.name)}",
-                f"spindle_speed_rpm = {speed * 30.0 / np.pi:.9g}",
+                f"spindle_speed_rpm = {to_rpm(speed):.9g}",
                 f"axial_depth_mm = {plan.axial_depth * 1e3:.9g}",
                 f"feed_per_tooth_mm = {plan.feed_per_tooth * 1e3:.9g}",
                 f"entry_angle_deg = {np.degrees(plan.engagement.entry):.9g}",

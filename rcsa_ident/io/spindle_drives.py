@@ -10,9 +10,9 @@ from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.text_columns import read_table
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.units import from_rpm
 
 SPEED, POWER, TORQUE = "spindle_speed_rpm", "power_kw", "torque_nm"
-_RPM = np.pi / 30.0
 
 
 def read_spindle_drive(path: str | Path) -> SpindleDrive:
@@ -37,8 +37,8 @@ def read_spindle_drive(path: str | Path) -> SpindleDrive:
             raise InputError(f"column {name}", f"{values[wrong[0]]:g}", "a finite number above 0", table.at(int(wrong[0])))
     falls = np.flatnonzero(np.diff(speed) <= 0.0)
     if falls.size:
-        raise InputError(f"column {SPEED}", f"{speed[falls[0] + 1]:g}", "speeds that rise [rev/min]", table.at(int(falls[0]) + 1))
+        raise InputError(f"column {SPEED}", f"{speed[falls[0] + 1]:g}", "increasing speeds [rev/min]", table.at(int(falls[0]) + 1))
     columns = dict(zip(names, found, strict=True))
     unknown = np.full(speed.size, np.inf)
     power = 1e3 * columns[POWER] if POWER in columns else unknown
-    return SpindleDrive(speed * _RPM, power, columns.get(TORQUE, unknown), float(speed[-1] * _RPM))
+    return SpindleDrive(from_rpm(speed), power, columns.get(TORQUE, unknown), float(from_rpm(speed[-1])))

@@ -36,7 +36,7 @@ def read_stickouts(path: str | Path, stickouts: Sequence[float]) -> list[Tooling
         insertion = min(base.insertion, length - stickout)
         if not (0.0 < stickout < length and insertion >= min(base.insertion, LEAST_INSERTION * shank) - 1e-9):
             most = length - min(base.insertion, LEAST_INSERTION * shank)
-            raise InputError("--stickout-mm", f"{stickout * 1e3:g}", f"above 0 and at most {most * 1e3:g} mm for this tool", str(path))
+            raise InputError("stickout", f"{stickout * 1e3:g} mm", f"above 0 and at most {most * 1e3:g} mm for this tool", str(path))
         assembly = clamped(pieces, base.holder, stickout, insertion, base.contact)
         found.append(replace(tooling, name=f"{tooling.name}, {stickout * 1e3:g} mm", assembly=assembly))
     return found

@@ -45,6 +45,14 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
 
     A channel is called by its name, or as ``group/channel`` where two groups have one of that name. The rate is the waveform's
     (``wf_increment``), else the campaign's.
+
+    Parameters
+    ----------
+    path : path
+    names : sequence of str
+        Channels that are wanted.
+    default_rate : float or None [Hz]
+        For a file that carries no rate.
     """
     where = str(path)
     raw = read_bytes(path, "recording", LARGEST_FILE)
@@ -95,7 +103,7 @@ def _check_structure(raw: bytes, where: str) -> None:
 
 def _too_many(where: str) -> InputError:
     allowed = f"at most {MOST_SEGMENTS} segments with at most {MOST_ENTRIES} objects and properties"
-    return InputError("recording", "more segments, objects and properties than a recording has", allowed, where)
+    return InputError("recording", "more segments, objects and properties than any recording has", allowed, where)
 
 
 def _segment_paths(raw: bytes, order: str, size: int, most: int, where: str) -> tuple[list[bytes], int]:
@@ -140,7 +148,7 @@ def _segment_paths(raw: bytes, order: str, size: int, most: int, where: str) -> 
             elif kind in _WIDTHS:
                 place += _WIDTHS[kind]
             else:
-                raise InputError("recording", f"a property of type {kind}", "numbers, texts, times and truths as properties", where)
+                raise InputError("recording", f"a property of type {kind}", "properties that are numbers, texts, times or booleans", where)
             properties += 1
         if place > len(raw):
             raise IndexError
@@ -236,7 +244,7 @@ def _rate(found: Sequence[Any], names: Sequence[str], default: float | None, whe
     for name, (seconds, fraction, timed) in zip(names, starts, strict=True):
         apart = (seconds - starts[0][0]) + (fraction - starts[0][1])
         if timed and starts[0][2] and abs(apart) * rates[0] > _SAME_START:
-            allowed = f"channels that start together, half a sample apart at most [s]; {names[0]} starts elsewhere"
+            allowed = f"channels that start together, within half a sample of {names[0]} [s]"
             raise InputError(f"start of channel {name}", f"{apart:.3g} s later", allowed, where)
     return rates[0]
 

@@ -10,9 +10,9 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.text_columns import read_table
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict
+from rcsa_ident.units import from_rpm
 
 COLUMNS = ("spindle_speed_rpm", "axial_depth_mm", "verdict")
-_RPM = np.pi / 30.0
 
 
 def read_tested_cuts(path: str | Path) -> TestedCuts:
@@ -41,4 +41,4 @@ def read_tested_cuts(path: str | Path) -> TestedCuts:
         if text.lower() not in list(Verdict):
             raise InputError(f"column {COLUMNS[2]}", text or "nothing", f"one of {', '.join(Verdict)}", table.at(row))
         verdicts.append(Verdict(text.lower()))
-    return TestedCuts(speed * _RPM, depth * 1e-3, tuple(verdicts))
+    return TestedCuts(from_rpm(speed), depth * 1e-3, tuple(verdicts))

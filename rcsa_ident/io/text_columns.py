@@ -78,9 +78,21 @@ def read_table(path: str | Path, field: str, largest: int = LARGEST_TEXT) -> Tex
     """Return a text table with its header; every row has as many cells as the header.
 
     Lines that start with # in front of the header are comments. With semicolons or tabs the decimal sign may be a comma.
+
+    Parameters
+    ----------
+    path : path
+    field : str
+        What the file is, for the message.
+    largest : int
+        Bytes that are allowed.
     """
-    where = str(path)
-    lines = _text(read_bytes(path, field, largest), field, where).replace('"', "").splitlines()
+    return table_of(_text(read_bytes(path, field, largest), field, str(path)), field, str(path))
+
+
+def table_of(text: str, field: str, where: str) -> TextTable:
+    """Return the table of a text, as `read_table` does of a file; `where` is named in the messages."""
+    lines = text.replace('"', "").splitlines()
     numbers = [i for i, line in enumerate(lines, start=1) if line and not line.isspace()]
     while numbers and lines[numbers[0] - 1].lstrip().startswith("#"):
         numbers.pop(0)
@@ -106,6 +118,14 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     """Return the sampling rate [Hz] and the named channels of a recording, shape (n,) each.
 
     The rate comes from a column ``time`` in seconds, else from the campaign. Samples that the time column skips are NaN.
+
+    Parameters
+    ----------
+    path : path
+    names : sequence of str
+        Channels that are wanted.
+    default_rate : float or None [Hz]
+        For a file that carries no rate.
     """
     table = read_table(path, "recording")
     for name in names:
@@ -138,7 +158,7 @@ def _text(raw: bytes, field: str, where: str) -> str:
             return raw.decode(encoding)
         except UnicodeDecodeError:
             continue
-    raise InputError(field, "bytes that are no text", "a text table in UTF-8", where)
+    raise InputError(field, "bytes that are not text", "a text table in UTF-8", where)
 
 
 def _is_number(text: str) -> bool:

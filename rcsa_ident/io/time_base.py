@@ -33,25 +33,25 @@ def uniform(time: FloatArray, expected: float | None = None) -> tuple[float, np.
         Names the row where a time is missing, does not rise or stands between two steps.
     """
     if time.size < 2:
-        raise Irregular(0, f"{time.size} samples", "at least two times, to tell the step from")
+        raise Irregular(0, f"{time.size} samples", "at least two times, which give the sampling interval")
     if not np.all(np.isfinite(time)):
         row = int(np.argmin(np.isfinite(time)))
         raise Irregular(row, "no number" if np.isnan(time[row]) else str(time[row]), "a time [s]")
     step = np.diff(time)
     if np.any(step <= 0.0):
         row = int(np.argmax(step <= 0.0)) + 1
-        raise Irregular(row, f"{time[row]:.9g} after {time[row - 1]:.9g}", "times that rise [s]")
+        raise Irregular(row, f"{time[row]:.9g} after {time[row - 1]:.9g}", "increasing times [s]")
     resolution = _resolution(time)
     typical = float(np.median(step))
     if not 1e-12 <= typical <= 1e12:
-        raise Irregular(1, f"steps of {typical:.3g} s", "steps from 1e-12 to 1e12 s")
+        raise Irregular(1, f"a sampling interval of {typical:.3g} s", "sampling intervals from 1e-12 to 1e12 s")
     # steps of rounded times differ by the rounding, their mean hardly does
     typical = float(np.mean(step[np.abs(step - typical) <= max(1.1 * resolution, 0.1 * typical)]))
     index = np.concatenate([[0.0], np.cumsum(np.rint(step / typical))])
     total = index[-1] + 1.0
     if total > 2 * time.size:
         raise Irregular(
-            int(np.argmax(step)) + 1, f"{total - time.size:.6g} samples lost of {total:.6g}", "at most every second sample lost"
+            int(np.argmax(step)) + 1, f"{total - time.size:.6g} samples lost of {total:.6g}", "at most half of the samples lost"
         )
     everyone = np.arange(time.size, dtype=float)
     # a coarse clock cannot tell a gap from rounding: then only gapless times are taken
@@ -98,5 +98,5 @@ def _first_irregular(time: FloatArray, steps: FloatArray, typical: float) -> Irr
     off = np.abs(steps - np.rint(steps))
     row = int(np.argmax((off > 5.0 * JITTER) | (steps < 0.5)))
     row = int(np.argmax(off)) if off[row] <= 5.0 * JITTER and steps[row] >= 0.5 else row
-    found = f"{time[row + 1]:.9g}, {steps[row]:.4g} steps after the time before it"
-    return Irregular(row + 1, found, f"whole multiples of the step, {typical:.6g} s")
+    found = f"{time[row + 1]:.9g}, {steps[row]:.4g} sampling intervals after the previous time"
+    return Irregular(row + 1, found, f"whole multiples of the sampling interval, {typical:.6g} s")

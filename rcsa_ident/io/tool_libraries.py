@@ -20,6 +20,7 @@ from typing import Any, NamedTuple, NoReturn
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes
 from rcsa_ident.io.setups import tooling_of
+from rcsa_ident.io.toolings import tooling_text
 from rcsa_ident.io.validated_table import Table, listed
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
@@ -45,13 +46,13 @@ class Assumptions:
     flute_ratio : float
         Diameter of the solid cylinder that bends as the fluted part, over the cutting diameter.
     helix_deg : float [deg]
-        Where the library gives none.
+        Helix of tools for which the library gives none.
     stickout_mm, insertion_mm : float or None [mm]
         None takes the library's length below the holder, and what is left of the tool behind it.
     material : str or None
-        Of the tool; None takes the library's.
+        Material of the tools; None takes the library's.
     contact : Contact or None
-        Of tool and holder; None joins them rigidly.
+        Contact of tool and holder; None joins them rigidly.
     holder : str or None
         Holder of the library for tools that have none of their own.
     """
@@ -83,7 +84,7 @@ class Imported(NamedTuple):
     Parameters
     ----------
     number : int
-        In the library, from 1.
+        Place in the library, from 1.
     name, kind : str
     tooling : Tooling or None
     text : str
@@ -115,7 +116,19 @@ def read_tool_library(path: str | Path, assumptions: Assumptions | None = None) 
 
 
 def import_tools(raw: bytes, where: str, assumptions: Assumptions | None = None, most: int = MOST_ENTRIES) -> list[Imported]:
-    """Return every entry of a library that is already in memory, at most so many, see `read_tool_library`."""
+    """Return every entry of a library that is already in memory, at most so many, see `read_tool_library`.
+
+    Parameters
+    ----------
+    raw : bytes
+        The library's JSON.
+    where : str
+        The file, for the messages.
+    assumptions : Assumptions, optional
+        In place of what the library cannot tell.
+    most : int
+        Entries that are allowed.
+    """
     given = assumptions or Assumptions()
     content = _content(raw, where)
     entries = content.get("data", [content]) if isinstance(content, Mapping) else content
@@ -144,7 +157,7 @@ def import_tools(raw: bytes, where: str, assumptions: Assumptions | None = None,
         name, kind = _name(entry), _line(entry.get("type", ""))
         try:
             data, notes = _tooling(Table(entry, where, place), name, given, spare)
-            text = _toml(data, notes)
+            text = tooling_text(data, notes)
             tooling = tooling_of(tomllib.loads(text), where, name)
             found.append(Imported(number, name, kind, tooling, text, tuple(notes), ""))
         except _Skipped as skipped:
@@ -187,13 +200,15 @@ def _content(raw: bytes, where: str) -> Any:
     except InputError:
         raise
     except UnicodeDecodeError:
-        raise InputError("tool library", "bytes that are no text", "JSON in UTF-8, or a .tools container with it", where) from None
+        raise InputError("tool library", "bytes that are not text", "JSON in UTF-8, or a .tools container with it", where) from None
     except json.JSONDecodeError as error:
         raise InputError(
             "tool library", f"no JSON ({error.msg})", "JSON, or a .tools container with it", f"{where} line {error.lineno}"
         ) from None
     except (RecursionError, ValueError):
-        raise InputError("tool library", "JSON without end", "JSON as a tool library has it", where) from None
+        raise InputError(
+            "tool library", "numbers too long, or lists nested too deeply", "JSON in the form of a tool library", where
+        ) from None
 
 
 def _unpacked(raw: bytes, where: str) -> bytes:
@@ -241,7 +256,7 @@ def _tooling(entry: Table, name: str, given: Assumptions, spare: Mapping[str, An
     helix = geometry.number("FHA", "deg", None, least=0.0, most=80.0)
     if helix is None:
         helix = given.helix_deg
-        notes.append(f"helix {helix:g} deg: the library gives none")
+        notes.append(f"helix angle {helix:g}° assumed: none in the library")
     material = _body(entry, given, notes)
     segments, shank = _tool_segments(entry, geometry, diameter, scale, given, material, notes)
     stickout, insertion = _lengths(geometry, scale, given, notes)
@@ -256,11 +271,9 @@ def _tooling(entry: Table, name: str, given: Assumptions, spare: Mapping[str, An
         "holder": {"insertion_mm": insertion, "segments": holder},
     }
     if given.contact is None:
-        notes.append(
-            "no contact: tool and holder are joined rigidly; calibrate it, or take that of a tooling with the same kind of clamping"
-        )
+        notes.append("no contact: tool and holder are joined rigidly; calibrate it, or take that of a tooling with the same clamping")
     else:
-        notes.append("contact of another tooling")
+        notes.append("contact taken from another tooling")
         keys = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
         data["contact"] = {key: getattr(given.contact, key) for key in keys}
     return data, notes
@@ -268,11 +281,11 @@ def _tooling(entry: Table, name: str, given: Assumptions, spare: Mapping[str, An
 
 def _unit(table: Table, notes: list[str]) -> float:
     if "unit" not in table:
-        notes.append("lengths in millimetres: the library names no unit")
+        notes.append("lengths assumed in millimetres: no unit in the library")
         return 1.0
     unit = table.text("unit", choices=tuple(UNITS))
     if unit == "inches":
-        notes.append("lengths from inches")
+        notes.append("lengths converted from inches")
     return UNITS[unit]
 
 
@@ -282,9 +295,9 @@ def _body(entry: Table, given: Assumptions, notes: list[str]) -> str:
     named = _line(entry.data.get("BMC", "")).lower()
     material = _BODIES.get(re.sub(r"[^a-z]", "", named), _CARBIDE)
     if re.sub(r"[^a-z]", "", named) not in _BODIES:
-        notes.append(f"tool of {material}: the library says {named or 'nothing'}")
+        notes.append(f"tool material {material} assumed: the library states {named or 'none'}")
     elif material == _STEEL:
-        notes.append("high-speed steel taken as steel")
+        notes.append("high-speed steel modelled as steel")
     return material
 
 
@@ -296,10 +309,10 @@ def _tool_segments(
     fluted = min(geometry.number("LCF", "", above=0.0) * scale, whole)
     shank = geometry.number("SFDM", "", None, above=0.0)
     if shank is None:
-        notes.append("shank as thick as the cutter: the library gives none (SFDM)")
+        notes.append("shank diameter assumed equal to the cutting diameter: none in the library (SFDM)")
     shank = diameter if shank is None else shank * scale
     segments = [{"length_mm": fluted, "outer_diameter_mm": given.flute_ratio * diameter}]
-    notes.append(f"fluted part as a cylinder of {given.flute_ratio:g} times the cutting diameter")
+    notes.append(f"fluted part modelled as a cylinder of {given.flute_ratio:g} times the cutting diameter")
     shoulder = min((geometry.number("shoulder-length", "", None, least=0.0) or 0.0) * scale, whole)
     if shoulder > fluted + 1e-6:
         neck = geometry.number("shoulder-diameter", "", None, above=0.0)
@@ -309,7 +322,7 @@ def _tool_segments(
         segments += _stack(Table(shaft, entry.where, entry.name("shaft")), scale)
     left = whole - sum(s["length_mm"] for s in segments)
     if left < -_ROUNDING:
-        geometry.refuse("OAL", f"{whole:.6g} mm, {-left:.6g} less than flutes, neck and shaft", "the length over all")
+        geometry.refuse("OAL", f"{whole:.6g} mm, {-left:.6g} mm less than flutes, neck and shaft", "the overall length")
     if left > 1e-6:
         segments.append({"length_mm": left, "outer_diameter_mm": shank})
     return [s | {"material": material} for s in _merged(segments)], shank
@@ -333,7 +346,7 @@ def _lengths(geometry: Table, scale: float, given: Assumptions, notes: list[str]
         stickout = given.stickout_mm
     else:
         stickout = geometry.number("LB", "length below the holder", above=0.0) * scale
-        notes.append(f"stickout {stickout:.6g} mm: the library's length below the holder (LB)")
+        notes.append(f"stickout {stickout:.6g} mm, the library's length below the holder (LB)")
     return stickout, given.insertion_mm
 
 
@@ -373,10 +386,10 @@ def _holder_segments(
     total = sum(c["length_mm"] for c in cones)
     if gauge and gauge * scale < total - _ROUNDING:
         cones = _cut(cones, gauge * scale)[0]
-        notes.append(f"holder up to its gauge line, {gauge * scale:.6g} of {total:.6g} mm: what is behind sits in the spindle")
+        notes.append(f"holder up to its gauge line, {gauge * scale:.6g} of {total:.6g} mm: the rest is inside the spindle")
     elif not gauge:
-        notes.append(f"holder to the end of its last segment, {total:.6g} mm: the library gives no gauge line")
-    notes.append("holder of solid steel behind the tool: the library gives no bore")
+        notes.append(f"holder up to the end of its last segment, {total:.6g} mm: no gauge line in the library")
+    notes.append("holder of solid steel behind the tool: no bore in the library")
     cones = [c | {"material": _STEEL} for c in cones]
     return cones if insertion is None else _bored(cones, insertion, shank)
 
@@ -384,10 +397,10 @@ def _holder_segments(
 def _behind(left: float, holder: list[dict[str, Any]], notes: list[str]) -> float:
     """Insertion that the library leaves open: what there is of the tool behind the holder's nose, inside of the holder."""
     if left <= 0.0:
-        raise _Skipped("a tool that ends at the holder's nose (OAL and LB): the insertion has to be given")
+        raise _Skipped("a tool that ends at the holder's nose (OAL and LB); the insertion has to be given")
     # a nanometre less than the whole: figures are rounded when they are written
     insertion = min(left, sum(c["length_mm"] for c in holder) - 1e-6)
-    notes.append(f"insertion {insertion:.6g} mm: all of the tool behind the holder's nose (OAL and LB); a bore may be shorter")
+    notes.append(f"insertion {insertion:.6g} mm assumed: all of the tool behind the holder's nose (OAL and LB); the bore may be shorter")
     return insertion
 
 
@@ -414,25 +427,3 @@ def _cut(cones: list[dict[str, Any]], length: float) -> tuple[list[dict[str, Any
 def _bored(cones: list[dict[str, Any]], insertion: float, shank: float) -> list[dict[str, Any]]:
     front, behind = _cut(cones, insertion)
     return [c | {"inner_diameter_mm": shank} for c in front] + behind
-
-
-def _toml(data: Mapping[str, Any], notes: Sequence[str]) -> str:
-    """A tooling file."""
-    lines = [f"# {note}" for note in notes]
-    lines.append(f"name = {json.dumps(data['name'], ensure_ascii=False)}")
-    for key in ("cutter", "tool", "holder", "contact"):
-        if key not in data:
-            continue
-        lines.append(f"[{key}]")
-        lines += [f"{name} = {_number(value)}" for name, value in data[key].items() if name != "segments"]
-        if "segments" in data[key]:
-            lines += ["segments = [", *(f"  {_inline(segment)}," for segment in data[key]["segments"]), "]"]
-    return "\n".join(lines) + "\n"
-
-
-def _inline(segment: Mapping[str, Any]) -> str:
-    return "{ " + ", ".join(f'{k} = "{v}"' if isinstance(v, str) else f"{k} = {_number(v)}" for k, v in segment.items()) + " }"
-
-
-def _number(value: float | int) -> str:
-    return str(value) if isinstance(value, int) else repr(round(value, 9)) if abs(value) < 1e6 else repr(float(value))

@@ -300,6 +300,8 @@ def write_uff(path: str | Path, functions: Sequence[UffFunction], binary: bool =
 
     Parameters
     ----------
+    path : path
+    functions : sequence of UffFunction
     binary : bool
         58b, little endian.
 

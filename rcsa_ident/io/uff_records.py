@@ -30,6 +30,14 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
 
     A channel is called by its response entity, the label of its ordinate, its title or its place (``3:-X``). The header keeps six
     digits of the step: the rate is the campaign's where that is one of those that it may stand for, else the roundest of these.
+
+    Parameters
+    ----------
+    path : path
+    names : sequence of str
+        Channels that are wanted.
+    default_rate : float or None [Hz]
+        For a file that carries no rate.
     """
     where = str(path)
     existing_file(path, "recording", LARGEST_FILE)

@@ -51,11 +51,28 @@ class Table:
         return f"{self.path}.{key}" if self.path else key
 
     def refuse(self, key: str, found: object, allowed: str) -> NoReturn:
-        """Raise the error that names a key of this table."""
+        """Raise the error that names a key of this table.
+
+        Parameters
+        ----------
+        key : str
+        found : object
+            What stands there.
+        allowed : str
+            What could, in words.
+        """
         raise InputError(self.name(key), found, allowed, self.where)
 
     def value(self, key: str, allowed: str, default: Any = _REQUIRED) -> Any:
-        """Return what stands under `key`; without a default the key must be there."""
+        """Return what stands under `key`; without a default the key must be there.
+
+        Parameters
+        ----------
+        key : str
+        allowed : str
+            What could stand there, in words.
+        default : object, optional
+        """
         if key in self.data:
             return self.data[key]
         if default is _REQUIRED:
@@ -73,7 +90,18 @@ class Table:
         most: float | None = None,
         whole: bool = False,
     ) -> Any:
-        """Return a finite number within its range, as int if `whole`, else as float; a default is returned unchecked."""
+        """Return a finite number within its range, as int if `whole`, else as float; a default is returned unchecked.
+
+        Parameters
+        ----------
+        key : str
+        unit : str
+            For the message.
+        default : object, optional
+        above, least, most : float, optional
+            Limits: `above` is not allowed itself, the others are.
+        whole : bool
+        """
         limits = [f"above {above:g}" if above is not None else "", f"at least {least:g}" if least is not None else ""]
         limits = [*(text for text in limits if text), *([f"at most {most:g}"] if most is not None else [])]
         allowed = "a whole number" if whole else "a finite number"
@@ -93,7 +121,15 @@ class Table:
         return int(number) if whole else number
 
     def numbers(self, key: str, count: int | None, unit: str = "") -> list[float]:
-        """Return a list of `count` finite numbers (any number of them if None)."""
+        """Return a list of `count` finite numbers (any number of them if None).
+
+        Parameters
+        ----------
+        key : str
+        count : int or None
+        unit : str
+            For the message.
+        """
         allowed = f"a list of {'finite' if count is None else f'{count} finite'} numbers" + (f" [{unit}]" if unit else "")
         value = self.value(key, allowed)
         if not _is_list(value) or (count is not None and len(value) != count):
@@ -104,7 +140,16 @@ class Table:
         return [n for n in numbers if n is not None]
 
     def text(self, key: str, default: Any = _REQUIRED, choices: Collection[str] = (), allowed: str = "a text") -> Any:
-        """Return a non-empty text, one of `choices` if there are any; a default is returned unchecked."""
+        """Return a non-empty text, one of `choices` if there are any; a default is returned unchecked.
+
+        Parameters
+        ----------
+        key : str
+        default : object, optional
+        choices : collection of str
+        allowed : str
+            What could stand there, in words, where there are no choices.
+        """
         allowed = f"one of {', '.join(choices)}" if choices else allowed
         value = self.value(key, allowed, default)
         if key not in self.data:
@@ -117,7 +162,15 @@ class Table:
         return value
 
     def table(self, key: str, known: Collection[str] | None = None, default: Any = _REQUIRED) -> Table:
-        """Return the table under `key`."""
+        """Return the table under `key`.
+
+        Parameters
+        ----------
+        key : str
+        known : collection of str, optional
+            Keys that the table may have; by default any.
+        default : mapping, optional
+        """
         return Table(self.value(key, f"a table [{self.name(key)}]", default), self.where, self.name(key), known)
 
     def tables(self, key: str, known: Collection[str] | None = None) -> list[Table]:
@@ -129,7 +182,15 @@ class Table:
         return [Table(item, self.where, f"{self.name(key)}[{i}]", known) for i, item in enumerate(value)]
 
     def named_tables(self, key: str, known: Collection[str] | None = None, default: Any = _REQUIRED) -> dict[str, Table]:
-        """Return the tables below `key` by their own names."""
+        """Return the tables below `key` by their own names.
+
+        Parameters
+        ----------
+        key : str
+        known : collection of str, optional
+            Keys that each of them may have; by default any.
+        default : mapping, optional
+        """
         outer = self.table(key, None, default)
         return {name: Table(item, self.where, outer.name(name), known) for name, item in outer.data.items()}
 

@@ -29,6 +29,14 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     """Return the sampling rate [Hz] and the named channels, full scale 1, shape (n,) each.
 
     Channels are called ch1, ch2, ...; where the file names its tracks (iXML), these names count, too.
+
+    Parameters
+    ----------
+    path : path
+    names : sequence of str
+        Channels that are wanted.
+    default_rate : float or None [Hz]
+        For a file that carries no rate.
     """
     where = str(path)
     raw = read_bytes(path, "recording", LARGEST_FILE)

@@ -38,7 +38,7 @@ class MeasuredFlange:
             found = ", ".join(str(c) for c in (*self.measured.rows, *self.measured.cols))
             raise InputError("flange coordinates", found, "coordinates of the point flange, rows as columns")
         if self.measured.omega.size < 4 or not np.all(np.diff(self.measured.omega) > 0.0):
-            raise InputError("flange frequencies", self.measured.omega.size, "at least four that rise [rad/s]")
+            raise InputError("flange frequencies", self.measured.omega.size, "at least four, increasing [rad/s]")
         if not np.all(np.isfinite(self.measured.values)):
             raise InputError("flange receptance", "not finite", "finite numbers")
 
@@ -149,6 +149,9 @@ def translations_only(omega: FloatArray, values: ComplexArray, axis: Dof = Dof.X
     ----------
     omega : array, shape (n,) [rad/s]
     values : complex array, shape (n,) [m/N]
+        Displacement per force of the flange.
+    axis : Dof
+        Machine axis X or Y: the bending plane.
     """
     block = np.zeros((np.size(omega), 2, 2), dtype=complex)
     block[:, 0, 0] = frozen(values, np.complex128)

@@ -28,5 +28,5 @@ class Spindle:
         return self.modes.coordinates
 
     def receptance(self, omega: FloatArray) -> Receptance:
-        """Return B33 of the paper's eq. 13, shape (n, 2, 2)."""
+        """Return the flange's receptance B33 ([inprocess], eq. 13), shape (n, 2, 2)."""
         return self.modes.receptance(omega)

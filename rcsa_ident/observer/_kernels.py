@@ -78,7 +78,7 @@ def kalman_steps(decay, observed, plants, forces, through, gain, first, measured
 
 @numba.njit(cache=True, fastmath=True)
 def smoothed_force(decay, observed, plants, forces, through, gain, variance, row, innovation, force):
-    """Return the force given all samples, shape (n,), by the backward recursion of Bryson and Frazier.
+    """Return the force given all samples, shape (n,), by the backward recursion of Bryson and Frazier [bryson1963].
 
     variance: of the innovation, shape (s,); row: covariance of the force with the state after each correction, shape (s, 2, m);
     of these and of `gain` the last stays; innovation, force: of the forward filter from the first sample on, shape (n,).

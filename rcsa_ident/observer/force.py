@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.observer.force_model import ForceModel, augmented
 from rcsa_ident.observer.kalman import FilterState, KalmanFilter, kalman_filter
 from rcsa_ident.observer.transfer_function import CORNER, SampledModes, TransferFunction, acceleration_filter, high_pass
+from rcsa_ident.shown import Saved
 
 #: What a spindle order below the band may change in a second, in displacement [m]: run-out that is not believed.
 _ORDER_WANDER = 1e-7
@@ -39,12 +41,12 @@ class RunOut:
     def __post_init__(self) -> None:
         object.__setattr__(self, "order", frozen(self.order))
         if np.any(self.order != np.rint(self.order)) or np.any(np.diff(self.order, prepend=0.0) <= 0.0):
-            raise InputError("run-out's orders", self.order.tolist(), "whole numbers from 1, rising")
+            raise InputError("run-out orders", self.order.tolist(), "whole numbers from 1, rising")
         for name in ("gap", "acceleration"):
             object.__setattr__(self, name, frozen(getattr(self, name), np.complex128))
 
     def signals(self, first: int, count: int, step: float) -> tuple[FloatArray, FloatArray]:
-        """Return gap and acceleration at `count` samples from the `first`, shape (count,) each."""
+        """Return gap and acceleration at `count` samples of a `step` [s] from the `first`, shape (count,) each [m], [m/s^2]."""
         return self.at(np.remainder(np.arange(first, first + count) * (self.spindle_speed * step / (2.0 * np.pi)), 1.0))
 
     def at(self, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -71,11 +73,12 @@ class AxisObserver:
     transfer : TransferFunction
         Tip force to the flange's displacement as the sensor shows it.
     corner : float [rad/s]
-        Of the high-pass that gap and fixture's motion share.
+        Corner frequency of the high-pass that gap and fixture's motion share.
     gap_filter, acceleration_filter : SampledModes
         The latter None without an accelerometer: the gap is then taken for the flange's motion.
     kalman : KalmanFilter
     run_out : RunOut or None
+        Taken out of the signals where it is known.
     """
 
     axis: Dof
@@ -85,6 +88,19 @@ class AxisObserver:
     acceleration_filter: SampledModes | None
     kalman: KalmanFilter
     run_out: RunOut | None = None
+
+    def to_control(self) -> Any:
+        """Return the observer in the steady state as python-control's sampled ``StateSpace``.
+
+        Inputs are ``gap`` [m] and, with an accelerometer, ``acceleration`` [m/s^2], run-out taken out of both; outputs ``force`` [N]
+        and ``innovation`` [m].
+        """
+        import control
+
+        filters = [each.state_space().to_control() for each in (self.gap_filter, self.acceleration_filter) if each is not None]
+        added = control.ss([], [], [], np.ones((1, len(filters))), self.transfer.step)
+        whole = self.kalman.state_space().to_control() * added * control.append(*filters)
+        return control.ss(whole, inputs=["gap", "acceleration"][: len(filters)], outputs=["force", "innovation"])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,7 +135,7 @@ class ForceBlock:
     Parameters
     ----------
     force : array, shape (n, a) [N]
-        Without its mean: below the band the displacement says nothing of the force.
+        The force without its mean: below the band the displacement says nothing of it.
     walking : array, shape (n, a) [N]
         The part that no oscillator holds; all of it with a random walk alone.
     innovation : array, shape (n, a) [m]
@@ -131,8 +147,8 @@ class ForceBlock:
     innovation: FloatArray
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ForceEstimate:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ForceEstimate(Saved):
     """Forces of a whole record.
 
     Parameters
@@ -141,22 +157,28 @@ class ForceEstimate:
     step : float [s]
     force : array, shape (n, a) [N]
     standard_deviation : array, shape (n, a) [N]
-        From sensor noise and the force model, raised where the innovations scatter more than they should.
-    consistency : array, shape (a,) [-]
+        What follows from sensor noise and the force model, raised where the innovations scatter more than they should.
+    consistency : array, shape (a,) [-], or None
         Scatter of the innovations in the band over the expected; 1 where model, noise and force agree, more where they are too
-        sure of themselves.
+        sure of themselves. None of forces from a file.
     """
 
     axes: tuple[Dof, ...]
     step: float
     force: FloatArray
     standard_deviation: FloatArray
-    consistency: FloatArray
+    consistency: FloatArray | None = None
 
     @property
     def time(self) -> FloatArray:
-        """From the first sample, shape (n,) [s]."""
+        """Time from the first sample, shape (n,) [s]."""
         return np.arange(self.force.shape[0]) * self.step
+
+    def __str__(self) -> str:
+        later = slice(self.force.shape[0] // 2, None)
+        size, std = np.std(self.force[later], axis=0), np.median(self.standard_deviation[later], axis=0)
+        rows = [f"{axis.upper()} {a:.3g} N rms (± {b:.2g} N)" for axis, a, b in zip(self.axes, size, std, strict=True)]
+        return f"{', '.join(rows)} over {self.force.shape[0] * self.step:.3g} s"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,7 +194,7 @@ class ForceObserver:
 
     @property
     def step_time(self) -> float:
-        """Of the samples [s]."""
+        """Time between samples [s]."""
         return self.axes[0].transfer.step
 
     def init(self) -> ObserverState:
@@ -184,7 +206,14 @@ class ForceObserver:
         return ObserverState(0, tuple(states))
 
     def step(self, state: ObserverState, gap: FloatArray, acceleration: FloatArray | None = None) -> tuple[ObserverState, ForceBlock]:
-        """Return the state and the estimates after one sample of each axis, shape (a,)."""
+        """Return the state and the estimates after one sample of each axis.
+
+        Parameters
+        ----------
+        state : ObserverState
+        gap : array, shape (a,) [m]
+        acceleration : array, shape (a,) [m/s^2], optional
+        """
         return self.run(state, np.asarray(gap)[None], None if acceleration is None else np.asarray(acceleration)[None])
 
     def run(self, state: ObserverState, gap: FloatArray, acceleration: FloatArray | None = None) -> tuple[ObserverState, ForceBlock]:
@@ -194,9 +223,9 @@ class ForceObserver:
         ----------
         state : ObserverState
         gap : array, shape (n, a) [m]
-            As the displacement sensors show it, in the order of `axes`.
+            The gap as the displacement sensors show it, in the order of `axes`.
         acceleration : array, shape (n, a) [m/s^2], optional
-            Of the sensors' fixture.
+            Acceleration of the sensors' fixture.
         """
         return self._scan(state, gap, acceleration, lost=False)
 
@@ -225,8 +254,9 @@ class ForceObserver:
 
         Parameters
         ----------
+        state : ObserverState
         gap, acceleration : arrays, shape (n, a) [m], [m/s^2]
-            In place of the lost samples.
+            Substitutes for the lost samples.
         """
         return self._scan(state, gap, acceleration, lost=True)
 
@@ -235,6 +265,9 @@ class ForceObserver:
 
         Parameters
         ----------
+        gap : array, shape (n, a) [m]
+        acceleration : array, shape (n, a) [m/s^2], optional
+            Acceleration of the sensors' fixture.
         smooth : bool
             Each sample given all others; else given those before it, as live.
         """
@@ -268,7 +301,7 @@ def restore_mean_force(estimate: ForceEstimate, idle: float, first: int = 0) -> 
         with its sign turned.
     """
     if not 0.0 < idle < 1.0:
-        raise InputError("idle share", idle, "above 0 and below 1: some time in which no tooth cuts")
+        raise InputError("idle share", f"{100.0 * idle:g} %", "more than 0 % and less than 100 %: the time in which no tooth cuts")
     levels = []
     for values in np.sort(estimate.force[first:], axis=0).T:
         held = max(int(0.5 * idle * values.size), 2)
@@ -302,7 +335,7 @@ def axis_observer(
     noise : float [m]
         Standard deviation of a displacement sample.
     acceleration_noise : float [m/s^2]
-        Standard deviation of an acceleration sample; 0: as if the integrated acceleration were without noise (the paper's).
+        Standard deviation of an acceleration sample; 0: as if the integrated acceleration were without noise, as in [inprocess].
     accelerometer : bool
         Whether the fixture's acceleration is measured.
     sensor_ratio : (omega, ratio), optional
@@ -310,9 +343,11 @@ def axis_observer(
     run_out : RunOut, optional
         Taken out of the signals.
     spindle_speed : float [rad/s]
-        Its orders below the band are taken for disturbance; 0: none.
+        Orders of this speed below the band are taken for disturbance; with 0 there are none.
     unmodelled : float [N]
-        Process noise.
+        Process noise: standard deviation of a force sample that the force model cannot follow.
+    longest_settling : int, optional
+        Steps of full covariance at most; by default as in `kalman_filter`.
     """
     step, band = transfer.step, transfer.band
     corner = CORNER * band[0]

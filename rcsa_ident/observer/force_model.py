@@ -1,4 +1,4 @@
-"""What the observer knows of the force between samples, and the augmented state {q, f} (the paper's eq. 17)."""
+"""What the observer knows of the force between samples, and the augmented state {q, f} ([inprocess], eq. 17)."""
 
 from __future__ import annotations
 
@@ -26,21 +26,22 @@ class ForceModel(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class RandomWalk:
-    """f[k+1] = f[k] + eta (the paper's), which may slowly forget: behind a high-pass the mean cannot be seen.
+    """f[k+1] = f[k] + eta ([inprocess], eq. 17), which may slowly forget: behind a high-pass the mean cannot be seen.
 
     Parameters
     ----------
     intensity : float [N/sqrt(s)]
+        Standard deviation of the walk after a second.
     leak : float [rad/s]
-        0 is the paper's.
+        Rate at which it forgets; 0 is the walk of [inprocess].
     """
 
     intensity: float
     leak: float = 0.0
 
     def __post_init__(self) -> None:
-        positive("random walk's intensity", self.intensity, "N/sqrt(s)")
-        non_negative("random walk's leak", self.leak, "rad/s")
+        positive("random-walk intensity", self.intensity, "N/sqrt(s)")
+        non_negative("random-walk leak", self.leak, "rad/s")
 
     def modes(self, step: float) -> tuple[ComplexArray, FloatArray]:
         """Return the only mode."""
@@ -58,6 +59,7 @@ class TeethResonators:
     omega : array, shape (j,) [rad/s]
         Multiples of the tooth-passing frequency; with cutter run-out, of the spindle's.
     intensity : array, shape (j,) [N/sqrt(s)]
+        How fast each amplitude walks.
     """
 
     walk: RandomWalk
@@ -84,11 +86,12 @@ class AugmentedModel:
 
     Parameters
     ----------
-    decay : complex array, shape (m,)
+    decay : complex array, shape (m,) [-]
+        Factor of each mode from one sample to the next.
     observed : complex array, shape (m,)
         The measurement is sum Re(observed x) + through * force + noise.
     counts : two ints
-        Plant modes, force modes.
+        Number of plant modes and of force modes.
     through : float [m/N]
     drive : array, shape (m,)
         Standard deviation of what is added, per step, to the real and to the imaginary part of a force or noise mode.
@@ -170,9 +173,9 @@ def augmented(
         Tip force to measured displacement [m/N].
     force : ForceModel
     noise : float [m]
-        Standard deviation of a displacement sample: the measurement noise of eq. 17.
+        Standard deviation of a displacement sample: the measurement noise of [inprocess], eq. 17.
     unmodelled : float [N]
-        Process noise of eq. 17: standard deviation of a force sample that the force model cannot follow.
+        Process noise of [inprocess], eq. 17: standard deviation of a force sample that the force model cannot follow.
     acceleration : SampledModes, optional
         Filter from the fixture's acceleration to displacement: it colours the accelerometer's noise.
     acceleration_noise : float [m/s^2]
@@ -192,7 +195,7 @@ def augmented(
         kinds.append((acceleration.decay, 2.0 * acceleration.gain, 0.0, acceleration_noise))
         direct = acceleration.through * acceleration_noise
     if len(disturbance):
-        spread = positive("disturbance's intensity", disturbance_intensity, "m/sqrt(s)") * np.sqrt(step)
+        spread = positive("disturbance intensity", disturbance_intensity, "m/sqrt(s)") * np.sqrt(step)
         kinds.append((np.exp(1j * np.asarray(disturbance) * step), 1.0, spread, 0.0))
     columns = [np.concatenate([np.broadcast_to(kind[c], kind[0].shape) for kind in kinds]) for c in range(4)]
     total = float(np.hypot(positive("measurement noise", noise, "m"), direct))

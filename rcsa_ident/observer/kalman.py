@@ -1,4 +1,4 @@
-"""Kalman filter of the augmented state {q, f}: settling and steady gains, streaming, fixed lag, smoothing (the paper's eq. 17)."""
+"""Kalman filter [kalman1960] of the augmented state {q, f} ([inprocess], eq. 17): settling, steady, streaming, fixed lag, smoothing."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.errors import InputError
 from rcsa_ident.observer._kernels import kalman_steps, lagged_force, smoothed_force
 from rcsa_ident.observer.force_model import AugmentedModel
@@ -43,10 +44,11 @@ class KalmanFilter:
     gain : array, shape (s, 2, m)
         The last is the steady one.
     variance : array, shape (s,) [m^2]
-        Of the innovation.
+        Variance of the innovation.
     row : array, shape (s, 2, m)
         Covariance of the force with the state after the correction.
     force_variance : array, shape (s,) [N^2]
+        Variance of the force after the correction.
     """
 
     model: AugmentedModel
@@ -85,13 +87,15 @@ class KalmanFilter:
 
         Parameters
         ----------
-        weight : array, shape (lag,)
-            From `lag_weights`.
+        state : FilterState
+        measured : array, shape (n,) [m]
+        weight : array, shape (lag,) [N/m]
+            As `lag_weights` gives them.
 
         Returns
         -------
         FilterState and array, shape (k,) [N]
-            Of the first block the lag is missing: k = n - lag; later ones are complete.
+            In the first block the lag is missing: k = n - lag; later ones are complete.
         """
         state, result = self.run(state, measured)
         joined = np.concatenate([state.waiting, result])
@@ -101,8 +105,8 @@ class KalmanFilter:
     def smooth(self, result: FloatArray) -> FloatArray:
         """Return the force given the whole record, shape (n,) [N]; `result` is that of `run` from the first sample on.
 
-        The fixed-interval smoother of Rauch, Tung and Striebel in the form of Bryson and Frazier, which needs no inverse of a
-        covariance and costs as little as the filter.
+        The fixed-interval smoother of Rauch, Tung and Striebel [rauch1965] in the form of Bryson and Frazier [bryson1963], which needs no
+        inverse of a covariance and costs as little as the filter.
         """
         force, innovation = (np.ascontiguousarray(result[:, c]) for c in (0, 2))
         return smoothed_force(*self._arrays(), self.gain, self.variance, self.row, innovation, force)
@@ -112,8 +116,10 @@ class KalmanFilter:
 
         Parameters
         ----------
+        lag : int
+            Number of later innovations.
         at : int, optional
-            Of which sample of the settling phase; by default in the steady state.
+            Number of the sample in the settling phase; by default one of the steady state.
         """
         at = self.gain.shape[0] - 1 if at is None else min(at, self.gain.shape[0] - 1)
         modes, result = -np.array(self.row[at]), np.empty((lag, 3))
@@ -125,6 +131,9 @@ class KalmanFilter:
 
         Parameters
         ----------
+        count : int
+        smoothed : bool
+            Given all samples; else given those before.
         longest : int
             How far a sample looks ahead.
         """
@@ -155,9 +164,7 @@ class KalmanFilter:
         complex arrays, shape (n,)
             Displacement to force, displacement to innovation.
         """
-        a, seen, row, _ = self.model.matrices()
-        gain = self.gain[-1].T.ravel()[self.model.live]
-        seen = seen * self.model.noise
+        a, seen, row, gain = self._steady()
         back = np.exp(-1j * np.asarray(omega, dtype=float) * self.model.step)
         closed = a - np.outer(gain, seen @ a)
         states = np.linalg.solve(np.eye(row.size) - back[:, None, None] * closed, np.broadcast_to(gain[:, None], (back.size, row.size, 1)))
@@ -168,12 +175,28 @@ class KalmanFilter:
             force = force + innovation * (ahead @ self.lag_weights(lag))
         return force, innovation
 
-    @property
-    def error_poles(self) -> ComplexArray:
-        """Poles of the estimate's error in the steady state, shape (n,): inside the unit circle."""
-        a, seen, _, _ = self.model.matrices()
-        gain = self.gain[-1].T.ravel()[self.model.live] * self.model.noise
-        return np.linalg.eigvals(a - np.outer(gain, seen @ a)).astype(complex)
+    def state_space(self) -> StateSpace:
+        """Return the filter in the steady state: measured displacement [m] in, force [N] and innovation [m] out.
+
+        Its poles are those of the estimate's error.
+        """
+        a, seen, row, gain = self._steady()
+        closed = a - np.outer(gain, seen @ a)
+        outputs = np.stack([row @ closed, -(seen @ a)])
+        return StateSpace(closed, gain[:, None], outputs, np.array([[row @ gain], [1.0]]), self.model.step)
+
+    def loop(self) -> StateSpace:
+        """Return the innovation loop, cut open: innovation [m] in, the displacement predicted from past corrections [m] out.
+
+        L(z) = H (z I - A)^-1 A K; the innovation is S = 1 / (1 + L) times the measured displacement.
+        """
+        a, seen, _, gain = self._steady()
+        return StateSpace(a, (a @ gain)[:, None], seen[None], np.zeros((1, 1)), self.model.step)
+
+    def _steady(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """A, H, the force's row and the gain of the live real states, in metres and newtons."""
+        a, seen, row, _ = self.model.matrices()
+        return a, seen * self.model.noise, row, self.gain[-1].T.ravel()[self.model.live]
 
     def _arrays(self) -> tuple[FloatArray, FloatArray, int, int, float]:
         model = self.model
@@ -219,7 +242,7 @@ def kalman_filter(model: AugmentedModel, longest_settling: int = LONGEST_SETTLIN
 def riccati(a: FloatArray, seen: FloatArray, q: FloatArray) -> FloatArray:
     """Return the steady covariance before the correction, for one measurement of unit noise, by structure-preserving doubling.
 
-    Each step covers twice the samples of the last (Chu, Fan, Lin and Wang 2004). Oscillators without damping have poles on the unit
+    Each step covers twice the samples of the last [chu2004]. Oscillators without damping have poles on the unit
     circle, where the ordered Schur form of the usual solution loses its order.
 
     Parameters
@@ -242,7 +265,7 @@ def riccati(a: FloatArray, seen: FloatArray, q: FloatArray) -> FloatArray:
             break
         if change <= 1e-14 * np.linalg.norm(covariance):
             return covariance / np.outer(size, size)
-    raise InputError("force model", "no steady Kalman gain", "modes that the displacement shows, each with noise")
+    raise InputError("force model", "no steady Kalman gain", "modes that are observable in the displacement, each driven by noise")
 
 
 def _corrected(predicted: FloatArray, seen: FloatArray) -> tuple[FloatArray, float, FloatArray]:

@@ -26,9 +26,9 @@ class ObserverFRF:
     observer : complex array, shape (n,) [N/m]
         Measured displacement to force.
     compensated : complex array, shape (n,) [-]
-        Times the machine's response from tip force to displacement: 1 where the observer is right.
+        The observer's response times the machine's from tip force to displacement: 1 where the observer is right.
     line : array, shape (j,) [rad/s]
-        Where the force of a steady cut has its lines.
+        Frequencies at which the force of a steady cut has its lines.
     at_line : complex array, shape (j,) [-]
         The compensated response there.
     """
@@ -50,12 +50,15 @@ class ObserverFRF:
         return float(np.max(np.abs(self.level[inside]))) if inside.any() else np.nan
 
     def usable(self, start: float, at_lines: bool = False, within: float = FLAT) -> tuple[float, float]:
-        """Return the band around or above `start` in which the compensated magnitude stays within 1 dB [rad/s]; NaN where there is none.
+        """Return the band around or above `start` in which the compensated magnitude stays flat [rad/s]; NaN where there is none.
 
         Parameters
         ----------
+        start : float [rad/s]
         at_lines : bool
             Look only where a steady cut has force: an oscillator is right at its own frequency.
+        within : float [dB]
+            Deviation that is allowed.
         """
         omega, level = (self.line, decibel(self.at_line)) if at_lines else (self.omega, self.level)
         good, above = np.abs(level) <= within, np.flatnonzero(omega >= start * (1.0 - 1e-9))
@@ -100,11 +103,11 @@ def observer_response(
     observer : AxisObserver
     omega : array, shape (n,) [rad/s]
     machine : complex array, shape (n,) [m/N]
-        From tip force to the flange's displacement as the sensor shows it: the true one where it is known, else the identified.
-    line, machine_at_line : arrays, shape (j,)
-        The same at the force's lines.
+        Response from tip force to the flange's displacement as the sensor shows it: the true one where it is known, else the identified.
+    line, machine_at_line : arrays, shape (j,) [rad/s], [m/N]
+        Frequencies of the force's lines, and the machine's response there.
     smoothed : bool
-        Given all samples instead of those before.
+        The estimate given all samples, instead of those before.
     """
     line = frozen(line)
     lag = _FAR if smoothed else 0

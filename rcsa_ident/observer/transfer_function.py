@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.rational import RationalFit, rational_fit
+from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.observer._kernels import modal_filter
 
@@ -28,9 +30,13 @@ class SampledModes:
     Parameters
     ----------
     decay : complex array, shape (m,) [-]
+        Poles in the z-plane, one of each conjugate pair.
     gain : complex array, shape (m,)
+        Output per state.
     through : float
+        Output per input at the same sample.
     step : float [s]
+        Time between samples.
     """
 
     decay: ComplexArray
@@ -48,6 +54,11 @@ class SampledModes:
         pairs = self.gain / (z - self.decay) + self.gain.conj() / (z - self.decay.conj())
         return np.sum(pairs, axis=1) + self.through
 
+    def state_space(self) -> StateSpace:
+        """Return the filter as a real state space in modal form."""
+        poles = PoleResidue(self.decay, self.gain[None], np.ones((self.decay.size, 1)), np.array([[self.through]]))
+        return replace(poles.state_space(), step=self.step)
+
     def init(self) -> FloatArray:
         """Return the state of a filter at rest, shape (2, m)."""
         return np.zeros((2, self.decay.size))
@@ -61,7 +72,7 @@ class SampledModes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TransferFunction:
-    """Rational function of the bilinear frequency 2 / step tan(omega step / 2), stable and strictly proper (the paper's eq. 18).
+    """Rational function of the bilinear frequency 2 / step tan(omega step / 2), stable and strictly proper ([inprocess], eq. 18).
 
     Parameters
     ----------
@@ -69,7 +80,7 @@ class TransferFunction:
         Flange displacement as the sensor shows it per tip force [m/N].
     step : float [s]
     band : two floats [rad/s]
-        Where the fit was asked to be good.
+        Frequencies between which the fit was asked to be good.
     flatness : float [dB]
         Largest deviation of its magnitude from the response that was given, in the band.
 
@@ -86,7 +97,7 @@ class TransferFunction:
 
     @property
     def order(self) -> int:
-        """n of eq. 18."""
+        """Degree n of the denominator ([inprocess], eq. 18)."""
         return self.fit.order
 
     def response(self, omega: FloatArray) -> ComplexArray:
@@ -99,7 +110,7 @@ class TransferFunction:
         Parameters
         ----------
         corner : float [rad/s]
-            Of `high_pass`.
+            Corner frequency of `high_pass`.
         """
         poles, rho = _high_pass_pole(corner, self.step)
         pole, residue = self.fit.pole, self.fit.residue[:, 0, 0]
@@ -127,15 +138,17 @@ def transfer_function(
     Parameters
     ----------
     omega : array, shape (n,) [rad/s]
-        Beyond the band on both sides, so that nothing odd happens there.
+        Frequencies that reach beyond the band on both sides, so that nothing odd happens there.
     receptance : complex array, shape (n,) [m/N]
         C31: absolute motion of the flange per force at the tip.
     step : float [s]
+        Time between samples.
     band : two floats [rad/s]
+        Frequencies between which the fit has to be good.
     sensor : complex array, shape (n,), optional
         Frequency response of the displacement sensor: bandwidth and delay.
     order : int, optional
-        By default the smallest that is good to the tolerance.
+        Number of poles; by default the smallest that is good to the tolerance.
     tolerance : float
         Relative rms misfit; outside the band it counts a twentieth.
 
@@ -176,10 +189,15 @@ def acceleration_filter(
     Parameters
     ----------
     corner : float [rad/s]
+        Corner frequency of the high-pass.
     step : float [s]
+        Time between samples.
     band : two floats [rad/s]
+        Frequencies between which the filter has to be good.
     ratio : complex array, shape (n,), optional
         Response of the displacement sensor over that of the accelerometer at `omega`, so that both arrive alike.
+    omega : array, shape (n,), optional [rad/s]
+        Frequencies of the fit; by default 400 from half the corner to a fifth above the band.
     """
     positive("corner", corner, "rad/s")
     if omega is None:

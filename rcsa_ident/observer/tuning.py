@@ -17,7 +17,7 @@ from rcsa_ident.observer.transfer_function import TransferFunction
 MARGIN = 1.0 / (10.0**0.005 - 1.0)
 #: Time in which an oscillator follows a change, in revolutions.
 RESPONSE_TURNS = 0.5
-#: The paper's walk does not forget; behind a high-pass it must, and this share of the band's lower end is nearly never.
+#: The walk of [inprocess] does not forget; behind a high-pass it must, and this share of the band's lower end is nearly never.
 BASELINE_LEAK = 0.1
 #: Intensity of the walk beside oscillators over that of a walk that has to follow everything.
 BESIDE = 0.1
@@ -32,9 +32,9 @@ class Tuning:
     noise_floor : float [m]
         Standard deviation of a displacement sample without any motion.
     bandwidth : float [rad/s]
-        Up to which the estimate shall follow the force.
+        Frequency up to which the estimate shall follow the force.
     response_time : float [s]
-        In which an oscillator's amplitude follows a change of the cut.
+        Time in which an oscillator's amplitude follows a change of the cut.
     """
 
     noise_floor: float
@@ -53,7 +53,7 @@ class Tuning:
         ----------
         transfer : TransferFunction
         leak : float [rad/s], optional
-            By default nearly none, as in the paper.
+            Rate at which the walk forgets; by default nearly none, as in [inprocess].
 
         Notes
         -----
@@ -75,6 +75,7 @@ class Tuning:
         ----------
         transfer : TransferFunction
         omega : array, shape (j,) [rad/s]
+            Those outside the band are left out.
 
         Notes
         -----
@@ -106,7 +107,7 @@ def harmonics(spindle_speed: float, teeth: int, band: tuple[float, float], run_o
     teeth : int
     band : two floats [rad/s]
     run_out : bool
-        Teeth are not alike: all multiples of the spindle's frequency, else those of the tooth-passing frequency.
+        True where teeth are not alike: all multiples of the spindle's frequency, else those of the tooth-passing frequency.
     """
     step = positive("spindle speed", spindle_speed, "rad/s") * (1 if run_out else teeth)
     return step * np.arange(np.ceil(band[0] / step - 1e-9), np.floor(band[1] / step + 1e-9) + 1.0)
@@ -116,7 +117,15 @@ class ObserverMethod(Protocol):
     """Which force model an observer has; an object that carries its settings."""
 
     def force_model(self, tuning: Tuning, transfer: TransferFunction, spindle_speed: float, teeth: int) -> ForceModel:
-        """Return the force model of one axis."""
+        """Return the force model of one axis.
+
+        Parameters
+        ----------
+        tuning : Tuning
+        transfer : TransferFunction
+        spindle_speed : float [rad/s]
+        teeth : int
+        """
         ...
 
     @property
@@ -147,17 +156,17 @@ class Resonators:
     colours_noise: ClassVar[bool] = True
 
     def force_model(self, tuning: Tuning, transfer: TransferFunction, spindle_speed: float, teeth: int) -> TeethResonators:
-        """Return the oscillators in the transfer function's band."""
+        """Return the oscillators in the transfer function's band (see `ObserverMethod`)."""
         return tuning.resonators(transfer, harmonics(spindle_speed, teeth, transfer.band, self.run_out))
 
 
 @dataclass(frozen=True, slots=True)
 class PaperWalk:
-    """The paper's random walk and white measurement noise: lags by the machine's own delay."""
+    """The random walk and white measurement noise of [inprocess], eq. 17: lags by the machine's own delay."""
 
     colours_noise: ClassVar[bool] = False
     response_turns: ClassVar[float] = RESPONSE_TURNS
 
     def force_model(self, tuning: Tuning, transfer: TransferFunction, spindle_speed: float, teeth: int) -> RandomWalk:
-        """Return the walk."""
+        """Return the walk (see `ObserverMethod`)."""
         return tuning.random_walk(transfer)

@@ -31,14 +31,15 @@ class WearIndicators:
     coefficient : array, shape (n, c) [N/m^2 of K_tc and K_rc, N/m of K_te and K_re]
         Least squares of each revolution by itself.
     standard_deviation : array, shape (n, c)
-        From what the model leaves of that revolution's lines.
+        As what the model leaves of that revolution's lines suggests.
     tracked, tracked_deviation : arrays, shape (n, c)
-        The same as a slow random walk, each given all revolutions.
+        Coefficients and standard deviations of a slow random walk, each given all revolutions.
     names : tuple of str
+        Of the c coefficients.
     separable : bool
         False where the lines in the band do not tell the coefficients from each other: then only sums of them mean something.
     condition : float
-        Of the scaled normal equations.
+        Condition number of the scaled normal equations.
     angle : float [rad]
         Immersion of tooth 1 at the first sample, up to a pitch.
     misfit : float [-]
@@ -91,11 +92,11 @@ def wear_indicators(
     step : float [s]
     cutter : Cutter
     conditions : CuttingConditions
-        With the spindle speed of the record.
+        The cut, with the spindle speed of the record.
     band : two floats [rad/s]
-        In which the force is known: only the teeth's harmonics in it are used.
+        Frequencies between which the force is known: only the teeth's harmonics there are used.
     edges : bool
-        With edge coefficients; else K_tc and K_rc alone.
+        Whether edge coefficients are found, too; else K_tc and K_rc alone.
     angle : float [rad], optional
         Immersion of tooth 1 at the first sample; by default found from the forces themselves.
     first : int

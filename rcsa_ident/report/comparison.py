@@ -109,11 +109,11 @@ def frf_comparison(
     ----------
     pairs : sequence of FrfPair
     names : (str, str)
-        Of the hammer's and of the other curve.
+        Names of the hammer's and of the other curve.
     band_hz : (float, float), optional
-        Where the machine was identified; outside is shaded.
+        Frequencies between which the machine was identified; outside is shaded.
     real_and_imaginary : bool
-        In place of magnitude and phase.
+        Draw these in place of magnitude and phase.
     """
     correlated = any(pair.correlation is not None for pair in pairs)
     rows, ratios = (3, (1.6, 1.0, 0.6)) if correlated else (2, (1.6, 1.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from html import escape
@@ -229,7 +230,7 @@ def _lengths(
 def _page(sheet: _Sheet, tooling: Tooling, nose: float, flange: float) -> str:
     cutter, assembly = tooling.cutter, tooling.assembly
     teeth = f"{cutter.teeth} teeth" if cutter.teeth > 1 else "1 tooth"
-    words = f"{teeth}, Ø{_figure(1e3 * cutter.diameter)}, helix {_figure(cutter.helix * 57.29577951308232)}°"
+    words = f"{teeth}, Ø{_figure(1e3 * cutter.diameter)}, helix {_figure(math.degrees(cutter.helix))}°"
     scale = "millimetres, 1:1"
     contact = assembly.contact
     joined = "tool and holder joined rigidly"

@@ -20,6 +20,7 @@ from matplotlib.ticker import MaxNLocator
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification.progress import BOTH, Stage, Step
 from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.units import to_hz
 
 #: Distinct for colour-blind readers, too (Okabe & Ito), and dark enough on white.
 COLOURS = {"X": "#0072B2", "Y": "#C8501A"}
@@ -27,10 +28,10 @@ STAGES = {
     Stage.SEARCH: ("genetic search", "#9aa5b1"),
     Stage.REFINE: ("refined candidates", "#0072B2"),
     Stage.NOISE: ("noise learned from the data", "#009E73"),
-    Stage.EXCHANGE: ("modes exchanged", "#CC79A7"),
+    Stage.EXCHANGE: ("modes added, merged or removed", "#CC79A7"),
     Stage.OTHER_AXIS: ("started from the other axis", "#E69F00"),
-    Stage.POLISH: ("both axes polished", "#C8501A"),
-    Stage.GROW: ("a mode beyond the evidence", "#56B4E9"),
+    Stage.POLISH: ("joint fit of both axes", "#C8501A"),
+    Stage.GROW: ("one mode more than the evidence supports", "#56B4E9"),
     Stage.GENERATION: ("best of each generation", "#0072B2"),
 }
 _TRUTH = "#1f2933"
@@ -97,7 +98,7 @@ def cross_frf(axis: AxisResult, tooling: Sequence[str], name: str) -> Figure:
     ----------
     axis : AxisResult
     tooling : sequence of str, length k
-        Of each cut.
+        Name of each cut's tooling.
     name : str
         X or Y.
     """
@@ -110,7 +111,7 @@ def cross_frf(axis: AxisResult, tooling: Sequence[str], name: str) -> Figure:
         for column, each in enumerate(names):
             order = np.flatnonzero(of == each)
             order = order[np.argsort(omega[order])]
-            frequency = omega[order] / (2.0 * np.pi)
+            frequency = to_hz(omega[order])
             top, bottom = grid[:, column]
             for ax, curve in ((top, lambda h: 1e6 * np.abs(h)), (bottom, lambda h: np.degrees(np.angle(h)))):
                 ax.plot(frequency, curve(value[order]), "o", ms=3.4, mfc="none", mec=COLOURS[name], mew=1.0, zorder=3, label="measured")
@@ -203,9 +204,9 @@ def tooltip_frf(
     tip : mapping of X or Y to complex array, shape (n,) [m/N]
     deviation : mapping of X or Y to (real, imaginary) standard deviations [m/N]
     truth : mapping of X or Y to complex array, shape (n,) [m/N]
-        Where it is known.
+        The true one, where it is known.
     band_hz : (low, high) [Hz]
-        That was identified; what lies outside is shaded.
+        Band that was identified; what lies outside is shaded.
     """
     figure, grid = _grid(2, len(tip), 4.8, (1.3, 1.0))
     with mpl.rc_context(_STYLE):

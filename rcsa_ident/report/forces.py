@@ -13,6 +13,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.observer.force import ForceEstimate
 from rcsa_ident.observer.response import FLAT, ObserverFRF, decibel
 from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS, _grid
+from rcsa_ident.units import to_hz
 
 
 def force_history(
@@ -26,7 +27,7 @@ def force_history(
     spindle_speed : float [rad/s]
     revolutions : float
     start : float [s], optional
-        By default the middle of the record.
+        Time of the first one drawn; by default they lie in the middle of the record.
     true : array, shape (n, a) [N], optional
         A measured or simulated force, with or without its mean as the estimate.
     """
@@ -58,12 +59,12 @@ def observer_frf(responses: Mapping[Dof, ObserverFRF], band: tuple[float, float]
     ----------
     responses : mapping of Dof to ObserverFRF
     band : two floats [rad/s]
-        In which forces are estimated; outside is shaded.
+        Frequencies between which forces are estimated; outside is shaded.
     """
     figure, grid = _grid(2, len(responses), 5.2, (1.0, 1.0))
     with mpl.rc_context(_STYLE):
         for column, (axis, response) in enumerate(responses.items()):
-            name, frequency = axis.upper(), response.omega / (2.0 * np.pi)
+            name, frequency = axis.upper(), to_hz(response.omega)
             top, bottom = grid[:, column]
             # a newton per micrometre is the size of these machines
             top.plot(frequency, decibel(response.observer) - 120.0, color=COLOURS[name])
@@ -72,7 +73,7 @@ def observer_frf(responses: Mapping[Dof, ObserverFRF], band: tuple[float, float]
             bottom.plot(frequency, response.level, color=COLOURS[name], lw=1.0, label="any frequency")
             if response.line.size:
                 bottom.plot(
-                    response.line / (2.0 * np.pi),
+                    to_hz(response.line),
                     decibel(response.at_line),
                     "o",
                     ms=4.0,
@@ -84,7 +85,7 @@ def observer_frf(responses: Mapping[Dof, ObserverFRF], band: tuple[float, float]
             bottom.set_ylim(-12.0, 6.0)
             bottom.set_xlabel("frequency [Hz]")
             for ax in (top, bottom):
-                low, high = (w / (2.0 * np.pi) for w in band)
+                low, high = (to_hz(w) for w in band)
                 ax.set_xlim(frequency[0], frequency[-1])
                 ax.axvspan(frequency[0], low, color="#9aa5b1", alpha=0.2, lw=0.0)
                 ax.axvspan(high, frequency[-1], color="#9aa5b1", alpha=0.2, lw=0.0)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident import __version__
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.parameters import JOINT
@@ -17,11 +16,12 @@ from rcsa_ident.identification.result import AxisResult, Identification
 from rcsa_ident.machining_setup import Campaign
 from rcsa_ident.report import figures
 from rcsa_ident.report.lobes import stability_figure
-from rcsa_ident.report.summaries import coefficient_rows, mode_rows, peak_row, recording_rows, two_digits
+from rcsa_ident.report.summaries import coefficient_rows, lobes_summary, mode_rows, peak_row, recording_rows, two_digits
 from rcsa_ident.signals.measurement import Reading
-from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.advice import Advice
+from rcsa_ident.units import to_hz
+from rcsa_ident.version import __version__
 
-_RPM = 30.0 / np.pi
 #: A logarithm that the data leave open by more than this is not told by them.
 UNTOLD = 0.5
 
@@ -43,15 +43,13 @@ class ToolingPage:
         Relative difference to the truth, where it is known.
     coverage : mapping of X or Y to float [-]
         Share of the true values (real and imaginary parts) within 2 standard deviations.
-    lobes : StabilityLobes or None
-    max_depth : float [m]
-    band : (array, array) or None [m]
-    best : sequence of (speed [rad/s], depth [m])
+    advice : Advice or None
+        Stability limits, and what is recommended within them.
     true_limit : array, shape (n,) [m], or None
     band_hz : (low, high) [Hz], or None
-        That was identified.
+        Band that was identified.
     conditions : str
-        Of the lobes, in words.
+        What the lobes hold for, in words.
     warnings : sequence of str
     """
 
@@ -63,10 +61,7 @@ class ToolingPage:
     truth: Mapping[str, ComplexArray] | None = None
     error: Mapping[str, float] = field(default_factory=dict)
     coverage: Mapping[str, float] = field(default_factory=dict)
-    lobes: StabilityLobes | None = None
-    max_depth: float = 0.01
-    band: tuple[FloatArray, FloatArray] | None = None
-    best: Sequence[tuple[float, float]] = ()
+    advice: Advice | None = None
     true_limit: FloatArray | None = None
     band_hz: tuple[float, float] | None = None
     conditions: str = ""
@@ -141,7 +136,7 @@ def _axis(name: str, part: AxisResult, tooling: Sequence[str], deviation: tuple[
         "part": part,
         "modes": mode_rows(part.modes, deviation),
         "residual": part.modes.residual.tolist(),
-        "band": (float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))) if omega.size else None,
+        "band": (float(to_hz(omega.min())), float(to_hz(omega.max()))) if omega.size else None,
         "points": omega.size,
         "figure": figures.svg(figures.cross_frf(part, tooling, name), f"cross{name}") if omega.size else "",
     }
@@ -170,15 +165,17 @@ def _range(value: float, std: float) -> tuple[float, float]:
 
 
 def _tooling(number: int, page: ToolingPage) -> dict[str, Any]:
-    lobes = page.lobes
+    found = None if page.advice is None else lobes_summary(page.advice)
     return {
         "page": page,
         "peaks": {axis: peak_row(page.frequency, value) for axis, value in page.tip.items()},
         "tip": figures.svg(figures.tooltip_frf(page.frequency, page.tip, page.deviation, page.truth, page.band_hz), f"tip{number}"),
         "lobes": ""
-        if lobes is None
-        else figures.svg(stability_figure(lobes, page.max_depth, page.band, page.best, page.true_limit), f"lobes{number}"),
-        "best": [{"rpm": s * _RPM, "mm": d * 1e3 if np.isfinite(d) else None} for s, d in page.best],
-        "anywhere": None if lobes is None or not np.isfinite(lobes.absolute_limit) else lobes.absolute_limit * 1e3,
-        "critical": None if lobes is None or not np.isfinite(lobes.absolute_frequency) else lobes.absolute_frequency / (2.0 * np.pi),
+        if page.advice is None
+        else figures.svg(
+            stability_figure(page.advice.lobes, page.advice.recommended, page.true_limit, usable=page.advice.usable), f"lobes{number}"
+        ),
+        "recommended": [] if found is None else found["recommended"],
+        "anywhere": None if found is None else found["absolute_limit_mm"],
+        "critical": None if found is None else found["absolute_frequency_hz"],
     }

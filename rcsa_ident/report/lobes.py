@@ -13,12 +13,13 @@ from matplotlib.figure import Figure
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS, _grid
+from rcsa_ident.stability.advice import OperatingPoint, UsableDepths
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.stability_map import StabilityMap
 from rcsa_ident.stability.surface_error import SurfaceError
 from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, Verdict
+from rcsa_ident.units import to_hz, to_rpm
 
-_RPM = 30.0 / np.pi
 _GREY, _GREEN, _RED = "#52606d", "#00704f", "#a33f12"
 #: Marker, colour and filling of a tested cut.
 _VERDICTS = {Verdict.STABLE: ("o", _GREEN, "none"), Verdict.CHATTER: ("X", _RED, _RED), Verdict.MARGINAL: ("D", "#b8860b", "none")}
@@ -40,7 +41,6 @@ class Panel(NamedTuple):
     ----------
     title : str
     lobes : StabilityLobes
-    max_depth : float [m]
     others : mapping of name to array, shape (n,) [m]
         Limits at the same speeds, as of idle FRFs.
     tested : Judged or None
@@ -48,59 +48,64 @@ class Panel(NamedTuple):
 
     title: str
     lobes: StabilityLobes
-    max_depth: float
     others: Mapping[str, FloatArray] = {}
     tested: Judged | None = None
 
 
 def stability_figure(
     lobes: StabilityLobes,
-    max_depth: float,
-    band: tuple[FloatArray, FloatArray] | None = None,
-    best: Sequence[tuple[float, float]] = (),
+    recommended: Sequence[OperatingPoint] = (),
     true_limit: FloatArray | None = None,
     tested: Judged | None = None,
     surface: SurfaceError | None = None,
     chart: StabilityMap | None = None,
+    usable: UsableDepths | None = None,
 ) -> Figure:
-    """Limit depth over spindle speed, the chatter frequency below, the best speeds marked.
+    """Stability limit and recommended depth over spindle speed, the recommended cuts marked, the chatter frequency below.
 
     Parameters
     ----------
     lobes : StabilityLobes
-    max_depth : float [m]
-        That was asked for; the cut is stable up to it where the limit is infinite.
-    band : (low, high) [m]
-    best : sequence of (speed [rad/s], depth [m])
+    recommended : sequence of OperatingPoint
+        Their depth is the limit less what a recommendation holds back.
     true_limit : array, shape (n,) [m]
-        Where it is known.
+        The true limit, where it is known.
     tested : Judged, optional
         Drawn over the lobes.
     surface : SurfaceError, optional
         Drawn below them.
     chart : StabilityMap, optional
         Tells the cuts that are stable above the first limit.
+    usable : UsableDepths, optional
+        The recommended depths; by default those of the lobes alone.
     """
     rows = (2.2, 1.0) if surface is None else (2.2, 1.0, 1.0)
     figure, grid = _grid(len(rows), 1, 4.6 if surface is None else 5.8, rows, sharey="none")
     top, bottom = grid[0, 0], grid[-1, 0]
     with mpl.rc_context(_STYLE):
-        ceiling = _ceiling(lobes, max_depth, tested)
+        max_depth, ceiling = lobes.max_depth, _ceiling(lobes, tested)
         if chart is not None:
             ceiling = 1e3 * float(chart.depth[-1])
-        _draw_limit(top, lobes, max_depth, ceiling, band, chart)
+        _draw_limit(top, lobes, ceiling, chart)
         if true_limit is not None:
             top.plot(
-                lobes.spindle_speed * _RPM, 1e3 * np.minimum(true_limit, max_depth), "--", color=_TRUTH, lw=1.1, label="from the true FRF"
+                to_rpm(lobes.spindle_speed), 1e3 * np.minimum(true_limit, max_depth), "--", color=_TRUTH, lw=1.1, label="from the true FRF"
             )
-        if np.isfinite(lobes.absolute_limit) and lobes.absolute_limit < max_depth:
+        if lobes.absolute_limit is not None and lobes.absolute_limit < max_depth:
             label = f"stable at any speed: {1e3 * lobes.absolute_limit:.2f} mm"
             top.axhline(1e3 * lobes.absolute_limit, color=_GREY, ls=":", lw=1.2, label=label)
-        for i, (best_speed, depth) in enumerate(best):
-            x, y = best_speed * _RPM, 1e3 * min(depth, max_depth)
-            top.plot(x, y, "v", color=_GREEN, ms=8.0, label="best speeds" if i == 0 else None)
-            text = f"{x:.0f} rev/min\n{y:.2f} mm" if depth <= max_depth else f"{x:.0f} rev/min"
-            top.annotate(text, (x, y), xytext=(0, 7), textcoords="offset points", ha="center", fontsize=8.5, color=_GREEN)
+        if recommended:
+            speed, depth = lobes.ordered().spindle_speed, lobes.ordered().recommended_depth()
+            if usable is not None:
+                speed, depth = usable.spindle_speed, usable.stable
+            top.plot(to_rpm(speed), 1e3 * depth, color=_GREEN, lw=1.1, label="recommended depth")
+        for point in recommended:
+            x, y = to_rpm(point.spindle_speed), 1e3 * point.depth
+            top.plot(x, y, "v", color=_GREEN, ms=8.0)
+            # above the limit, where no line crosses it
+            above = (x, min(1e3 * point.limit, 0.86 * ceiling))
+            text = f"{x:.0f} rev/min\n{y:.2f} mm"
+            top.annotate(text, above, xytext=(0, 6), textcoords="offset points", ha="center", fontsize=8.5, color=_GREEN)
         if tested is not None:
             _draw_tested(top, tested)
         top.set_ylim(0.0, ceiling)
@@ -111,47 +116,71 @@ def stability_figure(
         if surface is not None:
             _draw_surface(grid[2, 0], surface)
         bottom.set_xlabel("spindle speed [rev/min]")
-        speed = lobes.spindle_speed * _RPM
+        speed = to_rpm(lobes.spindle_speed)
         bottom.set_xlim(np.min(speed), np.max(speed))
     return figure
 
 
-def _ceiling(lobes: StabilityLobes, max_depth: float, tested: Judged | None) -> float:
-    limit = 1e3 * np.minimum(lobes.limit_depth, max_depth)
-    ceiling = 1e3 * max_depth if np.any(lobes.stable) else min(1e3 * max_depth, 1.25 * float(np.max(limit)))
+def _ceiling(lobes: StabilityLobes, tested: Judged | None) -> float:
+    deepest = 1e3 * lobes.max_depth
+    ceiling = deepest if np.any(lobes.stable) else min(deepest, 1.25e3 * float(np.max(lobes.nominal)))
     return ceiling if tested is None else max(ceiling, 1.08e3 * float(tested.cuts.axial_depth.max()))
 
 
-def _draw_limit(
-    ax: Axes,
-    lobes: StabilityLobes,
-    max_depth: float,
-    ceiling: float,
-    band: tuple[FloatArray, FloatArray] | None = None,
-    chart: StabilityMap | None = None,
-) -> None:
-    speed, limit = lobes.spindle_speed * _RPM, 1e3 * np.minimum(lobes.limit_depth, max_depth)
+def _draw_limit(ax: Axes, lobes: StabilityLobes, ceiling: float, chart: StabilityMap | None = None, bands: bool = True) -> None:
+    max_depth, band = lobes.max_depth, lobes.band if bands else None
+    speed, limit = to_rpm(lobes.spindle_speed), 1e3 * np.minimum(lobes.limit_depth, max_depth)
     if chart is None:
         ax.fill_between(speed, 0.0, limit, color="#009E73", alpha=0.13, lw=0)
         ax.fill_between(speed, limit, ceiling, color="#C8501A", alpha=0.10, lw=0)
     else:
-        # a cut of no depth is stable
-        depth = 1e3 * np.concatenate([[0.0], chart.depth])
-        growth = np.concatenate([np.minimum(chart.growth[:, :1], -0.1), chart.growth], axis=1).T
-        ax.contourf(chart.spindle_speed * _RPM, depth, growth, [-np.inf, 0.0, np.inf], colors=["#009E73", "#C8501A"], alpha=0.13)
-        ax.contour(chart.spindle_speed * _RPM, depth, growth, [0.0], colors=[_GREY], linewidths=0.9)
+        _draw_map(ax, chart)
     if band is not None:
         low, high = (1e3 * np.minimum(edge, max_depth) for edge in band)
-        ax.fill_between(speed, low, high, color=COLOURS["X"], alpha=0.35, lw=0, label="95 % of what the records leave open")
+        ax.fill_between(speed, low, high, color=COLOURS["X"], alpha=0.35, lw=0, label="95 % uncertainty band")
     ax.plot(speed, limit, color=COLOURS["X"], label="stability limit")
-    if lobes.flip is not None and np.any(lobes.flip):
+    if np.any(lobes.flip):
         ax.plot(speed[lobes.flip], limit[lobes.flip], "o", color="#CC79A7", ms=3.5, label="by period doubling")
+    _name_sides(ax)
+
+
+def _name_sides(ax: Axes) -> None:
     ax.text(0.008, 0.97, "chatter", transform=ax.transAxes, va="top", color=_RED, fontsize=9.5, style="italic")
     ax.text(0.008, 0.03, "stable", transform=ax.transAxes, va="bottom", color=_GREEN, fontsize=9.5, style="italic")
 
 
+def _draw_map(ax: Axes, chart: StabilityMap) -> None:
+    # a cut of no depth is stable
+    depth = 1e3 * np.concatenate([[0.0], chart.depth])
+    growth = np.concatenate([np.minimum(chart.growth[:, :1], -0.1), chart.growth], axis=1).T
+    ax.contourf(to_rpm(chart.spindle_speed), depth, growth, [-np.inf, 0.0, np.inf], colors=["#009E73", "#C8501A"], alpha=0.13)
+    ax.contour(to_rpm(chart.spindle_speed), depth, growth, [0.0], colors=[_GREY], linewidths=0.9)
+
+
+def map_figure(chart: StabilityMap) -> Figure:
+    """Stable and unstable cuts over spindle speed and depth."""
+    figure, grid = _grid(1, 1, 3.6)
+    with mpl.rc_context(_STYLE):
+        _draw_map(grid[0, 0], chart)
+        _name_sides(grid[0, 0])
+        grid[0, 0].set_ylabel("axial depth [mm]")
+        grid[0, 0].set_xlabel("spindle speed [rev/min]")
+        grid[0, 0].set_ylim(0.0, 1e3 * float(chart.depth[-1]))
+    return figure
+
+
+def surface_figure(surface: SurfaceError) -> Figure:
+    """Surface location error over spindle speed."""
+    figure, grid = _grid(1, 1, 3.0)
+    with mpl.rc_context(_STYLE):
+        _draw_surface(grid[0, 0], surface)
+        grid[0, 0].set_xlabel("spindle speed [rev/min]")
+        grid[0, 0].legend(loc="upper right")
+    return figure
+
+
 def _draw_tested(ax: Axes, tested: Judged) -> None:
-    speed, depth = tested.cuts.spindle_speed * _RPM, 1e3 * tested.cuts.axial_depth
+    speed, depth = to_rpm(tested.cuts.spindle_speed), 1e3 * tested.cuts.axial_depth
     for verdict, (marker, colour, filling) in _VERDICTS.items():
         seen = tested.cuts.seen(verdict)
         if seen.any():
@@ -162,7 +191,7 @@ def _draw_tested(ax: Axes, tested: Judged) -> None:
 
 def _told(tally: Tally) -> str:
     """The four cases in one line."""
-    words = f"{tally.stable_stable + tally.chatter_chatter} of {tally.decided} tested cuts told right"
+    words = f"{tally.stable_stable + tally.chatter_chatter} of {tally.decided} tested cuts classified correctly"
     wrong = [
         f"{count} {what}"
         for count, what in ((tally.stable_chatter, "unexpected chatter"), (tally.chatter_stable, "stable above the limit"))
@@ -173,7 +202,7 @@ def _told(tally: Tally) -> str:
 
 def _draw_chatter(ax: Axes, lobes: StabilityLobes) -> None:
     order = np.argsort(lobes.spindle_speed)
-    speed, chatter = lobes.spindle_speed[order] * _RPM, lobes.chatter_frequency[order] / (2.0 * np.pi)
+    speed, chatter = to_rpm(lobes.spindle_speed[order]), to_hz(lobes.chatter_frequency[order])
     # another lobe or another mode: no line between them
     jumps = np.abs(np.diff(chatter, prepend=chatter[0])) > 0.03 * chatter
     chatter[jumps] = np.nan
@@ -182,7 +211,7 @@ def _draw_chatter(ax: Axes, lobes: StabilityLobes) -> None:
 
 
 def _draw_surface(ax: Axes, surface: SurfaceError) -> None:
-    speed, error = surface.spindle_speed * _RPM, 1e6 * surface.error
+    speed, error = to_rpm(surface.spindle_speed), 1e6 * surface.error
     ax.fill_between(speed, error.min(axis=1), error.max(axis=1), color="#CC79A7", alpha=0.35, lw=0, label="over the depth")
     ax.plot(speed, error.mean(axis=1), color="#CC79A7", label="mean")
     ax.axhline(0.0, color=_GREY, lw=0.8)
@@ -202,11 +231,11 @@ def cases_figure(panels: Sequence[Panel]) -> Figure:
         grid = figure.subplots(rows, cols, squeeze=False)
         labels: dict[str, Artist] = {}
         for ax, panel in zip(grid.ravel(), panels, strict=False):
-            ceiling = _ceiling(panel.lobes, panel.max_depth, panel.tested)
-            _draw_limit(ax, panel.lobes, panel.max_depth, ceiling)
-            speed = panel.lobes.spindle_speed * _RPM
+            ceiling = _ceiling(panel.lobes, panel.tested)
+            _draw_limit(ax, panel.lobes, ceiling, bands=False)
+            speed = to_rpm(panel.lobes.spindle_speed)
             for (name, limit), colour in zip(panel.others.items(), (_TRUTH, *_CURVES[2:]), strict=False):
-                ax.plot(speed, 1e3 * np.minimum(limit, panel.max_depth), "--", color=colour, lw=1.1, label=name)
+                ax.plot(speed, 1e3 * np.minimum(limit, panel.lobes.max_depth), "--", color=colour, lw=1.1, label=name)
             title = panel.title
             if panel.tested is not None:
                 _draw_tested(ax, panel.tested)
@@ -222,123 +251,6 @@ def cases_figure(panels: Sequence[Panel]) -> Figure:
         for ax in grid[:, 0]:
             ax.set_ylabel("axial depth [mm]")
         figure.legend(list(labels.values()), list(labels), loc="outside upper center", ncols=5, fontsize=9.0, frameon=False)
-    return figure
-
-
-class Depths(NamedTuple):
-    """Depths over speed of one tooling, each shape (n,): speeds [rad/s], depths [m], removal rate [m^3/s]."""
-
-    spindle_speed: FloatArray
-    limit: FloatArray
-    stable: FloatArray
-    by_power: FloatArray
-    by_torque: FloatArray
-    depth: FloatArray
-    removal_rate: FloatArray
-
-
-class Mark(NamedTuple):
-    """A cut to point at: speed [rad/s], depth [m], removal rate [m^3/s], what it is."""
-
-    spindle_speed: float
-    depth: float
-    removal_rate: float
-    text: str
-
-
-def usable_figure(depths: Depths, marks: Sequence[Mark] = (), planned: Sequence[Mark] = (), common: FloatArray | None = None) -> Figure:
-    """How deep one may cut and what stands against more, the removal rate below.
-
-    Parameters
-    ----------
-    depths : Depths
-    marks : sequence of Mark
-        Recommended cuts.
-    planned : sequence of Mark
-        Cuts that somebody wants to make.
-    common : array, shape (n,) [m], optional
-        What is stable on all machines that the records allow.
-    """
-    figure, grid = _grid(2, 1, 5.2, (2.0, 1.0), sharey="none")
-    top, bottom = grid[:, 0]
-    speed = depths.spindle_speed * _RPM
-    limit, depth = 1e3 * depths.limit, 1e3 * depths.depth
-    ceiling = 1.18 * float(max(limit.max(), *(1e3 * mark.depth for mark in planned), 1e-6))
-    with mpl.rc_context(_STYLE):
-        top.fill_between(speed, 0.0, depth, color="#009E73", alpha=0.16, lw=0, label="usable")
-        top.fill_between(speed, limit, ceiling, color="#C8501A", alpha=0.10, lw=0)
-        for values, colour, name in ((depths.by_power, "#CC79A7", "power"), (depths.by_torque, "#8c6d00", "torque")):
-            curve = 1e3 * values
-            if np.any(curve < limit):
-                top.plot(speed, np.where(curve < ceiling, curve, np.nan), color=colour, lw=1.3, label=f"{name} ends here")
-                top.fill_between(speed, np.minimum(curve, limit), limit, color=colour, alpha=0.13, lw=0)
-        if common is not None:
-            top.plot(speed, 1e3 * common, ":", color=_TRUTH, lw=1.2, label="stable on all machines that the records allow")
-        if np.any(np.abs(depths.stable - depths.limit) > 1e-9):
-            top.plot(speed, 1e3 * depths.stable, color=_GREEN, lw=1.1, label="stable with tolerance and reserve")
-        top.plot(speed, limit, color=COLOURS["X"], label="stability limit")
-        for group, marker, colour, name in ((marks, "v", _GREEN, "highest removal"), (planned, "s", _RED, "planned")):
-            for i, mark in enumerate(group):
-                x, y = mark.spindle_speed * _RPM, 1e3 * mark.depth
-                top.plot(x, y, marker, color=colour, ms=7.0, zorder=5, label=name if i == 0 else None)
-                bottom.plot(x, 6e7 * mark.removal_rate, marker, color=colour, ms=6.0, zorder=5)
-                _beside(top, x, y, mark.text, colour, speed)
-        top.set_ylim(0.0, ceiling)
-        top.set_ylabel("axial depth [mm]")
-        figure.legend(*top.get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=9.0, frameon=False)
-        bottom.plot(speed, 6e7 * depths.removal_rate, color=_GREEN)
-        bottom.set_ylim(bottom=0.0)
-        bottom.set_ylabel("removal [cm³/min]")
-        bottom.set_xlabel("spindle speed [rev/min]")
-        bottom.set_xlim(speed.min(), speed.max())
-    return figure
-
-
-def _beside(ax: Axes, x: float, y: float, text: str, colour: str, speed: FloatArray) -> None:
-    """Write beside a mark, away from the nearer end of the axis."""
-    right = x < speed.min() + 0.8 * np.ptp(speed)
-    ax.annotate(
-        text,
-        (x, y),
-        xytext=(8 if right else -8, 4),
-        textcoords="offset points",
-        ha="left" if right else "right",
-        fontsize=8.5,
-        color=colour,
-    )
-
-
-def comparison_figure(curves: Mapping[str, Depths], marks: Mapping[str, Mark]) -> Figure:
-    """Usable depth and removal rate of several toolings or stickouts over speed.
-
-    Parameters
-    ----------
-    curves : mapping of name to Depths
-    marks : mapping of name to Mark
-        The best cut of each.
-    """
-    figure, grid = _grid(2, 1, 5.6, (1.4, 1.0), sharey="none")
-    top, bottom = grid[:, 0]
-    with mpl.rc_context(_STYLE):
-        for i, (name, depths) in enumerate(curves.items()):
-            colour, dashes = _CURVES[i % len(_CURVES)], ("-", "--", ":")[i // len(_CURVES) % 3]
-            speed = depths.spindle_speed * _RPM
-            top.plot(speed, 1e3 * depths.limit, dashes, color=colour, lw=0.8, alpha=0.6)
-            top.plot(speed, 1e3 * depths.depth, dashes, color=colour, label=name.replace("$", r"\$"))
-            bottom.plot(speed, 6e7 * depths.removal_rate, dashes, color=colour)
-            if name in marks:
-                mark = marks[name]
-                top.plot(mark.spindle_speed * _RPM, 1e3 * mark.depth, "v", color=colour, ms=7.0, zorder=5)
-                bottom.plot(mark.spindle_speed * _RPM, 6e7 * mark.removal_rate, "v", color=colour, ms=7.0, zorder=5)
-                _beside(bottom, mark.spindle_speed * _RPM, 6e7 * mark.removal_rate, mark.text, colour, speed)
-            bottom.set_xlim(speed.min(), speed.max())
-        top.set_ylim(bottom=0.0)
-        top.set_ylabel("usable depth [mm]\n(thin: stability alone)")
-        bottom.set_ylim(bottom=0.0)
-        bottom.margins(y=0.15)
-        bottom.set_ylabel("removal [cm³/min]")
-        bottom.set_xlabel("spindle speed [rev/min]")
-        figure.legend(*top.get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=9.0, frameon=False)
     return figure
 
 

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.force import REFERENCE_RUNOUT, ForceCoefficient, ForceTerm
+from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.uncertain import UncertainReceptance
+from rcsa_ident.errors import InputError
 from rcsa_ident.signals.measurement import Reading
-
-_RPM = 30.0 / np.pi
+from rcsa_ident.stability.advice import Advice, OperatingPoint, PlannedCut
+from rcsa_ident.stability.result import StabilityLobes
+from rcsa_ident.stability.tested_cuts import Tally
+from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +50,7 @@ def recording_rows(readings: Iterable[Reading]) -> list[RecordingRow]:
     rows = []
     for reading in readings:
         verdict, found = reading.verdict, reading.measurement
-        common = (reading.cut_id, reading.tooling, verdict.usable, verdict.reasons, verdict.notes, reading.programmed_speed * _RPM)
+        common = (reading.cut_id, reading.tooling, verdict.usable, verdict.reasons, verdict.notes, to_rpm(reading.programmed_speed))
         if found is None:
             rows.append(RecordingRow(*common))
             continue
@@ -54,7 +60,7 @@ def recording_rows(readings: Iterable[Reading]) -> list[RecordingRow]:
             if lines.omega.size
         }
         count = sum(lines.omega.size for lines in found.axes.values())
-        rows.append(RecordingRow(*common, found.spindle_speed * _RPM, count, ratios))
+        rows.append(RecordingRow(*common, to_rpm(found.spindle_speed), count, ratios))
     return rows
 
 
@@ -87,12 +93,10 @@ def mode_rows(modes: ModalModel, deviation: tuple[FloatArray, FloatArray] | None
         Standard deviations of natural frequencies [rad/s] and damping ratios, in the modes' order.
     """
     order = np.argsort(modes.omega_n)
-    deviations = (
-        [(None, None)] * order.size if deviation is None else [(d / (2.0 * np.pi), 100.0 * z) for d, z in zip(*deviation, strict=True)]
-    )
+    deviations = [(None, None)] * order.size if deviation is None else [(to_hz(d), 100.0 * z) for d, z in zip(*deviation, strict=True)]
     return [
         ModeRow(
-            float(modes.omega_n[n] / (2.0 * np.pi)),
+            float(to_hz(modes.omega_n[n])),
             float(100.0 * modes.zeta[n]),
             complex(modes.phi[n, 0]),
             complex(modes.phi[n, 1]),
@@ -144,3 +148,142 @@ def two_digits(std: float, value: float | None = None) -> str:
     """Return a standard deviation with two digits and no exponent, below a millionth 0; or a value with as many places as it."""
     places = max(0, 1 - int(np.floor(np.log10(std)))) if std > 1e-6 else 0 if value is None else 6
     return f"{std if value is None else value:.{places}f}"
+
+
+def lobes_summary(advice: Advice) -> dict[str, Any]:
+    """Return what is worth knowing of stability limits without reading the curve; None where there is nothing to tell.
+
+    The stability limit is where chatter begins; the recommended depth is the limit less what a recommendation holds back.
+    """
+    lobes = advice.lobes
+    return {
+        "method": lobes.method,
+        "absolute_limit_mm": finite(lobes.absolute_limit, 1e3),
+        "absolute_frequency_hz": None if lobes.absolute_frequency is None else to_hz(lobes.absolute_frequency),
+        "best_speeds": [
+            {
+                "spindle_speed_rpm": to_rpm(pocket.spindle_speed, 6),
+                "limit_depth_mm": finite(pocket.limit_depth, 1e3),
+                "recommended_depth_mm": 1e3 * pocket.recommended_depth,
+            }
+            for pocket in lobes.best_speeds(recommended=advice.usable.stable)
+        ],
+        "recommended": [_recommended(point, lobes) for point in advice.recommended],
+        "flip_speeds": int(lobes.flip.sum()),
+        "tested": None if advice.tested is None else tally_summary(advice.tested),
+    }
+
+
+def lobes_curves(advice: Advice) -> dict[str, Any]:
+    """Return stability limits over speed; None belongs to a cut that is stable up to the depth that was asked for."""
+    lobes, band = advice.lobes, advice.lobes.band
+    return {
+        "spindle_speed_rpm": to_rpm(lobes.spindle_speed, 6).tolist(),
+        "limit_depth_mm": _finite_list(lobes.limit_depth * 1e3),
+        "limit_depth_low_mm": None if band is None else _finite_list(band[0] * 1e3),
+        "limit_depth_high_mm": None if band is None else _finite_list(band[1] * 1e3),
+        "recommended_depth_mm": (1e3 * advice.usable.stable).tolist(),
+        "chatter_frequency_hz": _finite_list(to_hz(lobes.chatter_frequency)),
+        "lobe": [None if n < 0 else n for n in lobes.lobe.tolist()],
+        "flip": lobes.flip.tolist(),
+    }
+
+
+def tally_summary(tally: Tally) -> dict[str, Any]:
+    """Return how many tested cuts were told right."""
+    return asdict(tally) | {"share_right": finite(tally.share_right)}
+
+
+def advice_summary(advice: Advice) -> dict[str, Any]:
+    """Return which cuts are recommended, the speeds for a depth, and how planned cuts stand."""
+    common = advice.common
+    return {
+        "tooling": advice.tooling,
+        "stickout_mm": None if advice.stickout is None else advice.stickout * 1e3,
+        "lowest_limit_mm": float(advice.lobes.nominal.min()) * 1e3,
+        "common_stable_depth_mm": None if common is None else float(common.min()) * 1e3,
+        "highest_removal": [_point(point, advice.lobes) for point in advice.recommended],
+        "windows": [
+            {
+                "from_rpm": to_rpm(w.low, 6),
+                "to_rpm": to_rpm(w.high, 6),
+                "best_rpm": to_rpm(w.best, 6),
+                "allowed_mm": w.allowed * 1e3,
+            }
+            for w in advice.windows
+        ],
+        "planned": [_planned(cut) for cut in advice.planned],
+    }
+
+
+def _recommended(point: OperatingPoint, lobes: StabilityLobes) -> dict[str, Any]:
+    return {
+        "spindle_speed_rpm": to_rpm(point.spindle_speed, 6),
+        "recommended_depth_mm": point.depth * 1e3,
+        "limit_depth_mm": None if point.limit >= lobes.max_depth else point.limit * 1e3,
+    }
+
+
+def _point(point: OperatingPoint, lobes: StabilityLobes) -> dict[str, Any]:
+    return _recommended(point, lobes) | {
+        "axial_depth_mm": point.depth * 1e3,
+        "removal_rate_cm3_per_min": None if point.removal_rate is None else to_cm3_per_min(point.removal_rate),
+        "power_kw": None if point.power is None else point.power * 1e-3,
+        "torque_nm": point.torque,
+        "bound": str(point.bound),
+    }
+
+
+def _planned(cut: PlannedCut) -> dict[str, Any]:
+    return {
+        "spindle_speed_rpm": to_rpm(cut.spindle_speed, 6),
+        "axial_depth_mm": cut.depth * 1e3,
+        "stable": cut.stable,
+        "limit_depth_mm": finite(cut.limit, 1e3),
+        "robust_limit_mm": cut.robust_limit * 1e3,
+        "margin": finite(cut.margin),
+        "chatter_frequency_hz": None if cut.chatter_frequency is None else to_hz(cut.chatter_frequency),
+        "slower_rpm": None if cut.slower is None else to_rpm(cut.slower, 6),
+        "faster_rpm": None if cut.faster is None else to_rpm(cut.faster, 6),
+        "probability": cut.probability,
+        "load": finite(cut.load),
+        "power_kw": cut.power * 1e-3,
+        "torque_nm": cut.torque,
+        "removal_rate_cm3_per_min": to_cm3_per_min(cut.removal_rate),
+    }
+
+
+def frf_summary(receptance: UncertainReceptance, coordinates: Sequence[Coordinate]) -> dict[str, Any]:
+    """Return direct receptances over frequency, axis by axis, with standard deviations where there are some [m/N].
+
+    Parameters
+    ----------
+    receptance : UncertainReceptance
+    coordinates : sequence of Coordinate
+        Translations, one for each axis.
+
+    Raises
+    ------
+    InputError
+        If a receptance is not finite.
+    """
+    deviation = receptance.deviation()
+    axes = {}
+    for coordinate in coordinates:
+        real, imaginary = deviation.get((coordinate, coordinate), (None, None))
+        values = receptance.between(str(coordinate), str(coordinate))
+        parts = {"re": values.real, "im": values.imag, "re_std": real, "im_std": imaginary}
+        if not all(part is None or np.all(np.isfinite(part)) for part in parts.values()):
+            raise InputError("tooling", "a receptance that is not finite", "a tooling whose receptance is finite at every frequency")
+        axes[coordinate.dof.upper()] = {key: None if part is None else part.tolist() for key, part in parts.items()}
+    return {"frequency_hz": np.round(to_hz(receptance.omega), 9).tolist(), "axes": axes}
+
+
+def finite(value: float | None, unit: float = 1.0) -> float | None:
+    """Return a number in a unit, None where it is not known or not finite."""
+    return None if value is None or not np.isfinite(value) else value * unit
+
+
+def _finite_list(values: FloatArray) -> list[float | None]:
+    known: list[float | None] = values.tolist()
+    return known if np.all(np.isfinite(values)) else [finite(value) for value in values.tolist()]

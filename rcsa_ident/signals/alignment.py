@@ -23,6 +23,10 @@ def align(cut: ComplexArray, air: ComplexArray, teeth: int, highest: int = 16) -
     Parameters
     ----------
     cut, air : complex arrays, shape (orders, axes) [m]
+        Lines of both records, orders from 0.
+    teeth : int
+    highest : int
+        Highest order that is looked at.
 
     Returns
     -------
@@ -63,7 +67,9 @@ def trigger_edge(recording: Recording, speed: float) -> tuple[float, float] | No
 
     Parameters
     ----------
+    recording : Recording
     speed : float [rad/s]
+        Spindle speed, as found in the record.
 
     Returns
     -------
@@ -98,6 +104,11 @@ def angle_to_air(cut: SteadyRecord, air: SteadyRecord, teeth: int) -> tuple[floa
     """Return the angle by which the air cut must be turned to lie under the cut, and its standard deviation [rad].
 
     From the triggers where both recordings have one, else from the flange's profile.
+
+    Parameters
+    ----------
+    cut, air : SteadyRecord
+    teeth : int
     """
     edges = trigger_edge(cut.recording, cut.spindle_speed), trigger_edge(air.recording, air.spindle_speed)
     if edges[0] is None or edges[1] is None:
@@ -116,6 +127,13 @@ def trigger_delay(recording: Recording, speed: float, teeth: int) -> tuple[float
     Where it is not, the time is that of the edge: the delay is later by the angle, the same in all cuts of a clamping. With
     several pulses a turn both are known only up to the time between them, which is enough where a whole number of teeth
     passes in it. None without a trigger that helps.
+
+    Parameters
+    ----------
+    recording : Recording
+    speed : float [rad/s]
+        Spindle speed, as found in the record.
+    teeth : int
     """
     edge = trigger_edge(recording, speed)
     sensor = None if edge is None else _trigger(recording)

@@ -1,4 +1,4 @@
-"""Lines of the cross FRF, tip force to flange displacement, and their estimators."""
+"""Lines of the cross FRF, tip force to flange displacement, and their estimators: H1, H2 and coherence are those of [bendat2010]."""
 
 from __future__ import annotations
 
@@ -79,8 +79,11 @@ class Estimator(Protocol):
 
         Parameters
         ----------
+        cut : SteadyRecord
+        air : SteadyRecord or None
+            The air cut, where there is one.
         angle : float [rad]
-            By which the air cut must be turned to lie under the cut.
+            Angle by which the air cut must be turned to lie under the cut.
         order : array of int, shape (n,)
         force : complex array, shape (n, axes) [N]
             Without zeros.
@@ -124,7 +127,7 @@ class LineEstimator:
 
 @dataclass(frozen=True, slots=True)
 class AirCorrectedSpectra:
-    """The paper's estimator: spectra averaged over segments, those of the air cut subtracted (eqs. 8 and 16).
+    """Spectra averaged over segments [welch1967], those of the air cut subtracted ([inprocess], eqs. 8 and 16).
 
     What cut and air cut share at an order goes only as far as it is uncorrelated with what the force does there; at the
     few harmonics where the flange's roundness reaches them this leaves a bias that `LineEstimator` does not have.
@@ -166,12 +169,29 @@ class AirCorrectedSpectra:
 
 
 def turned_air(air: SteadyRecord, angle: float, highest: int) -> tuple[ComplexArray, FloatArray]:
-    """Return an air cut's lines turned by an angle and their variance, orders 0..highest; 0 where the record has no such order."""
+    """Return an air cut's lines turned by an angle and their variance, orders 0..highest; 0 where there is no such order.
+
+    Parameters
+    ----------
+    air : SteadyRecord
+    angle : float [rad]
+    highest : int
+        Highest order that is returned.
+    """
     return turned(air.flange, air.variance, angle, highest)
 
 
 def turned(lines: ComplexArray, noise: FloatArray, angle: float, highest: int) -> tuple[ComplexArray, FloatArray]:
-    """Return lines (orders, ...) turned by an angle, and their variance, orders 0..highest; 0 where there is no such order."""
+    """Return lines turned by an angle, and their variance, orders 0..highest; 0 where there is no such order.
+
+    Parameters
+    ----------
+    lines : complex array, shape (orders, ...)
+    noise : array of the same shape
+        Their variance.
+    angle : float [rad]
+    highest : int
+    """
     rest = [(0, 0)] * (lines.ndim - 1)
     missing = max(highest + 1 - lines.shape[0], 0)
     amplitude = np.pad(lines, [(0, missing), *rest])[: highest + 1]
@@ -203,10 +223,15 @@ def hv(displacement: ComplexArray, force: ComplexArray) -> ComplexArray:
 
 
 def air_corrected(displacement: ComplexArray, force: ComplexArray, air: ComplexArray) -> ComplexArray:
-    """Return (S_dd - S_aa) / (S_fd - S_fa), the paper's eqs. 8 and 16, with S_fd = E[F D*].
+    """Return (S_dd - S_aa) / (S_fd - S_fa) with S_fd = E[F D*] ([inprocess], eqs. 8 and 16).
 
     Spectra are subtracted, not lines: what the air cut shares with the cut is only taken out in the mean, which is
     exact where both are uncorrelated.
+
+    Parameters
+    ----------
+    displacement, force, air : complex arrays, shape (segments, ...) [m], [N], [m]
+        Spectra of the segments of a cut, of its force and of its air cut.
     """
     return (_mean(displacement, displacement) - _mean(air, air)) / (_mean(force, displacement) - _mean(force, air))
 

@@ -14,6 +14,7 @@ from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
 from rcsa_ident.remarks import Remark
+from rcsa_ident.shown import Shown
 from rcsa_ident.signals.alignment import angle_to_air, trigger_delay
 from rcsa_ident.signals.frf import AxisLines, Estimator, LineEstimator, turned_air
 from rcsa_ident.signals.recording import Recording
@@ -28,9 +29,7 @@ WEAKEST_FORCE = 1e-3
 _AIR_BEYOND = 1.02
 DEFAULT_ESTIMATOR = LineEstimator()
 #: Note on a cut without an air cut.
-NO_AIR = Remark(
-    RecordCode.NO_AIR_CUT, "no air cut: run-out and roundness of the flange are left in the lines that the teeth share with them"
-)
+NO_AIR = Remark(RecordCode.NO_AIR_CUT, "no air cut: run-out and roundness of the flange remain in the lines at the tooth-passing harmonics")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,8 +39,9 @@ class CutMeasurement:
     Parameters
     ----------
     cut_id, tooling : str
+        Name of the cut and of its tooling.
     spindle_speed : float [rad/s]
-        From the record.
+        As found in the record.
     axes : mapping of Dof to AxisLines
     alignment_std : float [rad]
         Standard deviation of the angle between cut and air cut; 0 without an air cut.
@@ -60,8 +60,8 @@ class CutMeasurement:
     tooth_angle_known: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
+@dataclass(frozen=True, slots=True, repr=False)
+class Reading(Shown):
     """A cut whose recordings were read: their verdict and, where they are usable, the measurement.
 
     Parameters
@@ -71,7 +71,7 @@ class Reading:
     verdict : Verdict
     measurement : CutMeasurement or None
     spindle_speed : float or None [rad/s]
-        From the record, also of one that is not usable, unless nothing can be told of it.
+        As found in the record, also in one that is not usable, unless nothing can be told of it.
     harmonics : mapping of Dof to int
         Multiples of the tooth-passing frequency, of an air cut of the spindle's, that stand above the noise beside them.
     """
@@ -83,6 +83,10 @@ class Reading:
     measurement: CutMeasurement | None = None
     spindle_speed: float | None = None
     harmonics: Mapping[Dof, int] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        lines = 0 if self.measurement is None else sum(each.omega.size for each in self.measurement.axes.values())
+        return f"{self.cut_id}: {self.verdict}" + (f", {lines} lines" if self.verdict.usable else "")
 
 
 def measure_cut(
@@ -100,13 +104,20 @@ def measure_cut(
 
     Parameters
     ----------
-    cut, air : Recording
+    cut_id, tooling : str
+        Name of the cut and of its tooling, for the result and for messages.
+    cut : Recording
         Displacement channels for X and/or Y, accelerometers of the fixture where there are some.
+    air : Recording or None
+        The same in the air, where it was recorded.
+    cutter : Cutter
     conditions : CuttingConditions
-        As programmed; forces are simulated at the speed found in the record.
+        The cut as programmed; forces are simulated at the speed found in the record.
+    coefficients : CuttingCoefficients
     max_frequency : float [Hz]
+        Highest line.
     estimator : Estimator
-        `LineEstimator`, or `AirCorrectedSpectra` for the paper's.
+        `LineEstimator`, or `AirCorrectedSpectra` for that of [inprocess].
 
     Raises
     ------
@@ -163,6 +174,14 @@ def measure_cut(
 
 def judge_air(cut_id: str, tooling: str, air: Recording, conditions: CuttingConditions, max_frequency: float = MAX_FREQUENCY) -> Reading:
     """Return the verdict on an air cut alone, as `measure_cut` judges it beside a cut.
+
+    Parameters
+    ----------
+    air : Recording
+    conditions : CuttingConditions
+        The cut as programmed: its speed counts.
+    max_frequency : float [Hz]
+        Highest line.
 
     Raises
     ------

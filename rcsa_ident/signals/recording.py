@@ -10,10 +10,11 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.shown import Drawn
 
 
 class Quantity(StrEnum):
-    """What a channel measures."""
+    """The physical quantity that a channel measures."""
 
     DISPLACEMENT = "displacement"
     ACCELERATION = "acceleration"
@@ -37,11 +38,19 @@ class Sensor:
     delay : float [s]
         The channel lags by it.
     bandwidth : float or None [Hz]
-        First-order low-pass of the sensor.
+        Cut-off frequency of the sensor's first-order low-pass.
     pulses_per_revolution : int
-        Of a trigger.
+        Marks that a trigger sees in one turn.
     tooth_angle : float or None [rad]
         Immersion angle of tooth 1 at the trigger's edge, if known.
+
+    Examples
+    --------
+    A capacitive gap sensor of 10 mV/um that is 2 % low at 2 kHz:
+
+    >>> sensor = Sensor("gap_x", Quantity.DISPLACEMENT, Dof.X, sensitivity=10e3, bandwidth=10e3)
+    >>> round(float(abs(sensor.response(2 * np.pi * 2000.0))), 3)
+    0.981
     """
 
     name: str
@@ -71,8 +80,8 @@ class Sensor:
         return value
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Recording:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Recording(Drawn):
     """Samples of all channels.
 
     Parameters
@@ -81,6 +90,13 @@ class Recording:
     samples : array, shape (n, c) [m, m/s^2, N; a trigger as it is]
         A sample that was lost is NaN.
     sensors : tuple of Sensor, length c
+
+    Examples
+    --------
+    >>> recording = Recording(51200.0, np.zeros((512, 1)), (Sensor("gap_x", Quantity.DISPLACEMENT, Dof.X),))
+    >>> sensor, samples = recording.channel(Quantity.DISPLACEMENT, Dof.X)
+    >>> sensor.name, samples.shape, recording.time[-1].round(6).item()
+    ('gap_x', (512,), 0.00998)
     """
 
     rate: float
@@ -104,3 +120,7 @@ class Recording:
             if sensor.quantity is quantity and (axis is None or sensor.axis is axis):
                 return sensor, self.samples[:, i]
         return None
+
+    def __str__(self) -> str:
+        seconds = self.samples.shape[0] / self.rate
+        return f"{seconds:.3g} s at {self.rate:.6g} Hz: {', '.join(sensor.name for sensor in self.sensors)}"

@@ -30,9 +30,9 @@ class LineSpectrum:
     amplitude : complex array, shape (m + 1, c) [channel's unit]
         Orders 0..m.
     variance : array, shape (m + 1, c)
-        Of the real and of the imaginary part each, from the noise floor beside each line.
+        Variance of the real and of the imaginary part each, from the noise floor beside each line.
     scatter : array, shape (m + 1, c)
-        The same from the scatter between quarters of the record.
+        The same variance from the scatter between quarters of the record.
     rest : array, shape (n, c)
         What is left of the record without lines and drift.
     rate : float [Hz]
@@ -85,6 +85,16 @@ def follow_speed(samples: FloatArray, rate: float, near: float, orders: int = 16
 
     In each of up to eight blocks the lines are fitted; the speed is the one at which all blocks tell the same amplitudes
     and phases. Blocks hold whole revolutions, so that orders above `orders` do not leak in.
+
+    Parameters
+    ----------
+    samples : array, shape (n, c)
+        Displacements, without lost samples.
+    rate : float [Hz]
+    near : float [rad/s]
+        The guess.
+    orders : int
+        Highest multiple that is fitted.
     """
     step = near / rate
     highest = int(min(orders, 0.9 * np.pi / step))
@@ -162,13 +172,15 @@ def line_spectrum(samples: FloatArray, rate: float, spindle_speed: float, max_fr
 
 
 def segment_lines(samples: FloatArray, rate: float, omega: FloatArray, segments: int = 8) -> ComplexArray:
-    """Return amplitudes at given frequencies in half-overlapping Hann segments, phases from the record's start.
+    """Return amplitudes at given frequencies in half-overlapping Hann segments [welch1967], phases from the record's start.
 
     Parameters
     ----------
     samples : array, shape (n, c)
     rate : float [Hz]
     omega : array, shape (m,) [rad/s]
+    segments : int
+        Number of segments.
 
     Returns
     -------

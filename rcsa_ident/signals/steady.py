@@ -26,18 +26,18 @@ class SteadyRecord:
     ----------
     recording : Recording
     axes : tuple of Dof
-        With a displacement sensor.
+        Machine axes with a displacement sensor.
     columns : tuple of int
         Channels of the recording that matter: the axes' displacements, then the fixture's accelerations.
     part : slice
     teeth : int
         1 for an air cut.
     lines : LineSpectrum
-        Of these channels; phases from the recording's first sample.
+        Lines of these channels; phases from the recording's first sample.
     outputs : complex array, shape (orders, axes, o) [m]
         Displacement at each order: gap and fixture, or the gap alone where no axis has the fixture's acceleration.
     output_variance : array, shape (orders, axes, o) [m^2]
-        Of the real and of the imaginary part each.
+        Variance of the real and of the imaginary part each.
     """
 
     recording: Recording
@@ -56,7 +56,7 @@ class SteadyRecord:
 
     @property
     def variance(self) -> FloatArray:
-        """Variance of the real and of the imaginary part of the flange's displacement each, shape (orders, axes) [m^2]."""
+        """Variance of its real and of its imaginary part each, shape (orders, axes) [m^2]."""
         return np.sum(self.output_variance, axis=2)
 
     def has_fixture(self, axis: Dof) -> bool:
@@ -65,12 +65,12 @@ class SteadyRecord:
 
     @property
     def spindle_speed(self) -> float:
-        """Spindle speed as the record itself has it [rad/s]."""
+        """Spindle speed, found in the record itself [rad/s]."""
         return self.lines.spindle_speed
 
     @property
     def highest_order(self) -> int:
-        """Highest multiple of the spindle frequency among the lines."""
+        """Highest multiple of the spindle's frequency among the lines."""
         return self.lines.amplitude.shape[0] - 1
 
     @property
@@ -97,10 +97,13 @@ def steady_record(recording: Recording, axes: Sequence[Dof], programmed: float, 
 
     Parameters
     ----------
+    recording : Recording
     axes : sequence of Dof
         Each with a displacement sensor in the recording.
     programmed : float [rad/s]
+        The spindle speed that was set; the true one is looked for near it.
     max_frequency : float [Hz]
+        Highest line.
     teeth : int
         1 for an air cut.
 

@@ -24,6 +24,8 @@ def steady_part(samples: FloatArray, rate: float, spindle_speed: float, teeth: i
     samples : array, shape (n, c)
     rate : float [Hz]
     spindle_speed : float [rad/s]
+    teeth : int
+        1 for an air cut.
     """
     n = samples.shape[0]
     period = 2.0 * np.pi / spindle_speed * rate

@@ -9,9 +9,11 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.remarks import Remark
+from rcsa_ident.shown import Shown
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, follow_speed, line_spectrum, refine_speed
 from rcsa_ident.signals.steady_part import hann
+from rcsa_ident.units import to_rpm
 
 #: Equal samples in a row that a live analogue channel does not produce.
 FROZEN_SAMPLES = 12
@@ -53,8 +55,8 @@ class RecordCode(StrEnum):
     NO_AIR_CUT = "no-air-cut"
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
+@dataclass(frozen=True, slots=True, repr=False)
+class Verdict(Shown):
     """What was found in a record.
 
     Parameters
@@ -72,6 +74,9 @@ class Verdict:
     def usable(self) -> bool:
         """True where nothing speaks against the record."""
         return not self.reasons
+
+    def __str__(self) -> str:
+        return "usable" if self.usable else f"left out: {'; '.join(self.reasons)}"
 
 
 def raw_faults(recording: Recording) -> tuple[Remark, ...]:
@@ -96,7 +101,7 @@ def raw_faults(recording: Recording) -> tuple[Remark, ...]:
         start, length = _runs(x)
         clipped = _clipped(x, x[start], length)
         if clipped:
-            words = f"saturation: {clipped} samples of {sensor.name} stand at its limits {x.min():.4g} and {x.max():.4g}"
+            words = f"saturation: {clipped} samples of {sensor.name} are at its limits, {x.min():.4g} and {x.max():.4g}"
             fault(RecordCode.SATURATED, words)
             continue
         k = _frozen(x[start], length)
@@ -115,7 +120,7 @@ def implausible(recording: Recording) -> tuple[Remark, ...]:
         x = x[np.isfinite(x)]
         swing = float(np.ptp(x)) if x.size else 0.0
         if swing > most or 0.0 < swing < least:
-            words = f"{sensor.name} swings by {swing:.3g} {unit}: are its unit and sensitivity right?"
+            words = f"{sensor.name} has a peak-to-peak amplitude of {swing:.3g} {unit}: check its unit and sensitivity"
             found.append(Remark(RecordCode.IMPLAUSIBLE, words))
     return tuple(found)
 
@@ -163,10 +168,11 @@ def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) ->
     samples : array, shape (n, c)
         Displacements.
     lines : LineSpectrum
-        Of these, in its first channels; others may follow.
+        Their lines, in its first channels; others may follow.
     programmed : float [rad/s]
+        The spindle speed that was set.
     """
-    speed, rate, rpm = lines.spindle_speed, lines.rate, 30.0 / np.pi
+    speed, rate = lines.spindle_speed, lines.rate
     order = np.arange(1, lines.amplitude.shape[0])[:, None]
     power = np.abs(lines.amplitude[1:, : samples.shape[1]]) ** 2
     information = power / np.maximum(lines.variance[1:, : samples.shape[1]], 1e-300)
@@ -179,7 +185,7 @@ def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) ->
         # an air cut of a round flange tells no speed
         return ()
     if abs(speed / programmed - 1.0) > 0.0095:
-        words = f"speed: the record repeats at {speed * rpm:.1f} rev/min, the programmed speed is {programmed * rpm:.0f} rev/min"
+        words = f"speed: the record repeats at {to_rpm(speed):.1f} rev/min, the programmed speed is {to_rpm(programmed):.0f} rev/min"
         return (Remark(RecordCode.WRONG_SPEED, words),)
     duration = samples.shape[0] / rate
     half = samples.shape[0] // 2
@@ -193,8 +199,8 @@ def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) ->
     std = 4.0 / np.sqrt(np.sum(order**2 * information) * duration**2 / 12.0)
     if phase > DRIFT_PHASE and abs(second - first) > 5.0 * std:
         words = (
-            f"speed drifts from {first * rpm:.1f} to {second * rpm:.1f} rev/min: "
-            f"the highest line's phase bends by {phase:.2g} rad (at most {DRIFT_PHASE})"
+            f"speed drifts from {to_rpm(first):.1f} to {to_rpm(second):.1f} rev/min: "
+            f"the phase of the highest line deviates by {phase:.2g} rad (limit {DRIFT_PHASE} rad)"
         )
         return (Remark(RecordCode.SPEED_DRIFT, words),)
     return ()
@@ -218,9 +224,8 @@ def silence(power: FloatArray, variance: FloatArray) -> Remark | None:
     # pure noise has a mean of 1, and its largest of n is rarely above log(n) + 7
     if np.max(ratio) > np.log(ratio.size) + 7.0:
         return None
-    return Remark(
-        RecordCode.NO_CUTTING, f"no cutting: the largest tooth-passing line is {np.sqrt(power.max()) * 1e9:.3g} nm, which is noise"
-    )
+    words = f"no cutting: the largest tooth-passing line is {np.sqrt(power.max()) * 1e9:.3g} nm, which is at the noise level"
+    return Remark(RecordCode.NO_CUTTING, words)
 
 
 def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: tuple[float, float]) -> Remark | None:
@@ -234,7 +239,7 @@ def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: 
     forced : array, one entry per displacement [m]
         Largest tooth-passing amplitude.
     band : (float, float) [Hz]
-        Where to look.
+        Frequencies between which chatter is looked for.
     """
     n = lines.rest.shape[0]
     window = hann(n)
@@ -252,7 +257,7 @@ def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: 
         floor = float(np.median(amplitude[inside, c]))
         if candidates[peak] > CHATTER_SHARE * forced[c] and candidates[peak] > 10.0 * floor:
             words = (
-                f"chatter: {candidates[peak] * 1e6:.3g} µm at {frequency[peak]:.0f} Hz, no multiple of the spindle's "
+                f"chatter: {candidates[peak] * 1e6:.3g} µm at {frequency[peak]:.0f} Hz, which is not a multiple of the spindle frequency, "
                 f"{lines.spindle_speed / (2 * np.pi):.1f} Hz (largest tooth-passing line {forced[c] * 1e6:.3g} µm)"
             )
             return Remark(RecordCode.CHATTER, words)
@@ -276,6 +281,8 @@ def tooth_count_fault(power: FloatArray, teeth: int) -> Remark | None:
     ----------
     power : array, shape (m + 1,)
         Squared amplitude of cut less air cut at each spindle order, all channels together.
+    teeth : int
+        Number of teeth that the cutter is said to have.
     """
     order = np.arange(power.size)
     shared = (order % teeth == 0) & (order > 0)
@@ -286,7 +293,7 @@ def tooth_count_fault(power: FloatArray, teeth: int) -> Remark | None:
         own, rest = others & (order % count == 0), others & (order % count != 0)
         claimed = first & (order % count != 0)
         if teeth > 1 and claimed.any() and _stands_out(power[own], power[rest], power[claimed]):
-            return _wrong_count(f"wrong tooth count (or chatter): the lines of the cut stand at multiples of {count}, not of {teeth}")
+            return _wrong_count(f"wrong tooth count (or chatter): the lines of the cut are at multiples of {count}, not of {teeth}")
         if teeth > 1 and own.any() and power[own].max() > ALONE * power[rest].max(initial=0.0):
             missed = power[first & (order % count != 0)].max(initial=0.0)
             if power[own].max() > (0.03 * power[first].max() if teeth % count == 0 else missed):
@@ -301,7 +308,7 @@ def tooth_count_fault(power: FloatArray, teeth: int) -> Remark | None:
     even = (order % (2 * teeth) == 0) & (order > 0) & (order <= 4 * teeth)
     background = power[others].mean() if others.any() else 0.0
     if odd.any() and even.any() and power[odd].max() < 1e-2 * power[even].max() and power[odd].max() < 4.0 * background:
-        return _wrong_count(f"wrong tooth count: of the multiples of {teeth} teeth only every second is there, as with {2 * teeth}")
+        return _wrong_count(f"wrong tooth count: only every second multiple of {teeth} is present, as with {2 * teeth} teeth")
     return None
 
 

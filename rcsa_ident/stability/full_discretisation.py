@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.stability.monodromy import EngagementProfile, MonodromyOperator
+from rcsa_ident.stability.methods import MethodName
+from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import check_resolution, marched_lobes
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tip_modes import TipModes, modes_of
+from rcsa_ident.stability.tip_modes import TipModes, require_modes
 
 
 @dataclass(frozen=True, slots=True)
 class FullDiscretisation:
-    """Full discretisation of the periodic delay equation (Ding, Zhu, Zhang & Ding, Int. J. Mach. Tools Manuf. 50 (2010) 502).
+    """Full discretisation of the periodic delay equation [ding2010].
 
     p' = pole p + inputs F moves exactly, F = K(t) (y - y(t - T)) + C(t) y' is a polynomial within each step: a straight line in the
     published method (degree 1), through Gauss-Lobatto nodes here. Steps begin and end where teeth enter and leave, so the error falls
     with the degree's order even in interrupted cuts. The map of a period is applied, never written down: its cost is linear in steps
-    and modes, and Arnoldi's method finds its largest multiplier.
+    and modes, and Arnoldi's method [arnoldi1951] finds its largest multiplier.
 
-    Takes unequal pitch, run-out (with the feed per tooth), helix, a varying speed, process damping, modes with a shape along the edge.
+    Takes unequal pitch, run-out (with the feed per tooth), helix, a varying speed, process damping, modes with a shape and an
+    engagement that changes along the edge.
 
     Parameters
     ----------
@@ -32,24 +35,26 @@ class FullDiscretisation:
     degree : int, default 6
     tolerance : float, default 3e-3
         Of the limit depth, relative, where `intervals` is None.
-    engagements : callable or None
-        Engagement along the edge by speed and depth, as a deflected tool has it: `deformation.deflected_engagement`.
     """
+
+    name: ClassVar[str] = MethodName.FULL_DISCRETISATION.value
+    needs: ClassVar[Literal["receptance", "modes"]] = "modes"
+    seconds_per_speed: ClassVar[float] = 0.06
+    gives_maps: ClassVar[bool] = True
 
     intervals: int | None = None
     degree: int = 6
     tolerance: float = 3e-3
-    engagements: EngagementProfile | None = None
 
     def __post_init__(self) -> None:
         check_resolution(self.intervals, self.tolerance)
         if not 1 <= self.degree <= 8:
             raise InputError("degree", self.degree, "a whole number from 1 to 8")
 
-    def cut(self, tip: Receptance | TipModes, process: MillingProcess) -> MonodromyOperator:
-        """Return the cut's map of a period."""
-        return MonodromyOperator(modes_of(tip, "full-discretisation"), process, self.degree, engagements=self.engagements)
+    def monodromy(self, tip: Receptance | TipModes, process: MillingProcess) -> MonodromyOperator:
+        """Return the cut's monodromy operator."""
+        return MonodromyOperator(require_modes(tip, self.name), process, self.degree)
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""
-        return marched_lobes(self.cut(tip, process), speeds, max_depth, self.intervals, self.tolerance, "full-discretisation")
+        return marched_lobes(self.monodromy(tip, process), speeds, max_depth, self.intervals, self.tolerance, self.name)

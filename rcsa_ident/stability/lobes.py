@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from dataclasses import replace
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.process import MillingProcess
-from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes
 from rcsa_ident.stability.zero_order import ZeroOrder
 
 _ZERO_ORDER = ZeroOrder()
-
-
-class StabilityMethod(Protocol):
-    """A published way to the stability limit."""
-
-    def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
-        """Return the limit at each speed; the arguments have been checked."""
-        ...
+#: Machines drawn from what the records leave open.
+DRAWS = 60
+#: How much deeper than asked for the zero-order method looks, for proportions.
+_DEEPER = 5.0
 
 
 def stability_lobes(
@@ -32,30 +29,99 @@ def stability_lobes(
     speeds: FloatArray,
     max_depth: float,
     method: StabilityMethod = _ZERO_ORDER,
+    draws: int = DRAWS,
+    seed: int = 1,
 ) -> StabilityLobes:
     """Return the stability limit of a milling cut over spindle speed.
 
     Parameters
     ----------
-    tip : Receptance or TipModes
-        Between ``tip.x`` and ``tip.y`` (machine axes) with their cross terms; `uncoupled_planes` makes a receptance from two
-        bending planes. Further coordinates are left aside. Methods that march through time need modes, the others take both.
+    tip : Receptance, UncertainReceptance or TipModes
+        Over ``tip.x`` and ``tip.y`` (machine axes) with their cross terms; a direction that is missing is rigid, further ones are left
+        aside. A method that needs modes gets those of a rational fit where a receptance is given, and its warnings say so.
     process : MillingProcess
     speeds : array, shape (n,) [rad/s]
         In any order.
     max_depth : float [m]
         Limits beyond it are not of interest.
     method : StabilityMethod, default ZeroOrder()
+    draws : int
+        Machines drawn from what is not known of the tip, where it is an `UncertainReceptance` with a spread; below 2 none are drawn.
+    seed : int
+        The same one draws the same machines, whatever the speeds are.
 
     Raises
     ------
     InputError
-        If the tip's coordinates are missing, or a speed or the depth is not usable.
+        If no direction of the tip is known, or a speed or the depth is not usable.
+
+    Notes
+    -----
+    Drawn machines are asked by the zero-order method, in milliseconds each; of another method's limit they are in the proportion
+    that they have to the zero-order limit of the tip itself at the same speed, which the warnings say.
     """
     speeds = np.atleast_1d(np.asarray(speeds, dtype=float))
     if speeds.ndim != 1 or speeds.size == 0 or not np.all(np.isfinite(speeds) & (speeds > 0.0)):
         raise InputError("speeds", speeds.tolist(), "one or more finite spindle speeds above 0 [rad/s]")
-    return method.lobes(tip, process, speeds, positive("max_depth", max_depth, "m"))
+    max_depth = positive("max_depth", max_depth, "m")
+    both = tip if isinstance(tip, TipModes) else both_directions(tip)
+    if isinstance(both, TipModes) or method.needs == "receptance":
+        found = method.lobes(both, process, speeds, max_depth)
+    else:
+        modes, error = fitted_modes(both)
+        found = method.lobes(modes, process, speeds, max_depth)
+        share = f"{100.0 * error:.2g}" if error > 1e-4 else "less than 0.01"
+        told = f"the receptance was replaced by a fit with {modes.pole.size} modes (relative error {share} %)"
+        found = replace(found, warnings=(*found.warnings, told))
+    if draws < 2 or not isinstance(tip, UncertainReceptance) or not tip.complete:
+        return found
+    if isinstance(method, ZeroOrder):
+        return replace(found, drawn=drawn_limits(tip, process, speeds, max_depth, draws, seed))
+    drawn = drawn_limits(tip, process, speeds, _DEEPER * max_depth, draws, seed)
+    nominal = _ZERO_ORDER.lobes(both, process, speeds, _DEEPER * max_depth).limit_depth
+    told = "the uncertainty band is scaled from the zero-order method's"
+    return replace(found, drawn=_in_proportion(drawn, nominal, found.limit_depth), warnings=(*found.warnings, told))
+
+
+def drawn_limits(
+    tip: UncertainReceptance, process: MillingProcess, speeds: FloatArray, max_depth: float, draws: int = DRAWS, seed: int = 1
+) -> FloatArray:
+    """Return the zero-order limits of tips drawn from a receptance's spread, shape (draws, n) [m], infinite beyond `max_depth`.
+
+    Notes
+    -----
+    They are told from a part of the frequencies: close where the tip's receptance changes from line to line, far apart where a quintic
+    goes through it.
+    """
+    nodes = tip.thinned()
+    tips = _embedded(nodes.drawn(draws, np.random.default_rng(seed)), nodes)
+    return _ZERO_ORDER.depths(nodes.omega, tips, process, speeds, max_depth)
+
+
+def both_directions(tip: Receptance) -> Receptance:
+    """Return the tip's 2 x 2 receptance over ``tip.x`` and ``tip.y``; a direction that is missing is rigid."""
+    if tip.rows == TIP and tip.cols == TIP:
+        return tip
+    return Receptance(tip.omega, _embedded(tip.values, tip), TIP, TIP)
+
+
+def _embedded(values: np.ndarray, tip: Receptance) -> np.ndarray:
+    """Values of a tip's receptance, shape (..., r, c), among zeros for the directions that are missing, shape (..., 2, 2)."""
+    known = [(i, tip.rows.index(c), tip.cols.index(c)) for i, c in enumerate(TIP) if c in tip.rows and c in tip.cols]
+    if not known:
+        found = ", ".join(str(c) for c in tip.rows)
+        raise InputError("tip receptance", found, "tip.x, tip.y or both: at least one flexible direction")
+    embedded = np.zeros((*values.shape[:-2], 2, 2), dtype=complex)
+    for i, row, _ in known:
+        for j, _, col in known:
+            embedded[..., i, j] = values[..., row, col]
+    return embedded
+
+
+def _in_proportion(drawn: FloatArray, nominal: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Limits that are to `wanted` as the drawn ones are to `nominal`; where one of these is infinite no proportion is known."""
+    ratio = np.divide(wanted, nominal, out=np.ones(nominal.shape), where=np.isfinite(wanted) & np.isfinite(nominal))
+    return np.where(np.isinf(nominal) & np.isfinite(wanted), wanted, drawn * ratio)
 
 
 def uncoupled_planes(x: Receptance | None, y: Receptance | None) -> Receptance:
@@ -68,15 +134,9 @@ def uncoupled_planes(x: Receptance | None, y: Receptance | None) -> Receptance:
     y : Receptance or None
         With ``tip.y``, at the same frequencies.
     """
-    known = [h for h in (x, y) if h is not None]
+    known = [h.block((c,)) for h, c in ((x, TIP[0]), (y, TIP[1])) if h is not None]
     if not known:
         raise InputError("tip receptances", "none", "at least one flexible direction")
-    omega = known[0].omega
-    if len(known) == 2 and not np.array_equal(omega, known[1].omega):
-        raise InputError("y receptance", f"{known[1].omega.size} frequencies", f"the {omega.size} frequencies of the x receptance")
-    values = np.zeros((omega.size, 2, 2), dtype=complex)
-    for i, (h, name) in enumerate(((x, "tip.x"), (y, "tip.y"))):
-        if h is not None:
-            values[:, i, i] = h.between(name, name)
-    coordinates = (Coordinate("tip", Dof.X), Coordinate("tip", Dof.Y))
-    return Receptance(omega, values, coordinates, coordinates)
+    if len(known) == 2 and not np.array_equal(known[0].omega, known[1].omega):
+        raise InputError("y receptance", f"{known[1].omega.size} frequencies", f"the {known[0].omega.size} frequencies of the x receptance")
+    return both_directions(Receptance.block_diagonal(known))

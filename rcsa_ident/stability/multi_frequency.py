@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.hill import Hill, PeriodicTeeth, TipMotion
+from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import TipModes, receptance_of
 
@@ -20,7 +22,7 @@ _LEFT = 0.2
 
 @dataclass(frozen=True, slots=True)
 class MultiFrequency:
-    """Truncated Hill determinant of the periodic delay equation (Merdol & Altintas, J. Manuf. Sci. Eng. 126 (2004) 459).
+    """Truncated Hill determinant of the periodic delay equation [merdol2004].
 
     With [alpha(t)] = sum_r [alpha_r] e^{i r w_T t}, w_T the tooth-passing frequency, a force with the harmonics
     F_k e^{i (w + k w_T) t} repeats itself for
@@ -41,6 +43,11 @@ class MultiFrequency:
         band: exact, but for what lies beyond the band. 0 is the zero-order limit.
     """
 
+    name: ClassVar[str] = MethodName.MULTI_FREQUENCY.value
+    needs: ClassVar[Literal["receptance", "modes"]] = "receptance"
+    seconds_per_speed: ClassVar[float] = 0.15
+    gives_maps: ClassVar[bool] = False
+
     harmonics: int | None = None
 
     def __post_init__(self) -> None:
@@ -52,6 +59,9 @@ class MultiFrequency:
         cutter = process.cutter
         if process.speed_variation is not None:
             raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
+        if process.engagement_profile is not None:
+            allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
+            raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
         if np.ptp(cutter.pitch) > 1e-9:
             raise InputError("pitch", np.degrees(cutter.pitch).tolist(), "equal pitch: zero-order and full-discretisation take any")
         motion = TipMotion.of(receptance_of(tip, wide=True))
@@ -76,7 +86,7 @@ class MultiFrequency:
             doubts.append(f"at {lost} of {speeds.size} speeds the limit is not converged: it may be percents off")
         # a flip vibrates at an odd multiple of half the tooth-passing frequency, and nothing else does to the last digit
         flip = np.abs(chatter / (cutter.teeth * speeds) % 1.0 - 0.5) < 1e-9
-        return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), "multi-frequency", tuple(doubts), flip)
+        return StabilityLobes(speeds, limit, chatter, lobe, max_depth, self.name, warnings=tuple(doubts), flip=flip)
 
 
 def _doubts(tip: TipMotion, chatter: FloatArray) -> list[str]:

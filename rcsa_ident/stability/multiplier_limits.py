@@ -51,7 +51,7 @@ class Growth:
 def longest_step(cut: MonodromyOperator) -> float:
     """Length of a step that is good to some thousandths of the limit [s]."""
     strength = cut.modes.strength
-    wave = 2.0 * np.pi / float(np.max(np.abs(cut.pole)[strength >= _WEAK * strength.max()]))
+    wave = 2.0 * np.pi / float(np.max(np.abs(cut.arrays.pole)[strength >= _WEAK * strength.max()]))
     degree = cut.table.shape[1] - 1
     return wave / _STEPS if cut.frozen else degree * wave / (_NODES * (1.0 + _LOW_DEGREE / degree**2))
 
@@ -88,7 +88,7 @@ def marched_lobes(
         # a quasi-periodic vibration may pass -1, too, but as one of a pair
         flip[i] = found.value.real < 0.0 and abs(found.value.imag) < 1e-6 * abs(found.value)
     doubts = [f"at {lost} of {speeds.size} speeds the limit is not converged to {100.0 * tolerance:g} %"] if lost else []
-    return StabilityLobes(speeds, limit, chatter, lobe, float("nan"), float("nan"), method, tuple(doubts), flip)
+    return StabilityLobes(speeds, limit, chatter, lobe, max_depth, method, warnings=tuple(doubts), flip=flip)
 
 
 def dominant(found: Multiplier) -> float:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import check_resolution, marched_lobes
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tip_modes import TipModes, modes_of
+from rcsa_ident.stability.tip_modes import TipModes, require_modes
 
 #: Of the polynomials that stand for the exact answer within a step: at 24 steps a wave they leave 1e-7 of the multiplier.
 _DEGREE = 3
@@ -18,10 +20,10 @@ _DEGREE = 3
 
 @dataclass(frozen=True, slots=True)
 class SemiDiscretisation:
-    """First-order semi-discretisation (Insperger & Stepan, Int. J. Numer. Meth. Eng. 61 (2004) 117).
+    """First-order semi-discretisation of the periodic delay equation [insperger2004].
 
     On each step K(t) and C(t) are replaced by their means and y(t - T) by the straight line between its ends; what is left has
-    constant coefficients and is solved exactly. The error falls with the square of the step. As Bachrathy & Stepan (2013) the map of
+    constant coefficients and is solved exactly. The error falls with the square of the step. As in [bachrathy2013] the map of
     a period is applied step by step, never multiplied out: its cost is linear in steps and modes.
 
     Takes what `FullDiscretisation` takes; that one needs far fewer steps.
@@ -34,16 +36,21 @@ class SemiDiscretisation:
         Of the limit depth, relative, where `intervals` is None.
     """
 
+    name: ClassVar[str] = MethodName.SEMI_DISCRETISATION.value
+    needs: ClassVar[Literal["receptance", "modes"]] = "modes"
+    seconds_per_speed: ClassVar[float] = 0.4
+    gives_maps: ClassVar[bool] = True
+
     intervals: int | None = None
     tolerance: float = 3e-3
 
     def __post_init__(self) -> None:
         check_resolution(self.intervals, self.tolerance)
 
-    def cut(self, tip: Receptance | TipModes, process: MillingProcess) -> MonodromyOperator:
-        """Return the cut's map of a period."""
-        return MonodromyOperator(modes_of(tip, "semi-discretisation"), process, _DEGREE, frozen=True)
+    def monodromy(self, tip: Receptance | TipModes, process: MillingProcess) -> MonodromyOperator:
+        """Return the cut's monodromy operator."""
+        return MonodromyOperator(require_modes(tip, self.name), process, _DEGREE, frozen=True)
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""
-        return marched_lobes(self.cut(tip, process), speeds, max_depth, self.intervals, self.tolerance, "semi-discretisation")
+        return marched_lobes(self.monodromy(tip, process), speeds, max_depth, self.intervals, self.tolerance, self.name)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 import scipy.optimize
@@ -13,10 +14,12 @@ from numpy.typing import NDArray
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError
+from rcsa_ident.shown import Drawn
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import ROUGH, Growth, longest_step
 from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.units import to_rpm
 
 #: Points along the side of a block at the start.
 _BLOCK = 4
@@ -26,8 +29,8 @@ _NEAR = 0.5
 _PROBES, _SHORTER = 5, 1.6
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class StabilityMap:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class StabilityMap(Drawn):
     """How fast the most persistent vibration grows, over speed and depth.
 
     Parameters
@@ -78,12 +81,40 @@ class StabilityMap:
             limit[self.spindle_speed == speed] = depth
         return np.where(self.growth[:, 0] >= 0.0, self.depth[0], limit)
 
+    @classmethod
+    def joined(cls, parts: Sequence[StabilityMap]) -> StabilityMap:
+        """Return the maps of several blocks of speeds, which have the same depths, as one with rising speeds."""
+        speed = np.concatenate([part.spindle_speed for part in parts])
+        back = np.argsort(speed)
+        crossing = np.concatenate([part.crossing_speed for part in parts])
+        order = np.argsort(crossing, kind="stable")
+        return cls(
+            speed[back],
+            parts[0].depth,
+            np.concatenate([part.growth for part in parts])[back],
+            np.concatenate([part.computed for part in parts])[back],
+            crossing[order],
+            np.concatenate([part.crossing_depth for part in parts])[order],
+            sum(part.evaluations for part in parts),
+            max(part.error for part in parts),
+            parts[0].method,
+        )
 
-class MarchingMethod(Protocol):
-    """A method that gives a cut's map of a period."""
+    def __str__(self) -> str:
+        n, k = self.growth.shape
+        speed, depth = to_rpm(self.spindle_speed), 1e3 * float(self.depth[-1])
+        cuts = f"{n} x {k} cuts, {speed.min():.0f} to {speed.max():.0f} rev/min up to {depth:.3g} mm"
+        return f"{self.method}, {cuts}: {100.0 * float(np.mean(self.stable)):.0f} % stable"
 
-    def cut(self, tip: TipModes, process: MillingProcess) -> MonodromyOperator:
-        """Return it."""
+
+@runtime_checkable
+class MonodromyMethod(Protocol):
+    """A method that finds the limit from Floquet multipliers: it also knows them at every other depth."""
+
+    name: ClassVar[str]
+
+    def monodromy(self, tip: TipModes, process: MillingProcess) -> MonodromyOperator:
+        """Return the cut's monodromy operator."""
         ...
 
 
@@ -92,7 +123,7 @@ def stability_map(
     process: MillingProcess,
     speeds: FloatArray,
     depths: FloatArray,
-    method: MarchingMethod | None = None,
+    method: MonodromyMethod | None = None,
     full: bool = False,
     tolerance: float = 5e-3,
 ) -> StabilityMap:
@@ -111,8 +142,8 @@ def stability_map(
         Of the crossings' depths, relative.
     """
     speeds, depths = (_ascending(name, values) for name, values in (("speeds", speeds), ("depths", depths)))
-    chosen = FullDiscretisation() if method is None else method
-    cut = chosen.cut(tip, process)
+    chosen: MonodromyMethod = FullDiscretisation() if method is None else method
+    cut = chosen.monodromy(tip, process)
     step = longest_step(cut)
     known = np.full((speeds.size, depths.size), np.nan)
     columns = [Growth(cut, float(speed), step, ROUGH) for speed in speeds]
@@ -171,7 +202,7 @@ def stability_map(
         np.array([depth for _, depth, _ in crossings]),
         sum(column.calls for column in (*columns, *exact, *probes)),
         error,
-        "semi-discretisation" if cut.frozen else "full-discretisation",
+        chosen.name,
     )
 
 

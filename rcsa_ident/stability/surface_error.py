@@ -13,6 +13,9 @@ from rcsa_ident.cutting.force import force_lines, runout_force_lines
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.shown import Drawn
+from rcsa_ident.stability.tip_modes import TIP, TipModes
+from rcsa_ident.units import to_rpm
 
 #: Most multiples of the spindle frequency; where the band holds more of them, the rest is left out.
 MOST_ORDERS = 4000
@@ -27,8 +30,8 @@ class Wall(StrEnum):
     EXIT = "exit"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SurfaceError:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SurfaceError(Drawn):
     """How far the wall lies from where a rigid tool would leave it; positive where material is left, negative where too much is gone.
 
     Parameters
@@ -64,15 +67,21 @@ class SurfaceError:
         """Mean over the height, shape (n,) [m]."""
         return self.error.mean(axis=1)
 
+    def __str__(self) -> str:
+        speed, error = to_rpm(self.spindle_speed), 1e6 * self.error
+        speeds, depth = f"{speed.min():.0f} to {speed.max():.0f} rev/min", f"{1e3 * float(self.height[-1]):.3g} mm deep"
+        side = "enter" if self.wall is Wall.ENTRY else "leave"
+        return f"{speeds}, {depth}: {error.min():.2g} to {error.max():.2g} µm at the wall where teeth {side}"
+
 
 def surface_location_error(
-    receptance: Receptance, process: MillingProcess, speeds: FloatArray, depth: float, wall: Wall | None = None, heights: int = 33
+    tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, depth: float, wall: Wall | None = None, heights: int = 33
 ) -> SurfaceError:
     """Return the surface location error of stable cuts over spindle speed.
 
     Parameters
     ----------
-    receptance : Receptance
+    tip : Receptance or TipModes
         Between ``tip.x`` and ``tip.y`` (machine axes).
     process : MillingProcess
         With a feed per tooth.
@@ -87,7 +96,7 @@ def surface_location_error(
     -----
     A stable cut of equal teeth repeats itself from tooth to tooth, so that what one leaves is what the next would have left:
     regeneration drops out and the tip moves as x(t) = Re sum_m G(i m Omega) F_m e^{i m Omega t} with the force lines F_m of a
-    rigid tool (Schmitz & Ziegert, Precision Engineering 23 (1999) 51; Mann, Young, Schmitz & Dilley, J. Manuf. Sci. Eng. 127 (2005) 446). A
+    rigid tool [schmitz1999], [mann2005]. A
     point of the wall is made by the edge that stands there, at immersion 0 (entry) or pi (exit): at height z that is at
     Omega t = phi_wall - psi_j + 2 z tan(helix) / D. Of unequal teeth the one that cuts deepest leaves the wall.
     """
@@ -104,19 +113,19 @@ def surface_location_error(
     angle = (np.pi if side is Wall.EXIT else 0.0) - cutter.tooth_angle[:, None] + 2.0 * height * np.tan(cutter.helix) / cutter.diameter
     outward = 1.0 if side is Wall.EXIT else -1.0
     normal = process.machine_from_feed[:, 1]
-    tip = _Tip(receptance)
+    response = _Tip(_from_dc(tip) if isinstance(tip, TipModes) else tip)
     error = np.empty((speeds.size, heights))
     tail = 0.0
     for i, speed in enumerate(speeds.tolist()):
-        orders = np.arange(min(int(tip.omega[-1] / speed), MOST_ORDERS) + 1)
+        orders = np.arange(min(int(response.omega[-1] / speed), MOST_ORDERS) + 1)
         lines = runout_force_lines if np.ptp(cutter.runout) > 0.0 else force_lines
         force = lines(cutter, process.conditions(speed, depth), process.coefficients, orders)
-        line = np.einsum("m,mrc,rc->r", normal, tip.at(orders * speed).transpose(1, 0, 2), force)
+        line = np.einsum("m,mrc,rc->r", normal, response.at(orders * speed).transpose(1, 0, 2), force)
         moved = np.einsum("r,rjz->jz", line, np.exp(1j * orders[:, None, None] * angle)).real
         error[i] = np.min(outward * moved - cutter.runout[:, None], axis=0)
         size = np.abs(line)
         tail = max(tail, float(size[3 * size.size // 4 :].sum() / max(size.sum(), 1e-300)))
-    return SurfaceError(speeds, height, error, side, tuple(_doubts(process, tip, speeds, tail)))
+    return SurfaceError(speeds, height, error, side, tuple(_doubts(process, response, speeds, tail)))
 
 
 class _Tip:
@@ -166,3 +175,10 @@ def _doubts(process: MillingProcess, tip: _Tip, speeds: FloatArray, tail: float)
     if process.speed_variation is not None:
         doubts.append("surface error: that of a constant speed")
     return doubts
+
+
+def _from_dc(modes: TipModes) -> Receptance:
+    """The receptance of modes from 0 Hz to four times the highest, at frequencies that resolve the sharpest."""
+    fine = modes.receptance().omega
+    omega = np.arange(0.0, 2.0 * fine[-1], fine[1] - fine[0])
+    return Receptance(omega, modes.response(omega), TIP, TIP)

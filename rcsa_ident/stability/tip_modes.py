@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.dynamics._kernels import pole_sum
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.poles import PoleResidue
+from rcsa_ident.dynamics.rational import fitted_poles
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.shown import Shown
+from rcsa_ident.units import to_hz
 
 #: Lines per half-power bandwidth of the least damped mode, and the most there may be.
 LINES_PER_BANDWIDTH = 10.0
@@ -20,21 +24,20 @@ MOST_LINES = 200_000
 #: How far above the highest mode the harmonics of a force are looked at, and the ratio of frequencies up there.
 _ABOVE, _STRETCH = 10.0, 1.03
 TIP = (Coordinate("tip", Dof.X), Coordinate("tip", Dof.Y))
+#: What a fit of a receptance may be beside it, root mean square.
+FIT_TOLERANCE = 2e-3
+#: Damping ratio of a fitted pole outside the band, at least: lightly damped, it would chatter.
+DAMPED_OUTSIDE = 0.1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TipModes:
-    """The tip's 2 x 2 receptance as sum of poles: H = sum_k outputs_k inputs_k / (i w - pole_k) + its mirror + constant.
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TipModes(PoleResidue, Shown):
+    """The tip's 2 x 2 receptance in machine axes X and Y as damped modes; along the edge they may have a shape.
 
     Parameters
     ----------
-    pole : complex array, shape (m,) [rad/s]
-        One of each conjugate pair; a real pole stands with half its residue.
-    outputs : complex array, shape (2, m)
-    inputs : complex array, shape (m, 2)
-        Machine axes X and Y.
-    constant : array, shape (2, 2) [m/N]
-        Of the modes beyond the band.
+    pole, outputs, inputs, constant
+        As in `PoleResidue`, outputs (2, m), inputs (m, 2), real parts of the poles negative.
     heights : array, shape (k,) [m], default none
         Distances from the tip along the edge, ascending.
     shape : array, shape (k, m) [-], default none
@@ -42,24 +45,14 @@ class TipModes:
         Such modes have real directions, and no constant stands beside them.
     """
 
-    pole: ComplexArray
-    outputs: ComplexArray
-    inputs: ComplexArray
-    constant: FloatArray
     heights: FloatArray | None = None
     shape: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        for name in ("pole", "outputs", "inputs"):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.complex128))
-        object.__setattr__(self, "constant", frozen(self.constant))
+        PoleResidue.__post_init__(self)
         m = self.pole.size
-        wanted = {"pole": (m,), "outputs": (2, m), "inputs": (m, 2), "constant": (2, 2)}
-        for name, size in wanted.items():
-            if getattr(self, name).shape != size:
-                raise InputError(name, getattr(self, name).shape, f"shape {size}")
-            if not np.all(np.isfinite(getattr(self, name))):
-                raise InputError(name, "values that are not finite", "finite values")
+        if self.constant.shape != (2, 2):
+            raise InputError("constant", self.constant.shape, "shape (2, 2)")
         if m == 0 or not np.any(self.outputs) or not np.any(self.inputs):
             raise InputError("tip modes", "none that moves the tip", "at least one flexible direction")
         if not np.all(self.pole.real < 0.0):
@@ -85,30 +78,19 @@ class TipModes:
         models : mapping of Dof to ModalModel
             With ``tip.x`` and ``tip.y``.
         """
-        poles, outputs, constant = [], [], np.zeros((2, 2))
+        parts = []
         for axis, model in models.items():
-            place = model.coordinates.index(Coordinate("tip", axis))
-            row = int(axis is Dof.Y)
-            out = np.zeros((2, model.omega_n.size), dtype=complex)
-            out[row] = model.phi[:, place]
-            poles.append(model.pole)
-            outputs.append(out)
-            constant[row, row] = model.residual[place, place]
-        if not poles:
+            turn = np.zeros((2, len(model.coordinates)))
+            turn[int(axis is Dof.Y), model.coordinates.index(Coordinate("tip", axis))] = 1.0
+            parts.append(model.pole_residue().projected(turn, turn.T))
+        if not parts:
             raise InputError("tip modes", "none", "at least one flexible direction")
-        both = np.concatenate(outputs, axis=1)
-        return cls(np.concatenate(poles), both, both.T, constant)
+        return cls.joined(parts)
 
     @property
     def strength(self) -> FloatArray:
         """Size of each mode's own peak, shape (m,) [m/N]."""
         return np.linalg.norm(self.outputs, axis=0) * np.linalg.norm(self.inputs, axis=1) / -self.pole.real
-
-    def at(self, omega: FloatArray) -> ComplexArray:
-        """Return the 2 x 2 receptances, shape (n, 2, 2) [m/N]."""
-        residues = np.einsum("pk,kq->kpq", self.outputs, self.inputs).reshape(-1, 4)
-        values = pole_sum(frozen(omega), np.concatenate([self.pole, self.pole.conj()]), np.concatenate([residues, residues.conj()]))
-        return values.reshape(-1, 2, 2) + self.constant
 
     def receptance(self, wide: bool = False) -> Receptance:
         """Return the receptance at frequencies that resolve the sharpest mode, from 0.1 to 2 times the modes' own.
@@ -130,18 +112,43 @@ class TipModes:
         if wide:
             tail = np.arange(1, int(np.log(0.5 * _ABOVE) / np.log(_STRETCH)) + 1)
             omega = np.concatenate([omega, high * _STRETCH**tail])
-        return Receptance(omega, self.at(omega), TIP, TIP)
+        return Receptance(omega, self.response(omega), TIP, TIP)
 
     @property
     def largest(self) -> float:
         """The largest gain of the receptance, from its modes' neighbourhoods [m/N]."""
         places = np.abs(self.pole.imag)[:, None] - self.pole.real[:, None] * np.linspace(-1.5, 1.5, 13)
         places = np.concatenate([places.ravel(), [0.0]])
-        return float(np.max(np.linalg.norm(self.at(np.maximum(places, 0.0)), 2, axis=(1, 2))))
+        return float(np.max(np.linalg.norm(self.response(np.maximum(places, 0.0)), 2, axis=(1, 2))))
+
+    def __str__(self) -> str:
+        frequency = np.sort(to_hz(np.abs(self.pole)))
+        return f"{self.pole.size} modes of the tip, {frequency[0]:.0f} to {frequency[-1]:.0f} Hz"
 
 
-def modes_of(tip: Receptance | TipModes, method: str) -> TipModes:
-    """Return the modes that a method marches with."""
+class ModeArrays(NamedTuple):
+    """What kernels take of modes, p' = pole p + inputs F, y = 2 Re(outputs p) + constant F, with m modes and r displacements.
+
+    The order is that in which the kernels unpack it. They are compiled anew for read-only arrays: these are not.
+    """
+
+    #: Complex, shape (m,).
+    pole: ComplexArray
+    #: Complex, shapes (r, m), (m, r).
+    outputs: ComplexArray
+    inputs: ComplexArray
+    #: Shape (r, r).
+    constant: FloatArray
+
+
+def fitted_modes(tip: Receptance) -> tuple[TipModes, float]:
+    """Return modes that stand for the tip's receptance, and how far they are beside it: the norm of what is left, as a share."""
+    found, error = fitted_poles(tip.omega, tip.values, FIT_TOLERANCE, DAMPED_OUTSIDE)
+    return TipModes.joined([found]), error
+
+
+def require_modes(tip: Receptance | TipModes, method: str) -> TipModes:
+    """Return the modes that a method marches with, or say what it needs."""
     if isinstance(tip, TipModes):
         return tip
     raise InputError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability._kernels import envelope, envelopes, largest_real_part, pitch_envelope
+from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import TipModes, receptance_of
 
@@ -22,14 +24,19 @@ FEWEST_TEETH_IN_CUT = 1.0
 
 @dataclass(frozen=True, slots=True)
 class ZeroOrder:
-    """Altintas & Budak's closed form (CIRP Annals 44 (1995) 357), with cross receptances.
+    """The closed form of Altintas and Budak [altintas1995], with cross receptances.
 
     F = a K_tc [alpha0] (1 - e^{-i w tau}) G(w) F with the mean directional matrix [alpha0]: at each frequency the two
     eigenvalues mu of [alpha0] G give the boundary a = 1 / (2 K_tc Re mu) at w tau = pi + 2 arg mu + 2 pi l. Between the
     given frequencies trace and determinant of [alpha0] G are interpolated by quintics. Unequal pitch replaces
-    1 - e^{-i w tau} by its mean over the teeth (Altintas, Engin & Budak, J. Manuf. Sci. Eng. 121 (1999) 173) and costs
+    1 - e^{-i w tau} by its mean over the teeth [altintas1999] and costs
     speeds times frequencies.
     """
+
+    name: ClassVar[str] = MethodName.ZERO_ORDER.value
+    needs: ClassVar[Literal["receptance", "modes"]] = "receptance"
+    seconds_per_speed: ClassVar[float] = 2e-5
+    gives_maps: ClassVar[bool] = False
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the lower envelope of all lobes in the range of `speeds`."""
@@ -56,21 +63,20 @@ class ZeroOrder:
             limit,
             chatter,
             lobe,
+            max_depth,
+            self.name,
             absolute_limit=1.0 / (2.0 * coefficients.tangential * strongest) if exists else float("inf"),
-            absolute_frequency=place if exists else float("nan"),
-            method="zero-order",
+            absolute_frequency=place if exists else None,
             warnings=tuple(_doubts(process, receptance, place if exists else None)),
         )
 
-    def depths(
-        self, omega: FloatArray, tips: tuple[ComplexArray, ComplexArray], process: MillingProcess, speeds: FloatArray, max_depth: float
-    ) -> FloatArray:
-        """Return the limits of many tips whose bending planes do not feel each other, as `lobes` does for each of them.
+    def depths(self, omega: FloatArray, tips: ComplexArray, process: MillingProcess, speeds: FloatArray, max_depth: float) -> FloatArray:
+        """Return the limits of many tips, as `lobes` does for each of them.
 
         Parameters
         ----------
         omega : array, shape (n,) [rad/s]
-        tips : (array, array), shape (d, n) each [m/N]
+        tips : complex array, shape (d, n, 2, 2) [m/N]
             The receptances in X and Y; a rigid direction is zero.
         speeds : array, shape (m,) [rad/s]
             In any order.
@@ -83,16 +89,22 @@ class ZeroOrder:
         alpha = _directions(process)
         kept = _above_rest(omega)
         omega = np.ascontiguousarray(omega[kept])
-        x, y = (tip if kept.size == tip.shape[1] else np.ascontiguousarray(tip[:, kept]) for tip in tips)
+        x, y = (np.ascontiguousarray(tips[:, kept, i, i]) for i in range(2))
+        xy, yx = tips[:, kept, 0, 1], tips[:, kept, 1, 0]
         order = np.argsort(speeds, kind="stable")
         ascending, stiffness = np.ascontiguousarray(speeds[order]), process.coefficients.tangential
-        if _equal_pitch(process):
-            found = envelopes(omega, x, y, alpha, stiffness, process.cutter.teeth, ascending)
+        teeth, pitch = process.cutter.teeth, process.cutter.pitch
+        if _equal_pitch(process) and not np.any(xy) and not np.any(yx):
+            found = envelopes(omega, x, y, alpha, stiffness, teeth, ascending)
         else:
-            traces, determinants = alpha[0, 0] * x + alpha[1, 1] * y, _determinant(alpha) * (x * y)
+            traces = alpha[0, 0] * x + alpha[0, 1] * yx + alpha[1, 0] * xy + alpha[1, 1] * y
+            determinants = _determinant(alpha) * (x * y - xy * yx)
             _finite(traces, determinants)
             each = zip(traces, determinants, strict=True)
-            found = np.array([pitch_envelope(omega, t, d, stiffness, process.cutter.pitch, ascending)[0] for t, d in each])
+            if _equal_pitch(process):
+                found = np.array([envelope(omega, t, d, stiffness, teeth, ascending)[0] for t, d in each])
+            else:
+                found = np.array([pitch_envelope(omega, t, d, stiffness, pitch, ascending)[0] for t, d in each])
         _finite(np.where(np.isinf(found), 0.0, found))
         limits = np.empty(found.shape)
         limits[:, order] = np.where(found <= max_depth, found, np.inf)
@@ -103,6 +115,9 @@ def _directions(process: MillingProcess) -> FloatArray:
     """[alpha0] of a cut at constant speed."""
     if process.speed_variation is not None:
         raise InputError("speed_variation", "a varying speed", "a constant speed: full-discretisation takes a varying one")
+    if process.engagement_profile is not None:
+        allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
+        raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
     return mean_directional_matrix(process.cutter.teeth, process.engagement, process.coefficients, process.feed_angle)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.shown import Shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +18,7 @@ class Material:
     density : float [kg/m^3]
     poisson : float [-]
     loss_factor : float [-]
-        Hysteretic: the modulus is E (1 + i loss_factor).
+        Hysteretic damping: the modulus is E (1 + i loss_factor).
     """
 
     youngs_modulus: float
@@ -34,7 +35,7 @@ class Material:
 
     @property
     def shear_modulus(self) -> float:
-        """G = E / (2 (1 + nu)) [Pa]."""
+        """Shear modulus G = E / (2 (1 + nu)) [Pa]."""
         return self.youngs_modulus / (2.0 * (1.0 + self.poisson))
 
 
@@ -60,7 +61,13 @@ class BeamSegment:
     end_diameter : float [m], default `diameter`
         Outer diameter at the flange's end: a taper.
     area, second_moment : float or None [m^2], [m^4]
-        Of the true section of a fluted part, where known; they replace the circle's.
+        Area and second moment of the true section of a fluted part, where known; they replace the circle's.
+
+    Examples
+    --------
+    >>> cone = BeamSegment(0.040, 0.030, MATERIALS["steel"], inner_diameter=0.012, end_diameter=0.050)
+    >>> round(cone.part(0.0, 0.020).end, 6)
+    0.04
     """
 
     length: float
@@ -101,13 +108,13 @@ class BeamSegment:
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """Distributed tool-holder joint, per metre of insertion.
+    """Distributed joint between tool and holder, per metre of insertion.
 
     Parameters
     ----------
     translational_stiffness : float [N/m^2]
     rotational_stiffness : float [N]
-        N m/rad per m.
+        Moment per angle and length, N m/rad per m.
     translational_damping : float [N s/m^2]
     rotational_damping : float [N s]
     """
@@ -123,8 +130,8 @@ class Contact:
             non_negative(name, getattr(self, name))
 
 
-@dataclass(frozen=True, slots=True)
-class ToolAssembly:
+@dataclass(frozen=True, slots=True, repr=False)
+class ToolAssembly(Shown):
     """A tool clamped in a holder; all segments run from the tip's end to the flange.
 
     Parameters
@@ -132,10 +139,21 @@ class ToolAssembly:
     tool : tuple of BeamSegment
         The tool's length in use: stickout + insertion (see `clamped`).
     holder : tuple of BeamSegment
+        From the holder's nose to the flange face.
     insertion : float [m]
         Length of tool inside the holder's bore; 0 is a butt joint.
     contact : Contact or None
         None is a rigid connection over the insertion.
+
+    Examples
+    --------
+    A carbide end mill of 12 mm, 40 mm of it in a holder of 60 mm:
+
+    >>> tool = (BeamSegment(0.030, 0.0096, MATERIALS["carbide"]), BeamSegment(0.070, 0.012, MATERIALS["carbide"]))
+    >>> holder = (BeamSegment(0.060, 0.050, MATERIALS["steel"], inner_diameter=0.012),)
+    >>> assembly = ToolAssembly(tool, holder, insertion=0.040, contact=Contact(2e10, 1e6))
+    >>> round(assembly.stickout, 6)
+    0.06
     """
 
     tool: tuple[BeamSegment, ...]
@@ -155,12 +173,12 @@ class ToolAssembly:
 
     @property
     def tool_length(self) -> float:
-        """Stickout + insertion [m]."""
+        """Length of tool in use, stickout + insertion [m]."""
         return sum(s.length for s in self.tool)
 
     @property
     def holder_length(self) -> float:
-        """From the holder's nose to the flange face [m]."""
+        """Length from the holder's nose to the flange face [m]."""
         return sum(s.length for s in self.holder)
 
     @property
@@ -168,11 +186,25 @@ class ToolAssembly:
         """Length of tool in front of the holder [m]."""
         return self.tool_length - self.insertion
 
+    def __str__(self) -> str:
+        lengths = {"stickout": self.stickout, "insertion": self.insertion, "holder": self.holder_length}
+        return ", ".join(f"{name} {1e3 * length:.4g} mm" for name, length in lengths.items())
+
 
 def clamped(
     tool: tuple[BeamSegment, ...], holder: tuple[BeamSegment, ...], stickout: float, insertion: float, contact: Contact | None
 ) -> ToolAssembly:
-    """Return the assembly with the tool cut to stickout + insertion; a tool that is too short is an error."""
+    """Return the assembly with the tool cut to stickout + insertion; a tool that is too short is an error.
+
+    Parameters
+    ----------
+    tool, holder : tuple of BeamSegment
+        From the tip's end to the flange; the tool at its full length.
+    stickout, insertion : float [m]
+        Length of tool in front of the holder and inside its bore.
+    contact : Contact or None
+        None is a rigid connection over the insertion.
+    """
     wanted = positive("stickout", stickout, "m") + non_negative("insertion", insertion, "m")
     length = sum(s.length for s in tool)
     if wanted > length + 1e-9:
@@ -190,7 +222,7 @@ def clamped(
 
 
 def stiffened(assembly: ToolAssembly, share: float) -> ToolAssembly:
-    """Return the assembly with all moduli and its contact stiffer by a share: natural frequencies rise by half of it."""
+    """Return the assembly with all moduli and its contact stiffer by a share [-]: natural frequencies rise by half of it."""
 
     def segments(old: tuple[BeamSegment, ...]) -> tuple[BeamSegment, ...]:
         materials = [replace(s.material, youngs_modulus=s.material.youngs_modulus * (1.0 + share)) for s in old]

@@ -50,10 +50,13 @@ def tool_holder_structure(
 
     Parameters
     ----------
+    assembly : ToolAssembly
     max_frequency : float [Hz]
         The mesh is chosen for it.
     axis : Dof
         The bending plane; the assembly is the same in all.
+    shear_coefficient : callable of (Poisson's ratio, inner over outer diameter)
+        `cowper` or `hutchinson`.
     refinement : int
         Divides every element further: for convergence studies.
 
@@ -83,18 +86,47 @@ def tool_holder_structure(
 def tool_holder_receptance(
     assembly: ToolAssembly, omega: FloatArray, axis: Dof = Dof.X, shear_coefficient: ShearCoefficient = cowper
 ) -> Receptance:
-    """Return the free-free receptances between tip and flange, shape (n, 4, 4), with mesh and modes chosen for `omega`."""
+    """Return the free-free receptances between tip and flange, shape (n, 4, 4), with mesh and modes chosen for `omega`.
+
+    Parameters
+    ----------
+    assembly : ToolAssembly
+    omega : array, shape (n,) [rad/s]
+    axis : Dof
+        The bending plane.
+    shear_coefficient : callable
+        As in `tool_holder_structure`.
+    """
     omega = np.asarray(omega, dtype=float)
     return tool_holder_poles(assembly, float(omega.max()), axis, shear_coefficient).receptance(omega)
 
 
 def tool_holder_poles(assembly: ToolAssembly, highest: float, axis: Dof = Dof.X, shear_coefficient: ShearCoefficient = cowper) -> PoleModel:
-    """Return the poles behind those receptances: translation and slope of the tip, then of the flange, up to a frequency [rad/s]."""
+    """Return the poles behind those receptances: translation and slope of the tip, then of the flange.
+
+    Parameters
+    ----------
+    assembly : ToolAssembly
+    highest : float [rad/s]
+        Frequency up to which they are good.
+    axis : Dof
+        The bending plane.
+    shear_coefficient : callable
+        As in `tool_holder_structure`.
+    """
     return poles(tool_holder_structure(assembly, highest / (2.0 * np.pi), axis, shear_coefficient), highest)
 
 
 def mesh_error(assembly: ToolAssembly, omega: FloatArray, shear_coefficient: ShearCoefficient = cowper) -> float:
-    """Return the relative error of the receptances against a mesh twice as fine, both solved exactly [-]."""
+    """Return the relative error of the receptances against a mesh twice as fine, both solved exactly [-].
+
+    Parameters
+    ----------
+    assembly : ToolAssembly
+    omega : array, shape (n,) [rad/s]
+    shear_coefficient : callable
+        As in `tool_holder_structure`.
+    """
     omega = np.asarray(omega, dtype=float)
     highest = float(omega.max()) / (2.0 * np.pi)
     coarse, fine = (
@@ -137,13 +169,22 @@ def _pieces(assembly: ToolAssembly) -> list[tuple[int, float, float, BeamSegment
     return pieces
 
 
+def expected_elements(assembly: ToolAssembly, max_frequency: float) -> float:
+    """Return about how many finite elements an assembly has up to a frequency [Hz], before any of them is made."""
+    return sum(_elements(segment, segment.length, max_frequency, cowper) for segment in (*assembly.tool, *assembly.holder))
+
+
 def _division(segment: BeamSegment, length: float, max_frequency: float, shear_coefficient: ShearCoefficient) -> int:
+    """Elements of a stretch."""
+    return int(np.ceil(_elements(segment, length, max_frequency, shear_coefficient)))
+
+
+def _elements(segment: BeamSegment, length: float, max_frequency: float, shear_coefficient: ShearCoefficient) -> float:
     """Elements of a stretch, short against the bending wavelength and the diameter."""
     beam = section(segment, shear_coefficient)
     wavelength = 2.0 * np.pi * float((beam.bending / beam.mass) ** 0.25) / np.sqrt(2.0 * np.pi * max(max_frequency, 1.0))
     density = max(ELEMENTS_PER_WAVELENGTH / wavelength, ELEMENTS_PER_DIAMETER / max(segment.diameter, segment.end))
-    least = 2 if segment.end_diameter is None else ELEMENTS_PER_TAPER
-    return max(int(np.ceil(length * density)), least)
+    return max(length * density, 2.0 if segment.end_diameter is None else float(ELEMENTS_PER_TAPER))
 
 
 def _key(z: float) -> int:

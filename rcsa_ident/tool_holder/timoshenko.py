@@ -1,8 +1,8 @@
 """Timoshenko beam elements: two nodes, deflection w and section rotation r = dw/dz + shear each.
 
-Consistent matrices from shape functions that satisfy the static equations exactly (Friedman & Kosmatka, Computers &
-Structures 47 (1993) 473), so a uniform beam under end loads is exact with one element. Order of freedoms: w1, r1, w2, r2;
-z runs from the tip to the spindle, a positive rotation lifts w with z.
+Consistent matrices from shape functions that satisfy the static equations exactly [friedman1993], so a uniform beam under
+end loads is exact with one element. Order of freedoms: w1, r1, w2, r2; z runs from the tip to the spindle, a positive rotation
+lifts w with z.
 
 These shapes leave out how inertia and contact, which load a beam along its length, bend it inside an element: in stubby parts
 the error of a natural frequency falls with the second power of the length only. Two more freedoms inside, the static answers
@@ -24,19 +24,22 @@ ShearCoefficient = Callable[[float, float], float]
 
 
 def cowper(poisson: float, ratio: float) -> float:
-    """Shear coefficient of a hollow circular section (Cowper, J. Appl. Mech. 33 (1966) 335).
+    """Shear coefficient of a hollow circular section [cowper1966].
 
-    kappa = 6 (1 + nu) (1 + m^2)^2 / ((7 + 6 nu) (1 + m^2)^2 + (20 + 12 nu) m^2), m = inner / outer diameter.
+    kappa = 6 (1 + nu) (1 + m^2)^2 / ((7 + 6 nu) (1 + m^2)^2 + (20 + 12 nu) m^2), m = inner / outer diameter (`ratio`).
+
+    >>> round(cowper(0.3, 0.0), 4), round(cowper(0.3, 0.5), 4)
+    (0.8864, 0.6202)
     """
     square = (1.0 + ratio**2) ** 2
     return 6.0 * (1.0 + poisson) * square / ((7.0 + 6.0 * poisson) * square + (20.0 + 12.0 * poisson) * ratio**2)
 
 
 def hutchinson(poisson: float, ratio: float) -> float:
-    """Shear coefficient of a hollow circular section (Hutchinson, J. Appl. Mech. 68 (2001) 87).
+    """Shear coefficient of a hollow circular section [hutchinson2001].
 
-    kappa = 6 (1 + nu)^2 (1 + m^2)^2 / ((7 + 12 nu + 4 nu^2) (1 + m^2)^2 + 4 (5 + 6 nu + 2 nu^2) m^2); with it the
-    solid section's frequencies are those of tables/stability_benchmarks.toml.
+    kappa = 6 (1 + nu)^2 (1 + m^2)^2 / ((7 + 12 nu + 4 nu^2) (1 + m^2)^2 + 4 (5 + 6 nu + 2 nu^2) m^2); the tests'
+    reference frequencies of solid sections were computed with it.
     """
     square = (1.0 + ratio**2) ** 2
     nu = poisson
@@ -50,12 +53,12 @@ class Section:
     Parameters
     ----------
     bending : float [N m^2]
-        E I.
+        Bending stiffness E I.
     shear : float [N]
-        kappa G A.
+        Shear stiffness kappa G A.
     mass : float [kg/m]
     rotary : float [kg m]
-        rho I.
+        Rotary inertia rho I per length.
     loss_factor : float [-]
     shear_loss_factor : float [-], default `loss_factor`
         Where several materials bend as one, shear may lose another share than bending.
@@ -140,7 +143,7 @@ _GAUSS_X, _GAUSS_W = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 
 
 def beam_matrices(beam: Section, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return consistent mass and stiffness of an element, each shape (4, 4)."""
+    """Return consistent mass and stiffness of an element of a length [m], each shape (4, 4)."""
     mass, stiffness, _ = refined_beam_matrices(beam, length)
     return mass[..., :4, :4], stiffness[..., :4, :4]
 
@@ -194,6 +197,12 @@ def layer_matrices(inner: Section, outer: Section, length: float) -> tuple[Float
 
     First for a unit translational stiffness per metre, then for a unit rotational one; freedoms of `inner`, then of
     `outer`. The relative motion is integrated with both bodies' own shape functions.
+
+    Parameters
+    ----------
+    inner, outer : Section
+        Of the elements that lie side by side.
+    length : float [m]
     """
     nodal = np.ix_([0, 1, 2, 3, 6, 7, 8, 9], [0, 1, 2, 3, 6, 7, 8, 9])
     gap, turn = refined_layer_matrices(inner, outer, length)
@@ -201,7 +210,14 @@ def layer_matrices(inner: Section, outer: Section, length: float) -> tuple[Float
 
 
 def refined_layer_matrices(inner: Section, outer: Section, length: float | FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return what `layer_matrices` does with both bodies' inner freedoms, each shape (12, 12), or (m, 12, 12)."""
+    """Return what `layer_matrices` does with both bodies' inner freedoms, each shape (12, 12), or (m, 12, 12).
+
+    Parameters
+    ----------
+    inner, outer : Section
+        Of the elements that lie side by side; arrays, shape (m,), for m pairs at once.
+    length : float, or array, shape (m,) [m]
+    """
     size = np.asarray(length, dtype=float)
     inner_w, inner_r = _refined_shapes(size, 12.0 * inner.bending / (inner.shear * size**2))
     outer_w, outer_r = _refined_shapes(size, 12.0 * outer.bending / (outer.shear * size**2))

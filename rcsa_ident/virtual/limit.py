@@ -61,15 +61,16 @@ def true_limit(
     Parameters
     ----------
     dynamics : Poles
-        At the cut's speed, with inputs ``tip.x``, ``tip.y``.
+        The machine at the cut's speed, with inputs ``tip.x``, ``tip.y``.
     cutter : Cutter
-        With equal teeth.
+        One with equal teeth.
     conditions : CuttingConditions
         Depth and feed are left aside.
+    coefficients : CuttingCoefficients
     bracket : (float, float) [m]
         The cut has to be stable at the first; depths up to the second are looked at.
     tolerance : float
-        Of the depth, relative.
+        Relative error of the depth that is allowed.
     step : float [s]
         See `multiplier`.
 
@@ -120,12 +121,19 @@ def multiplier(
     of the tool's path obeys F = a K_tc [alpha(t)] {d(t) - d(t - T)} as long as it is small against the feed: no tooth
     leaves the material. It is marched from tooth to tooth as `mill_cut` marches the cut (force linear within a step,
     poles exact), with the directional matrix averaged over depth and step in closed form, and the delay a whole number
-    of steps. The largest eigenvalue of the march over one tooth period is found by Arnoldi's method.
+    of steps. The largest eigenvalue of the march over one tooth period is found by Arnoldi's method
+    [arnoldi1951].
 
     Parameters
     ----------
+    dynamics : Poles
+        At the cut's speed, with inputs ``tip.x``, ``tip.y``.
+    cutter : Cutter
+        With equal teeth.
+    conditions : CuttingConditions
+    coefficients : CuttingCoefficients
     step : float [s]
-        At most so long; the error falls with its square.
+        Longest step of the march; the error falls with its square.
     """
     return _Disturbance(dynamics, cutter, conditions, coefficients, step).multiplier(conditions.axial_depth)
 
@@ -242,6 +250,15 @@ def directional_matrices(cutter: Cutter, conditions: CuttingConditions, coeffici
     """Return [alpha] at `count` instants of a tooth period, summed over equal teeth, in machine axes, shape (count, 2, 2).
 
     Each is the mean over the depth, along the helix, and over the step around its instant, in closed form.
+
+    Parameters
+    ----------
+    cutter : Cutter
+        With equal teeth.
+    conditions : CuttingConditions
+    coefficients : CuttingCoefficients
+    count : int
+        Instants in a tooth period.
     """
     pitch = 2.0 * np.pi / cutter.teeth
     entry, leave = conditions.engagement.entry, conditions.engagement.exit
@@ -256,7 +273,7 @@ def directional_matrices(cutter: Cutter, conditions: CuttingConditions, coeffici
         return np.array([[-sc - kr * ss, -cc - kr * sc], [ss - kr * sc, sc - kr * cc]])
 
     def twice(phi: FloatArray) -> FloatArray:
-        """Integral of `once` from the entry on."""
+        """Return the integral of `once` from the entry on."""
         inside = np.clip(phi, entry, leave)
         run = inside - entry
         sc, ss, cc = (g(inside) - g(entry) - f(entry) * run for f, g in zip(_PRIMITIVES, _SECOND_PRIMITIVES, strict=True))

@@ -22,9 +22,9 @@ class Bearing:
     Parameters
     ----------
     position : float [m]
-        From the spindle's flange face towards the rear.
+        Distance from the spindle's flange face towards the rear.
     stiffness : two floats, X and Y [N/m]
-        At standstill.
+        Stiffness at standstill.
     damping : two floats, X and Y [N s/m]
     softening : float [s/rad], default 0
         Share of the stiffness lost per spindle speed: k = k0 (1 - softening Omega).
@@ -105,7 +105,7 @@ class VirtualSpindle:
     Parameters
     ----------
     shaft : tuple of BeamSegment
-        From the flange face to the rear end.
+        Segments from the flange face to the rear end.
     bearings : tuple of Bearing
     housing : Housing
     joint : FlangeJoint
@@ -134,7 +134,7 @@ class VirtualSpindle:
 
     @property
     def shaft_length(self) -> float:
-        """From the flange face to the rear end [m]."""
+        """Length from the flange face to the rear end [m]."""
         return sum(s.length for s in self.shaft)
 
     @property
@@ -157,14 +157,15 @@ class CutPlan:
     Parameters
     ----------
     spindle_speeds : tuple of float [rad/s]
-        As programmed.
+        Programmed speeds.
     axial_depth, feed_per_tooth : float [m]
     engagement : Engagement
     feed_angle : float [rad]
+        Direction of the feed in the machine's X-Y plane, from +X towards +Y.
     duration : float [s]
-        Of each record.
+        Length of each record.
     settling : float [s]
-        Simulated before it and dropped.
+        Time that is simulated before it and dropped.
     """
 
     spindle_speeds: tuple[float, ...]

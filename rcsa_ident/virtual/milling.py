@@ -29,11 +29,11 @@ class CutHistory:
     angle : array, shape (n,) [rad]
         Immersion angle of tooth 1 at the tip, from the feed's normal, growing.
     force : array, shape (n, 2) [N]
-        On the tool, machine axes X and Y.
+        Force on the tool, machine axes X and Y.
     tip, flange, fixture : arrays, shape (n, 2) [m]
         Absolute displacements, X and Y.
     acceleration : array, shape (n, 2) [m/s^2]
-        Of the fixture.
+        Acceleration of the fixture.
     """
 
     step: float
@@ -68,15 +68,19 @@ def mill_cut(
     Parameters
     ----------
     dynamics : Poles
-        With inputs ``tip.x``, ``tip.y`` and outputs at ``tip``, ``flange``, ``fixture``.
+        The machine with inputs ``tip.x``, ``tip.y`` and outputs at ``tip``, ``flange``, ``fixture``.
+    cutter : Cutter
     conditions : CuttingConditions
-        With the true spindle speed.
+        The cut, with the true spindle speed.
+    coefficients : CuttingCoefficients
     step : float [s]
         The force is linear between instants; displacements follow exactly.
+    count : int
+        Number of instants.
     start_angle : float [rad]
         Immersion of tooth 1 at the first instant.
     slices : int
-        Of the depth, for the helix.
+        Slices of the depth, for the helix.
 
     Notes
     -----
@@ -125,6 +129,16 @@ def rigid_force_lines(
     """Return the force of a tool that does not vibrate as F = Re sum_m lines[m] e^{i m Omega t}, shape (orders, 2) [N].
 
     Tooth 1 is at immersion 0 when t = 0; machine axes.
+
+    Parameters
+    ----------
+    cutter : Cutter
+    conditions : CuttingConditions
+    coefficients : CuttingCoefficients
+    slices : int
+        Slices of the depth, for the helix.
+    samples : int
+        Instants of a revolution.
     """
     step = 2.0 * np.pi / conditions.spindle_speed / samples
     tooth, delay, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices, 0.0)
@@ -179,6 +193,8 @@ def synchronous_lines(angle: FloatArray, values: FloatArray, orders: int) -> np.
     angle : array, shape (n,) [rad]
         Growing evenly.
     values : array, shape (n, c)
+    orders : int
+        Number of spindle orders, 0 among them.
     """
     turn = 2.0 * np.pi
     first, last = np.ceil(angle[0] / turn), np.floor(angle[-1] / turn)

@@ -47,6 +47,10 @@ def reduced(
 
     Parameters
     ----------
+    model : Rotor
+    max_frequency : float [Hz]
+    inputs : tuple of str
+        Coordinates such as ``tip.x`` at which forces act.
     exact_at : tuple of float [Hz]
         Frequencies at which the full solutions, real and imaginary parts apart, join the basis: dampers that act in one
         place, as in the tool's clamping, excite shapes that no low undamped mode has.
@@ -120,6 +124,14 @@ def poles(model: ReducedRotor, speed: float = 0.0, inputs: tuple[str, ...] = ("t
     with negative imaginary part are unstable. The poles of positive frequency together with their conjugates make a
     real, causal system; it differs from the hysteretic one by a share of the loss factor far from resonance
     (`tests/virtual/test_reduction.py` holds it below 0.2 %).
+
+    Parameters
+    ----------
+    model : ReducedRotor
+    speed : float [rad/s]
+        Spindle speed.
+    inputs : tuple of str
+        Coordinates at which forces act.
     """
     m = model.stiffness.shape[0]
     state = np.zeros((2 * m, 2 * m), dtype=complex)

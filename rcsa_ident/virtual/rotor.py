@@ -59,6 +59,9 @@ def rotor(spindle: VirtualSpindle, tooling: ToolAssembly | None, refinement: int
 
     Parameters
     ----------
+    spindle : VirtualSpindle
+    tooling : ToolAssembly or None
+        None is the bare spindle.
     refinement : int
         Divides every element further: for convergence studies.
     """
@@ -109,9 +112,10 @@ def frequency_response(
 
     Parameters
     ----------
+    model : Rotor
     omega : array, shape (n,) [rad/s], above 0
     speed : float [rad/s]
-        Of the spindle: gyroscopic moments and softening.
+        Spindle speed, for gyroscopic moments and softening.
     inputs, outputs : tuples of str
         Coordinates such as ``tip.x``; outputs default to all.
 
@@ -124,7 +128,17 @@ def frequency_response(
 
 
 def frequency_motion(model: Rotor, omega: FloatArray, inputs: tuple[str, ...], speed: float = 0.0) -> ComplexArray:
-    """Return the motion of every freedom under unit forces at `inputs`, shape (n, d, inputs)."""
+    """Return the motion of every freedom under unit forces at `inputs`, shape (n, d, inputs).
+
+    Parameters
+    ----------
+    model : Rotor
+    omega : array, shape (n,) [rad/s], above 0
+    inputs : tuple of str
+        Coordinates such as ``tip.x``.
+    speed : float [rad/s]
+        Spindle speed.
+    """
     omega = np.asarray(omega, dtype=float)
     force = np.ascontiguousarray(model.ports[model.port(*inputs)].T.astype(complex))
     stiffness = model.stiffness - speed * model.softening + 1j * model.loss

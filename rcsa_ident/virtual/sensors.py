@@ -92,7 +92,15 @@ class Clamping:
 
 
 def clamp(suite: SensorSuite, tooth_angle: FloatArray, rng: np.random.Generator) -> Clamping:
-    """Draw a clamping: amplitudes that fall with the order, any phases, an eccentric cutter."""
+    """Draw a clamping: amplitudes that fall with the order, any phases, an eccentric cutter.
+
+    Parameters
+    ----------
+    suite : SensorSuite
+    tooth_angle : array, shape (teeth,) [rad]
+        Angle of each tooth ahead of tooth 1.
+    rng : numpy.random.Generator
+    """
     order = np.arange(1, suite.roundness_orders + 1)
     size = rng.uniform(0.5, 1.5, order.size) / order
     size *= suite.roundness / max(size.sum(), 1e-300)
@@ -106,11 +114,13 @@ def out_of_round(suite: SensorSuite, clamping: Clamping, angle: FloatArray, spee
 
     Parameters
     ----------
+    suite : SensorSuite
+    clamping : Clamping
     angle : array, shape (n,) [rad]
         Angle of tooth 1 at each sample, clockwise from +Y to +X.
     speed : float [rad/s]
     factor : int
-        Of the `decimator`, whose flatness at each order is exact here.
+        Fine instants per sample; the `decimator`'s flatness at each order is exact here.
     """
     order = np.arange(1, clamping.roundness.size + 1)
     omega = order * speed
@@ -153,7 +163,13 @@ def sample(values: FloatArray, factor: int, fine_step: float, delay: float, band
     ----------
     values : array, shape (factor * (n - 1 + 2 pad) + 1,)
         With `padding` on both sides; the delay may not exceed the padding by much.
+    factor : int
+        Fine instants per sample.
     fine_step : float [s]
+    delay : float [s]
+        The sensor lags by it.
+    bandwidth : float or None [Hz]
+        Of the sensor's first-order low-pass.
 
     Returns
     -------
@@ -184,14 +200,30 @@ def _delayed(taps: FloatArray, shift: float) -> FloatArray:
 
 
 def drift(size: float, count: int, rng: np.random.Generator) -> FloatArray:
-    """Return a slow wandering: a line and half a wave across the record, shape (count,)."""
+    """Return a slow wandering: a line and half a wave across the record, shape (count,).
+
+    Parameters
+    ----------
+    size : float [m]
+    count : int
+    rng : numpy.random.Generator
+    """
     s = np.linspace(-0.5, 0.5, count)
     a, b, phase = rng.normal(), rng.normal(), rng.uniform(0.0, 2.0 * np.pi)
     return size * (a * s + 0.3 * b * np.sin(np.pi * s + phase))
 
 
 def trigger_pulse(angle: FloatArray, edge: float, width: float = 0.35) -> FloatArray:
-    """Return 1 while the reference mark passes, else 0; the edge rises where the tooth angle passes `edge`."""
+    """Return 1 while the reference mark passes, else 0; the edge rises where the tooth angle passes `edge`.
+
+    Parameters
+    ----------
+    angle : array, shape (n,) [rad]
+        Angle of tooth 1.
+    edge : float [rad]
+        Tooth angle at which the pulse rises.
+    width : float [rad]
+    """
     return (np.mod(angle - edge, 2.0 * np.pi) < width).astype(float)
 
 
@@ -210,15 +242,20 @@ def record(
 
     Parameters
     ----------
+    suite : SensorSuite
+    clamping : Clamping
     speed : float [rad/s]
-        True and constant in the record.
+        True spindle speed, constant in the record.
     angle : float [rad]
         Immersion angle of tooth 1 at the first sample.
     feed_angle : float [rad]
+    count : int
+        Number of samples.
     factor : int
         Fine instants per sample.
     history : CutHistory or None
-        With `padding` on both sides; None is an air cut.
+        The simulated cut with `padding` on both sides; None is an air cut.
+    rng : numpy.random.Generator
     """
     turned = np.asarray(angle + speed * np.arange(count) / suite.rate, dtype=np.float64)
     gap = out_of_round(suite, clamping, turned - feed_angle, speed, factor)

@@ -23,7 +23,7 @@ from rcsa_ident.signals.verdict import chatter
 
 #: Highest line of the full-signal fit [Hz]: below the resonance of most dynamometers.
 MAX_FREQUENCY = 2000.0
-#: ShortestPlan revolutions of a usable record, and most blocks that it is divided into.
+#: Fewest revolutions of a usable record, and most blocks that it is divided into.
 LEAST_REVOLUTIONS, MOST_BLOCKS = 16.0, 24
 #: Largest share of lost samples; they are bridged by straight lines.
 LOST_SHARE = 1e-3
@@ -213,7 +213,7 @@ def calibrate(
             progress(done, len(campaign.cuts))
     if not used:
         raise InputError("cuts", f"none of {len(campaign.cuts)} usable ({left_out[0][1]})", "recordings of the cutting force")
-    notes = [] if any(cut.air is not None for cut in campaign.cuts) else ["no air cuts: zero is taken from the sensors as it is"]
+    notes = [] if any(cut.air is not None for cut in campaign.cuts) else ["no air cuts: the sensors' own zero level is used"]
     if not signal:
         return Calibrated(_mean(used), None, tuple(used), tuple(left_out), tuple(notes))
     found = calibrate_signal([m.record for m in used], dynamometer, free_helix)

@@ -10,17 +10,12 @@ from itertools import pairwise
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.coupling.rcsa import couple
-from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.rational import rational_fit
 from rcsa_ident.errors import InputError
-from rcsa_ident.identification.posterior import MachineAxis, spread
+from rcsa_ident.machine.machine import Machine
 from rcsa_ident.tool_holder.geometry import ToolAssembly
-from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.workflows.contact import neighbour_noise
-from rcsa_ident.workflows.tip import turned_plane
 
 #: Modes farther apart than this share of their frequency are not the same one.
 MATCH = 0.12
@@ -99,10 +94,9 @@ class ResponseComparison:
 
 
 def compare(
-    machine: Mapping[Dof, MachineAxis],
+    machine: Machine,
     tests: Mapping[tuple[Place, Dof], tuple[FloatArray, ComplexArray]],
     assembly: ToolAssembly | None = None,
-    band: tuple[float, float] | None = None,
     speed: float | None = None,
     bands: bool = True,
 ) -> list[ResponseComparison]:
@@ -110,12 +104,10 @@ def compare(
 
     Parameters
     ----------
-    machine : mapping of Dof to MachineAxis
+    machine : Machine
     tests : mapping of (Place, Dof) to (array, complex array), shapes (n,) [rad/s] and (n,) [m/N]
     assembly : ToolAssembly or None
         Of all places but the bare flange.
-    band : (float, float), optional [rad/s]
-        Where the machine is known; frequencies outside are left out.
     speed : float or None [rad/s]
         For a machine that changes with it; by default the middle of the campaign's.
     bands : bool
@@ -123,46 +115,36 @@ def compare(
     """
     found = []
     for (place, axis), (omega, values) in tests.items():
-        if axis not in machine:
-            raise InputError("hammer test", axis.upper(), f"an identified axis: {', '.join(a.upper() for a in machine)}")
+        if axis not in machine.axes:
+            raise InputError("hammer test", axis.upper(), f"an identified axis: {', '.join(a.upper() for a in machine.axes)}")
         if place is not Place.FLANGE and assembly is None:
             raise InputError("hammer test", place, "the tooling that was clamped, or a test of the bare flange")
-        low, high = band or (0.0, np.inf)
+        low, high = machine.band or (0.0, np.inf)
         inside = (omega >= low) & (omega <= high) & (omega > 0.0)
         if np.sum(inside) < 8:
             raise InputError("hammer test", f"{np.sum(inside)} frequencies in the identified band", "eight at least")
         omega, values = omega[inside], np.asarray(values)[inside]
-        found.append(_one(machine[axis], place, axis, omega, values, assembly, speed, bands))
+        found.append(_one(machine.at(speed), place, axis, omega, values, assembly, bands))
     return found
 
 
 def _one(
-    part: MachineAxis,
+    machine: Machine,
     place: Place,
     axis: Dof,
     omega: FloatArray,
     hammer: ComplexArray,
     assembly: ToolAssembly | None,
-    speed: float | None,
     bands: bool,
 ) -> ResponseComparison:
-    holder = None
-    if assembly is not None and place is not Place.FLANGE:
-        plane = tool_holder_receptance(assembly, omega)
-        holder = plane if axis is Dof.X else turned_plane(plane)
-    points = {Place.TIP: ("tip", "tip"), Place.CROSS: ("spindle", "tip"), Place.SPINDLE: ("spindle", "spindle")}
-
-    def response(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
-        flange = modes.receptance(omega)
-        if holder is None:
-            return flange["flange", "flange"][:, 0, 0]
-        return couple(holder, flange, joint)[points[place]][:, 0, 0]
-
-    identified = response(*part.at(axis, speed))
-    deviation = None
-    if bands and part.posterior is not None:
-        changes = spread(part.posterior, axis, response, speed)
-        deviation = np.sqrt(np.sum(changes.real**2, axis=0)), np.sqrt(np.sum(changes.imag**2, axis=0))
+    if assembly is None or place is Place.FLANGE:
+        ends, response = ("flange", "flange"), machine.receptance(omega, (axis,))
+    else:
+        ends = {Place.TIP: ("tip", "tip"), Place.CROSS: ("spindle", "tip"), Place.SPINDLE: ("spindle", "spindle")}[place]
+        response = machine.coupled(assembly, omega, (axis,))
+    entry = Coordinate(ends[0], axis), Coordinate(ends[1], axis)
+    identified = response.between(*(str(c) for c in entry))
+    deviation = response.deviation().get(entry) if bands else None
     # both at the hammer's noise, so that both fits resolve alike
     noise = neighbour_noise(hammer)
     modes = matched(local_modes(omega, hammer, noise), local_modes(omega, identified, noise))

@@ -18,7 +18,11 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.identification.data import IdentificationData, prepare
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
+from rcsa_ident.identification.machine import IdentifiedMachine
+from rcsa_ident.identification.parameters import AxisLayout
+from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.search import SearchSettings
+from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.observer.force_model import RandomWalk, augmented
 from rcsa_ident.observer.kalman import kalman_filter
 from rcsa_ident.observer.transfer_function import SampledModes
@@ -26,6 +30,7 @@ from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement, measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
@@ -33,7 +38,6 @@ from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Too
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.virtual.milling import mill_cut
 from rcsa_ident.virtual.reduction import Poles
-from rcsa_ident.workflows.lobes import LobeConditions, modal_tip
 
 _CUTTER = Cutter(2, 0.012)
 _COEFFICIENTS = CuttingCoefficients(9e8, 0.3)
@@ -94,22 +98,35 @@ def _paper_method() -> None:
     PaperGeneticAlgorithm(population=4, generations=1).run(_lines(1), 1)
 
 
+def _tip() -> TipModes:
+    model = normal_modes(np.array([5000.0]), np.array([0.05]), np.ones((1, 1)), (Coordinate("tip", Dof.X),))
+    return TipModes.of({Dof.X: model})
+
+
 def _lobes() -> None:
-    tip = modal_tip({Dof.X: normal_modes(np.array([5000.0]), np.array([0.05]), np.ones((1, 1)), (Coordinate("tip", Dof.X),))})
+    tip = _tip().receptance()
     speeds = np.linspace(800.0, 1000.0, 3)
     for cutter in (_CUTTER, Cutter(2, 0.012, 0.0, np.array([3.0, 2.0 * np.pi - 3.0]))):
         process = MillingProcess(cutter, _COEFFICIENTS, _CONDITIONS.engagement)
-        LobeConditions(process, speeds, 0.01).lobes(tip)
+        stability_lobes(tip, process, speeds, 0.01)
         # and of machines that were drawn, for bands
-        direct = np.ascontiguousarray(tip.values[:, 0, 0])[None]
-        ZeroOrder().depths(tip.omega, (direct, 0.0 * direct), process, speeds, 0.01)
+        ZeroOrder().depths(tip.omega, tip.values[None], process, speeds, 0.01)
+
+
+def _tips() -> None:
+    """The tip of a tooling on a machine with a posterior, as every tool change asks for it."""
+    layout = AxisLayout(2)
+    theta = np.concatenate([np.log([5000.0, 9000.0]), np.full(layout.size - 2, 0.1), np.log([2e9, 5e6, 1e4, 10.0])])
+    posterior = Posterior(theta, 1e-6 * np.eye(theta.size), layout)
+    axis = MachineAxis(Spindle(posterior.machine(Dof.X)[0]), posterior.machine(Dof.X)[1], posterior)
+    machine = IdentifiedMachine({Dof.X: axis}, (2000.0, 8000.0))
+    assert machine.tip(_assembly()).thinned().spread.size
 
 
 def _lobes_in_time() -> None:
-    model = normal_modes(np.array([5000.0]), np.array([0.05]), np.ones((1, 1)), (Coordinate("tip", Dof.X),))
     process, speeds = MillingProcess(_CUTTER, _COEFFICIENTS, _CONDITIONS.engagement), np.array([900.0])
     for method in (FullDiscretisation(), TimeDomain(periods=20)):
-        LobeConditions(process, speeds, 1e-3, method).lobes(TipModes.of({Dof.X: model}))
+        stability_lobes(_tip(), process, speeds, 1e-3, method)
 
 
 def _observer() -> None:
@@ -135,6 +152,7 @@ STEPS: dict[str, Callable[[], None]] = {
     "recordings": _recordings,
     "default method": _default_method,
     "paper's method": _paper_method,
+    "tips": _tips,
     "lobes": _lobes,
     "lobes in time": _lobes_in_time,
     "force observer": _observer,

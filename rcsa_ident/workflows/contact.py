@@ -69,7 +69,9 @@ class TapTest:
     def __post_init__(self) -> None:
         omega, values = frozen(self.omega), frozen(self.values, np.complex128)
         if omega.ndim != 1 or omega.shape != values.shape or not np.all(np.diff(omega, prepend=0.0) > 0.0):
-            raise InputError("tap test", f"{omega.shape} and {values.shape}", "values at frequencies above 0 that rise", self.name)
+            raise InputError(
+                "tap test", f"{omega.shape} and {values.shape}", "one value for each of increasing frequencies above 0", self.name
+            )
         if not np.all(np.isfinite(values)) or np.any(values == 0.0):
             raise InputError("tap test", "zero or no number", "a receptance above 0 at every frequency [m/N]", self.name)
         std = neighbour_noise(values) if self.std is None else frozen(np.broadcast_to(self.std, values.shape))
@@ -328,17 +330,19 @@ def _answer(problem: _Problem, theta: FloatArray) -> ContactCalibration:
     notes = []
     for name, s, ok in zip(NAMES, std[:4], told, strict=True):
         if not ok:
-            notes.append(f"{name.replace('_', ' ')}: the taps hardly tell it (known to a factor of {np.exp(s):.2g}); the prior holds it")
+            known = f"known to within a factor of {np.exp(s):.2g}"
+            notes.append(f"{name.replace('_', ' ')}: hardly determined by the tap tests ({known}); the prior dominates")
     for i in range(4):
         for j in range(i):
             if abs(correlation[i, j]) > 0.95 and told[i] and told[j]:
                 both = f"{NAMES[j].replace('_', ' ')} and {NAMES[i].replace('_', ' ')}"
-                notes.append(f"{both} are told together only (correlation {correlation[i, j]:+.2f}): other stickouts would part them")
+                tied = f"correlation {correlation[i, j]:+.2f}"
+                notes.append(f"{both} are determined only together ({tied}): tap tests at other stickouts would separate them")
     if problem.model_error > 0.1:
         share = 100.0 * problem.model_error
-        notes.append(f"{share:.0f} % of the receptances stay unexplained: geometry, materials or support are not as modelled")
+        notes.append(f"the model leaves {share:.0f} % of the receptances unexplained: geometry, materials or support differ from it")
     if problem.physical > 4 and abs(theta[4]) > 2.5 * problem.width[4]:
-        notes.append(f"the moduli had to change by {100.0 * np.expm1(theta[4]):+.1f} %: check materials and geometry")
+        notes.append(f"the fit changed the moduli by {100.0 * np.expm1(theta[4]):+.1f} %: check materials and geometry")
     modulus_std = float(std[4]) if problem.physical > 4 else 0.0
     gain = {tap.name: float(np.exp(g)) for tap, g in zip(problem.taps, theta[problem.physical :], strict=True)}
     return ContactCalibration(

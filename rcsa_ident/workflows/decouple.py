@@ -13,11 +13,11 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.machine.responses import in_plane
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.workflows.compare import Place
 from rcsa_ident.workflows.contact import neighbour_noise
-from rcsa_ident.workflows.tip import turned_plane
 
 #: Share of a measured receptance that its calibration and the tool-holder's model may be off.
 MODEL_SHARE = 0.01
@@ -66,7 +66,7 @@ def flange_from_taps(
         Standard deviation of what the noise between neighbouring frequencies does not show, as a share of each receptance.
     """
     if not taps:
-        raise InputError("taps", "none", "hammer tests with three toolings at least")
+        raise InputError("taps", "none", "hammer tests with at least three toolings")
     omega = np.asarray(taps[0].omega, dtype=float)
     planes: dict[int, Receptance] = {}
     observations = []
@@ -78,7 +78,7 @@ def flange_from_taps(
         key = id(tap.assembly)
         if key not in planes:
             planes[key] = tool_holder_receptance(tap.assembly, omega)
-        holder = planes[key] if axis is Dof.X else turned_plane(planes[key])
+        holder = in_plane(planes[key], axis)
         std = np.hypot(neighbour_noise(tap.values), model_share * np.abs(tap.values))
         observations.append(Observation(holder, *_ENDS[tap.place], tap.values, std))
     return least_squares_flange(observations, joint, least_damping)

@@ -8,19 +8,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.coupling.rcsa import SPINDLE, couple
+from rcsa_ident.coupling.rcsa import SPINDLE
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, Unsteady
-from rcsa_ident.identification.posterior import MachineAxis, spread
+from rcsa_ident.machine.machine import Machine
 from rcsa_ident.observer.force import AxisObserver, ForceEstimate, ForceObserver, RunOut, axis_observer, force_observer
 from rcsa_ident.observer.response import ObserverFRF, observer_response
 from rcsa_ident.observer.transfer_function import HIGHEST, transfer_function
 from rcsa_ident.observer.tuning import ObserverMethod, Resonators, Tuning, harmonics
 from rcsa_ident.observer.wear import WearIndicators, wear_indicators
+from rcsa_ident.shown import Drawn
 from rcsa_ident.signals.alignment import angle_to_air
 from rcsa_ident.signals.measurement import NO_AIR
 from rcsa_ident.signals.recording import Quantity, Recording
@@ -28,9 +28,7 @@ from rcsa_ident.signals.spectra import line_spectrum
 from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
 from rcsa_ident.signals.verdict import raw_faults, speed_faults
 from rcsa_ident.tool_holder.geometry import ToolAssembly
-from rcsa_ident.tool_holder.model import tool_holder_receptance
-from rcsa_ident.workflows.speeds import MachineOverSpeed
-from rcsa_ident.workflows.tip import tooltip, turned_plane
+from rcsa_ident.units import to_hz, to_rpm
 
 #: The band begins this much below the lowest identified line: a model is as good a little beyond its last point.
 BELOW = 0.7
@@ -45,8 +43,8 @@ UNRELATED, PERIODIC = 0.5, 0.9
 METHOD = Resonators()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MonitoredCut:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class MonitoredCut(Drawn):
     """Forces of a recording and what they rest on.
 
     Parameters
@@ -79,14 +77,17 @@ class MonitoredCut:
     noise: Mapping[Dof, float]
     notes: tuple[str, ...] = field(default=())
 
+    def __str__(self) -> str:
+        low, high = (to_hz(w) for w in self.band)
+        return f"{self.estimate}, {to_rpm(self.spindle_speed):.0f} rev/min, {low:.0f} to {high:.0f} Hz"
+
 
 def observe(
-    machine: MachineOverSpeed,
+    machine: Machine,
     assembly: ToolAssembly,
     teeth: int,
     cut: Recording,
     air: Recording | None,
-    identified: tuple[float, float],
     programmed: float | None = None,
     method: ObserverMethod = METHOD,
     bandwidth: float | None = None,
@@ -96,15 +97,12 @@ def observe(
 
     Parameters
     ----------
-    machine : MachineOverSpeed
-        Identified.
+    machine : Machine
     assembly : ToolAssembly
         Of the tooling that was cut with; it need not be one of the identification's.
     teeth : int
     cut, air : Recording
         The air cut, where there is one, with the same clamping and speed: its run-out is taken out.
-    identified : two floats [rad/s]
-        Band of the identification.
     programmed : float [rad/s], optional
         Spindle speed, to 1 %; by default from the trigger.
     method : ObserverMethod
@@ -124,34 +122,40 @@ def observe(
     faults = (*raw_faults(cut), *(f"air cut: {fault}" for fault in (raw_faults(air) if air is not None else ())))
     if faults:
         raise Unsteady("recording", "; ".join(faults), "a record without lost, frozen or clipped samples")
-    axes = tuple(axis for axis in measured_axes(cut) if axis in machine.whole)
+    axes = tuple(axis for axis in measured_axes(cut) if axis in machine.axes)
     if not axes:
         raise InputError("sensors", "no displacement along an identified axis", "a displacement sensor for X or Y")
     programmed = trigger_speed(cut) if programmed is None else programmed
+    assert machine.band is not None
+    identified = machine.band
     top = min(identified[1], HIGHEST * 2.0 * np.pi * cut.rate)
     steady = steady_record(cut, axes, programmed, top / (2.0 * np.pi), teeth)
     speed = steady.spindle_speed
     notes: list[str] = [*speed_faults(steady.displacement, steady.lines, programmed)]
     _periodic(steady, programmed, notes)
-    band = _band(identified, top, speed, teeth, notes)
+    answers = identified if machine.ends else (0.0, np.inf)
+    band = _band(identified, max(BELOW * identified[0], answers[0]), top, speed, teeth, notes)
     run_out = _run_out(steady, air, axes, programmed, top, teeth, notes)
     known = machine.speed_range
     if known is not None and not known[0] * (1.0 - 1e-9) <= speed <= known[1] * (1.0 + 1e-9):
-        low, high = (each * 30.0 / np.pi for each in known)
-        notes.append(f"the machine was identified from {low:.0f} to {high:.0f} rev/min, the record has {speed * 30.0 / np.pi:.0f}")
+        low, high = (to_rpm(each) for each in known)
+        notes.append(
+            f"the machine was identified from {low:.0f} to {high:.0f} rev/min, the recording was made at {to_rpm(speed):.0f} rev/min"
+        )
     omega = 2.0 * np.pi * np.arange(max(0.25 * band[0] / (2.0 * np.pi), STEP_HZ), 1.3 * band[1] / (2.0 * np.pi), STEP_HZ)
-    coupled = tooltip(machine.at(speed), assembly, omega, bands=False, speed=speed).coupled
+    omega = omega[(omega >= answers[0]) & (omega <= answers[1])]
+    here = machine.at(speed)
+    coupled = here.coupled(assembly, omega, axes)
     tuning = {axis: Tuning(_noise(steady, i), bandwidth or band[1], _response_time(method, speed)) for i, axis in enumerate(axes)}
     observers = []
     for i, axis in enumerate(axes):
-        cross = coupled[axis][SPINDLE, "tip"][:, 0, 0]
-        observers.append(_axis(steady, axis, i, omega, cross, band, tuning[axis], method, speed, teeth, run_out))
+        observers.append(_axis(steady, axis, i, omega, _cross(coupled, axis), band, tuning[axis], method, speed, teeth, run_out))
     observer = force_observer(observers)
     estimate = observer.observe(*_signals(cut, axes), smooth=smooth)
     if not method.colours_noise:
         estimate = replace(estimate, force=_above(estimate.force, band[0], estimate.step))
-    errors = {axis: _model_error(machine.at(speed)[axis], axis, assembly, estimate, i, band, speed) for i, axis in enumerate(axes)}
-    response = {each.axis: _response(each, steady, omega, coupled[each.axis][SPINDLE, "tip"][:, 0, 0], speed, smooth) for each in observers}
+    errors = {axis: _model_error(here, axis, assembly, estimate, i, band, speed) for i, axis in enumerate(axes)}
+    response = {each.axis: _response(each, steady, omega, _cross(coupled, each.axis), speed, smooth) for each in observers}
     return MonitoredCut(
         _widened(estimate, [errors[axis] for axis in axes]),
         observer,
@@ -175,12 +179,13 @@ def trigger_speed(recording: Recording) -> float:
     """
     found = recording.channel(Quantity.TRIGGER)
     if found is None:
-        raise InputError("--speed-rpm", "none, and no trigger in the recording", "the programmed spindle speed [rev/min]")
+        raise InputError("spindle_speed", "none, and no trigger in the recording", "the programmed spindle speed [rev/min]")
     sensor, signal = found
     high = signal > 0.5 * (np.nanmin(signal) + np.nanmax(signal))
     edges = np.flatnonzero(high[1:] & ~high[:-1])
     if edges.size < 3:
-        raise Unsteady("trigger", f"{edges.size} rising edges", "three or more, or the programmed spindle speed with --speed-rpm")
+        found_edges = f"none, and {edges.size} rising edges of the trigger"
+        raise Unsteady("spindle_speed", found_edges, "the programmed spindle speed [rev/min], or three rising edges or more")
     # the median shrugs off a stray or a lost edge
     return float(2.0 * np.pi * recording.rate / np.median(np.diff(edges)) / sensor.pulses_per_revolution)
 
@@ -190,26 +195,27 @@ def _periodic(steady: SteadyRecord, programmed: float, notes: list[str]) -> None
     signals = steady.displacement - steady.displacement.mean(axis=0)
     share = 1.0 - float(np.sum(steady.lines.rest[:, : signals.shape[1]] ** 2) / max(np.sum(signals**2), 1e-300))
     if share < UNRELATED:
-        found = f"{programmed * 30.0 / np.pi:.0f} rev/min, whose orders make {100.0 * share:.0f} % of the vibration"
-        raise Unsteady("--speed-rpm", found, "the speed of the spindle to 1 % [rev/min], in a cut without chatter")
+        found = f"{to_rpm(programmed):.0f} rev/min, whose orders account for {100.0 * share:.0f} % of the vibration"
+        raise Unsteady("spindle_speed", found, "the spindle speed to within 1 % [rev/min], in a cut without chatter")
     if share < PERIODIC:
-        notes.append(f"{100.0 * (1.0 - share):.0f} % of the vibration does not follow the spindle: chatter, or not a steady cut")
+        notes.append(f"{100.0 * (1.0 - share):.0f} % of the vibration is not at orders of the spindle: chatter, or an unsteady cut")
 
 
-def _band(identified: tuple[float, float], top: float, speed: float, teeth: int, notes: list[str]) -> tuple[float, float]:
+def _band(identified: tuple[float, float], low: float, top: float, speed: float, teeth: int, notes: list[str]) -> tuple[float, float]:
     """Where forces are estimated, and what that leaves out."""
     hz = 2.0 * np.pi
-    low = BELOW * identified[0]
     if low >= 0.9 * top:
         raise InputError("band", f"{low / hz:.0f} to {top / hz:.0f} Hz", "one that the sampling rate can hold")
     fundamental = speed * teeth
     if fundamental < low:
         share = f"harmonics below {low / hz:.0f} Hz are left out"
-        notes.append(f"the tooth-passing frequency, {fundamental / hz:.0f} Hz, lies below what the identified model is good for: {share}")
+        notes.append(
+            f"the tooth-passing frequency, {fundamental / hz:.0f} Hz, lies below the range in which the identified model is valid: {share}"
+        )
     elif fundamental < identified[0]:
         notes.append(
             f"the tooth-passing frequency, {fundamental / hz:.0f} Hz, lies below the identified band, which begins at "
-            f"{identified[0] / hz:.0f} Hz: its share of the force rests on the model beyond its data"
+            f"{identified[0] / hz:.0f} Hz: its part of the force is extrapolated"
         )
     return low, top
 
@@ -224,7 +230,7 @@ def _run_out(
     still = steady_record(air, axes, programmed, 1.02 * top / (2.0 * np.pi), 1)
     angle, std = angle_to_air(cut, still, teeth)
     if std > LOOSE_ANGLE:
-        notes.append(f"the angle between cut and air cut is known to {np.degrees(std):.0f}° only: run-out is left in")
+        notes.append(f"the angle between cut and air cut is known only to {np.degrees(std):.0f}°: run-out is not subtracted")
         return None
     count = min(cut.highest_order, still.highest_order)
     order = np.arange(1, count + 1)
@@ -322,33 +328,32 @@ def _signals(recording: Recording, axes: tuple[Dof, ...]) -> tuple[FloatArray, F
     return np.stack(gap, axis=1), np.stack(acceleration, axis=1)
 
 
+def _cross(coupled: Receptance, axis: Dof) -> ComplexArray:
+    """C31: the spindle's motion over a force at the tip, along one axis, shape (n,) [m/N]."""
+    return coupled.between(f"{SPINDLE}.{axis}", f"tip.{axis}")
+
+
 def _model_error(
-    part: MachineAxis, axis: Dof, assembly: ToolAssembly, estimate: ForceEstimate, column: int, band: tuple[float, float], speed: float
+    machine: Machine, axis: Dof, assembly: ToolAssembly, estimate: ForceEstimate, column: int, band: tuple[float, float], speed: float
 ) -> float:
-    """Standard deviation of the force that the machine's posterior leaves [N]: the force's lines, each with its C31's."""
-    if part.posterior is None:
-        return 0.0
+    """Standard deviation of the force that is left by what is not known of the machine [N]: the force's lines, each with its C31's."""
     rate, force = 1.0 / estimate.step, estimate.force[:, column : column + 1]
     # the second half: a live estimate has settled by then
-    amplitude = line_spectrum(force[force.size // 2 :], rate, speed, band[1] / (2.0 * np.pi)).amplitude[:, 0]
+    amplitude = line_spectrum(force[force.size // 2 :], rate, speed, to_hz(band[1])).amplitude[:, 0]
     order = np.arange(amplitude.size)
     order = order[(order * speed >= band[0]) & (order * speed <= band[1])]
     power = np.abs(amplitude[order]) ** 2
-    omega = order * speed
-    plane = tool_holder_receptance(assembly, omega)
-    plane = plane if axis is Dof.X else turned_plane(plane)
-
-    def cross(modes: ModalModel, joint: LumpedJoint) -> ComplexArray:
-        return couple(plane, modes.receptance(omega), joint)[SPINDLE, "tip"][:, 0, 0]
-
-    changes = spread(part.posterior, axis, cross, speed)
-    middle = cross(*part.at(axis, speed))
-    relative = np.sum(np.abs(changes / middle) ** 2, axis=0)
+    coupled = machine.coupled(assembly, order * speed, (axis,))
+    entry = Coordinate(SPINDLE, axis), Coordinate("tip", axis)
+    known = coupled.deviation().get(entry)
+    if known is None:
+        return 0.0
+    relative = (known[0] ** 2 + known[1] ** 2) / np.abs(_cross(coupled, axis)) ** 2
     return float(np.sqrt(0.5 * np.sum(power * relative)))
 
 
 def _above(force: FloatArray, low: float, step: float) -> FloatArray:
-    """Forces without what lies below the band: the paper's walk puts the sensors' drift and integrated noise there."""
+    """Forces without what lies below the band: the walk of [inprocess] puts the sensors' drift and integrated noise there."""
     from scipy.signal import butter, sosfiltfilt
 
     sections = butter(4, 0.5 * low / (2.0 * np.pi), "highpass", fs=1.0 / step, output="sos")

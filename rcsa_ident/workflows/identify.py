@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -88,7 +89,12 @@ def identify(
     InputError
         If no cut is usable.
     """
-    return method.run(data_of(campaign, readings), seed, map, progress)
+    return of_campaign(method.run(data_of(campaign, readings), seed, map, progress), campaign)
+
+
+def of_campaign(found: Identification, campaign: Campaign) -> Identification:
+    """Return the identification with what its machine has to know of the campaign: name, workpiece and sensors."""
+    return replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors)
 
 
 def mode_deviations(found: Identification) -> dict[Dof, tuple[FloatArray, FloatArray]]:

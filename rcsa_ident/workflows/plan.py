@@ -31,15 +31,17 @@ from rcsa_ident.identification.experiment_design import (
     tip_changes,
     unknowns,
 )
-from rcsa_ident.identification.posterior import MachineAxis, Posterior
+from rcsa_ident.identification.machine import IdentifiedMachine
+from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.machine.machine import STIFFNESS_SPREAD
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.signals.measurement import MAX_FREQUENCY, CutMeasurement
-from rcsa_ident.stability.lobes import StabilityMethod
+from rcsa_ident.stability.lobes import stability_lobes
+from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.tool_holder.geometry import stiffened
 from rcsa_ident.tool_holder.model import tool_holder_receptance
-from rcsa_ident.workflows.lobes import LobeConditions, tooling_lobes
-from rcsa_ident.workflows.tip import STIFFNESS_SPREAD, tooltip
+from rcsa_ident.units import from_rpm, to_rpm
 
 #: Two cuts of one tooling differ by at least this share of their speed; a programmed speed is met within as much.
 SPACING = 0.01
@@ -91,10 +93,10 @@ class CutConstraints:
     def speeds(self) -> FloatArray:
         """Whole rev/min, a little more than `SPACING` apart, shape (n,) [rad/s]."""
         count = int(np.log(self.highest / self.lowest) / (1.02 * SPACING)) + 1
-        rpm = np.geomspace(self.lowest, self.highest, count) * (30.0 / np.pi)
+        rpm = to_rpm(np.geomspace(self.lowest, self.highest, count))
         # rounding does not lead out of what is allowed
         inside = np.clip(np.round(rpm), np.ceil(rpm[0] - 1e-6), max(np.floor(rpm[-1] + 1e-6), np.ceil(rpm[0] - 1e-6)))
-        return np.unique(inside) * (np.pi / 30.0)
+        return from_rpm(np.unique(inside))
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +177,7 @@ class PlannedCuts:
 
 
 def plan_cuts(
-    machine: Mapping[Dof, MachineAxis],
+    machine: IdentifiedMachine,
     toolings: Sequence[Tooling],
     targets: Sequence[Tooling],
     allowed: CutConstraints,
@@ -191,7 +193,7 @@ def plan_cuts(
 
     Parameters
     ----------
-    machine : mapping of Dof to MachineAxis
+    machine : IdentifiedMachine
         With posteriors.
     toolings : sequence of Tooling
         To cut with.
@@ -220,7 +222,7 @@ def plan_cuts(
     """
     _check(machine, toolings, targets, count, band_hz)
     goal = MeanVariance() if goal is None else goal
-    posteriors = {axis: part.posterior for axis, part in machine.items() if part.posterior is not None}
+    posteriors = {axis: part.posterior for axis, part in machine.identified.items() if part.posterior is not None}
     candidates, unstable, deepest = _candidates(machine, toolings, allowed, coefficients)
     if not candidates:
         found = f"none of {unstable} stable with a margin of {allowed.margin:g} (the deepest stable one would be {1e3 * deepest:.3g} mm)"
@@ -229,13 +231,13 @@ def plan_cuts(
     order = greedy(prospects, count, goal)
     warnings = []
     if len(order) < count:
-        warnings.append(f"only {len(order)} of {count} cuts: no further speed is stable and {100 * SPACING:g} % away from the others")
+        warnings.append(f"only {len(order)} of {count} cuts: no further stable speed is {100 * SPACING:g} % away from the others")
     order = exchanged(prospects, order, goal) if wanted is None else _shortest(prospects, order, goal, positive("wanted band", wanted))
     even = _even(candidates, toolings, allowed, len(order))
     band = deviations(prospects, order)
     if wanted is not None and band[-1].max() > wanted:
         warnings.append(
-            f"the band of {100 * wanted:.3g} % is not reached: {len(order)} cuts come to {100 * band[-1].max():.3g} % "
+            f"a standard deviation of {100 * wanted:.3g} % is not reached: {len(order)} cuts give {100 * band[-1].max():.3g} % "
             f"({100 * band[0].max():.3g} % without them)"
         )
     return PlannedCuts(
@@ -259,9 +261,9 @@ def line_noise(measurements: Sequence[CutMeasurement]) -> float:
 
 
 def _check(
-    machine: Mapping[Dof, MachineAxis], toolings: Sequence[Tooling], targets: Sequence[Tooling], count: int, band_hz: tuple[float, float]
+    machine: IdentifiedMachine, toolings: Sequence[Tooling], targets: Sequence[Tooling], count: int, band_hz: tuple[float, float]
 ) -> None:
-    for axis, part in machine.items():
+    for axis, part in machine.identified.items():
         if part.posterior is None:
             raise InputError(f"axis {axis.upper()}", "no covariance", "an identification with a posterior")
     for name, given in (("toolings", toolings), ("targets", targets)):
@@ -277,7 +279,7 @@ def _check(
 
 
 def _candidates(
-    machine: Mapping[Dof, MachineAxis], toolings: Sequence[Tooling], allowed: CutConstraints, coefficients: CuttingCoefficients
+    machine: IdentifiedMachine, toolings: Sequence[Tooling], allowed: CutConstraints, coefficients: CuttingCoefficients
 ) -> tuple[list[PlannedCut], int, float]:
     """All stable cuts, tooling by tooling, speed by speed; how many may chatter; the deepest that would be stable anywhere [m]."""
     omega = 2.0 * np.pi * np.arange(LOBE_FREQUENCIES[0], MAX_FREQUENCY, LOBE_FREQUENCIES[1])
@@ -289,13 +291,9 @@ def _candidates(
         seen = speeds[speeds * tooling.cutter.teeth <= 2.0 * np.pi * MAX_FREQUENCY]
         if not seen.size:
             continue
-        conditions = LobeConditions(
-            MillingProcess(tooling.cutter, coefficients, allowed.engagement, allowed.feed_angle),
-            np.outer(around, seen).ravel(),
-            2.0 * allowed.margin * max(allowed.depths),
-            allowed.method,
-        )
-        lobes = tooling_lobes(tooltip(machine, tooling.assembly, omega, bands=False), conditions)
+        process = MillingProcess(tooling.cutter, coefficients, allowed.engagement, allowed.feed_angle)
+        tip, deepest_asked = machine.tip(tooling, omega, spread=False), 2.0 * allowed.margin * max(allowed.depths)
+        lobes = stability_lobes(tip, process, np.outer(around, seen).ravel(), deepest_asked, allowed.method)
         limits = lobes.limit_depth.reshape(around.size, -1).min(axis=0)
         deepest = max(deepest, float(limits.max()) / allowed.margin)
         for speed, limit in zip(seen.tolist(), limits.tolist(), strict=True):

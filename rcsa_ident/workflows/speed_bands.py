@@ -15,9 +15,8 @@ from rcsa_ident.identification.result import Identification
 from rcsa_ident.machining_setup import Campaign
 from rcsa_ident.scaleout import Map
 from rcsa_ident.signals.measurement import Reading
+from rcsa_ident.units import to_rpm
 from rcsa_ident.workflows.identify import data_of
-
-_RPM = 30.0 / np.pi
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,8 +76,8 @@ def split_by_speed(readings: Sequence[Reading], count: int) -> list[tuple[tuple[
             number = sum(each.tooling == name for each in cuts)
             if number < FEWEST_CUTS:
                 raise InputError(
-                    "--speed-bands",
-                    f"{number} cuts with {name} from {low * _RPM:.0f} to {high * _RPM:.0f} rev/min",
+                    "speed_bands",
+                    f"{number} cuts with {name} from {to_rpm(low):.0f} to {to_rpm(high):.0f} rev/min",
                     f"at least {FEWEST_CUTS} cuts with each tooling in each of {count} bands: fewer bands, or more cuts",
                 )
         found.append(((low, high), cuts))

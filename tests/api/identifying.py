@@ -17,8 +17,8 @@ from api.reading.campaigns import load_campaign
 from api.security import new_id, now
 from api.stores.entities import Store
 from api.stores.jobs import Job
+from tests.fixtures.paths import SAMPLES
 
-SAMPLES = Path(__file__).resolve().parents[2] / "data" / "sample_runs"
 #: Cuts of one tooling, along one axis: enough for a search with all its steps, and soon done.
 CUTS = 4
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from rcsa_ident.io.recordings import write_hdf5
 from rcsa_ident.signals.recording import Quantity
-from tests.signals import synthetic
+from tests.fixtures import synthetic
 
 RATE, RPM = synthetic.RATE, 9000.0
 #: Of the sensors below [V/m], [V/(m/s^2)].

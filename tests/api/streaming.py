@@ -1,11 +1,10 @@
-"""A machine whose forces are known, its signals, and both sides of a stream for tests."""
+"""A service in this process with a machine whose forces are known, and both sides of a stream."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,47 +16,10 @@ from api.main import create_app
 from api.settings import Settings
 from api.streams.design import design
 from api.streams.frames import packed
-from benchmarks.observer import DATA
-from rcsa_ident.io.results import plain, spindle_to_json
-from tests.api.conftest import URL, Here, Near, embedded
-from tests.observer.flange_machine import BAND, flange_machine
-from tests.workflows.test_stream_forces import RATE, SECOND, streamed
+from tests.api.in_process import URL, Here, Near, embedded
+from tests.fixtures.force_stream import result, tooling
 
 STREAM = "ws://localhost/v1/forces/stream"
-CHANNELS = ["gap_x", "gap_y", "fix_x", "fix_y"]
-#: V/m, V/(m/s^2).
-SENSITIVITY = np.array([1e4, 1e4, 1e-3, 1e-3])
-SENSORS = {
-    f"{place}_{axis}": {"quantity": quantity, "axis": axis.upper(), "sensitivity": sensitivity}
-    for place, quantity, sensitivity in (("gap", "displacement", 1e4), ("fix", "acceleration", 1e-3))
-    for axis in "xy"
-}
-
-
-@cache
-def result() -> str:
-    """RESULT.json of the sample machine as a tap test at its flange would give it."""
-    axes = {axis.upper(): spindle_to_json(part.spindle.modes, part.joint) for axis, part in flange_machine().whole.items()}
-    data = {
-        "schema_version": 1, "status": "converged", "reasons": [], "seed": 1, "method": "default", "software": "by hand",
-        "campaign": {"name": "by hand", "cuts_used": 80, "cuts_left_out": []}, "sensors": SENSORS,
-        "workpiece": {"name": "EN AW-6082", "tangential_coefficient_mpa": 902.0, "radial_ratio": 0.26},
-        "band_hz": [w / (2.0 * np.pi) for w in BAND], "axes": axes, "delays": {},
-    }  # fmt: skip
-    return json.dumps(plain(data))
-
-
-@cache
-def tooling() -> str:
-    """The tooling of the cut, with two teeth."""
-    text = (Path(DATA) / "machines" / "toolings" / "S2-PG25.toml").read_text(encoding="utf-8")
-    return text.replace("teeth = 4", "teeth = 2")
-
-
-def signals(begin: float, end: float, *, wander: float = 0.0, sag: float = 0.0) -> np.ndarray:
-    """What the sensors give [V]: air until 1.5 s, then the cut."""
-    samples = streamed(wander, sag)[0][round(begin * SECOND) : round(end * SECOND)]
-    return (samples * SENSITIVITY).astype(np.float32).astype(float)
 
 
 class Remembering(Here):
@@ -85,13 +47,6 @@ def streaming(folder: Path, host: Any = None, **settings: Any) -> Iterator[tuple
         assert written.status_code == 201, written.text
         assert http.put("/v1/toolings/T1", content=tooling(), headers={"Content-Type": "application/toml"}).status_code == 201
         yield http, id
-
-
-def hello(machine: str, **changed: Any) -> dict[str, Any]:
-    """The first message of a data logger whose stream begins in the cut."""
-    return {
-        "machine": machine, "tooling": "T1", "spindle_speed_rpm": 12000, "sampling_rate_hz": RATE, "channels": CHANNELS, "settle_s": 0.2,
-    } | changed  # fmt: skip
 
 
 def send(socket: WebSocketTestSession, first: int, samples: np.ndarray, text: bool = False) -> None:

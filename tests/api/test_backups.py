@@ -21,15 +21,16 @@ from typer.testing import CliRunner
 from api.backups import save
 from api.backups.load import restore
 from api.backups.save import backup
+from api.client import Client
 from api.files import NORMALISED, UPLOADS, Files
 from api.serve import app
 from api.stores.entities import Document
 from api.stores.sql import open_store
 from api.stores.tables import SCHEMA_VERSION
 from rcsa_ident.errors import InputError
-from tests.api.conftest import Client, service
+from tests.api.in_process import service
 from tests.api.recordings import content, declared
-from tests.cli import by_hand
+from tests.fixtures import by_hand
 
 
 @pytest.fixture
@@ -186,7 +187,7 @@ save.backup(Path(sys.argv[1]), Path(sys.argv[2]))
     assert subprocess.run([sys.executable, "-c", code, str(data), str(target)], check=False).returncode == 9
     assert not target.exists()
     (part,) = tmp_path.glob(".b.tar.*.part")
-    with pytest.raises(InputError, match="whole backup"):
+    with pytest.raises(InputError, match="complete backup"):
         restore(part, tmp_path / "new")
     assert not (tmp_path / "new").exists()
     # what the dead one has left in the data folder is gone with the next
@@ -216,7 +217,7 @@ def test_two_at_once(data, tmp_path, monkeypatch):
         return write(*arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(save, "_write", again)
-    with pytest.raises(InputError, match="there already"):
+    with pytest.raises(InputError, match="exists already"):
         backup(data, tmp_path / "b.tar")
     assert (tmp_path / "b.tar").read_text() == "mine"
 
@@ -254,7 +255,7 @@ HASH = "0" * 64
 def test_members_that_no_backup_has(tmp_path, info):
     before = set(tmp_path.iterdir())
     tar = made(tmp_path / "b.tar", [(info, b"{}" if info.isreg() else b"")])
-    with pytest.raises(InputError, match="whole backup"):
+    with pytest.raises(InputError, match="complete backup"):
         restore(tar, tmp_path / "new")
     assert set(tmp_path.iterdir()) - before == {tar}
 
@@ -300,8 +301,8 @@ def matching(members):
         (lambda members: [*members, members[0]], "twice"),
         (lambda members: [members[-1], *members[:-1]], "behind the manifest"),
         (lambda members: [(members[0][0], members[0][1] + b"x"), *members[1:]], "other content"),
-        (lambda members: [*members[:-1], (members[-1][0], b"[" * 100_000)], "manifest that can not be read"),
-        (lambda members: [*members[:-1], (members[-1][0], b'{"format": 1}')], "manifest that can not be read"),
+        (lambda members: [*members[:-1], (members[-1][0], b"[" * 100_000)], "manifest that cannot be read"),
+        (lambda members: [*members[:-1], (members[-1][0], b'{"format": 1}')], "manifest that cannot be read"),
         (lambda members: matching([(members[0][0], b"no database" * 1000), *members[1:]]), "no whole database"),
         (of_format(2), "format 2, of release 9.9"),
         (of_schema, f"at most {SCHEMA_VERSION}: a later release"),
@@ -371,7 +372,7 @@ def test_what_is_refused(data, tmp_path, small):
         restore(tmp_path / "none.tar", tmp_path / "new")
     with pytest.raises(InputError, match=r"no service\.db"):
         backup(full, tmp_path / "b.tar")
-    with pytest.raises(InputError, match="there already"):
+    with pytest.raises(InputError, match="exists already"):
         backup(data, full / "x")
     with pytest.raises(InputError, match="no such folder"):
         backup(data, tmp_path / "nowhere" / "b.tar")
@@ -384,7 +385,7 @@ def test_commands(data, tmp_path, small):
     assert run(app, ["restore", str(tmp_path / "b.tar"), "--data", str(tmp_path / "new")]).exit_code == 0
     assert (tmp_path / "new" / "service.db").is_file()
     again = run(app, ["restore", str(tmp_path / "b.tar"), "--data", str(tmp_path / "new")])
-    assert (again.exit_code, "with something in it" in again.stderr) == (2, True)
+    assert (again.exit_code, "which is not empty" in again.stderr) == (2, True)
     elsewhere = {"RCSA_IDENT_DATABASE": "postgresql+psycopg://u:secret@h/n"}
     other = run(app, ["--data", str(data), "backup", str(tmp_path / "c.tar")], env=elsewhere)
     assert (other.exit_code, "pg_dump" in other.stderr, "secret" in other.stderr) == (2, True, False)

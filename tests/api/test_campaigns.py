@@ -14,14 +14,14 @@ import pytest
 
 from api.reading.campaign_text import FORMATS, campaign_of_text, declare, files_of, recording_name, toml_text
 from api.reading.campaigns import load_campaign
-from api.routes.archives import zipped
+from api.transfer.archives import zipped
 from api.work.toolings import toml_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import READERS, read_cut
 from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.workflows.identify import judge_cut
+from tests.api.in_process import refused
 from tests.api.recordings import TOOLING, content, declared
-from tests.api.test_machines import refused
 
 TOML = {"Content-Type": "application/toml"}
 
@@ -104,7 +104,7 @@ def test_toolings_come_from_the_library_in_three_ways(client, machine):
 
 
 def _file(client, name):
-    folder = Path(client.http.app.state.parts.settings.data)
+    folder = Path(client.http.app.state.components.settings.data)
     path = folder / name
     path.write_bytes(content(folder))
     return path
@@ -124,7 +124,7 @@ def test_of_paths_the_last_part_counts(client, machine):
     data["cuts"][1] |= {"cut": "Fra\u0308sen.csv", "air": "C:\\data\\air.TDMS"}
     made = client.make_campaign(machine, data)
     assert [(cut.cut.name, cut.air.name) for cut in made.cuts] == [("c0_cut.h5", "air.TDMS"), ("Fr\u00e4sen.csv", "air.TDMS")]
-    files = files_of(client.http.app.state.parts.store.campaigns.get("local", made.id).text)
+    files = files_of(client.http.app.state.components.store.campaigns.get("local", made.id).text)
     assert files["air.TDMS"].cuts == ("c0", "c1")
     assert recording_name("a/b\\c.h5") == "c.h5"
 
@@ -271,7 +271,7 @@ def test_an_archive_of_nothing(client, machine):
 
 def test_an_archive_is_never_whole_in_memory(tmp_path, monkeypatch):
     (tmp_path / "long").write_bytes(bytes(range(256)) * 40)
-    monkeypatch.setattr("api.routes.archives._BLOCK", 1000)
+    monkeypatch.setattr("api.transfer.archives._BLOCK", 1000)
     pieces = list(zipped([("a/short", b"x"), ("b/long", tmp_path / "long")]))
     assert max(map(len, pieces)) < 1300
     archive = zipfile.ZipFile(io.BytesIO(b"".join(pieces)))
@@ -292,7 +292,7 @@ def test_what_an_identification_reads(uploaded, tmp_path, store):
     client.archive(id, tmp_path / "c.zip")
     zipfile.ZipFile(tmp_path / "c.zip").extractall(tmp_path / "folder")
     folder = read_campaign(tmp_path / "folder")
-    found, read = load_campaign(store, client.http.app.state.parts.files, "local", id)
+    found, read = load_campaign(store, client.http.app.state.components.files, "local", id)
     assert [cut.id for cut in found.cuts] == [cut.id for cut in folder.cuts]
     assert (found.name, found.sensors, found.workpiece) == (folder.name, folder.sensors, folder.workpiece)
     assert repr(found.toolings) == repr(folder.toolings)
@@ -305,11 +305,11 @@ def test_what_an_identification_reads(uploaded, tmp_path, store):
 
 
 def test_a_campaign_that_can_not_be_loaded_says_why(client, machine, store):
-    made, files = client.make_campaign(machine, declared()), client.http.app.state.parts.files
+    made, files = client.make_campaign(machine, declared()), client.http.app.state.components.files
     with pytest.raises(InputError, match="no recording of a cut"):
         load_campaign(store, files, "local", made.id)
     for group, id in (("local", "none"), ("other", made.id)):
-        with pytest.raises(InputError, match="a campaign that is there"):
+        with pytest.raises(InputError, match="an existing campaign"):
             load_campaign(store, files, group, id)
 
 

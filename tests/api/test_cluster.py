@@ -9,7 +9,7 @@ import pytest
 from api.jobs.cluster import over_cluster
 from api.settings import from_environment
 from rcsa_ident.errors import InputError
-from tests import scaleout_tasks as tasks
+from tests.fixtures import scaleout_tasks as tasks
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def test_without_a_cluster_it_is_done_here(monkeypatch, caplog):
     monkeypatch.setattr("api.jobs.cluster.cluster_map", lambda address: away(address, 0.3))
     found = list(over_cluster("tcp://127.0.0.1:1")(tasks.late, [5.0, 4.0]))
     assert found == [(5.0, os.getpid()), (4.0, os.getpid())]
-    assert [record.getMessage() for record in caplog.records] == ["the cluster is away: working here"]
+    assert [record.getMessage() for record in caplog.records] == ["the cluster cannot be reached: the tasks are done here"]
 
 
 def away(address, timeout):

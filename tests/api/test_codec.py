@@ -15,7 +15,7 @@ from hypothesis.extra import numpy as arrays
 
 from api.jobs import codec
 from api.jobs.codec import NOUNS, Unknown, _noun, decode, encode
-from api.work.requests import CutQuestion, LobeQuestion
+from api.work.requests import LobeRequest
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.dynamics.coordinates import Dof
@@ -23,8 +23,10 @@ from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.parameters import AxisLayout, Layout
 from rcsa_ident.identification.progress import Stage, Step
+from rcsa_ident.machining_setup import CutSpec
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.verdict import RecordCode, Verdict
+from tests.fixtures.effort import examples
 
 DTYPES = st.sampled_from(["<f8", ">f8", "<c16", "<i8", "<i4", "<u2", "?", "<f4"])
 ARRAYS = DTYPES.flatmap(lambda kind: arrays.arrays(kind, arrays.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=4)))
@@ -80,7 +82,7 @@ def same(a, b) -> bool:
     return a == b
 
 
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=examples(60, 300))
 @given(VALUES)
 def test_what_is_told_comes_back(value):
     text = encode(value)
@@ -102,8 +104,8 @@ def test_what_a_search_has_come_to():
 
 
 def test_a_question():
-    cut = CutQuestion(Engagement(0.5, 3.0), 0.25, None, "steel", (("tangential", 9.02e8),), (1e-6, 0.0), ProcessDamping(1e14, 1e-4, 0.3))
-    question = LobeQuestion(cut, (418.87902047863909, 500.0), 0.01, "semi-discretisation", True, 0.0005, 20.0)
+    cut = CutSpec(Engagement(0.5, 3.0), 0.25, None, "steel", {"tangential": 9.02e8}, (1e-6, 0.0), ProcessDamping(1e14, 1e-4, 0.3))
+    question = LobeRequest(cut, (418.87902047863909, 500.0), 0.01, "semi-discretisation", True, 0.0005, 20.0)
     assert same(question, decode(encode(question)))
 
 

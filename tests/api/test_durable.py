@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 from sqlalchemy import create_engine, text
 
-from tests.api.conftest import POSTGRESQL, SQLITE, database
+from tests.api.in_process import POSTGRESQL, SQLITE, database
+from tests.fixtures.waiting import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Carries jobs out until all are over, or dies in a step; each line of its output is a step that it computed.
@@ -57,7 +58,7 @@ os._exit(0)
 def engine(url: str, executor: str, deadly: str, *jobs: str) -> tuple[int, list[str]]:
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     words = [sys.executable, "-c", SCRIPT, url, executor, deadly, *jobs]
-    found = subprocess.run(words, capture_output=True, text=True, env=environment, check=False, timeout=120)
+    found = subprocess.run(words, capture_output=True, text=True, env=environment, check=False, timeout=PATIENCE)
     assert found.returncode in (0, 9), found.stderr
     return found.returncode, found.stdout.splitlines()
 
@@ -82,7 +83,7 @@ def test_a_killed_engine_goes_on_and_another_takes_over(request, tmp_path, kind)
 
 @pytest.mark.parametrize("kind", [SQLITE, POSTGRESQL])
 def test_what_is_kept_is_json(request, tmp_path, kind):
-    """No pickle: whoever can write to the engine's tables can not have code run by reading them."""
+    """No pickle: whoever can write to the engine's tables cannot have code run by reading them."""
     url = database(request, kind, tmp_path)
     engine(url, "w-1", "c", "j1")
     tables = create_engine(url)

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from api.client import Client, ServiceError
-from benchmarks.observer import relative_error
 from rcsa_ident.io.forces import read_forces_csv
 from rcsa_ident.signals.spectra import line_spectrum
-from tests.api.conftest import example
 from tests.api.recordings import declared
-from tests.api.streaming import CHANNELS, SENSORS, STREAM, closed, result, send, signals, streaming, until
+from tests.api.streaming import STREAM, closed, send, streaming, until
 from tests.api.test_streams import joined
-from tests.workflows.test_stream_forces import RATE, streamed
+from tests.fixtures.force_stream import CHANNELS, RATE, SENSORS, result, signals, streamed
+from tests.fixtures.service import example
+from tests.fixtures.virtual_cut import relative_error
 
 #: Of the recordings below [s].
 AIR, CUT = (0.2, 0.7), (2.0, 2.5)
@@ -117,7 +117,7 @@ def test_every_sample_as_a_file(shop, tmp_path):
     assert np.all(relative_error(both, true_force(), RATE) < 0.05)
     assert set(deviation) == {"X", "Y"}
     # nothing stays
-    assert not [path for path in http.app.state.parts.files.folder.rglob("*") if path.is_file() and "parts" in str(path)]
+    assert not [path for path in http.app.state.components.files.folder.rglob("*") if path.is_file() and "parts" in str(path)]
 
 
 def test_without_an_air_cut_it_is_told(shop):

@@ -10,7 +10,8 @@ import pytest
 from api.problems import MEDIA_TYPE
 from api.stores.entities import Unavailable
 from api.work.pool import Busy
-from tests.api.conftest import Here, embedded, example, service
+from tests.api.in_process import Here, embedded, service
+from tests.fixtures.service import example
 
 JSON = {"Content-Type": "application/json"}
 LOBES = '{"machine": "m", "toolings": ["t"], "max_depth_mm": %s}'
@@ -150,8 +151,8 @@ ERRORS = [(RuntimeError("secret detail"), 500), (Busy(), 503), (Unavailable(), 5
 def test_nothing_unexpected_leaves_the_service(store, tmp_path, error, status, caplog):
     with service(store, tmp_path) as http:
         id = http.post("/v1/machines", json={"name": "m"}).json()["id"]
-        http.app.state.parts.work.__class__ = Failing
-        http.app.state.parts.work.error = error
+        http.app.state.components.work.__class__ = Failing
+        http.app.state.components.work.error = error
         answer = http.put(f"/v1/machines/{id}/identification", content=b"{}", headers=JSON)
     told = problem(answer, status)
     assert "secret" not in answer.text

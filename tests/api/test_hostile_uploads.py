@@ -19,10 +19,10 @@ from api.main import create_app
 from api.problems import MEDIA_TYPE
 from api.reading.reader import Limits, Reader
 from api.settings import Settings
-from tests.api.conftest import Here, embedded
+from tests.api.in_process import Here, embedded
 from tests.api.recordings import RATE, channels, content, declared
-from tests.io import test_hdf5, test_matlab, test_tdms
-from tests.io.formats import FORMATS
+from tests.fixtures import hostile_hdf5, hostile_matlab, hostile_tdms
+from tests.fixtures.recording_formats import FORMATS
 
 BINARY = {"Content-Type": "application/octet-stream"}
 NAMES = ["flange_x", "flange_y", "fixture_x", "fixture_y"]
@@ -82,10 +82,21 @@ def peak(reader: Reader) -> int:
 
 
 HDF5 = [
-    test_hdf5.external_link, test_hdf5.external_link_beside, test_hdf5.soft_link, test_hdf5.external_storage, test_hdf5.virtual,
-    test_hdf5.terabytes, test_hdf5.bomb, test_hdf5.unwritten, test_hdf5.never_written, test_hdf5.foreign_filter,
-    test_hdf5.twice_deflated, test_hdf5.inflating_chunk, test_hdf5.long_chunk, test_hdf5.lzf_after_deflate,
-]  # fmt: skip
+    hostile_hdf5.external_link,
+    hostile_hdf5.external_link_beside,
+    hostile_hdf5.soft_link,
+    hostile_hdf5.external_storage,
+    hostile_hdf5.virtual,
+    hostile_hdf5.terabytes,
+    hostile_hdf5.bomb,
+    hostile_hdf5.unwritten,
+    hostile_hdf5.never_written,
+    hostile_hdf5.foreign_filter,
+    hostile_hdf5.twice_deflated,
+    hostile_hdf5.inflating_chunk,
+    hostile_hdf5.long_chunk,
+    hostile_hdf5.lzf_after_deflate,
+]
 
 
 @pytest.mark.parametrize("spoil", HDF5, ids=lambda f: f.__name__)
@@ -109,10 +120,10 @@ def test_hdf5_does_not_read_this_machine(campaign, tmp_path):
     assert "external file" in campaign.put((tmp_path / "x.h5").read_bytes()).json()["detail"]
 
 
-@pytest.mark.parametrize("name", test_matlab.HOSTILE)
+@pytest.mark.parametrize("name", hostile_matlab.HOSTILE)
 def test_matlab_bombs(campaign, name):
     before = peak(campaign.reader) if campaign.reader.child.ready else None
-    answer = campaign.put(test_matlab.HOSTILE[name][0], ".mat")
+    answer = campaign.put(hostile_matlab.HOSTILE[name][0](), ".mat")
     assert answer.status_code == 422
     assert "costs more" not in answer.text
     assert before is None or peak(campaign.reader) < before + (64 << 20)
@@ -167,9 +178,9 @@ def test_files_that_are_cut_off(campaign, tmp_path, name, share):
     assert campaign.put(raw[: int(share * len(raw))], suffix).status_code == 422
 
 
-@pytest.mark.parametrize("name", test_tdms.HOSTILE)
+@pytest.mark.parametrize("name", hostile_tdms.HOSTILE)
 def test_tdms_that_lies(campaign, name):
-    raw, _ = test_tdms.HOSTILE[name]
+    raw, _ = hostile_tdms.HOSTILE[name]
     assert campaign.put(raw, ".tdms").status_code == 422
 
 

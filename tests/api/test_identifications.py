@@ -29,9 +29,9 @@ from rcsa_ident.identification.method import Phase
 from rcsa_ident.io.recordings import read_cut
 from rcsa_ident.io.setups import read_campaign
 from tests.api import identifying
-from tests.api.conftest import URL, embedded, service
 from tests.api.identifying import Steps, carried, declared, uploaded
-from tests.api.test_machines import refused
+from tests.api.in_process import URL, embedded, refused, service
+from tests.fixtures.waiting import until
 
 KINDS = {"progress", "trace", "fit", "end"}
 
@@ -391,8 +391,8 @@ def test_many_watch_at_the_cost_of_one(store):
             asked.append("events")
             return store.jobs.events(*arguments)
 
-    async def watch(feeds):
-        after, seen = 0, []
+    async def watch(feeds, seen):
+        after = 0
         while not seen or seen[-1].kind != "end":
             found = await feeds.events(id, after)
             seen += found
@@ -403,10 +403,11 @@ def test_many_watch_at_the_cost_of_one(store):
 
     async def main():
         feeds = EventFeeds(Counted(), 3)
-        watching = [asyncio.create_task(watch(feeds)) for _ in range(100)]
+        seen = [[] for _ in range(100)]
+        watching = [asyncio.create_task(watch(feeds, each)) for each in seen]
         for k in range(4):
-            await asyncio.sleep(0.4)
             store.jobs.tell(id, "w", [Event(0, "trace", f"{k}")])
+            await asyncio.to_thread(until, lambda k=k: all(each and each[-1].data == f"{k}" for each in seen))
         store.jobs.finish(id, "w", Outcome("done", now()))
         return await asyncio.gather(*watching)
 

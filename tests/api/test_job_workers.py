@@ -24,6 +24,7 @@ from api.security import now
 from api.stores.jobs import Outcome, Worker
 from rcsa_ident.errors import InputError
 from tests.api.identifying import Steps, job, left, running
+from tests.fixtures.waiting import until
 
 
 class Quiet:
@@ -206,8 +207,8 @@ def test_refusals_are_remembered_as_such(quiet):
     ("fault", "words"),
     [
         (InputError("cuts", "none", "some"), "cuts: found none, allowed is some"),
-        (RuntimeError("secret detail"), "something unexpected happened; the log has it under this job's id"),
-        (MemoryError(), "something unexpected happened; the log has it under this job's id"),
+        (RuntimeError("secret detail"), "an internal error occurred; it is logged under this job's id"),
+        (MemoryError(), "an internal error occurred; it is logged under this job's id"),
     ],
 )
 @pytest.mark.parametrize("inside", [True, False])
@@ -234,14 +235,8 @@ def test_a_job_that_is_cancelled_stops_where_it_looks_up(quiet):
     with quiet.desk() as desk:
         quiet.store.jobs.cancel("A", quiet.id, now())
 
-        def work():
-            start = time.monotonic()
-            while time.monotonic() - start < 10.0:
-                desk.event("trace", {"cost": 1.0})
-                time.sleep(0.01)
-
         with pytest.raises(desks.Stopped):
-            work()
+            until(lambda: desk.event("trace", {"cost": 1.0}))
     assert quiet.codes == []
     assert quiet.store.jobs.find(quiet.id).state == "cancelled"
 
@@ -249,14 +244,14 @@ def test_a_job_that_is_cancelled_stops_where_it_looks_up(quiet):
 def test_long_work_without_a_word_ends_with_its_process(quiet):
     with quiet.desk():
         quiet.store.jobs.cancel("A", quiet.id, now())
-        time.sleep(0.6)
+        until(lambda: quiet.codes)
     assert quiet.codes == [0]
 
 
 def test_who_has_lost_a_job_says_nothing_more(quiet):
     with quiet.desk():
         quiet.store.jobs.begin(quiet.id, "another", now())
-        time.sleep(0.2)
+        until(lambda: quiet.codes)
     assert quiet.codes[0] == 3
 
 

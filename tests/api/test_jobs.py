@@ -11,8 +11,8 @@ import pytest
 from api.security import new_id, now
 from api.stores.entities import Document, Machine, Taken, digest_of
 from api.stores.jobs import Applied, Event, Full, Outcome, Worker
-from tests.api.conftest import BOTH
 from tests.api.identifying import job, running
+from tests.api.in_process import BOTH
 
 
 @BOTH

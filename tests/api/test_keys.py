@@ -9,8 +9,8 @@ import pytest
 from api.client import Client
 from api.components import Rates
 from api.security import SCOPES
-from tests.api.conftest import example, service
-from tests.api.test_machines import refused
+from tests.api.in_process import refused, service
+from tests.fixtures.service import example
 
 #: Method, path, body, scope.
 CALLS = [

@@ -22,12 +22,14 @@ from api.security import new_id, now
 from api.stores.entities import Machine, Store, digest_of
 from api.stores.jobs import Job
 from api.stores.sql import open_store
-from api.work.requests import CutQuestion, LobeQuestion, MachineText, ToolingText
+from api.work.requests import LobeRequest, MachineText, ToolingSource
 from rcsa_ident.cutting.conditions import Engagement
-from tests.api.conftest import POSTGRESQL, SQLITE, database, example
+from rcsa_ident.machining_setup import CutSpec
 from tests.api.identifying import uploaded
-from tests.api.test_serve import command, serving
-from tests.cli import by_hand
+from tests.api.in_process import POSTGRESQL, SQLITE, database
+from tests.fixtures import by_hand
+from tests.fixtures.service import command, example, serving
+from tests.fixtures.waiting import PATIENCE, until
 
 pytestmark = pytest.mark.skipif(os.name != "posix" or not Path("/proc/self/stat").exists(), reason="processes are looked up in /proc")
 
@@ -48,9 +50,7 @@ def kill(pids: list[int]) -> None:
     for pid in pids:
         with suppress(ProcessLookupError):
             os.kill(pid, signal.SIGKILL)
-    for each in told:
-        while not each.endswith(":") and not gone(each):
-            time.sleep(0.02)
+    until(lambda: all(each.endswith(":") or gone(each) for each in told))
 
 
 def workers(store: Store) -> list[int]:
@@ -70,10 +70,12 @@ def after(client: Client, id: str, count: int) -> None:
 
 @contextmanager
 def started(folder: Path, url: str) -> Iterator[tuple[Client, subprocess.Popen]]:
-    settings = {"RCSA_IDENT_JOB_NICE": "0"} | ({} if url.startswith("sqlite") else {"RCSA_IDENT_DATABASE": url})
-    with serving(folder, folder.parent / "log", **settings) as (address, running), Client(address) as client:
-        yield client, running
-        kill([*descendants(running.pid), running.pid])
+    settings = {"RCSA_IDENT_JOB_WORKERS": "1", "RCSA_IDENT_JOB_NICE": "0"} | (
+        {} if url.startswith("sqlite") else {"RCSA_IDENT_DATABASE": url}
+    )
+    with serving(folder, **settings) as served, Client(served.url) as client:
+        yield client, served.process
+        kill([*descendants(served.process.pid), served.process.pid])
 
 
 @pytest.mark.parametrize("kind", [SQLITE, POSTGRESQL])
@@ -86,7 +88,7 @@ def test_an_identification_survives_everything(request, tmp_path, kind):
         machine = client.make_machine("M").id
         campaign = uploaded(client, machine)
         undisturbed = client.identify_campaign(campaign, seed=7)
-        assert client.wait(undisturbed.id, 120.0).state == "done"
+        assert client.wait(undisturbed.id, PATIENCE).state == "done"
         expected = client.result(undisturbed.id)
         job = client.identify_campaign(campaign, seed=7, apply=False).id
         store = open_store(url)
@@ -103,7 +105,7 @@ def test_an_identification_survives_everything(request, tmp_path, kind):
         after(client, job, rng.randrange(1, 4))
         kill([*workers(store), service.pid])
     with started(folder, url) as (client, _):
-        found = client.wait(job, 120.0)
+        found = client.wait(job, PATIENCE)
         assert (found.state, found.problem) == ("done", None)
         assert client.result(job) == expected
         assert [kind for kind, _ in client.events(job)].count("end") == 1
@@ -147,10 +149,10 @@ def test_an_identification_survives_an_upgrade(tmp_path, left):
 
 def lobe_job(store: Store, machine: str, result: str, speeds: int, method: str) -> str:
     """A job that keeps a worker at work for a while."""
-    cut = CutQuestion(Engagement(1.57, 3.14))
-    question = LobeQuestion(cut, tuple(800.0 + k for k in range(speeds)), 0.005, method, False, 0.0, 1e6)
-    asked = lobes.asked(MachineText(digest_of(result), result), [ToolingText(f"T{k}", by_hand.TOOLING) for k in range(3)], question)
-    return store.jobs.add(Job(new_id(), "A", "lobes", machine, None, "{}", "queued", now()), {"question": asked}, 1000).id
+    cut = CutSpec(Engagement(1.57, 3.14))
+    question = LobeRequest(cut, tuple(800.0 + k for k in range(speeds)), 0.005, method, False, 0.0, 1e6)
+    text = lobes.asked(MachineText(digest_of(result), result), [ToolingSource(f"T{k}", by_hand.TOOLING) for k in range(3)], question)
+    return store.jobs.add(Job(new_id(), "A", "lobes", machine, None, "{}", "queued", now()), {"question": text}, 1000).id
 
 
 @contextmanager
@@ -161,13 +163,6 @@ def working(folder: Path, url: str, name: str) -> Iterator[subprocess.Popen]:
             yield running
         finally:
             kill([*descendants(running.pid), running.pid])
-
-
-def until(condition, seconds: float = 90.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "it did not come to pass"
-        time.sleep(0.05)
 
 
 def test_several_workers_share_jobs_and_take_over(request, tmp_path, result):
@@ -214,7 +209,7 @@ def test_a_worker_that_is_not_free_or_not_there(tmp_path, result):
         following = client.lobes_later(machine, example(), speeds={"step_rpm": 2000}).id
         until(lambda: client.lobe_job(following).job.state == "done")
         # the search through all those speeds takes an hour
-        assert time.monotonic() - start < 90.0
+        assert time.monotonic() - start < PATIENCE
         assert client.lobe_job(job).job.state == "cancelled"
         # the engine's tables are no database any more
         store = open_store(url)

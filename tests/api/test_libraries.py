@@ -6,7 +6,6 @@ import io
 import json
 import shutil
 import zipfile
-from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -17,12 +16,11 @@ from api.work import libraries
 from rcsa_ident.cli import app
 from rcsa_ident.io.tested_cuts import read_tested_cuts
 from rcsa_ident.io.tool_libraries import Assumptions, import_tools
-from tests.api.conftest import service
-from tests.api.test_machines import refused
-from tests.cli import by_hand
-from tests.io.fusion import END_MILL, end_mill, library
+from tests.api.in_process import refused, service
+from tests.fixtures import by_hand
+from tests.fixtures.paths import SAMPLES
+from tests.fixtures.tool_library import END_MILL, end_mill, library
 
-SAMPLES = Path(__file__).resolve().parents[2] / "data" / "sample_runs"
 DRILL = end_mill(type="drill", description="drill")
 
 

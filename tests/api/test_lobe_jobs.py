@@ -13,9 +13,9 @@ from api.client import Client, ServiceError
 from api.jobs import lobes
 from api.jobs.codec import decode
 from api.jobs.worker import carry
-from tests.api.conftest import example, service
 from tests.api.identifying import Steps, carried
-from tests.api.test_machines import refused
+from tests.api.in_process import refused, service
+from tests.fixtures.service import example
 
 SPEEDS = {"from_rpm": 6000, "to_rpm": 12000, "step_rpm": 500}
 

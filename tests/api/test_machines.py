@@ -7,17 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from api.client import Client, ServiceError
+from api.client import Client
 from rcsa_ident.dynamics.coordinates import Dof
-from tests.api.conftest import result_text
-from tests.cli import by_hand
-
-
-def refused(status, call, *arguments, **further):
-    with pytest.raises(ServiceError) as error:
-        call(*arguments, **further)
-    assert error.value.status == status, error.value
-    return error.value.problem
+from tests.api.in_process import refused
+from tests.fixtures import by_hand
 
 
 def test_a_machine_from_making_to_forgetting(client):
@@ -76,7 +69,7 @@ def test_an_identification_comes_back_as_it_was_written(client, result):
 def test_nobody_overwrites_what_he_has_not_seen(client, result, tmp_path):
     id = client.make_machine("m").id
     first = client.identify(id, result)
-    other = result_text(tmp_path, seed=8)
+    other = by_hand.result_text(tmp_path, seed=8)
     refused(412, client.identify, id, other, seen="0" * 32)
     path, kind = f"/machines/{id}/identification", {"Content-Type": "application/json"}
     refused(412, client.send, "PUT", path, content=other, headers=kind | {"If-None-Match": "*"})
@@ -127,7 +120,7 @@ def test_the_flange_in_closed_form(shop):
 )
 def test_a_result_that_the_commands_would_refuse(client, tmp_path, change, field):
     id = client.make_machine("m").id
-    assert field in refused(422, client.identify, id, result_text(tmp_path, **change)).errors[0].field
+    assert field in refused(422, client.identify, id, by_hand.result_text(tmp_path, **change)).errors[0].field
     refused(404, client.identification, id)
 
 
@@ -144,7 +137,7 @@ def test_unknowns_without_a_finite_machine_are_refused(client, result):
 
 def test_a_failed_identification_is_kept_but_nothing_to_compute_with(client, tmp_path):
     id = client.make_machine("m").id
-    client.identify(id, result_text(tmp_path, status="failed", axes={}))
+    client.identify(id, by_hand.result_text(tmp_path, status="failed", axes={}))
     assert client.machine(id).identification.axes == []
     assert client.modes(id).axes == {}
     assert "failed" in refused(422, client.frf, id).detail

@@ -10,8 +10,8 @@ import re
 import pytest
 
 from api.routes.static_files import FOLDER
-from tests.api.conftest import example
-from tests.api.test_machines import refused
+from tests.api.in_process import refused
+from tests.fixtures.service import example
 
 VENDOR = FOLDER / "vendor"
 

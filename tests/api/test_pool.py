@@ -14,6 +14,7 @@ import pytest
 
 from api.work.pool import Busy, Pool, guarded
 from rcsa_ident.errors import InputError
+from tests.fixtures.waiting import ended, until
 
 
 def die():
@@ -96,12 +97,4 @@ def test_workers_end_with_the_service_however_it_ends(tmp_path):
     with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env=environment) as service:
         worker = int(service.stdout.readline())
         service.kill()
-    for _ in range(200):
-        try:
-            # a zombie that nobody waits for counts as ended
-            if Path(f"/proc/{worker}/stat").read_text(encoding="utf-8").rsplit(")", 1)[1].split()[0] == "Z":
-                return
-        except OSError:
-            return
-        time.sleep(0.05)
-    pytest.fail("the worker lives on")
+    until(lambda: ended(worker))

@@ -14,10 +14,9 @@ from api.files import NORMALISED, UPLOADS
 from api.reading.samples import read_normalised
 from rcsa_ident.io.recordings import read_recording, write_hdf5
 from rcsa_ident.signals.recording import Quantity, Sensor
-from tests.api.conftest import service
+from tests.api.in_process import refused, service
 from tests.api.recordings import RATE, RPM, channels, content, declared, pair
-from tests.api.test_machines import refused
-from tests.io.formats import FORMATS
+from tests.fixtures.recording_formats import FORMATS
 
 BINARY = {"Content-Type": "application/octet-stream"}
 
@@ -136,7 +135,7 @@ def test_readable_is_kept_though_it_is_not_usable(client, campaign, tmp_path):
 def test_a_wrong_unit_leaves_a_note(client, campaign, tmp_path):
     """Metres declared as volts, and the other way round."""
     found = client.upload(campaign, made(tmp_path, "c0_cut.h5", flange_x=channels()["flange_x"] * 1e4))
-    assert any("flange_x swings by" in note for note in found.verdict.notes)
+    assert any("flange_x has a peak-to-peak amplitude of" in note for note in found.verdict.notes)
     tiny = {name: values * 1e-5 for name, values in channels(1).items()}
     found = client.upload(campaign, made(tmp_path, "c1_cut.h5", 1, **tiny))
     assert sum("are its unit and sensitivity right?" in note for note in found.verdict.notes) >= 2
@@ -154,7 +153,7 @@ def test_every_format_tells_the_same(client, tmp_path, kind):
     assert (found.sampling_rate_hz, found.duration_s) == (RATE, pytest.approx(0.28))
     assert found.spindle_speed_rpm == pytest.approx(pair().speed * 30.0 / np.pi, rel=1e-5)
     assert found.harmonics_above_noise["X"] >= 6
-    parts = client.http.app.state.parts
+    parts = client.http.app.state.components
     row = parts.store.recordings.get("local", id, path.name)
     assert parts.files.path("local", UPLOADS, row.sha256).read_bytes() == path.read_bytes()
     sensors = tuple(Sensor(name, Quantity.TRIGGER) for name in volts)

@@ -7,19 +7,17 @@ import os
 import socket
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-import httpx2
 import pytest
 
 from api.client import Client
 from api.settings import Settings, from_environment
 from rcsa_ident.errors import InputError
-from tests.api.test_machines import refused
-from tests.cli import by_hand
+from tests.api.in_process import refused
+from tests.fixtures import by_hand
+from tests.fixtures.service import command, serving
+from tests.fixtures.waiting import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -68,79 +66,38 @@ def test_importing_does_nothing_and_the_service_stays_light():
     assert found.stdout.strip() == "[]"
 
 
-def command(folder: Path, *arguments: str, **settings: str) -> tuple[list[str], dict[str, str]]:
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "RCSA_IDENT_DATA": str(folder), "RCSA_IDENT_WORKERS": "1", **settings}
-    return [sys.executable, "-c", "from api.serve import main; main()", *arguments], environment
-
-
-def free_port() -> int:
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return int(found.getsockname()[1])
-
-
-@contextmanager
-def serving(folder: Path, log: Path, **settings: str) -> Iterator[tuple[str, subprocess.Popen]]:
-    port = free_port()
-    words, environment = command(folder, "--port", str(port), **settings)
-    with log.open("w") as told, subprocess.Popen(words, env=environment, stderr=told) as process:
-        url = f"http://127.0.0.1:{port}"
-        try:
-            for _ in range(600):
-                assert process.poll() is None, log.read_text()
-                try:
-                    if httpx2.get(f"{url}/ready").status_code == 200:
-                        break
-                except httpx2.TransportError:
-                    pass
-                time.sleep(0.1)
-            yield url, process
-        finally:
-            process.kill()
-
-
 def test_a_service_with_keys_killed_and_started_again(tmp_path, result):
     words, environment = command(tmp_path / "data", "create-key", "--group", "hall 3", "--label", "first")
     made = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
     key = made.stdout.strip()
-    log = tmp_path / "log"
-    with serving(tmp_path / "data", log, RCSA_IDENT_KEYS="on") as (url, process), Client(url, key) as client:
+    with serving(tmp_path / "data", RCSA_IDENT_KEYS="on") as served, Client(served.url, key) as client:
         id = client.make_machine("m", repeat="k").id
         client.identify(id, result)
         client.write_tooling("T1", by_hand.TOOLING)
         first = client.lobes(id, "T1")
-        with Client(url) as nobody:
+        with Client(served.url) as nobody:
             refused(401, nobody.machine, id)
         # no farewell
-        process.kill()
-    assert key not in log.read_text()
-    log = tmp_path / "second log"
-    with serving(tmp_path / "data", log, RCSA_IDENT_KEYS="on") as (url, process), Client(url, key) as client:
+        served.process.kill()
+    assert key not in served.log.read_text()
+    with serving(tmp_path / "data", RCSA_IDENT_KEYS="on") as served, Client(served.url, key) as client:
         assert client.make_machine("m", repeat="k").id == id
         assert client.tooling_file("T1") == by_hand.TOOLING
         # the same numbers to the last digit
         assert client.lobes(id, "T1") == first
-        process.terminate()
-        assert process.wait(20) in (0, -15)
-    lines = [json.loads(line) for line in log.read_text().splitlines()]
+        served.process.terminate()
+        assert served.process.wait(PATIENCE) in (0, -15)
+    lines = [json.loads(line) for line in served.log.read_text().splitlines()]
     (line,) = [line for line in lines if line.get("route", "").endswith("/lobes")]
     assert line["status"] == 200
     assert line["group"] == "hall 3"
     assert key.split("_", 2)[2].encode() not in (tmp_path / "data" / "service.db").read_bytes()
 
 
-def test_a_service_without_keys_says_so(tmp_path):
-    log = tmp_path / "log"
-    with serving(tmp_path / "data", log) as (url, _), Client(url) as client:
-        assert list(client.machines()) == []
-    assert any("no keys are asked for" in json.loads(line)["event"] for line in log.read_text().splitlines())
-
-
-def test_a_body_without_an_end_is_cut_off(tmp_path):
+def test_a_service_without_keys_says_so_and_cuts_off_a_body_without_an_end(tmp_path):
     """In chunks, whose sum nobody tells before; the connection ends when the limit is passed."""
-    with serving(tmp_path / "data", tmp_path / "log", RCSA_IDENT_MAX_BODY_BYTES="100000") as (url, _):
-        address = url.removeprefix("http://").split(":")
-        with socket.create_connection((address[0], int(address[1])), timeout=20) as link:
+    with serving(tmp_path / "data", RCSA_IDENT_MAX_BODY_BYTES="100000") as served:
+        with socket.create_connection(("127.0.0.1", served.port), timeout=PATIENCE) as link:
             head = "POST /v1/machines HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nTransfer-Encoding: chunked\r\n\r\n"
             link.sendall(head.encode())
             sent = 0
@@ -152,8 +109,9 @@ def test_a_body_without_an_end_is_cut_off(tmp_path):
                 pass
             assert sent < 50_000_000
         # it goes on for others
-        with Client(url) as client:
+        with Client(served.url) as client:
             assert list(client.machines()) == []
+    assert any("no keys are asked for" in json.loads(line)["event"] for line in served.log.read_text().splitlines())
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from api.stores.campaigns import Campaign, Counts, Recording
 from api.stores.entities import ABSENT, Document, Machine, Stale, Taken, Unavailable, digest_of
 from api.stores.sql import open_store
 from rcsa_ident.errors import InputError
-from tests.api.postgres import postgres, postgres_server  # noqa: F401
+from tests.fixtures.postgres import postgres, postgres_server  # noqa: F401
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])

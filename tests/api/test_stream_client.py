@@ -3,43 +3,27 @@
 from __future__ import annotations
 
 import signal
-import subprocess
 import time
 
-import httpx2
 import numpy as np
 import pytest
 
+from api.client import Client
 from api.stream_client import Event, Forces, ForceStream, StreamRefused
-from benchmarks.observer import relative_error
-from benchmarks.streaming import processes
-from tests.api.streaming import hello, result, signals, tooling
-from tests.api.test_serve import command, free_port
-from tests.workflows.test_stream_forces import RATE, streamed
+from tests.fixtures.force_stream import RATE, hello, result, signals, streamed, tooling
+from tests.fixtures.service import processes, serving
+from tests.fixtures.virtual_cut import relative_error
+from tests.fixtures.waiting import PATIENCE, until
 
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory):
     """A service with the machine and its tooling: its process, port and the machine's id."""
-    port = free_port()
-    words, environment = command(tmp_path_factory.mktemp("served"), "--port", str(port), RCSA_IDENT_JOB_WORKERS="0")
-    with subprocess.Popen(words, env=environment, stderr=subprocess.DEVNULL) as process:
-        try:
-            url = f"http://127.0.0.1:{port}"
-            for _ in range(1200):
-                try:
-                    if httpx2.get(f"{url}/ready").status_code == 200:
-                        break
-                except httpx2.TransportError:
-                    pass
-                time.sleep(0.1)
-            id = httpx2.post(f"{url}/v1/machines", json={"name": "m"}).json()["id"]
-            kinds = ({"Content-Type": "application/json"}, {"Content-Type": "application/toml"})
-            assert httpx2.put(f"{url}/v1/machines/{id}/identification", content=result(), headers=kinds[0]).status_code == 201
-            assert httpx2.put(f"{url}/v1/toolings/T1", content=tooling(), headers=kinds[1]).status_code == 201
-            yield process, port, id
-        finally:
-            process.kill()
+    with serving(tmp_path_factory.mktemp("served")) as found, Client(found.url) as client:
+        id = client.make_machine("m").id
+        client.identify(id, result())
+        client.write_tooling("T1", tooling())
+        yield found.process, found.port, id
 
 
 @pytest.mark.parametrize("form", ["float32", "json"])
@@ -127,6 +111,6 @@ def test_the_service_ends_with_its_streams(served):
         with pytest.raises(StreamRefused) as caught:
             list(stream.received())
         assert caught.value.code in (1001, 1012)
-    assert process.wait(20.0) is not None
-    assert time.monotonic() - start < 15.0
-    assert "streams" not in processes()
+    assert process.wait(PATIENCE) is not None
+    assert time.monotonic() - start < 60.0
+    until(lambda: "streams" not in processes())

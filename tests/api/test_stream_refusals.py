@@ -13,7 +13,8 @@ from starlette.websockets import WebSocketDisconnect
 
 from api.security import make_key
 from api.streams.frames import packed
-from tests.api.streaming import STREAM, closed, hello, send, streaming, until
+from tests.api.streaming import STREAM, closed, send, streaming, until
+from tests.fixtures.force_stream import hello
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +71,7 @@ def test_a_bad_frame_ends_the_stream_with_words(shop, form, frame, code, field):
     assert problem["errors"][0]["field"] == field
     assert problem["title"]
     assert problem["request_id"]
-    assert not http.app.state.parts.streams.sessions
+    assert not http.app.state.components.streams.sessions
     assert http.get("/health").status_code == 200
 
 
@@ -166,7 +167,7 @@ def test_openings_have_a_pace(tmp_path):
 def keyed(tmp_path):
     """A service that asks for keys; the machine is group A's."""
     with streaming(tmp_path) as (http, id):
-        parts, keys = http.app.state.parts, {}
+        parts, keys = http.app.state.components, {}
         for name, group, scopes in (
             ("run", "local", ("run",)),
             ("read", "local", ("read",)),
@@ -212,16 +213,16 @@ def test_keys_scopes_and_groups(keyed):
 
 
 def test_a_key_that_is_withdrawn_ends_its_stream(keyed, monkeypatch):
-    monkeypatch.setattr("api.routes.stream_connection.LOOK", 0.1)
+    monkeypatch.setattr("api.live.stream_connection.LOOK", 0.1)
     http, id, keys = keyed
     with http.websocket_connect(STREAM) as socket, http.websocket_connect(STREAM) as viewer:
         socket.send_json(hello(id, key=keys["run"]))
         session = until(socket, "opened")[0]["session"]
         viewer.send_json({"watch": session, "key": keys["read"]})
         until(viewer, "watching")
-        store = http.app.state.parts.store
+        store = http.app.state.components.store
         store.keys.delete("local", keys["read"].split("_")[1])
         assert closed(viewer)[1]["status"] == 401
-        assert session in http.app.state.parts.streams.sessions
+        assert session in http.app.state.components.streams.sessions
         store.keys.delete("local", keys["run"].split("_")[1])
         assert closed(socket)[1]["status"] == 401

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import time
 
 import numpy as np
 import pytest
@@ -15,12 +14,14 @@ from api.streams.process import StreamProcess
 from api.work.forces import observed
 from api.work.machine_cache import read
 from api.work.toolings import tooling_of
-from benchmarks.observer import relative_error
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
-from tests.api.conftest import Near
-from tests.api.streaming import CHANNELS, SENSITIVITY, STREAM, closed, hello, result, send, signals, streaming, tooling, until
-from tests.workflows.test_stream_forces import RATE, streamed
+from tests.api.in_process import Near
+from tests.api.streaming import STREAM, closed, send, streaming, until
+from tests.fixtures.force_stream import CHANNELS, RATE, SENSITIVITY, hello, result, signals, streamed, tooling
+from tests.fixtures.virtual_cut import relative_error
+from tests.fixtures.waiting import ended
+from tests.fixtures.waiting import until as until_true
 
 SETTLE = round(0.2 * RATE)
 
@@ -32,7 +33,7 @@ def shop(tmp_path):
 
 
 def hub_of(http):
-    return http.app.state.parts.streams
+    return http.app.state.components.streams
 
 
 def batch(raw: np.ndarray) -> np.ndarray:
@@ -305,7 +306,7 @@ def test_the_end_of_the_service_is_told(tmp_path):
         until(socket, "opened")
         http.portal.call(hub_of(http).stop)
         code, problem = closed(socket)
-    assert (code, problem["status"], problem["detail"]) == (1001, 503, "the service ends")
+    assert (code, problem["status"], problem["detail"]) == (1001, 503, "the service is shutting down")
 
 
 def test_what_fails_unforeseen_is_told_without_its_text(shop):
@@ -358,11 +359,7 @@ def test_the_process_of_the_streams_is_replaced_when_it_dies(tmp_path):
         expected = batch(raw)[-5000:]
         np.testing.assert_allclose(joined(frames)[-5000:], expected, atol=0.1 * np.abs(expected).max())
         second = host.process.pid
-    for _ in range(100):
-        if not os.path.exists(f"/proc/{second}"):
-            break
-        time.sleep(0.05)
-    assert not os.path.exists(f"/proc/{second}")
+    until_true(lambda: ended(second))
 
 
 def test_a_slow_spindle_has_enough_revolutions(shop):

@@ -2,36 +2,31 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
 import pytest
 
-from rcsa_ident.cutting.conditions import Engagement
+from api.work import tasks
+from api.work.machine_cache import MachineCache
 from rcsa_ident.cutting.materials import materials
-from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.identification import machine as identified
 from rcsa_ident.io.curves import read_frf_csv
-from rcsa_ident.io.identifications import machine_from_json, speed_bands_from_json, workpiece_from_json
-from rcsa_ident.workflows.limits import machine_limits
-from rcsa_ident.workflows.lobes import LobeConditions
-from rcsa_ident.workflows.speeds import MachineOverSpeed
-from rcsa_ident.workflows.tip import tooltip
-from tests.api.conftest import example, result_text
-from tests.api.test_machines import refused
-from tests.cli import by_hand
+from rcsa_ident.io.identifications import machine_from_json
+from rcsa_ident.machining_setup import CutSpec
+from rcsa_ident.workflows import tool_change
+from rcsa_ident.workflows.tool_change import ToolChange, tooltip
+from tests.api.in_process import refused
+from tests.fixtures import by_hand
+from tests.fixtures.service import example
 
 SPEEDS = {"from_rpm": 6000, "to_rpm": 9000, "step_rpm": 500}
 RPM = math.pi / 30.0
 
 
-def by_workflow(result, tooling, speeds, draws=60):
-    import json
-
-    data = json.loads(result)
-    machine = MachineOverSpeed(machine_from_json(data, ""), speed_bands_from_json(data, ""))
-    process = MillingProcess(tooling.cutter, workpiece_from_json(data, "").coefficients, Engagement.from_immersion(0.5, "down"))
-    omega = 2.0 * np.pi * np.arange(100.0, data["band_hz"][1] + 0.5)
-    return machine_limits(machine, tooling.assembly, omega, LobeConditions(process, speeds, 0.01), draws, 5e-4)
+def by_workflow(result, tooling, speeds):
+    return ToolChange(machine_from_json(json.loads(result), ""), tooling, CutSpec(), speeds, 0.01).limits()
 
 
 @pytest.fixture
@@ -42,17 +37,17 @@ def tooling(tmp_path):
 @pytest.mark.parametrize("softening", [False, True])
 def test_lobes_are_those_of_the_command(client, tmp_path, tooling, softening):
     """With bands, for a machine that stays the same at all speeds and for one that changes."""
-    result = result_text(tmp_path, softening)
+    result = by_hand.result_text(tmp_path, softening)
     id = client.make_machine("m").id
     client.identify(id, result)
     client.write_tooling("T1", by_hand.TOOLING)
     (found,) = client.lobes(id, "T1", speeds=SPEEDS).toolings
     expected = by_workflow(result, tooling, np.arange(6000.0, 9001.0, 500.0) * RPM)
     assert found.spindle_speed_rpm == [6000.0, 6500.0, 7000.0, 7500.0, 8000.0, 8500.0, 9000.0]
-    np.testing.assert_allclose(found.limit_depth_mm, expected.lobes.limit_depth * 1e3, rtol=1e-9)
-    np.testing.assert_allclose(found.chatter_frequency_hz, expected.lobes.chatter_frequency / (2.0 * np.pi), rtol=1e-8)
+    np.testing.assert_allclose(found.limit_depth_mm, expected.limit_depth * 1e3, rtol=1e-9)
+    np.testing.assert_allclose(found.chatter_frequency_hz, expected.chatter_frequency / (2.0 * np.pi), rtol=1e-8)
     np.testing.assert_allclose([found.limit_depth_low_mm, found.limit_depth_high_mm], np.array(expected.band) * 1e3, rtol=1e-4)
-    assert found.lobe == expected.lobes.lobe.tolist()
+    assert found.lobe == expected.lobe.tolist()
     assert found.tooling == "T1"
     assert found.warnings[0].startswith("the identification is suspect")
     assert any(w.startswith("interrupted cut") for w in found.warnings) == (tooling.cutter.teeth * 90 < 360)
@@ -150,8 +145,6 @@ def test_advice_has_its_limit_of_work(shop):
 
 
 def test_tooltip_is_that_of_the_command(shop, result, tooling, tmp_path):
-    import json
-
     client, id = shop
     machine = machine_from_json(json.loads(result), "")
     kept = client.tooltip(id, "T1")
@@ -159,10 +152,12 @@ def test_tooltip_is_that_of_the_command(shop, result, tooling, tmp_path):
     assert own.frequency_hz == [500.0 + 2.5 * k for k in range(161)]
     for found in (kept, own):
         omega = 2.0 * np.pi * np.array(found.frequency_hz)
-        expected = tooltip(machine, tooling.assembly, omega, True)
+        expected = tooltip(machine, tooling, omega).tip
+        deviation = {str(row): each for (row, col), each in expected.deviation().items() if row == col}
         for axis, curve in found.axes.items():
-            np.testing.assert_allclose(np.array(curve.re) + 1j * np.array(curve.im), expected.tip(axis.lower()), rtol=1e-8)
-            np.testing.assert_allclose([curve.re_std, curve.im_std], expected.deviation[axis.lower()], rtol=1e-5)
+            tip = f"tip.{axis.lower()}"
+            np.testing.assert_allclose(np.array(curve.re) + 1j * np.array(curve.im), expected.between(tip, tip), rtol=1e-8)
+            np.testing.assert_allclose([curve.re_std, curve.im_std], deviation[tip], rtol=1e-5)
     path = tmp_path / "FRF.csv"
     path.write_text(client.tooltip_file(id, "T1"), encoding="utf-8")
     file = read_frf_csv(path)
@@ -174,7 +169,7 @@ def test_tooltip_is_that_of_the_command(shop, result, tooling, tmp_path):
 
 def test_a_speed_that_the_machine_was_not_cut_at(client, tmp_path):
     id = client.make_machine("m").id
-    client.identify(id, result_text(tmp_path, True))
+    client.identify(id, by_hand.result_text(tmp_path, True))
     inside, outside = (client.tooltip(id, example(), spindle_speed_rpm=n, step_hz=10) for n in (9000, 30000))
     assert not any("identified from" in w for w in inside.warnings)
     assert any("identified from 5730 to 13369 rev/min" in w for w in outside.warnings)
@@ -245,16 +240,14 @@ def test_numbers_that_lead_nowhere_are_told_not_thrown(shop):
 
 def test_a_posterior_that_is_too_large_to_keep_is_weighed(shop, monkeypatch):
     """The plain road gives the same limits; where it would take too long it is refused, and so are too many frequencies."""
-
-    from api.work import machine_cache
-
     client, id = shop
     quick = client.lobes(id, "T1", speeds=SPEEDS).toolings[0]
-    monkeypatch.setattr(machine_cache, "MOST_KEPT", 10)
+    monkeypatch.setattr(tasks, "_machines", MachineCache(4))
+    monkeypatch.setattr(identified, "MOST_KEPT", 10)
     slow = client.lobes(id, "T1", speeds=SPEEDS).toolings[0]
     np.testing.assert_allclose(slow.limit_depth_low_mm, quick.limit_depth_low_mm, rtol=1e-4)
     np.testing.assert_allclose(slow.limit_depth_mm, quick.limit_depth_mm, rtol=1e-9)
-    monkeypatch.setattr(machine_cache, "SPREAD_COST", 1.0)
+    monkeypatch.setattr(tool_change, "_SPREAD_SECONDS", 1.0)
     assert refused(422, client.lobes, id, "T1", speeds=SPEEDS).errors[0].field == "speeds"
     assert refused(422, client.tooltip, id, "T1").errors[0].field == "step_hz"
     assert refused(422, client.frf, id).errors[0].field == "step_hz"

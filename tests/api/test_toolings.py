@@ -13,9 +13,9 @@ from api.work.toolings import MOST_ELEMENTS, toml_of, tooling_of, weigh
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.tool_holder.model import tool_holder_structure
-from tests.api.conftest import example
-from tests.api.test_machines import refused
-from tests.cli import by_hand
+from tests.api.in_process import refused
+from tests.fixtures import by_hand
+from tests.fixtures.service import example
 
 
 def test_a_tooling_file_comes_back_as_it_was_written(client):

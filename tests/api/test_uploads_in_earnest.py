@@ -25,9 +25,9 @@ from api.files import STALE_FILE, STALE_PART, UPLOADS
 from api.main import create_app
 from api.settings import Settings
 from api.stores.sql import open_store
-from tests.api.conftest import Here, embedded, service
+from tests.api.in_process import Here, embedded, refused, service
 from tests.api.recordings import content, declared
-from tests.api.test_machines import refused
+from tests.fixtures.waiting import PATIENCE, until
 
 ROOT = Path(__file__).resolve().parents[2]
 BINARY = {"Content-Type": "application/octet-stream"}
@@ -42,8 +42,7 @@ def listening(folder: Path, **settings) -> Iterator[int]:
         server = uvicorn.Server(uvicorn.Config(app, log_config=None, access_log=False, timeout_graceful_shutdown=5))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [bound]})
         thread.start()
-        while not server.started:
-            time.sleep(0.01)
+        until(lambda: server.started)
         try:
             yield bound.getsockname()[1]
         finally:
@@ -68,13 +67,6 @@ def files_in(folder: Path) -> list[Path]:
     return [p for p in (folder / "files").rglob("*") if p.is_file()]
 
 
-def until(true, seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
 def head(method: str, path: str, *further: str) -> bytes:
     lines = [f"{method} {path} HTTP/1.1", "Host: localhost", "Content-Type: application/octet-stream", *further]
     return "\r\n".join([*lines, "", ""]).encode()
@@ -88,7 +80,7 @@ def answer_of(link: socket.socket) -> tuple[int, bytes]:
 
 
 def test_a_body_without_an_end_is_cut_off(place, tmp_path):
-    with place(max_upload_bytes=3_000_000) as (client, port, id), socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+    with place(max_upload_bytes=3_000_000) as (client, port, id), socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
         link.sendall(head("PUT", f"/v1/campaigns/{id}/recordings/c0_cut.h5", "Transfer-Encoding: chunked"))
         sent = 0
         try:
@@ -112,7 +104,7 @@ def test_a_client_that_goes_half_way(place, tmp_path, method):
     raw = content(tmp_path)
     with place() as (client, port, id):
         path = f"/v1/campaigns/{id}/recordings/c0_cut.h5"
-        with socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+        with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
             link.sendall(head(method, path, f"Content-Length: {len(raw)}", "Upload-Offset: 0", f"Upload-Length: {len(raw)}") + raw[:20_000])
             until(lambda: files_in(tmp_path) != [])
         if method == "PUT":
@@ -137,16 +129,16 @@ def test_a_length_that_is_a_lie(place, tmp_path):
     raw = content(tmp_path)
     with place(upload_idle_seconds=0.3) as (client, port, id):
         path = f"/v1/campaigns/{id}/recordings/c0_cut.h5"
-        with socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+        with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
             link.sendall(head("PUT", path, f"Content-Length: {len(raw) + 1}") + raw)
             status, text = answer_of(link)
-        assert (status, b"nothing has come for 0.3 s" in text) == (408, True)
-        with socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+        assert (status, b"no data has arrived for 0.3 s" in text) == (408, True)
+        with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
             link.sendall(head("PUT", path, f"Content-Length: {len(raw) - 1000}") + raw)
             assert answer_of(link)[0] == 422
         assert files_in(tmp_path) == []
         for told in ("-1", "x", "9" * 400, "1e3"):
-            with socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+            with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
                 link.sendall(head("PUT", path, f"Content-Length: {told}") + b"x")
                 assert answer_of(link)[0] in (400, 413)
         assert client.upload(id, _written(tmp_path, raw)).verdict.usable
@@ -154,11 +146,11 @@ def test_a_length_that_is_a_lie(place, tmp_path):
 
 def test_a_client_that_crawls_is_given_up(place, tmp_path):
     limits = {"upload_idle_seconds": 0.5, "upload_bytes_per_second": 100_000}
-    with place(**limits) as (_, port, id), socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+    with place(**limits) as (_, port, id), socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
         link.sendall(head("PUT", f"/v1/campaigns/{id}/recordings/c0_cut.h5", "Content-Length: 1000000"))
         begin = time.monotonic()
         try:
-            while time.monotonic() - begin < 30.0:
+            while time.monotonic() - begin < PATIENCE:
                 link.sendall(b"x")
                 time.sleep(0.05)
                 link.setblocking(False)
@@ -168,7 +160,7 @@ def test_a_client_that_crawls_is_given_up(place, tmp_path):
                 except BlockingIOError:
                     pass
                 finally:
-                    link.settimeout(20)
+                    link.settimeout(PATIENCE)
         except OSError:
             pytest.fail("the connection ended without an answer")
         status, text = answer_of(link)
@@ -180,7 +172,7 @@ def test_too_many_at_once_are_told_to_wait(place, tmp_path):
     raw = content(tmp_path)
     with place(uploads=2) as (client, port, id):
         path = f"/v1/campaigns/{id}/recordings/c0_cut.h5"
-        links = [socket.create_connection(("127.0.0.1", port), timeout=20) for _ in range(2)]
+        links = [socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) for _ in range(2)]
         for link in links:
             link.sendall(head("PUT", path, f"Content-Length: {len(raw)}") + raw[:1000])
         until(lambda: len(files_in(tmp_path)) == 2)
@@ -202,10 +194,14 @@ def test_uploads_of_one_name_at_once(place, tmp_path):
         url = f"http://127.0.0.1:{port}/v1/campaigns/{id}/recordings/"
         with ThreadPoolExecutor(6) as threads:
             same = list(
-                threads.map(lambda _: httpx2.put(url + "c0_cut.h5", content=raws[0], headers=BINARY, timeout=60).status_code, range(6))
+                threads.map(
+                    lambda _: httpx2.put(url + "c0_cut.h5", content=raws[0], headers=BINARY, timeout=PATIENCE).status_code, range(6)
+                )
             )
             other = list(
-                threads.map(lambda k: httpx2.put(url + "c1_cut.h5", content=raws[k % 2], headers=BINARY, timeout=60).status_code, range(6))
+                threads.map(
+                    lambda k: httpx2.put(url + "c1_cut.h5", content=raws[k % 2], headers=BINARY, timeout=PATIENCE).status_code, range(6)
+                )
             )
         assert sorted(same) == [200] * 5 + [201]
         assert sorted(other) == [200, 200, 201, 409, 409, 409]
@@ -217,13 +213,13 @@ def test_two_who_write_the_same_parts(place, tmp_path):
     with place() as (client, port, id):
         path = f"/v1/campaigns/{id}/recordings/c0_cut.h5"
         told = ["Upload-Offset: 0", f"Upload-Length: {len(raw)}"]
-        with socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+        with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
             link.sendall(head("PATCH", path, f"Content-Length: {len(raw)}", *told) + raw[:2000])
             until(lambda: files_in(tmp_path) != [])
             headers = BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}
             assert client.http.patch(path, content=raw, headers=headers).status_code == 503
             link.sendall(raw[2000:])
-            link.settimeout(20)
+            link.settimeout(PATIENCE)
             assert link.recv(65536).split(b" ", 2)[1] == b"201"
 
 
@@ -232,7 +228,9 @@ def test_air_and_cut_at_once_end_with_the_right_verdict(place, tmp_path):
         url = f"http://127.0.0.1:{port}/v1/campaigns/{id}/recordings/"
         raws = {f"c{k}_{kind}.h5": content(tmp_path, k, kind == "air") for k in range(2) for kind in ("cut", "air")}
         with ThreadPoolExecutor(4) as threads:
-            done = list(threads.map(lambda name: httpx2.put(url + name, content=raws[name], headers=BINARY, timeout=60).status_code, raws))
+            done = list(
+                threads.map(lambda name: httpx2.put(url + name, content=raws[name], headers=BINARY, timeout=PATIENCE).status_code, raws)
+            )
         assert done == [201] * 4
         found = client.campaign(id)
         assert found.usable == 2
@@ -280,7 +278,7 @@ CODE = """
 import importlib, json, os, sys
 from pathlib import Path
 import api.reading.examine
-from tests.api.conftest import embedded, service
+from tests.api.in_process import embedded, service
 
 def upload(folder, id, target, survived, replacing):
     path, _, function = target.rpartition(".")
@@ -312,7 +310,7 @@ for folder, *step in json.loads(sys.argv[1]):
 def whole(folder: Path, group: str = "local") -> dict[str, str]:
     """Names and hashes of recordings, each of which is there to the last byte."""
     with service(open_store(f"sqlite:///{folder / 'store.db'}"), folder) as http:
-        parts = http.app.state.parts
+        parts = http.app.state.components
         (machine,) = parts.store.machines.list(group, "", 9)
         (campaign,) = parts.store.campaigns.list(group, machine.id, "", 9)
         found = {}
@@ -355,7 +353,7 @@ def test_a_kill_at_every_step_loses_nothing_and_leaves_nothing(tmp_path, replaci
         # the next start sweeps, and judges what is owed
         with service(open_store(f"sqlite:///{copy / 'store.db'}"), copy) as http:
             until(lambda copy=copy, there=there: len(files_in(copy)) == 2 * len(there))
-            store = http.app.state.parts.store
+            store = http.app.state.components.store
             until(lambda store=store: store.campaigns.unsettled() == [])
             again = http.put(f"/v1/campaigns/{id}/recordings/c0_cut.h5?replace=true", content=new, headers=BINARY)
             assert again.status_code == (200 if kept else 201)

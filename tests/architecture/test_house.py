@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import ast
+import doctest
+import importlib
 import os
 import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -15,7 +18,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "rcsa_ident"
 SOURCES = sorted(p for folder in ("rcsa_ident", "api", "tests", "benchmarks") for p in (ROOT / folder).rglob("*.py"))
-KERNELS = sorted(PACKAGE.rglob("_kernels.py"))
+KERNELS = sorted(PACKAGE.rglob("_*kernels.py"))
 
 
 def run(*command: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -46,9 +49,9 @@ def test_types():
     passes("mypy")
 
 
-@pytest.mark.parametrize("path", KERNELS, ids=lambda p: p.parent.name)
+@pytest.mark.parametrize("path", KERNELS, ids=lambda p: f"{p.parent.name}{p.stem}")
 def test_kernels_see_arrays_and_scalars_only(path):
-    """They import numpy, numba and math, take ten arguments at most, and stay serial and cached."""
+    """And named tuples of them: they import numpy, numba and math, take ten arguments at most, and stay serial and cached."""
     tree = ast.parse(path.read_text())
     imported = set()
     for node in ast.walk(tree):
@@ -56,7 +59,7 @@ def test_kernels_see_arrays_and_scalars_only(path):
             imported |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             imported.add((node.module or "").split(".")[0])
-    assert imported <= {"__future__", "math", "numba", "numpy"}
+    assert imported <= {"__future__", "math", "numba", "numpy", "typing"}
     functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
     assert functions
     for function in functions:
@@ -70,20 +73,43 @@ def test_kernels_see_arrays_and_scalars_only(path):
                 assert "parallel" not in words, f"{function.name}: {words}"
 
 
+def tests_of(path: Path) -> Path:
+    """Of ``room/_kernels.py`` they stand in ``tests/room/test_kernels.py``."""
+    return ROOT / "tests" / path.parent.relative_to(PACKAGE) / f"test{path.name}"
+
+
 def test_kernels_have_their_tests():
-    for path in KERNELS:
-        assert (ROOT / "tests" / path.parent.relative_to(PACKAGE) / "test_kernels.py").exists(), path
+    assert not [path for path in KERNELS if not tests_of(path).exists()]
+
+
+def test_kernels_need_no_types():
+    """The compiler infers them: the checker is told so, file by file, since its patterns know whole names only."""
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        overrides = tomllib.load(file)["tool"]["mypy"]["overrides"]
+    untyped = next(each["module"] for each in overrides if each.get("disallow_untyped_defs") is False)
+    assert sorted(untyped) == [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in KERNELS]
 
 
 def test_kernels_without_the_compiler():
     """The same tests, with the kernels as plain Python: no result rests on what the compiler lets pass."""
-    tests = [str(p) for p in sorted((ROOT / "tests").rglob("test_kernels.py"))]
+    tests = [str(tests_of(path)) for path in KERNELS]
     passes(sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests, NUMBA_DISABLE_JIT="1")
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
-def test_no_file_is_too_long(path):
-    assert len(path.read_text().splitlines()) <= 500
+def test_no_file_is_too_long():
+    lengths = {str(path.relative_to(ROOT)): len(path.read_text().splitlines()) for path in SOURCES}
+    assert {name: length for name, length in lengths.items() if length > 500} == {}
+
+
+def test_examples_in_docstrings():
+    """What a docstring shows is what comes out."""
+    found = [p for p in SOURCES if p.is_relative_to(PACKAGE) and ">>> " in p.read_text()]
+    assert found
+    for path in found:
+        module = importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
+        result = doctest.testmod(module)
+        assert result.attempted, path
+        assert not result.failed, path
 
 
 def test_no_set_up_beside_pyproject():
@@ -95,6 +121,31 @@ def test_importing_does_nothing_heavy():
     """The package's door imports no physics, no web, no plots."""
     code = "import sys, rcsa_ident; print([m for m in ('numpy', 'numba', 'fastapi', 'pymoo', 'matplotlib', 'control') if m in sys.modules])"
     assert run(sys.executable, "-c", code).stdout.strip() == "[]"
+
+
+def test_one_place_turns_speeds_into_rad_per_s():
+    """30/π and π/30 stand in units.py and nowhere else, whether written as a quotient or as digits."""
+    factor = re.compile(r"\b30(\.0*)?\s*/\s*(np|math)\.pi|(np|math)\.pi\s*/\s*30\b|\b9\.549\d|\b0\.1047\d")
+    offenders = set()
+    for path in (p for folder in ("rcsa_ident", "api") for p in (ROOT / folder).rglob("*.py")):
+        if factor.search(path.read_text()):
+            offenders.add(str(path.relative_to(ROOT)))
+    assert offenders == {"rcsa_ident/units.py"}
+
+
+def test_errors_are_in_the_words_of_the_library():
+    """No option of the command line stands in a text outside cli/: the commands turn the library's fields into their options."""
+    option = re.compile(r"(^| )--[a-z][a-z-]+( |$|[,;.)])")
+    offenders = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        if path.is_relative_to(PACKAGE / "cli"):
+            continue
+        tree = ast.parse(path.read_text())
+        documents = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        texts = [n for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str) and id(n) not in documents]
+        offenders += [f"{path.relative_to(ROOT)}:{text.lineno}" for text in texts if option.search(text.value)]
+    # the last one is an option of Dask's own worker
+    assert [offender.split(":")[0] for offender in offenders] == ["rcsa_ident/scaleout.py"], offenders
 
 
 def drawn_tree() -> set[str]:

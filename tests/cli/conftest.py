@@ -9,9 +9,8 @@ import pytest
 
 from rcsa_ident.io.identifications import identification_to_json
 from rcsa_ident.io.results import write_result
-from tests.cli import by_hand
-
-SAMPLES = Path(__file__).resolve().parents[2] / "data" / "sample_runs"
+from tests.fixtures import by_hand
+from tests.fixtures.paths import SAMPLES
 
 
 @pytest.fixture
@@ -26,8 +25,23 @@ def softening_file(tmp_path: Path) -> Path:
     return written(tmp_path / "SOFT.json", True)
 
 
-def written(path: Path, softening: bool) -> Path:
-    write_result(path, identification_to_json(by_hand.identification(softening), by_hand.campaign(path.parent), by_hand.LEFT_OUT))
+@pytest.fixture
+def certain_file(tmp_path: Path) -> Path:
+    """Of a machine whose number of modes nobody doubts: its bands are those of one Gaussian."""
+    return written(tmp_path / "CERTAIN.json", False, rivals=0)
+
+
+def written(path: Path, softening: bool, rivals: int = 1) -> Path:
+    found = by_hand.identification(softening, rivals)
+    write_result(path, identification_to_json(found, by_hand.campaign(path.parent), by_hand.LEFT_OUT))
+    return path
+
+
+@pytest.fixture
+def tooling_file(tmp_path: Path) -> Path:
+    """T1 alone."""
+    path = tmp_path / "T1.toml"
+    path.write_text(by_hand.TOOLING, encoding="utf-8")
     return path
 
 

@@ -13,8 +13,8 @@ from rcsa_ident.io.dynamometer import read_workpiece
 from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.io.setups import read_campaign
 from tests.cli.measurements import run
-from tests.workflows.conftest import TOOLING
-from tests.workflows.dynamometer import TRUE, plan, true_force
+from tests.fixtures import by_hand
+from tests.fixtures.dynamometer import TRUE, plan, true_force
 
 RATE = 25600.0
 
@@ -24,7 +24,7 @@ def force_campaign(tmp_path_factory):
     """Five cuts with a dynamometer under the workpiece (the other sign), an air cut each, sensitivities in V/N."""
     folder = tmp_path_factory.mktemp("forces")
     (folder / "recordings").mkdir()
-    (folder / "T1.toml").write_text(TOOLING.replace("diameter_mm = 12.0\n[tool]", "diameter_mm = 12.0\nhelix_deg = 30.0\n[tool]"))
+    (folder / "T1.toml").write_text(by_hand.TOOLING.replace("diameter_mm = 12.0\n[tool]", "diameter_mm = 12.0\nhelix_deg = 30.0\n[tool]"))
     rng = np.random.default_rng(1)
     lines = ['[campaign]\nname = "dynamometer"\nsampling_rate_hz = 25600']
     for axis in "xy":

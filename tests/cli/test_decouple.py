@@ -97,14 +97,14 @@ def test_the_flange_carries_another_tooling(taps):
 def test_tips_alone_are_called_doubtful(taps):
     """Three tips leave two flanges at many frequencies: written, and the exit code says that it is not settled."""
     result = run("decouple", *options(taps, ("tip",)), "--out", taps / "TIPS.csv", code=3)
-    assert "a fourth tooling would tell" in result.output
+    assert "a fourth tooling would decide" in result.output
     assert (taps / "TIPS.csv").exists()
 
 
 def test_what_is_refused(taps):
     out = taps / "NONE.csv"
     one = options(taps)[:2]
-    assert "three at least" in run("decouple", *one, "--out", out, code=2).output
+    assert "at least three" in run("decouple", *one, "--out", out, code=2).output
     assert "TOOLING.toml=FRF" in run("decouple", "--tap", "a.csv", "--out", out, code=2).output
     assembly = read_tooling(taps / "A20.toml").assembly
     flat = np.ones(OMEGA.size, dtype=complex)
@@ -114,5 +114,5 @@ def test_what_is_refused(taps):
         flange_from_taps(
             [FlangeTap("a", assembly, Place.TIP, OMEGA, flat), FlangeTap("b", assembly, Place.TIP, OMEGA[1:], flat[1:])], Dof.X
         )
-    with pytest.raises(InputError, match="three toolings at least"):
+    with pytest.raises(InputError, match="at least three toolings"):
         flange_from_taps([], Dof.X)

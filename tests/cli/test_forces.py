@@ -9,14 +9,15 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from benchmarks.observer import DATA, relative_error
 from rcsa_ident.cli.forces import forces
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.forces import read_forces_csv, sensors_of_result, write_forces_csv
 from rcsa_ident.io.recordings import write_hdf5
-from rcsa_ident.io.results import read_result, spindle_to_json, write_result
-from tests.observer.flange_machine import BAND, flange_machine, paper_cut
+from rcsa_ident.io.results import read_result, write_result
+from tests.fixtures.flange_machine import BAND, flange_keys, paper_cut
+from tests.fixtures.paths import TOOLINGS
+from tests.fixtures.virtual_cut import relative_error
 
 app = typer.Typer()
 app.command()(forces)
@@ -33,17 +34,16 @@ def folder(tmp_path_factory):
     """RESULT.json of the machine, TOOLING.toml with two teeth, both recordings."""
     folder, made = tmp_path_factory.mktemp("forces"), paper_cut()
     sensors = {s.name: {"quantity": str(s.quantity), "axis": s.axis.upper(), "sensitivity": s.sensitivity} for s in made.cut.sensors}
-    axes = {axis.upper(): spindle_to_json(*part.at(axis, None)) for axis, part in flange_machine().whole.items()}
     write_result(
         folder / "RESULT.json",
         {
             "schema_version": 1, "status": "converged", "reasons": [], "seed": 1, "method": "default", "software": "by hand",
             "campaign": {"name": "by hand", "cuts_used": 0, "cuts_left_out": []}, "sensors": sensors,
             "workpiece": {"name": "EN AW-6082", "tangential_coefficient_mpa": 902.0, "radial_ratio": 0.26},
-            "band_hz": [w / (2.0 * np.pi) for w in BAND], "axes": axes,
+            "band_hz": [w / (2.0 * np.pi) for w in BAND], "axes": flange_keys(),
         },
     )  # fmt: skip
-    text = (DATA / "machines" / "toolings" / "S2-PG25.toml").read_text(encoding="utf-8")
+    text = (TOOLINGS / "S2-PG25.toml").read_text(encoding="utf-8")
     (folder / "T.toml").write_text(text.replace("teeth = 4", "teeth = 2"), encoding="utf-8")
     for name, recording in (("cut.h5", made.cut), ("air.h5", made.air)):
         channels = {s.name: recording.samples[:, i] * s.sensitivity for i, s in enumerate(recording.sensors)}
@@ -111,7 +111,7 @@ def test_the_mean_where_the_cut_is_interrupted(folder):
         (("--bandwidth-hz", "0"), "--bandwidth-hz"),
         (("--bandwidth-hz", "100"), "harmonics in the band"),
         (("--plot", "F.gif"), "--plot"),
-        (("--idle-percent", "120"), "idle share"),
+        (("--idle-percent", "120"), "--idle-percent: found 120 %"),
         (("--wear", "W.csv"), "--axial-depth-mm"),
         (("--out", "no/such/F.csv"), "--out"),
         (("--air", "nowhere.h5"), "nowhere.h5"),

@@ -17,8 +17,7 @@ from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.remarks import Remark
-from rcsa_ident.workflows.tip import tooltip
-from tests.cli import by_hand
+from tests.fixtures import by_hand
 
 
 def run(*arguments, code=0):
@@ -103,9 +102,9 @@ def test_two_processes_write_the_same_bytes(tmp_path, small_campaign, first, war
 def test_a_warm_start_says_the_same_of_a_tip(small_campaign, first, warm):
     assembly = read_campaign(small_campaign).toolings["S1-ER32"].assembly
     omega = 2.0 * np.pi * np.linspace(600.0, 4000.0, 100)
-    again, cold = (tooltip(machine_from_json(read_result(path), ""), assembly, omega, False) for path in (warm[0], first))
-    for axis in (Dof.X, Dof.Y):
-        assert np.linalg.norm(again.tip(axis) - cold.tip(axis)) < 0.01 * np.linalg.norm(cold.tip(axis))
+    again, cold = (machine_from_json(read_result(path), "").tip(assembly, omega, spread=False) for path in (warm[0], first))
+    for tip in ("tip.x", "tip.y"):
+        assert np.linalg.norm(again.between(tip, tip) - cold.between(tip, tip)) < 0.01 * np.linalg.norm(cold.between(tip, tip))
     assert read_result(warm[0])["started_from"] == "RESULT.json"
     assert "started_from" not in read_result(first)
 

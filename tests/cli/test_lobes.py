@@ -15,7 +15,9 @@ from rcsa_ident.cli import advice, cases, export, lobes
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.curves import read_lobes_csv, write_frf_csv
 from rcsa_ident.io.frf_files import Source, read_tap_tests
-from tests.cli import by_hand
+from rcsa_ident.io.identifications import machine_from_json
+from rcsa_ident.io.results import read_result
+from tests.fixtures import by_hand
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 APP = typer.Typer(pretty_exceptions_enable=False)
@@ -64,8 +66,8 @@ def test_every_method_from_modes_and_from_tap_tests(shop, method):
     assert one["method"] == two["method"] == method
     a, b = read_lobes_csv(shop / "a.csv"), read_lobes_csv(shop / "b.csv")
     np.testing.assert_allclose(a.limit, b.limit, rtol=1e-3 if method == "zero-order" else 1e-2)
-    assert any("fitted with" in w for w in two["warnings"]) == (method not in ("zero-order", "multi-frequency"))
-    assert (shop / "a.csv").read_text(encoding="utf-8").splitlines()[0].endswith(",lobe,flip")
+    assert any("replaced by a fit with" in w for w in two["warnings"]) == (method not in ("zero-order", "multi-frequency"))
+    assert (shop / "a.csv").read_text(encoding="utf-8").splitlines()[0].endswith(",lobe,recommended_depth_mm,flip")
 
 
 def test_a_map_knows_islands_that_the_first_limit_does_not(tmp_path):
@@ -106,10 +108,14 @@ def test_tested_cuts_are_counted_at_their_own_speeds(shop):
         "share_right": 0.6,
     }  # fmt: skip
     drawing = (shop / "L.svg").read_text(encoding="utf-8")
-    for words in ("tested: chatter", "tested: marginal", "3 of 5 tested cuts told right (1 unexpected chatter, 1 stable above the limit)"):
+    for words in (
+        "tested: chatter",
+        "tested: marginal",
+        "3 of 5 tested cuts classified correctly (1 unexpected chatter, 1 stable above the limit)",
+    ):
         assert words in drawing
     table = run("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, *SPEEDS, *out).stdout
-    assert "told right: 3 of 5, 60.0 %" in table
+    assert "classified correctly: 3 of 5, 60.0 %" in table
 
 
 def test_surface_error_stands_beside_the_lobes(shop):
@@ -301,7 +307,7 @@ def test_export_of_flange_and_modes(result_file, tmp_path):
     assert {"X", "X_tM", "X_rF", "X_rM", "Y"} <= set(data["receptances"])
     run("export", result_file, "--to", "csv", "--what", "modes", "--out", tmp_path / "m.csv")
     rows = list(csv.DictReader((tmp_path / "m.csv").read_text(encoding="utf-8").splitlines()))
-    machine, _ = lobes.read_machine(result_file)
+    machine = machine_from_json(read_result(result_file), "").identified
     assert float(rows[0]["natural_frequency_hz"]) == pytest.approx(machine[Dof.X].spindle.modes.omega_n[0] / (2.0 * np.pi))
     for more, words in (
         (("--to", "uff", "--what", "modes"), "csv or json for modes"),
@@ -325,7 +331,7 @@ def test_the_face_mill_of_the_shared_files(tmp_path):
 
 
 def test_cases_in_process_and_at_standstill(result_file, tmp_path):
-    """Cuts at 0.9 and 1.1 of the machine's own limit are told right by it, and not by tap tests of a machine twice as soft."""
+    """Cuts at 0.9 and 1.1 of the machine's own limit are classified correctly by it, and not by tap tests of a machine twice as soft."""
     folder, speeds = result_file.parent, ("--speed-from", 9000, "--speed-to", 15000, "--speed-step", 500)
     run(
         "lobes", result_file, folder / "T1.toml", *speeds, "--no-bands", "--immersion", 0.7, "--strategy", "up", "--out", tmp_path / "L.csv"

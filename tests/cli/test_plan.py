@@ -102,7 +102,7 @@ def test_figures_for_machines(tmp_path):
 
 def test_a_band_out_of_reach_is_a_warning(tmp_path):
     shown = run(result_in(tmp_path), *options(tmp_path, "--cuts", 2, "--band", 1e-4))
-    assert "the band of 0.0001 % is not reached: 2 cuts come to" in shown.stderr
+    assert "a standard deviation of 0.0001 % is not reached: 2 cuts give" in shown.stderr
     assert shown.stdout.count("S1-ER32") + shown.stdout.count("S2-PG25") == 2
 
 

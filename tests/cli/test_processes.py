@@ -15,6 +15,7 @@ import pytest
 
 from rcsa_ident.cli.processes import workers
 from rcsa_ident.identification.progress import Stage, Step
+from tests.fixtures.waiting import PATIENCE, until
 
 
 def square(x):
@@ -71,7 +72,7 @@ def test_words_of_workers_and_of_this_process_arrive(two):
     heard = []
     with two.listening(lambda *word: heard.append((*word, threading.current_thread() is threading.main_thread()))) as progress:
         assert list(two.map(say_something, [(x, progress) for x in range(8)])) == list(range(8))
-        time.sleep(0.3)
+        until(lambda: len(heard) == 8)
     assert {main for *_, main in heard} == {True, False}
     assert all(axis == "x" and stage == f"{cost:.0f} modes" for axis, stage, cost, _ in heard)
     count = len(heard)
@@ -104,17 +105,18 @@ def test_after_an_error_no_worker_is_left():
         fail()
     assert len(children) >= 2
     for child in children:
-        child.join(5.0)
+        child.join(PATIENCE)
         assert not child.is_alive()
 
 
 CTRL_C = """
-import os, sys, time
+import os, pathlib, signal, sys, time
 sys.path.insert(0, {root!r})
 from rcsa_ident.cli.processes import workers
-def work(_):
+def work(task):
+    pathlib.Path({place!r}, str(task)).touch()
     # a signal between a check of the interpreter and one long sleep would wait for the sleep's end
-    end = time.monotonic() + 30.0
+    end = time.monotonic() + 600.0
     while time.monotonic() < end:
         time.sleep(0.01)
 def main():
@@ -127,24 +129,29 @@ def main():
     except KeyboardInterrupt:
         print("interrupted", flush=True)
 if __name__ == "__main__":
+    # whoever started this may have had the signal ignored, which is inherited
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     main()
 """
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no process groups")
-@pytest.mark.parametrize("wait", [0.0, 1.0], ids=["while they start", "while they work"])
-def test_ctrl_c_ends_all_of_them_without_a_word(tmp_path, wait):
+@pytest.mark.parametrize("at_work", [0, 3], ids=["while they start", "while they work"])
+def test_ctrl_c_ends_all_of_them_without_a_word(tmp_path, at_work):
+    """At once, and when each process has begun with a task."""
+    place = tmp_path / "begun"
+    place.mkdir()
     script = tmp_path / "script.py"
     root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    script.write_text(CTRL_C.format(root=root), encoding="utf-8")
+    script.write_text(CTRL_C.format(root=root, place=str(place)), encoding="utf-8")
     with subprocess.Popen(
         [sys.executable, str(script)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as running:
         lines = [line.strip() for line in iter(running.stdout.readline, "ready\n")]
-        time.sleep(wait)
+        until(lambda: len(list(place.iterdir())) >= at_work)
         # as a terminal does: to all processes of the group
         os.killpg(running.pid, signal.SIGINT)
-        out, err = running.communicate(timeout=20)
+        out, err = running.communicate(timeout=PATIENCE)
     assert out == "interrupted\n"
     assert err == ""
     assert len(lines) == 2

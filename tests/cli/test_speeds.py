@@ -13,8 +13,8 @@ from rcsa_ident.cli import app, lobes
 from rcsa_ident.io.curves import read_frf_csv, read_lobes_csv
 from rcsa_ident.io.identifications import machine_from_json, speed_band_to_json
 from rcsa_ident.io.results import read_result
-from rcsa_ident.workflows.tip import STIFFNESS_SPREAD, tooltip
-from tests.cli import by_hand
+from rcsa_ident.machine.machine import STIFFNESS_SPREAD
+from tests.fixtures import by_hand
 
 RPM = 30.0 / np.pi
 SPEEDS = ("--speed-from", 6000, "--speed-to", 13000, "--speed-step", 500)
@@ -34,11 +34,11 @@ def tip(path, folder, *more):
 def test_a_speed_gives_the_machine_at_that_speed(tmp_path, softening_file):
     curves = tip(softening_file, tmp_path, "--speed", 6500)
     machine = machine_from_json(read_result(softening_file), "")
-    assembly = by_hand.campaign(tmp_path).toolings["T1"].assembly
-    response = tooltip(machine, assembly, 2.0 * np.pi * curves.frequency, speed=6500.0 / RPM)
-    for axis in machine:
-        np.testing.assert_allclose(curves.values[axis.upper()], response.tip(axis), rtol=1e-10)
-        np.testing.assert_allclose(curves.bands[f"{axis.upper()}_re_std"], response.deviation[axis][0], rtol=1e-8)
+    response = machine.at(6500.0 / RPM).tip(by_hand.campaign(tmp_path).toolings["T1"], 2.0 * np.pi * curves.frequency)
+    for row in response.rows:
+        axis = row.dof.upper()
+        np.testing.assert_allclose(curves.values[axis], response.between(str(row), str(row)), rtol=1e-10)
+        np.testing.assert_allclose(curves.bands[f"{axis}_re_std"], response.deviation()[row, row][0], rtol=1e-8)
     middle = tip(softening_file, tmp_path)
     assert np.linalg.norm(curves.values["X"] - middle.values["X"]) > 0.01 * np.linalg.norm(middle.values["X"])
 

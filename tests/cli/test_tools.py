@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from rcsa_ident.cli import tools
 from rcsa_ident.io.setups import read_tooling
-from tests.io.fusion import END_MILL, end_mill, library
+from tests.fixtures.tool_library import END_MILL, end_mill, library
 
 TOOLING = Path(__file__).resolve().parents[2] / "data" / "machines" / "toolings" / "S1-ER32.toml"
 app = typer.Typer()
@@ -80,7 +80,7 @@ def test_files_that_are_there_stay(tmp_path, tool_library):
     ("options", "words"),
     [
         ([], "--out: found nothing, allowed is a folder, or --list"),
-        (["--out", "T", "--list"], "--out: found --out beside --list"),
+        (["--out", "T", "--list"], "--out: found given together with --list"),
         (["--list", "--tool", "9"], "--tool: found 9, allowed is the name or the number of an entry, from 1 to 3"),
         (["--list", "--flute-ratio", "3"], "flute ratio: found 3.0"),
         (["--list", "--contact", "nothing.toml"], "nothing.toml"),
@@ -95,7 +95,7 @@ def test_no_tooling_at_all_is_bad_input(tmp_path):
     path = tmp_path / "L.json"
     path.write_text(json.dumps(library(end_mill(type="drill"))), encoding="utf-8")
     said = run("import-tools", path, "--list", code=2)
-    assert "no tool of the library became a tooling" in said.output
+    assert "no tool of the library could be imported" in said.output
     assert "L.json line 1: tool library: found no JSON" in run("import-tools", _with(path, "{"), "--list", code=2).output
 
 

@@ -23,7 +23,7 @@ def test_every_entry_says_where_it_comes_from():
 
 
 def test_published_numbers():
-    """As printed: the main paper's, the review's table 5 (K_rc as a ratio), the robot papers'."""
+    """As printed: [inprocess], section 4; [duan2021], table 5 (K_rc as a ratio); [du2023], [huynh2018]."""
     c = material("EN AW-6082").coefficients
     assert (c.tangential, c.radial_ratio) == (902e6, 0.26)
     c = material("EN AW-7075-T6").coefficients

@@ -76,7 +76,7 @@ def test_a_curve_and_a_limit_together():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (([1.0, 1.0], [1.0, 1.0], [1.0, 1.0]), "speeds that rise"),
+        (([1.0, 1.0], [1.0, 1.0], [1.0, 1.0]), "increasing speeds"),
         (([1.0, 2.0], [1.0, 0.0], [1.0, 1.0]), "power"),
         (([1.0, 2.0], [1.0, 1.0], [1.0]), "torque"),
         (([1.0], [1.0], [1.0], 0.0), "max_speed"),

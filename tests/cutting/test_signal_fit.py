@@ -94,7 +94,7 @@ def test_a_resonance_of_the_dynamometer():
     np.testing.assert_allclose(found.sensor, [[1900.0, 0.04], [2280.0, 0.032]], rtol=0.02)
     blind = calibrate_signal(made)
     assert blind.forces.misfit > 0.05
-    assert any("stays unexplained" in reason for reason in blind.forces.reasons)
+    assert any("remains unexplained" in reason for reason in blind.forces.reasons)
 
 
 def test_a_bandwidth():
@@ -149,7 +149,7 @@ def test_intervals_see_what_differs_between_cuts():
     few = calibrate_signal(made[:3])
     assert np.all(np.isinf(few.cut_half_width))
     np.testing.assert_array_equal(few.forces.half_width, few.noise_half_width)
-    assert any("do not tell how cuts differ" in note for note in few.forces.notes)
+    assert any("too few to estimate their scatter" in note for note in few.forces.notes)
 
 
 def test_noise_width_is_the_estimates_scatter():

@@ -12,15 +12,12 @@ from hypothesis import strategies as st
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.modal import normal_modes
-from rcsa_ident.dynamics.rational import FitStatus, rational_fit, tip_modes
-from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.dynamics.rational import FitStatus, fitted_poles, rational_fit
 from rcsa_ident.errors import InputError
-from rcsa_ident.identification.posterior import MachineAxis
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.machine.spindle import Spindle
+from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.virtual.rotor import frequency_response, rotor
-from rcsa_ident.workflows.tip import tooltip
 
 MACHINES = Path(__file__).parents[2] / "data" / "machines"
 OMEGA = 2.0 * np.pi * np.arange(100.0, 4301.0, 5.0)
@@ -156,22 +153,20 @@ def test_tip_and_cross_receptance_of_a_finite_element_machine(tooling):
         np.testing.assert_allclose(fit.response(between[::7])[:, 0, 0], true, rtol=0.01, atol=1e-3 * np.abs(true).max())
 
 
-def test_tip_modes_of_the_coupling_chain():
+def test_poles_of_the_coupling_chain():
     """A tooling on an identified machine, both planes: separate poles, shapes along the axes, error and order told."""
     tooling = read_tooling(MACHINES / "toolings" / "S1-ER32.toml")
     omega = 2.0 * np.pi * np.arange(100.0, 4301.0, 5.0)
     natural = 2.0 * np.pi * np.array([180.0, 998.0, 1820.0, 2330.0, 3970.0])
     psi = np.array([[0.08, 0.4], [0.15, 1.5], [0.25, 3.0], [0.2, 4.0], [0.15, 8.0]])
     joint = LumpedJoint(3e9, 6e6, 2e3, 10.0)
-    machine = {
-        axis: MachineAxis(Spindle(normal_modes(shift * natural, np.full(5, 0.05), psi, plane("flange", axis))), joint)
-        for axis, shift in ((Dof.X, 1.0), (Dof.Y, 0.95))
-    }
-    response = tooltip(machine, tooling.assembly, omega, bands=False)
-    values = np.zeros((omega.size, 2, 2), dtype=complex)
-    values[:, 0, 0], values[:, 1, 1] = response.tip(Dof.X), response.tip(Dof.Y)
-    modes = tip_modes(Receptance(omega, values, TIP, TIP))
+    flanges = tuple(
+        normal_modes(shift * natural, np.full(5, 0.05), psi, plane("flange", axis)) for axis, shift in ((Dof.X, 1.0), (Dof.Y, 0.95))
+    )
+    values = FlangeMachine(flanges, (omega[0], omega[-1]), joint).tip(tooling, omega).values
+    modes, error = fitted_poles(omega, values)
     found = modes.response(omega)
+    assert error < 1e-3
     np.testing.assert_array_equal(found[:, 0, 1], 0.0)
     for i in (0, 1):
         assert np.linalg.norm(found[:, i, i] - values[:, i, i]) < 1e-3 * np.linalg.norm(values[:, i, i])
@@ -183,7 +178,7 @@ def test_tip_modes_of_the_coupling_chain():
 
 def test_coupled_planes_share_poles_and_modes_have_one_shape():
     values = modal().receptance(OMEGA).values
-    modes = tip_modes(Receptance(OMEGA, values, TIP, TIP), order=8, constant=False)
+    modes = rational_fit(OMEGA, values, order=8, constant=False).modes()
     assert modes.pole.size == 4
     np.testing.assert_allclose(modes.response(OMEGA), values, rtol=1e-7, atol=1e-13)
     # a symmetric receptance: shapes of motion and of force are the same up to a factor
@@ -224,4 +219,4 @@ def test_what_cannot_be_fitted_is_refused(omega, values, options, message):
 
 def test_nothing_moves_has_no_modes():
     with pytest.raises(InputError, match="zero"):
-        tip_modes(Receptance(OMEGA, np.zeros((OMEGA.size, 2, 2)), TIP, TIP))
+        fitted_poles(OMEGA, np.zeros((OMEGA.size, 2, 2)))

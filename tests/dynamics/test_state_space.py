@@ -1,9 +1,8 @@
-"""State space: sampling against closed forms and against a fine integration, modal form, python-control."""
+"""State space: response, and the way through python-control, whose sampling is held against closed forms and a fine integration."""
 
 from __future__ import annotations
 
-import warnings
-
+import control
 import numpy as np
 import pytest
 import scipy.integrate
@@ -23,6 +22,11 @@ def random_system(seed, order=5, inputs=2, outputs=2):
     return StateSpace(a, rng.normal(size=(order, inputs)), rng.normal(size=(outputs, order)), rng.normal(size=(outputs, inputs)))
 
 
+def sampled(system, step, hold):
+    """The system between samples, through python-control."""
+    return StateSpace.from_control(system.to_control().sample(step, hold))
+
+
 def test_response_of_an_oscillator():
     omega = np.array([1.0, 20.0, 55.0])
     np.testing.assert_allclose(OSCILLATOR.response(omega)[:, 0, 0], 1.0 / (400.0 - omega**2 + 2.0j * omega), rtol=1e-12)
@@ -36,7 +40,7 @@ def march(system, signal):
     return np.array(result)
 
 
-@pytest.mark.parametrize("hold", ["zero-order", "first-order"])
+@pytest.mark.parametrize("hold", ["zoh", "foh"])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_sampling_is_exact_for_its_hold(hold, seed):
     """Against an adaptive integration with the input held as promised."""
@@ -48,68 +52,52 @@ def test_sampling_is_exact_for_its_hold(hold, seed):
         after = signal[k + 1] if k + 1 < len(signal) else u
 
         def slope(t, state, u=u, after=after):
-            value = u if hold == "zero-order" else u + (after - u) * t / step
+            value = u if hold == "zoh" else u + (after - u) * t / step
             return system.A @ state + system.B @ value
 
         x = scipy.integrate.solve_ivp(slope, (0.0, step), x, rtol=1e-11, atol=1e-12).y[:, -1]
-    np.testing.assert_allclose(march(system.sampled(step, hold), signal), expected, rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(march(sampled(system, step, hold), signal), expected, rtol=1e-8, atol=1e-9)
 
 
 def test_first_order_hold_converges_twice_as_fast():
     """Error of the response at a fixed frequency: order 1 in the step for a held input (its delay), 2 for a ramp."""
     omega = np.array([13.0])
     true = OSCILLATOR.response(omega)
-    for hold, order in (("zero-order", 1), ("first-order", 2)):
-        error = [abs((OSCILLATOR.sampled(step, hold).response(omega) / true - 1.0).item()) for step in (4e-3, 2e-3)]
+    for hold, order in (("zoh", 1), ("foh", 2)):
+        error = [abs((sampled(OSCILLATOR, step, hold).response(omega) / true - 1.0).item()) for step in (4e-3, 2e-3)]
         assert np.log2(error[0] / error[1]) == pytest.approx(order, abs=0.05)
 
 
 @settings(max_examples=30, deadline=None)
-@given(st.integers(0, 2**31), st.integers(1, 8), st.sampled_from(["zero-order", "first-order"]))
+@given(st.integers(0, 2**31), st.integers(1, 8), st.sampled_from(["zoh", "foh"]))
 def test_sampling_maps_poles_and_keeps_stability_and_the_static_gain(seed, order, hold):
     system = random_system(seed, order)
-    sampled = system.sampled(0.1, hold)
-    np.testing.assert_allclose(np.sort_complex(sampled.pole), np.sort_complex(np.exp(0.1 * system.pole)), rtol=1e-6, atol=1e-9)
-    assert sampled.stable
+    found = sampled(system, 0.1, hold)
+    np.testing.assert_allclose(np.sort_complex(found.pole), np.sort_complex(np.exp(0.1 * system.pole)), rtol=1e-6, atol=1e-9)
+    assert found.stable
     assert system.stable
     static = system.D - system.C @ np.linalg.solve(system.A, system.B)
-    np.testing.assert_allclose(sampled.response(np.zeros(1))[0].real, static, rtol=1e-7, atol=1e-7 * np.abs(static).max())
+    np.testing.assert_allclose(found.response(np.zeros(1))[0].real, static, rtol=1e-7, atol=1e-7 * np.abs(static).max())
 
 
-@settings(max_examples=30, deadline=None)
-@given(st.integers(0, 2**31), st.integers(1, 8))
-def test_modal_form_is_the_same_system_in_blocks(seed, order):
-    system = random_system(seed, order)
-    modal = system.modal()
-    omega = np.linspace(0.0, 10.0, 7)
-    np.testing.assert_allclose(modal.response(omega), system.response(omega), rtol=1e-7, atol=1e-7)
-    outside = np.abs(np.subtract.outer(np.arange(order), np.arange(order))) > 1
-    np.testing.assert_allclose(modal.A[outside], 0.0, atol=1e-8 * np.abs(modal.A).max())
-    pairs = system.pole.imag > 0.0
-    np.testing.assert_allclose(np.sum(np.abs(np.triu(modal.A, 1)) > 1e-8 * np.abs(modal.A).max()), np.sum(pairs))
-
-
-def test_coinciding_poles_have_no_modal_form():
-    with pytest.raises(InputError, match="poles that differ"):
-        StateSpace([[0.0, 1.0], [0.0, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]]).modal()
-
-
-def test_python_control_agrees():
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        other = OSCILLATOR.to_control()
-        sampled = OSCILLATOR.sampled(0.02).to_control()
+def test_python_control_there_and_back():
+    other = OSCILLATOR.to_control(["tip.x"], ["tip.x"])
+    held = other.sample(0.02)
+    transfer = control.tf([2.0], [1.0, 2.0, 400.0])
     omega = np.array([3.0, 19.0])
     np.testing.assert_allclose(np.squeeze(other(1j * omega)), OSCILLATOR.response(omega)[:, 0, 0], rtol=1e-12)
-    assert sampled.dt == 0.02
+    assert other.input_labels == other.output_labels == ["tip_x"]
+    assert other.isctime(strict=True)
+    back, again = StateSpace.from_control(other), StateSpace.from_control(held)
+    assert (back.step, again.step, again.to_control().dt) == (0.0, 0.02, 0.02)
+    for name in "ABCD":
+        np.testing.assert_array_equal(getattr(back, name), getattr(OSCILLATOR, name))
+        np.testing.assert_array_equal(getattr(again.to_control(), name), getattr(held, name))
+    np.testing.assert_allclose(StateSpace.from_control(transfer).response(omega), 2.0 * OSCILLATOR.response(omega), rtol=1e-12)
+    with pytest.raises(InputError, match="time between samples"):
+        StateSpace.from_control(control.ss(0.5, 1.0, 1.0, 0.0, True))
 
 
-def test_shapes_and_holds_are_checked():
+def test_shapes_are_checked():
     with pytest.raises(InputError, match="state space B"):
         StateSpace(np.eye(2), np.ones((3, 1)), np.ones((1, 2)), np.zeros((1, 1)))
-    with pytest.raises(InputError, match="hold"):
-        OSCILLATOR.sampled(0.1, "third-order")
-    with pytest.raises(InputError, match="continuous"):
-        OSCILLATOR.sampled(0.1).sampled(0.1)
-    with pytest.raises(InputError, match="step"):
-        OSCILLATOR.sampled(0.0)

@@ -7,21 +7,19 @@ import numpy as np
 import pytest
 
 from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
-from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.method import Phase
 from rcsa_ident.identification.parameters import AxisLayout, parameter_names
-from rcsa_ident.identification.posterior import MachineAxis
 from rcsa_ident.identification.preview import Preview
 from rcsa_ident.identification.progress import BOTH, Stage
-from rcsa_ident.identification.result import IdentificationCode, Status
+from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
-from rcsa_ident.machine.spindle import Spindle
+from rcsa_ident.identification.status import Status
 from rcsa_ident.remarks import says
-from rcsa_ident.workflows.tip import tooltip
-from tests.identification.conftest import AXES, TIP_OMEGA, open_shop
+from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, open_shop
 
 SMALL = EvidenceSelection(search=SearchSettings(modes=8, population=4, generations=2, steps=6), candidates=2)
 #: For what must not crash, whatever comes out.
@@ -31,10 +29,15 @@ RPM = np.pi / 30.0
 
 def tip_errors(shop, found, speed=None, told=None):
     """Relative error of the tooltip FRF of a tooling that never cut, each axis, at a speed; `told` is the speed the model is asked for."""
-    machine = {axis: MachineAxis(Spindle(r.modes), r.joint, r.posterior) for axis, r in found.axes.items()}
-    response = tooltip(machine, shop.held_out.assembly, TIP_OMEGA, bands=False, speed=speed if told is None else told)
+    machine = found.machine.at(speed if told is None else told)
+    tip = machine.tip(shop.held_out, TIP_OMEGA, spread=False)
     true = shop.tip(14000.0 * RPM if speed is None else speed)
-    return {a: np.linalg.norm(response.tip(a) - true[:, i]) / np.linalg.norm(true[:, i]) for i, a in enumerate(AXES) if a in machine}
+    return {a: np.linalg.norm(own(tip, a) - true[:, i]) / np.linalg.norm(true[:, i]) for i, a in enumerate(AXES) if a in machine.axes}
+
+
+def own(tip, axis):
+    """The direct receptance along an axis."""
+    return tip.between(f"tip.{axis}", f"tip.{axis}")
 
 
 def off(found, data, delays):
@@ -71,16 +74,15 @@ def test_tooltip_of_a_tooling_that_never_cut(shop, found):
 
 
 def test_bands_hold_the_truth(shop, found):
-    machine = {axis: MachineAxis(Spindle(r.modes), r.joint, r.posterior) for axis, r in found.axes.items()}
-    response = tooltip(machine, shop.held_out.assembly, TIP_OMEGA)
-    true = shop.tip(14000.0 * RPM)
+    tip = found.machine.tip(shop.held_out, TIP_OMEGA)
+    true, deviation = shop.tip(14000.0 * RPM), tip.deviation()
     for i, axis in enumerate(AXES):
-        error = response.tip(axis) - true[:, i]
-        z = np.concatenate([error.real / response.deviation[axis][0], error.imag / response.deviation[axis][1]])
+        error, (real, imaginary) = own(tip, axis) - true[:, i], deviation[(Coordinate("tip", axis),) * 2]
+        z = np.concatenate([error.real / real, error.imag / imaginary])
         # neighbouring frequencies are wrong together: one draw of a few unknowns
         assert 0.2 < np.sqrt(np.mean(z**2)) < 2.5
         # and they are not wide because they say nothing
-        width = np.hypot(*response.deviation[axis])
+        width = np.hypot(real, imaginary)
         assert np.median(width / np.abs(true[:, i])) < 0.05
 
 
@@ -182,11 +184,10 @@ def test_warm_start_comes_to_the_same_machine_sooner(shop, campaign, found, told
     assert len(steps) < 0.75 * len(told)
     assert Stage.SEARCH not in {step.stage for step in steps}
     assert max(tip_errors(shop, again).values()) < 0.03
-    machines = [{a: MachineAxis(Spindle(r.modes), r.joint, r.posterior) for a, r in f.axes.items()} for f in (found, again)]
-    one, two = (tooltip(machine, shop.held_out.assembly, TIP_OMEGA) for machine in machines)
+    one, two = (each.machine.tip(shop.held_out, TIP_OMEGA) for each in (found, again))
     for axis in AXES:
-        width = np.sqrt(np.sum(np.abs(one.spread[axis]) ** 2, axis=0))
-        assert np.sqrt(np.mean((np.abs(one.tip(axis) - two.tip(axis)) / width) ** 2)) < 2.0
+        width = np.hypot(*one.deviation()[(Coordinate("tip", axis),) * 2])
+        assert np.sqrt(np.mean((np.abs(own(one, axis) - own(two, axis)) / width) ** 2)) < 2.0
 
 
 @pytest.fixture(scope="module")

@@ -28,10 +28,10 @@ from rcsa_ident.identification.experiment_design import (
 from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_layout
-from rcsa_ident.identification.posterior import Posterior, spread
+from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.tool_holder.model import tool_holder_receptance
-from tests.identification.conftest import machine_vector, remade, vector_of
+from tests.identification.models import machine_vector, remade, vector_of
 
 NOISE = 1e-10
 
@@ -269,7 +269,8 @@ def test_the_tips_changes_are_those_of_the_bands(shop, posteriors):
         found = tip(*posterior.machine(Dof.X))
         # that one goes through complex modes and back
         np.testing.assert_allclose(values, found, rtol=0.0, atol=1e-8 * np.abs(found).max())
-        expected = np.sum(np.abs(spread(narrow, Dof.X, tip)) ** 2, axis=0)
+        spread = narrow.part(Dof.X).response(lambda candidate, tip=tip: tip(candidate.flange, candidate.joint))[1]
+        expected = np.sum(np.abs(spread) ** 2, axis=0)
         np.testing.assert_allclose(np.sum(np.abs(change) ** 2, axis=1), expected, rtol=1e-5)
 
 

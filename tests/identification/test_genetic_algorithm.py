@@ -11,7 +11,8 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.data import LEVER
 from rcsa_ident.identification.genetic_algorithm import WIDE, LiteralCost, NoiseWeightedCost, PaperGeneticAlgorithm, SearchSpace, _Problem
-from rcsa_ident.identification.result import IdentificationCode, Status
+from rcsa_ident.identification.result import IdentificationCode
+from rcsa_ident.identification.status import Status
 from rcsa_ident.remarks import says
 from rcsa_ident.tool_holder.geometry import BeamSegment, Material, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
@@ -158,7 +159,7 @@ def test_modes_that_feed_energy_in_are_named(found):
 
 
 def test_two_outputs_are_taken_as_their_sum(rich):
-    """The paper knows the flange's motion only."""
+    """The published method knows the flange's motion only."""
     low, high = _Problem(PaperGeneticAlgorithm(), rich.only(Dof.X)).bounds()
     x = low + np.random.default_rng(1).uniform(size=(3, low.size)) * (high - low)
     for cost in (LiteralCost(), NoiseWeightedCost()):

@@ -7,7 +7,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.misfit import DELAY_UNIT, Misfit, Residual
 from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_layout
 from rcsa_ident.identification.priors import Priors
-from tests.identification.conftest import vector_of
+from tests.identification.models import vector_of
 
 FREQUENCIES = ((600.0, 1400.0, 2500.0), (900.0, 2100.0))
 SHARES = (0.02, 0.05)

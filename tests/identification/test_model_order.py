@@ -20,7 +20,7 @@ from rcsa_ident.identification.model_order import (
 from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_layout, pack, unpack, with_mode, without_mode
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import Stage
-from tests.identification.conftest import machine_vector, own, remade, vector_of
+from tests.identification.models import machine_vector, own, remade, vector_of
 from tests.identification.test_parameters import receptance
 
 BAND = (530.0, 4300.0)

@@ -7,11 +7,11 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, flange_layout, unpack
-from rcsa_ident.identification.posterior import MachineAxis, Posterior, spread
+from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.tool_holder.model import tool_holder_receptance
-from tests.identification.conftest import machine_vector, remade, vector_of
+from tests.identification.models import machine_vector, remade, vector_of
 from tests.identification.test_parameters import receptance
 
 THREE = AxisLayout(3)
@@ -41,6 +41,11 @@ def tip(shop):
     return response
 
 
+def spread(posterior, tip, speed=None):
+    """Changes of a tip's receptance along all independent directions, shape (p, n)."""
+    return posterior.part(Dof.X, speed).response(lambda candidate: tip(candidate.flange, candidate.joint))[1]
+
+
 def posterior_at(few, theta, noise):
     data, _ = remade(few.only(Dof.X), theta, flange_layout(3), np.random.default_rng(8), noise=noise)
     misfit = Misfit(data, Priors(), (1e-6,))
@@ -62,7 +67,7 @@ def test_spread_against_draws(soft, tip, speed):
     # where the response is straight over the posterior, its spread is that of the draws
     rng = np.random.default_rng(9)
     posterior = Posterior(soft, some_covariance(soft.size), SOFT, SPEEDS)
-    rows = spread(posterior, Dof.X, tip, speed)
+    rows = spread(posterior, tip, speed)
     draws = rng.multivariate_normal(soft, posterior.covariance, size=600)
     values = np.array([tip(*posterior.machine(Dof.X, draw, speed)) for draw in draws])
     sampled = np.std(values, axis=0)
@@ -70,14 +75,14 @@ def test_spread_against_draws(soft, tip, speed):
 
 
 def test_bands_shrink_with_the_noise(few, theta, tip):
-    loud, quiet = (deviation(spread(posterior_at(few, theta, noise), Dof.X, tip)) for noise in (1e-2, 1e-3))
+    loud, quiet = (deviation(spread(posterior_at(few, theta, noise), tip)) for noise in (1e-2, 1e-3))
     ratio = loud / quiet
     assert 2.0 < np.median(ratio) < 12.0
     assert np.all(ratio > 1.0)
 
 
 def test_no_uncertainty_no_band(theta, tip):
-    rows = spread(Posterior(theta, np.zeros((theta.size, theta.size)), THREE), Dof.X, tip)
+    rows = spread(Posterior(theta, np.zeros((theta.size, theta.size)), THREE), tip)
     assert rows.shape == (1, 60)
     assert np.all(rows == 0.0)
 
@@ -87,22 +92,22 @@ def test_each_rival_adds_its_difference(theta, tip):
     rivals = (machine_vector((620.0, 2500.0)), machine_vector((600.0, 1400.0, 2600.0, 3100.0)), theta)
     covariance = some_covariance(theta.size)
     alone = Posterior(theta, covariance, THREE)
-    rows = spread(Posterior(theta, covariance, THREE, rivals=rivals), Dof.X, tip)
-    np.testing.assert_allclose(rows[:-3], spread(alone, Dof.X, tip), rtol=1e-12)
+    rows = spread(Posterior(theta, covariance, THREE, rivals=rivals), tip)
+    np.testing.assert_allclose(rows[:-3], spread(alone, tip), rtol=1e-12)
     here = tip(*alone.machine(Dof.X))
     for row, rival, modes in zip(rows[-3:], rivals, (2, 4, 3), strict=True):
         other = Posterior(rival, np.eye(rival.size), AxisLayout(modes))
         np.testing.assert_allclose(row, tip(*other.machine(Dof.X)) - here, rtol=1e-9, atol=1e-20)
     np.testing.assert_array_equal(rows[-1], 0.0)
     # a rival alone is a band, too
-    only = spread(Posterior(theta, 0.0 * covariance, THREE, rivals=rivals[:1]), Dof.X, tip)
+    only = spread(Posterior(theta, 0.0 * covariance, THREE, rivals=rivals[:1]), tip)
     np.testing.assert_allclose(only, rows[-3:-2], rtol=1e-12)
 
 
 def test_rivals_change_with_speed_as_well(soft, tip):
     rival = vector_of(Layout((AxisLayout(2, softening=True),)), ((620.0, 2500.0),), seed=2)
     posterior = Posterior(soft, np.zeros((soft.size, soft.size)), SOFT, SPEEDS, (rival,))
-    row = spread(posterior, Dof.X, tip, 2100.0)[0]
+    row = spread(posterior, tip, 2100.0)[0]
     other = Posterior(rival, np.eye(rival.size), AxisLayout(2, softening=True), SPEEDS)
     expected = tip(*other.machine(Dof.X, speed=2100.0)) - tip(*posterior.machine(Dof.X, speed=2100.0))
     np.testing.assert_allclose(row, expected, rtol=1e-9)

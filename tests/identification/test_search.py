@@ -6,7 +6,7 @@ from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import DAMPING_UNIT, JOINT, flange_layout, lower_triangle
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.search import SearchSettings, _by_frequency, explore, starts
-from tests.identification.conftest import machine_vector, remade
+from tests.identification.models import machine_vector, remade
 
 SMALL = SearchSettings(modes=4, population=4, generations=3, steps=3)
 BAND = (500.0, 4200.0)

@@ -42,5 +42,5 @@ def test_what_is_refused(tmp_path):
     with pytest.raises(InputError, match="no columns X_tF_re"):
         read_flange_csv(path)
     write_flange_csv(path, F[::-1], {Dof.X: block(1)})
-    with pytest.raises(InputError, match="four that rise"):
+    with pytest.raises(InputError, match="at least four, increasing"):
         read_flange_csv(path)

@@ -20,7 +20,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import READERS, read_recording, write_hdf5
 from rcsa_ident.signals.recording import Quantity, Sensor
-from tests.io.formats import FORMATS
+from tests.fixtures.recording_formats import FORMATS
 
 SAMPLES = Path(__file__).resolve().parents[2] / "data" / "sample_runs"
 SENSORS = (

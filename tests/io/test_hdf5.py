@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,151 +12,35 @@ import pytest
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import read_recording, write_hdf5
 from rcsa_ident.signals.recording import Quantity, Sensor
+from tests.fixtures.hostile_hdf5 import (
+    DATA,
+    bomb,
+    damaged,
+    external_link,
+    external_link_beside,
+    external_storage,
+    foreign_filter,
+    garbled_chunk,
+    group,
+    huge_chunks,
+    inflating_chunk,
+    list_of_rates,
+    long_chunk,
+    lzf_after_deflate,
+    make,
+    many_chunks,
+    never_written,
+    own_rates,
+    soft_link,
+    terabytes,
+    truncated,
+    twice_deflated,
+    unwritten,
+    virtual,
+)
 
 X = Sensor("x", Quantity.TRIGGER)
 Y = Sensor("y", Quantity.TRIGGER)
-DATA = np.arange(64, dtype=np.float32)
-
-
-def make(path: Path, rate: object = 51200.0, **channels: object) -> h5py.File:
-    file = h5py.File(path, "w")
-    if rate is not None:
-        file.attrs["sampling_rate_hz"] = rate
-    for name, values in channels.items():
-        file.create_dataset(name, data=values)
-    return file
-
-
-def external_link(path: Path) -> None:
-    make(path.with_name("other.h5"), x=DATA).close()
-    with make(path) as file:
-        file["x"] = h5py.ExternalLink("other.h5", "/x")
-
-
-def external_link_beside(path: Path) -> None:
-    with make(path, x=DATA) as file:
-        file["z"] = h5py.ExternalLink("/etc/passwd", "/x")
-
-
-def soft_link(path: Path) -> None:
-    with make(path, real=DATA) as file:
-        file["x"] = h5py.SoftLink("/real")
-
-
-def external_storage(path: Path) -> None:
-    path.with_name("raw.bin").write_bytes(DATA.tobytes())
-    with make(path) as file:
-        file.create_dataset("x", (64,), "f4", external=[(str(path.with_name("raw.bin")), 0, 256)])
-
-
-def virtual(path: Path) -> None:
-    make(path.with_name("other.h5"), x=DATA).close()
-    layout = h5py.VirtualLayout((64,), "f4")
-    layout[:] = h5py.VirtualSource(str(path.with_name("other.h5")), "x", shape=(64,))
-    with make(path) as file:
-        file.create_virtual_dataset("x", layout)
-
-
-def terabytes(path: Path) -> None:
-    with make(path) as file:
-        file.create_dataset("x", (10**12,), "f4", chunks=(1024,))
-
-
-def bomb(path: Path) -> None:
-    with make(path) as file:
-        file.create_dataset("x", data=np.zeros(10**6, "f4"), compression="gzip", compression_opts=9, chunks=(10**6,))
-
-
-def huge_chunks(path: Path) -> None:
-    with make(path) as file:
-        file.create_dataset("x", data=DATA, chunks=(2**26,), maxshape=(None,))
-
-
-def unwritten(path: Path) -> None:
-    with make(path) as file:
-        file.create_dataset("x", (64,), "f4", chunks=(16,))[:32] = 1.0
-
-
-def never_written(path: Path) -> None:
-    with make(path) as file:
-        file.create_dataset("x", (64,), "f4")
-
-
-def foreign_filter(path: Path) -> None:
-    with make(path) as file:
-        file.create_dataset("x", data=np.arange(64), scaleoffset=0)
-
-
-def twice_deflated(path: Path) -> None:
-    plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    plist.set_chunk((64,))
-    plist.set_deflate(9)
-    plist.set_deflate(9)
-    with make(path) as file:
-        space = h5py.h5s.create_simple((64,))
-        h5py.h5d.create(file.id, b"x", h5py.h5t.NATIVE_FLOAT, space, plist).write(h5py.h5s.ALL, h5py.h5s.ALL, DATA)
-
-
-def inflating_chunk(path: Path) -> None:
-    with make(path) as file:
-        file.create_dataset("x", (64,), "f4", chunks=(64,), compression="gzip")
-        file["x"].id.write_direct_chunk((0,), zlib.compress(bytes(10**6)))
-
-
-def long_chunk(path: Path) -> None:
-    with make(path) as file:
-        file.create_dataset("x", (64,), "f4", chunks=(64,), compression="gzip")
-        file["x"].id.write_direct_chunk((0,), bytes(10**4))
-
-
-def lzf_after_deflate(path: Path) -> None:
-    plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    plist.set_chunk((64,))
-    plist.set_deflate(9)
-    plist.set_filter(h5py.h5z.FILTER_LZF, h5py.h5z.FLAG_OPTIONAL)
-    with make(path) as file:
-        h5py.h5d.create(file.id, b"x", h5py.h5t.NATIVE_FLOAT, h5py.h5s.create_simple((64,)), plist)
-        file["x"][:] = DATA
-
-
-def many_chunks(path: Path) -> None:
-    with make(path, filler=np.ones(10**5)) as file:
-        file.create_dataset("x", (200_000,), "f4", chunks=(1,))
-
-
-def garbled_chunk(path: Path) -> None:
-    with make(path) as file:
-        file.create_dataset("x", (64,), "f4", chunks=(64,), compression="gzip")
-        file["x"].id.write_direct_chunk((0,), b"garbage")
-
-
-def truncated(path: Path) -> None:
-    make(path, x=np.arange(4096.0)).close()
-    path.write_bytes(path.read_bytes()[:9000])
-
-
-def damaged(path: Path) -> None:
-    with make(path) as file:
-        file.create_dataset("x", data=np.arange(4096.0), chunks=(4096,), fletcher32=True)
-        offset = file["x"].id.get_chunk_info(0).byte_offset
-    raw = bytearray(path.read_bytes())
-    raw[offset + 100] ^= 0xFF
-    path.write_bytes(raw)
-
-
-def group(path: Path) -> None:
-    with make(path) as file:
-        file.create_group("x")
-
-
-def own_rates(path: Path) -> None:
-    with make(path, x=DATA, y=DATA) as file:
-        file["y"].attrs["sampling_rate_hz"] = 25600.0
-
-
-def list_of_rates(path: Path) -> None:
-    with make(path, rate=None, x=DATA) as file:
-        file.attrs["sampling_rate_hz"] = np.array([51200.0, 51200.0])
 
 
 BROKEN: list[tuple[Callable[[Path], object], list[str]]] = [

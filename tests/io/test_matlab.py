@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 import tracemalloc
-import zlib
 from pathlib import Path
 
 import h5py
@@ -15,7 +14,8 @@ import scipy.io
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
-from tests.io.formats import mat73
+from tests.fixtures.hostile_matlab import HOSTILE, matrix
+from tests.fixtures.recording_formats import mat73
 
 X = Sensor("x", Quantity.TRIGGER)
 Y = Sensor("y", Quantity.TRIGGER)
@@ -119,53 +119,10 @@ def test_a_truth_and_big_endian(tmp_path):
     np.testing.assert_array_equal(read_recording(tmp_path / "cut.mat", (X,), 1.0).samples[:, 0], [1.0, 2.0, 3.0])
 
 
-def padded(kind: int, data: bytes, order: str = "<", size: int | None = None) -> bytes:
-    return struct.pack(f"{order}II", kind, len(data) if size is None else size) + data + bytes(-len(data) % 8)
-
-
-def matrix(name: bytes, shape: tuple[int, ...], data: bytes, kind: int = 9, order: str = "<", size: int | None = None) -> bytes:
-    flags = padded(6, struct.pack(f"{order}II", 6, 0), order)
-    dims = padded(5, struct.pack(f"{order}{len(shape)}i", *shape), order)
-    body = flags + dims + padded(1, name, order) + padded(kind, data, order, size)
-    return struct.pack(f"{order}II", 14, len(body)) + body
-
-
-def packed(raw: bytes) -> bytes:
-    small = zlib.compress(raw, 9)
-    return struct.pack("<II", 15, len(small)) + small
-
-
-def file(*elements: bytes) -> bytes:
-    return bytes(124) + b"\x00\x01IM" + b"".join(elements)
-
-
-ZEROS = bytes(40_000_000)
-HOSTILE = {
-    "a bomb that says so": (file(packed(matrix(b"x", (1, 5_000_000), ZEROS))), "bytes declared in a file of"),
-    "a bomb that says it is small": (file(packed(matrix(b"x", (1, 4), ZEROS))), "bytes for 4 samples"),
-    "a bomb beside": (file(packed(matrix(b"z", (1, 5_000_000), ZEROS))), "channel x: found no such channel"),
-    "a small tag around a bomb": (
-        file(packed(struct.pack("<II", 14, 96) + matrix(b"x", (1, 4), ZEROS)[8:])),
-        "channel x",
-    ),
-    "terabytes": (file(matrix(b"x", (1, 2**31 - 1), bytes(32))), "MB of declared samples"),
-    "terabytes of rows and columns": (file(matrix(b"x", (2**31 - 1, 2**31 - 1), bytes(32))), "channel x: found shape"),
-    "negative": (file(matrix(b"x", (-1, -4), bytes(32))), "channel x: found shape (-1, -4)"),
-    "bytes beyond the end": (file(matrix(b"x", (1, 4), bytes(32), size=2**31)), "channel x"),
-    "another type": (file(matrix(b"x", (1, 4), bytes(32), kind=14)), "samples of type 14"),
-    "two of a name": (file(matrix(b"x", (1, 4), bytes(32)), matrix(b"x", (1, 4), bytes(32))), "two of that name"),
-    "a name without end": (file(matrix(b"x" * 9000, (1, 4), bytes(32))), "a name without end"),
-    "100 dimensions": (file(matrix(b"x", (1,) * 100, bytes(32))), "a variable of 100 dimensions"),
-    "no zlib": (file(struct.pack("<II", 15, 40) + bytes(40)), "cannot be read"),
-    "many variables": (file(*[matrix(b"z", (1, 1), bytes(8))] * 20_000), "more than 10000 variables"),
-    "a bomb in a bomb": (file(packed(packed(matrix(b"x", (1, 4), ZEROS)))), "an element of type 15"),
-    "version 7.3 in name only": (b"MATLAB 7.3".ljust(512) + b"\x89HDF\r\n\x1a\n" + bytes(100), "cannot be read"),
-}  # fmt: skip
-
-
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_file_costs_one_sentence(tmp_path, name):
-    raw, words = HOSTILE[name]
+    make, words = HOSTILE[name]
+    raw = make()
     (tmp_path / "cut.mat").write_bytes(raw)
     tracemalloc.start()
     try:

@@ -33,7 +33,7 @@ def test_a_shorter_stickout_cuts_the_tool_and_a_longer_one_takes_it_out_of_the_b
 
 @pytest.mark.parametrize("stickout", [0.0, -0.01, 0.0986, 0.12, float("nan")])
 def test_a_tool_that_nothing_holds_is_refused(path, stickout):
-    with pytest.raises(InputError, match=r"T.toml: --stickout-mm: found .*, allowed is above 0 and at most 98.5 mm for this tool"):
+    with pytest.raises(InputError, match=r"T.toml: stickout: found .* mm, allowed is above 0 and at most 98.5 mm for this tool"):
         read_stickouts(path, [0.05, stickout])
 
 

@@ -14,14 +14,14 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io import tdms as reader
 from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
-from tests.io.formats import tdms
+from tests.fixtures.hostile_tdms import BIG_ENDIAN, HOSTILE, INTERLEAVED, METADATA, NEW_LIST, RAW, channel, segment
+from tests.fixtures.recording_formats import tdms
 
 nptdms = pytest.importorskip("nptdms", reason="npTDMS is not installed")
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 A = Sensor("a", Quantity.TRIGGER)
 B = Sensor("b", Quantity.TRIGGER)
 RAMP = np.arange(1000, dtype=np.int16)
-METADATA, NEW_LIST, RAW, INTERLEAVED, BIG_ENDIAN = 2, 4, 8, 32, 64
 
 
 def scaled(*scales: dict, raw: np.ndarray = RAMP, **more: object) -> dict:
@@ -151,21 +151,6 @@ def test_channels_of_two_lengths_are_refused(tmp_path):
         read_recording(path, (A, B), 1.0)
 
 
-def text(value: bytes, order: str) -> bytes:
-    return struct.pack(f"{order}I", len(value)) + value
-
-
-def segment(objects: bytes, count: int, data: bytes, flags: int, order: str = "<", size: int | None = None) -> bytes:
-    metadata = struct.pack(f"{order}I", count) + objects
-    size = len(metadata) + len(data) if size is None else size
-    return b"TDSm" + struct.pack("<I", flags) + struct.pack(f"{order}IQQ", 4713, size, len(metadata)) + metadata + data
-
-
-def channel(path: bytes, count: int, order: str = "<", kind: int = 10, properties: bytes = b"", declared: int = 0) -> bytes:
-    index = struct.pack(f"{order}IIIQ", 20, kind, 1, count)
-    return text(path, order) + index + struct.pack(f"{order}I", declared) + properties
-
-
 @pytest.mark.parametrize("interleaved", [False, True])
 @pytest.mark.parametrize("order", ["<", ">"])
 def test_both_byte_orders_and_layouts(tmp_path, order, interleaved):
@@ -178,46 +163,6 @@ def test_both_byte_orders_and_layouts(tmp_path, order, interleaved):
     (tmp_path / "cut.tdms").write_bytes(segment(objects, 2, data, flags, order) + again)
     found = read_recording(tmp_path / "cut.tdms", (A, B), 1.0).samples
     np.testing.assert_array_equal(found, np.tile(values, 2).T)
-
-
-DATA = METADATA | NEW_LIST | RAW
-MANY = b"".join(channel(b"/'g'/'%d'" % i, 0) for i in range(20_000))
-HOSTILE = {
-    "an unfinished segment": (segment(channel(b"/'g'/'a'", 4), 1, bytes(32), DATA, size=2**64 - 1), "a segment that is cut off"),
-    "data beyond the end": (segment(channel(b"/'g'/'a'", 4), 1, bytes(32), DATA, size=10**6), "a segment that is cut off"),
-    "a rest": (segment(channel(b"/'g'/'a'", 4), 1, bytes(32), DATA) + b"TDSm", "cut off"),
-    "no segment": (segment(channel(b"/'g'/'a'", 4), 1, bytes(32), DATA) + bytes(40), "no segment at byte"),
-    "terabytes": (segment(channel(b"/'g'/'a'", 10**12), 1, bytes(32), DATA), "1000000000000 samples declared in a file of"),
-    "objects without end": (segment(channel(b"/'g'/'a'", 4), 4 * 10**9, bytes(32), DATA), "cut off"),
-    "properties without end": (segment(channel(b"/'g'/'a'", 4, declared=4 * 10**9), 1, bytes(32), DATA), "cut off"),
-    "an endless name": (segment(struct.pack("<I", 2**31) + b"x", 1, b"", DATA), "cut off"),
-    "widths without end": (
-        segment(text(b"/'g'/'a'", "<") + struct.pack("<IIIQII", 0x1269, 0xFFFFFFFF, 1, 4, 0, 2**32 - 1) + bytes(4), 1, b"", DATA),
-        "cut off",
-    ),
-    "an object twice": (segment(2 * channel(b"/'g'/'a'", 2), 2, bytes(32), DATA), "an object twice"),
-    "an unknown property": (
-        segment(channel(b"/'g'/'a'", 4, properties=text(b"p", "<") + struct.pack("<I", 77), declared=1), 1, bytes(32), DATA),
-        "a property of type 77",
-    ),
-    "many objects in many segments": (
-        segment(MANY, 20_000, b"", METADATA | NEW_LIST) + 1000 * segment(b"", 0, b"", METADATA),
-        "more segments, objects and properties than a recording has",
-    ),
-    "samples of no size": (
-        # a DAQmx channel without scalers takes no bytes and has as many samples as it likes
-        segment(
-            text(b"/'g'/'a'", "<") + struct.pack("<IIIQIII", 0x1269, 0xFFFFFFFF, 1, 150, 0, 1, 1) + struct.pack("<I", 0)
-            + channel(b"/'g'/'z'", 0), 2, bytes(200), DATA,
-        ),
-        "recording",
-    ),
-    "one byte a chunk": (
-        segment(channel(b"/'g'/'a'", 1, kind=1), 1, bytes(30_000), DATA),
-        "more than 20000 chunks",
-    ),
-    "a path that is none": (segment(channel(b"//x'", 4), 1, bytes(32), DATA), "cannot be read (Invalid path"),
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", HOSTILE)

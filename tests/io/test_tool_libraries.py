@@ -17,7 +17,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.io.tool_libraries import Assumptions, file_names, import_tools, read_tool_library
 from rcsa_ident.tool_holder.geometry import MATERIALS, Contact
-from tests.io.fusion import END_MILL, end_mill, inches, library
+from tests.fixtures.tool_library import END_MILL, end_mill, inches, library
 
 
 def imported(*entries, **assumed):
@@ -56,7 +56,7 @@ def test_inches_are_the_same_tool():
     assert shape(metric.tool) == shape(other.tool)
     assert shape(metric.holder) == shape(other.holder)
     assert other.stickout == pytest.approx(metric.stickout, abs=1e-12)
-    assert "lengths from inches" in only(inches(END_MILL)).notes
+    assert "lengths converted from inches" in only(inches(END_MILL)).notes
 
 
 def test_the_text_is_the_tooling(tmp_path):
@@ -73,19 +73,19 @@ def test_the_text_is_the_tooling(tmp_path):
 @pytest.mark.parametrize(
     ("entry", "assumed", "note"),
     [
-        (END_MILL, {}, "helix 30 deg: the library gives none"),
-        (END_MILL, {}, "fluted part as a cylinder of 0.8 times the cutting diameter"),
-        (END_MILL, {}, "stickout 60 mm: the library's length below the holder (LB)"),
-        (END_MILL, {}, "insertion 44 mm: all of the tool behind the holder's nose (OAL and LB); a bore may be shorter"),
-        (END_MILL, {}, "holder up to its gauge line, 95 of 135 mm: what is behind sits in the spindle"),
+        (END_MILL, {}, "helix angle 30° assumed: none in the library"),
+        (END_MILL, {}, "fluted part modelled as a cylinder of 0.8 times the cutting diameter"),
+        (END_MILL, {}, "stickout 60 mm, the library's length below the holder (LB)"),
+        (END_MILL, {}, "insertion 44 mm assumed: all of the tool behind the holder's nose (OAL and LB); the bore may be shorter"),
+        (END_MILL, {}, "holder up to its gauge line, 95 of 135 mm: the rest is inside the spindle"),
         (END_MILL, {}, "no contact: tool and holder are joined rigidly"),
-        (END_MILL, {"contact": Contact(1e10, 1e5)}, "contact of another tooling"),
-        (end_mill(unit=None), {}, "lengths in millimetres: the library names no unit"),
-        (end_mill(BMC="hss"), {}, "high-speed steel taken as steel"),
-        (end_mill(BMC="ceramics"), {}, "tool of carbide: the library says ceramics"),
-        (end_mill(BMC=None), {}, "tool of carbide: the library says nothing"),
-        (end_mill(geometry__SFDM=None), {}, "shank as thick as the cutter: the library gives none (SFDM)"),
-        (end_mill(holder__gaugeLength=None), {}, "holder to the end of its last segment, 135 mm: the library gives no gauge line"),
+        (END_MILL, {"contact": Contact(1e10, 1e5)}, "contact taken from another tooling"),
+        (end_mill(unit=None), {}, "lengths assumed in millimetres: no unit in the library"),
+        (end_mill(BMC="hss"), {}, "high-speed steel modelled as steel"),
+        (end_mill(BMC="ceramics"), {}, "tool material carbide assumed: the library states ceramics"),
+        (end_mill(BMC=None), {}, "tool material carbide assumed: the library states none"),
+        (end_mill(geometry__SFDM=None), {}, "shank diameter assumed equal to the cutting diameter: none in the library (SFDM)"),
+        (end_mill(holder__gaugeLength=None), {}, "holder up to the end of its last segment, 135 mm: no gauge line in the library"),
     ],
 )
 def test_what_is_assumed_is_said(entry, assumed, note):
@@ -154,7 +154,7 @@ SKIPPED = [
     (end_mill(type=None), "an entry without a type"),
     (end_mill(holder=None), "a tool without a holder; name one of the library's"),
     (end_mill(holder={}), "a tool without a holder"),
-    (end_mill(geometry__OAL=60.0), "a tool that ends at the holder's nose (OAL and LB): the insertion has to be given"),
+    (end_mill(geometry__OAL=60.0), "a tool that ends at the holder's nose (OAL and LB); the insertion has to be given"),
     (end_mill(geometry__OAL=None), "data[0].geometry.OAL: found nothing"),
     (end_mill(geometry__NOF=0), "data[0].geometry.NOF: found 0, allowed is a whole number at least 1"),
     (end_mill(geometry__NOF="four"), 'data[0].geometry.NOF: found the text "four"'),
@@ -223,20 +223,16 @@ def test_a_container_a_list_and_a_single_tool(tmp_path):
     assert import_tools(b"\xef\xbb\xbf" + text, "L.json")[0].tooling is not None
 
 
-BOMB = b'{"data": [' + b" " * 60_000_000 + b"]}"
 HOSTILE = {
     "empty list": (b'{"data": []}', "no list of tools"),
     "another json": (b'{"data": {"a": 1}}', "no list of tools"),
     "a number": (b"12", "no list of tools"),
     "no json": (b"{'data': []}", "L.json line 1: tool library: found no JSON"),
-    "binary": (b"\xff\xfe\x00", "bytes that are no text"),
+    "binary": (b"\xff\xfe\x00", "bytes that are not text"),
     "nan": (b'{"data": [{"geometry": {"DC": NaN}}]}', "found NaN, allowed is finite numbers"),
     "deep": (b"[" * 200_000, "JSON"),
-    "digits": (b'{"data": [{"geometry": {"DC": ' + b"9" * 6000 + b"}}]}", "JSON without end"),
+    "digits": (b'{"data": [{"geometry": {"DC": ' + b"9" * 6000 + b"}}]}", "numbers too long, or lists nested too deeply"),
     "many": (json.dumps({"data": [{"geometry": {}}] * 30_000}).encode(), "30000 entries, allowed is at most 20000"),
-    "a bomb": (zipped(BOMB), "more than 32 MB"),
-    "a bomb by bzip2": (zipped(BOMB, method=zipfile.ZIP_BZIP2), "a packed file of another method"),
-    "a bomb by lzma": (zipped(BOMB, method=zipfile.ZIP_LZMA), "a packed file of another method"),
     "many files": (zipped(b"{}", more=200), "1 JSON files among 201"),
     "no file": (zipped(b"{}", "tools.txt"), "0 JSON files among 1"),
     "cut off": (zipped(json.dumps(library(END_MILL)).encode())[:200], "a container that is damaged"),
@@ -245,9 +241,7 @@ HOSTILE = {
 }
 
 
-@pytest.mark.parametrize("name", HOSTILE)
-def test_a_hostile_library_costs_one_sentence(name):
-    raw, words = HOSTILE[name]
+def costs_one_sentence(raw: bytes, words: str) -> None:
     tracemalloc.start()
     try:
         with pytest.raises(InputError) as caught:
@@ -258,6 +252,23 @@ def test_a_hostile_library_costs_one_sentence(name):
     assert words in str(caught.value)
     assert "L.json" in str(caught.value)
     assert peak < 80e6
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_library_costs_one_sentence(name):
+    costs_one_sentence(*HOSTILE[name])
+
+
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        (zipfile.ZIP_DEFLATED, "more than 32 MB"),
+        (zipfile.ZIP_BZIP2, "a packed file of another method"),
+        (zipfile.ZIP_LZMA, "a packed file of another method"),
+    ],
+)
+def test_a_bomb_costs_one_sentence(method, words):
+    costs_one_sentence(zipped(b'{"data": [' + b" " * 60_000_000 + b"]}", method=method), words)
 
 
 @pytest.mark.parametrize(

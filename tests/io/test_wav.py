@@ -16,7 +16,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
-from tests.io.formats import wav
+from tests.fixtures.recording_formats import wav
 
 FIRST = Sensor("ch1", Quantity.TRIGGER)
 SECOND = Sensor("ch2", Quantity.TRIGGER)

@@ -124,7 +124,7 @@ def test_what_is_refused():
         MeasuredFlange(Receptance(omega, values, (Coordinate("tip", Dof.X), rows[1]), rows))
     with pytest.raises(InputError, match="at least four"):
         MeasuredFlange(Receptance(omega[:3], values[:3], rows, rows))
-    with pytest.raises(InputError, match="at least four that rise"):
+    with pytest.raises(InputError, match="at least four, increasing"):
         MeasuredFlange(Receptance(omega[::-1], values, rows, rows))
     broken = values.copy()
     broken[3, 0, 0] = np.nan

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import control
 import numpy as np
 import pytest
 
-from benchmarks.observer import relative_error, true_response
 from rcsa_ident.errors import InputError
 from rcsa_ident.observer.force import RunOut, force_observer, restore_mean_force
+from rcsa_ident.observer.kalman import kalman_filter
 from rcsa_ident.observer.tuning import PaperWalk, Resonators, Tuning, harmonics
 from rcsa_ident.workflows.estimate_forces import observe
-from tests.observer.flange_machine import BAND, flange_machine, paper_cut
+from tests.fixtures.flange_machine import BAND, flange_machine, paper_cut
+from tests.fixtures.virtual_cut import relative_error, true_response
 
 RATE = 25600.0
 PROGRAMMED = 12000.0 * np.pi / 30.0
@@ -21,7 +23,7 @@ PROGRAMMED = 12000.0 * np.pi / 30.0
 def monitored(method, smooth=False, air=True, cut=None):
     made = paper_cut()
     record, still = cut or made.cut, made.air if air else None
-    return observe(flange_machine(), made.tooling.assembly, 2, record, still, BAND, PROGRAMMED, method, None, smooth)
+    return observe(flange_machine(), made.tooling.assembly, 2, record, still, PROGRAMMED, method, None, smooth)
 
 
 @pytest.fixture(scope="module")
@@ -129,6 +131,22 @@ def test_estimates_are_linear_in_the_signals(oscillating, signals):
             for g, a in ((gap, acceleration), (shaken, 0.0 * shaken), (2.0 * gap - shaken, 2.0 * acceleration))
         )
         np.testing.assert_allclose(both, 2.0 * one - two, atol=1e-8 * np.abs(both).max())
+
+
+def test_exported_to_python_control(oscillating, signals):
+    """Filters, plant and force model as one sampled state space: it is the observer whose gain is steady from the first sample on."""
+    axis = oscillating.observer.axes[1]
+    axis = replace(axis, run_out=None, kalman=kalman_filter(axis.kalman.model, longest_settling=0))
+    gap, acceleration = (each[:, 1] for each in signals)
+    gap = gap - gap[0]
+    system = axis.to_control()
+    assert (system.input_labels, system.output_labels) == (["gap", "acceleration"], ["force", "innovation"])
+    found = control.forced_response(system, inputs=np.stack([gap, acceleration])).outputs
+    alone = force_observer([axis])
+    expected = alone.run(alone.init(), gap[:, None], acceleration[:, None])[1]
+    np.testing.assert_allclose(found[0], expected.force[:, 0], atol=1e-7 * np.abs(expected.force).max())
+    np.testing.assert_allclose(found[1], expected.innovation[:, 0], atol=1e-7 * np.abs(expected.innovation).max())
+    assert replace(axis, acceleration_filter=None).to_control().input_labels == ["gap"]
 
 
 def test_run_out_signal_is_its_lines():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import control
 import numpy as np
 import pytest
 import scipy.linalg
@@ -219,7 +220,7 @@ def test_the_errors_dynamics_are_stable_and_the_riccati_equation_holds(intensity
         omega = omega[:1]
     force = TeethResonators(RandomWalk(intensity, leak), omega, np.full(omega.size, 0.3 * intensity))
     kalman = kalman_filter(augmented(PLANT, force, noise), longest_settling=0)
-    assert np.max(np.abs(kalman.error_poles)) < 1.0
+    assert kalman.state_space().stable
     a, seen, row, q = kalman.model.matrices()
     predicted = riccati(a, seen, q)
     gain = predicted @ seen / (seen @ predicted @ seen + 1.0)
@@ -253,6 +254,19 @@ def test_a_force_that_the_displacement_does_not_show_is_refused():
     blind = SampledModes(np.array([0.5]), np.array([0.0]), 0.0, STEP)
     with pytest.raises(InputError, match="force model"):
         kalman_filter(augmented(blind, RandomWalk(10.0), 1e-8))
+
+
+def test_exported_in_the_steady_state(measured):
+    """As state space, in frequency and in time, and as python-control's system."""
+    kalman = kalman_filter(model(), longest_settling=0)
+    system = kalman.state_space()
+    omega = np.linspace(10.0, 3000.0, 50)
+    np.testing.assert_allclose(system.response(omega)[:, :, 0].T, kalman.response(omega), rtol=1e-9, atol=1e-9)
+    found = control.forced_response(system.to_control(), inputs=measured).outputs
+    force, _, innovation = kalman.run(kalman.init(), measured)[1].T
+    np.testing.assert_allclose(found[0], force, atol=1e-9 * np.abs(force).max())
+    np.testing.assert_allclose(found[1], innovation, atol=1e-9 * np.abs(innovation).max())
+    np.testing.assert_allclose(PLANT.state_space().response(omega)[:, 0, 0], PLANT.response(omega), rtol=1e-12)
 
 
 @pytest.mark.parametrize("lag", [0, 5, 400])

@@ -10,7 +10,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.observer.transfer_function import SampledModes, acceleration_filter, high_pass, transfer_function, warped
 from rcsa_ident.signals.recording import Quantity, Sensor
-from tests.observer.flange_machine import BAND, paper_cut
+from tests.fixtures.flange_machine import BAND, paper_cut
 
 STEP = 1.0 / 25600.0
 OMEGA = 2.0 * np.pi * np.arange(100.0, 5500.0, 5.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-# Identified machine-spindle modes at the flange, tables A.4 (X) and A.5 (Y) of the in-process identification paper, as
+# Identified machine-spindle modes at the flange, [inprocess], tables A.4 (X) and A.5 (Y), as
 # printed: natural frequency [Hz], damping ratio [%], Re and Im phi_t [sqrt(s/kg) 1e-4], Re and Im phi_r
 # [rad sqrt(s/(kg m^2)) 1e-4]. With r = dw/dz and z from the tip towards the spindle phi_r changes its sign.
 PUBLISHED_MODES = {
@@ -38,7 +38,7 @@ PUBLISHED_MODES = {
     ),
 }
 
-# The same paper's table A.6: N/m, N s/m, N m/rad, N m s/rad.
+# [inprocess], table A.6: N/m, N s/m, N m/rad, N m s/rad.
 PUBLISHED_JOINT = {
     "translational_stiffness": 999.4e12,
     "translational_damping": 794.5,
@@ -46,7 +46,7 @@ PUBLISHED_JOINT = {
     "rotational_damping": 20.0,
 }
 
-# Nominal geometry for the paper's toolings 1-4, chosen from the published stickouts and holder types; not measured.
+# Nominal geometry for the toolings 1-4 of [inprocess], chosen from the published stickouts and holder types; not measured.
 # Segments from the tip to the flange: length, outer diameter, inner diameter [mm], material.
 NOMINAL_MATERIALS = {
     "carbide": {"youngs_modulus": 600e9, "density": 14400.0, "poisson": 0.22, "loss_factor": 0.003},
@@ -84,7 +84,7 @@ NOMINAL_TOOLINGS = {
 }
 PUBLISHED_STICKOUT_MM = {1: 70.5, 2: 60.9, 3: 65.9, 4: 62.6}
 
-# Two-tooth mill of Insperger & Stepan with its zero-order limits; K_t, K_n in F = -w H (q - q_tau), that is
+# Two-tooth mill of [insperger2004] with its zero-order limits; K_t, K_n in F = -w H (q - q_tau), that is
 # K_tc = K_t and k_rc = K_n / K_t.
 INSPERGER_STEPAN = {
     "teeth": 2,
@@ -119,7 +119,7 @@ TIMOSHENKO = {
     },
 }
 
-# The same mill (one mode in x; "two": the same mode in y as well), and the mill of four modes after Gradisek et al., computed with
+# The same mill (one mode in x; "two": the same mode in y as well), and the mill of four modes after [gradisek2005], computed with
 # Chebyshev spectral elements that are split where teeth enter and leave: two resolutions agree to 7e-9.
 # Spectral radius at 5000 rev/min and 0.2, 0.5, 0.7, 1.0 mm.
 MULTIPLIER_RPM, MULTIPLIER_DEPTH_MM = 5000.0, np.array([0.2, 0.5, 0.7, 1.0])
@@ -148,8 +148,8 @@ FOUR_MODES = {
     "limit_mm": np.array([2.78505, 1.49104, 6.36278, 1.64411]),
 }
 
-# A milling robot's tool that the cut bends (Du et al., Metals 13 (2023) 974): modes in x and y as frequency [Hz], damping ratio and
-# mass-normalised shape [1/sqrt(kg)] at 3, 12, 24, 36 mm from the tip. The paper leaves the diameter and the machine's compliance open;
+# A milling robot's tool that the cut bends [du2023]: modes in x and y as frequency [Hz], damping ratio and
+# mass-normalised shape [1/sqrt(kg)] at 3, 12, 24, 36 mm from the tip. The source leaves the diameter and the machine's compliance open;
 # the limits below were computed for a diameter of 10 mm, solid carbide of 600 GPa and 0.26 um/N, modes that move the whole edge alike.
 DEFORMED_TOOL = {
     "teeth": 3,

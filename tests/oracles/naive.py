@@ -23,7 +23,7 @@ def pole_sum(omega, pole, residue):
 
 
 def directional_matrix(phi: float, radial_ratio: float) -> np.ndarray:
-    """[alpha] of one tooth at immersion phi, the paper's eq. 3."""
+    """[alpha] of one tooth at immersion phi ([inprocess], eq. 3)."""
     s, c = math.sin(phi), math.cos(phi)
     return np.array([[-s * (c + radial_ratio * s), -c * (c + radial_ratio * s)], [s * (s - radial_ratio * c), c * (s - radial_ratio * c)]])
 

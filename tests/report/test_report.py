@@ -13,24 +13,29 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
+from rcsa_ident.cutting.power import SpindleDrive
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.parameters import AxisLayout, parameter_names
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import BOTH, Stage, Step
-from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode, Status
+from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
+from rcsa_ident.identification.status import Status
 from rcsa_ident.machining_setup import Campaign, Cut, Tooling, Workpiece
 from rcsa_ident.remarks import Remark
 from rcsa_ident.report.figures import svg, tooltip_frf
 from rcsa_ident.report.html import ToolingPage, report_html
-from rcsa_ident.report.summaries import coefficient_rows, mode_rows, recording_rows, two_digits
+from rcsa_ident.report.summaries import coefficient_rows, lobes_curves, lobes_summary, mode_rows, recording_rows, two_digits
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement, Reading
 from rcsa_ident.signals.verdict import RecordCode, Verdict
+from rcsa_ident.stability.advice import Advice, highest_removal, usable_depths
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 
 STEEL = MATERIALS["steel"]
+PROCESS = MillingProcess(Cutter(4, 0.012), CuttingCoefficients(902e6, 0.26), Engagement(0.5 * np.pi, np.pi))
 # neither HTML nor a formula
 NAME = "<b>T1</b> & $co_"
 
@@ -89,9 +94,12 @@ def page_of(name=NAME, **more):
     speed = np.linspace(400.0, 2000.0, 30)
     limit = np.where(speed > 1800.0, np.inf, 1e-3 * (1.2 + np.sin(speed / 100.0)))
     stable = np.isinf(limit)
-    lobes = StabilityLobes(speed, limit, np.where(stable, np.nan, 5e3), np.where(stable, -1, 2), 2e-4, 5e3, "zero-order")
+    lobes = StabilityLobes(speed, limit, np.where(stable, np.nan, 5e3), np.where(stable, -1, 2), 4e-3, "zero-order", 2e-4, 5e3)
+    usable = usable_depths(lobes, PROCESS, SpindleDrive.flat())
+    points = tuple(highest_removal(usable, PROCESS))
     deviation = {"X": (np.full(50, 1e-8), np.full(50, 1e-8))}
-    return ToolingPage(name, True, frequency, tip, deviation, lobes=lobes, best=[(1900.0, np.inf), (500.0, 2e-3)], **more)
+    advice = Advice(name, 0.06, lobes, usable, points, (), (), None, ())
+    return ToolingPage(name, True, frequency, tip, deviation, advice=advice, **more)
 
 
 class Tags(HTMLParser):
@@ -154,7 +162,7 @@ def test_the_page_is_whole_and_self_contained(found, campaign, readings):
 def test_what_the_records_do_not_tell_is_marked(found, campaign, readings):
     text = report_html(found, campaign, readings)
     rows = {
-        row.split("</td>")[0]: "hardly tell" in row
+        row.split("</td>")[0]: "hardly determined" in row
         for row in re.findall(r"<tr><td>((?:translational|rotational).*?)</tr>", text, re.DOTALL)
     }
     assert rows == {
@@ -179,6 +187,24 @@ def test_the_same_figure_gives_the_same_text():
     assert one == two
     assert one.startswith("<svg")
     assert "<metadata" not in one
+
+
+def test_a_recommendation_stands_beside_its_limit_and_an_infinite_one_is_none(found, campaign, readings):
+    advice = page_of().advice
+    summary, curves = lobes_summary(advice), lobes_curves(advice)
+    assert len(summary["recommended"]) == len(advice.recommended) > 1
+    best = summary["recommended"][0]
+    # stable up to the depth that was asked for: no limit is known there
+    assert advice.recommended[0].spindle_speed > 1800.0
+    assert best["limit_depth_mm"] is None
+    assert best["recommended_depth_mm"] == pytest.approx(0.9 * 4.0)
+    assert summary["best_speeds"][0]["limit_depth_mm"] is None
+    assert curves["limit_depth_mm"][-1] is None
+    assert curves["recommended_depth_mm"] == pytest.approx(1e3 * advice.usable.stable)
+    text = " ".join(parsed(report_html(found, campaign, readings, [page_of()])).text)
+    for point in advice.recommended:
+        assert f"{point.spindle_speed * 30.0 / np.pi:.0f}" in text
+        assert f"{1e3 * point.depth:.2f}" in text
 
 
 def test_rows_say_what_a_recording_is_worth(readings):

@@ -4,7 +4,7 @@ import pytest
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.alignment import align, trigger_delay, trigger_edge
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
-from tests.signals.synthetic import RATE, RPM, pair, profile
+from tests.fixtures.synthetic import RATE, RPM, pair, profile
 
 
 def profiles(rng, teeth, forced, noise=3e-11, orders=33, roundness=4e-6):

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from rcsa_ident.signals import frf
 from rcsa_ident.signals.frf import AirCorrectedSpectra, LineEstimator
-from tests.signals.synthetic import pair
+from tests.fixtures.synthetic import pair
 
 H = np.array([2e-8 - 1e-8j, -3e-9 + 5e-9j, 1e-7j])
 

@@ -13,7 +13,7 @@ from rcsa_ident.signals.measurement import measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from rcsa_ident.workflows.simulate import simulate
-from tests.signals.synthetic import COEFFICIENTS, FIXTURE, RPM, conditions, pair
+from tests.fixtures.synthetic import COEFFICIENTS, FIXTURE, RPM, conditions, pair
 
 AXES = (Dof.X, Dof.Y)
 

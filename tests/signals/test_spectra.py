@@ -4,7 +4,7 @@ from scipy.signal import lfilter
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.spectra import follow_speed, line_spectrum, refine_speed, segment_lines
-from tests.signals.synthetic import RATE, RPM, drift, profile, wave
+from tests.fixtures.synthetic import RATE, RPM, drift, profile, wave
 
 
 def bound(amplitude, noise, n):

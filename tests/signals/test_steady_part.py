@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from rcsa_ident.signals.steady_part import steady_part
-from tests.signals.synthetic import RATE, RPM, profile, wave
+from tests.fixtures.synthetic import RATE, RPM, profile, wave
 
 SPEED = 9000.0 * RPM
 TURN = 2.0 * np.pi / SPEED * RATE

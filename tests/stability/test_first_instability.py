@@ -67,7 +67,7 @@ def test_lenses_of_random_mills():
         process = mill(int(rng.integers(1, 4)), rng.choice([0.02, 0.05, 0.1]), rng.choice(["up", "down"]), rng.uniform(0.5, 0.9))
         known.append((rows, process, rng.uniform(5000.0, 40_000.0, 6) * RPM))
     for rows, process, speeds in known:
-        cut = method.cut(tip(rows), process)
+        cut = method.monodromy(tip(rows), process)
         grid = np.geomspace(stable_depth_bound(cut.modes, cut.process), 40e-3, 220)
         limits = stability_lobes(tip(rows), process, speeds, grid[-1], method).limit_depth
         for speed, limit in zip(speeds, limits, strict=True):

@@ -33,10 +33,10 @@ MULTI = MultiFrequency()
 ONE = ((0, 922.0, 0.011, 0.03993),)
 TWO = (*ONE, (1, 922.0, 0.011, 0.03993))
 SKEWED = ((0, 780.0, 0.03, 0.05), (1, 930.0, 0.02, 0.04), (1, 1350.0, 0.03, 0.08))
-# Gradisek-type case: three modes in x, one in y
+# The mill of [gradisek2005]: three modes in x, one in y
 FOUR = ((0, 441.64, 0.028722, 11.125), (0, 563.6, 0.055801, 1.4986), (0, 778.56, 0.058996, 13.063), (1, 516.2, 0.025004, 1.199))
 
-# First loss of stability [mm] of Insperger & Stepan's mill in a slot, and of the four modes in half-immersion down-milling, by
+# First loss of stability [mm] of the two-tooth mill of [insperger2004] in a slot, and of the four modes in half-immersion down-milling, by
 # Chebyshev spectral elements split at tooth entry and exit, all digits good.
 SLOT_RPM = np.array([5000.0, 7500.0, 10000.0, 12500.0, 15000.0, 17500.0, 20000.0, 25000.0])
 SLOT_LIMIT_MM = {

@@ -55,7 +55,7 @@ def test_the_error_that_is_known_is_taken_off():
 def test_the_limit_is_where_growth_begins():
     process = PROCESSES["helix"]
     found = stability_lobes(tip(SKEWED), process, SPEEDS, 20e-3, FULL)
-    cut = FULL.cut(tip(SKEWED), process)
+    cut = FULL.monodromy(tip(SKEWED), process)
     for speed, limit in zip(SPEEDS, found.limit_depth, strict=True):
         growth = Growth(cut, speed, 0.5 * longest_step(cut))
         assert growth(0.99 * limit) < 0.0 < growth(1.01 * limit)
@@ -71,7 +71,7 @@ def test_the_limit_is_where_growth_begins():
 )
 def test_nothing_grows_at_the_surely_stable_depth(immersion, teeth, rpm, ratio, constant):
     process = mill(teeth, immersion, coefficients=CuttingCoefficients(6e8, ratio), feed_angle=0.4)
-    cut = FULL.cut(tip(SKEWED, residual=(constant, 0.5 * constant)), process)
+    cut = FULL.monodromy(tip(SKEWED, residual=(constant, 0.5 * constant)), process)
     assert Growth(cut, rpm * RPM, longest_step(cut))(stable_depth_bound(cut.modes, cut.process)) < 0.0
 
 

@@ -62,7 +62,7 @@ def test_islands_are_found():
 def test_crossings_are_where_growth_is_nought(name):
     modes, process, depth = CASES[name]
     found = stability_map(tip(modes), process, SPEEDS[::16], np.linspace(depth / 40.0, depth, 40), tolerance=1e-3)
-    cut = FullDiscretisation().cut(tip(modes), process)
+    cut = FullDiscretisation().monodromy(tip(modes), process)
     step = longest_step(cut)
     for speed, crossing in zip(found.crossing_speed, found.crossing_depth, strict=True):
         growth = Growth(cut, float(speed), step)

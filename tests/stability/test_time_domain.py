@@ -141,7 +141,7 @@ def test_steady_state_does_work_and_repeats():
     orders = 2 * np.arange(1, 9)
     wave = np.exp(-1j * orders[:, None] * history.angle[-2 * tooth :])
     force, motion = wave @ history.force[-2 * tooth :], wave @ history.tip[-2 * tooth :]
-    expected = np.einsum("kab,kb->ka", modes.at(orders * speed), force)
+    expected = np.einsum("kab,kb->ka", modes.response(orders * speed), force)
     np.testing.assert_allclose(motion, expected, rtol=0, atol=2e-3 * np.abs(expected).max())
     # over a period the force's work is what the dampers take: positive
     work = np.sum(history.force[-tooth:] * history.velocity[-tooth:]) * (history.time[1] - history.time[0])

@@ -30,7 +30,7 @@ STEEL = CuttingCoefficients(CASE["tangential"], CASE["normal"] / CASE["tangentia
 MILL = Cutter(CASE["teeth"], 0.012)
 
 # Spectral radius per tooth period at 5000 rev/min and 0.2, 0.5, 0.7, 1.0 mm, and first loss of stability [mm] in the slot, of
-# Insperger & Stepan's mill with one and with two degrees of freedom; Chebyshev spectral elements split at tooth entry and exit.
+# The two-tooth mill of [insperger2004] with one and with two degrees of freedom; Chebyshev spectral elements split at tooth entry and exit.
 DEPTH_MM = np.array([0.2, 0.5, 0.7, 1.0])
 MULTIPLIER = {
     (1, "slot"): (SLOT, [0.81974278, 1.07397559, 1.22155614, 1.40647353]),

@@ -6,13 +6,13 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from rcsa_ident.cli.simulation import simulate_campaign as simulate
 from rcsa_ident.cutting.force import force_lines
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.samples import simulate_campaign as simulate
 from rcsa_ident.signals.recording import Quantity
 
 

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
-import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-import httpx2
 import pytest
 from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request, Response, sync_playwright
 
 from api.client import Client
-from tests.api.conftest import result_text
-from tests.api.test_serve import command, free_port
-from tests.cli import by_hand
+from tests.fixtures import by_hand
+from tests.fixtures.service import Served, serving
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLES = ROOT / "data" / "sample_runs"
@@ -37,54 +32,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
                 item.add_marker(pytest.mark.skip(reason="there is no Chromium: apt-get install chromium"))
 
 
-@dataclass(frozen=True, slots=True)
-class Served:
-    """A service that runs.
-
-    Parameters
-    ----------
-    url : str
-    data : Path
-    """
-
-    url: str
-    data: Path
-
-
-@contextmanager
-def serving(data: Path, **environment: str) -> Iterator[Served]:
-    """Start the service in a process of its own, and end it."""
-    port = free_port()
-    words, settings = command(data, "--port", str(port), **environment)
-    with (data / "log.txt").open("w") as log:
-        process = subprocess.Popen(words, stdout=log, stderr=log, env=settings)
-        try:
-            url = f"http://127.0.0.1:{port}"
-            for _ in range(240):
-                if process.poll() is not None:
-                    pytest.fail((data / "log.txt").read_text()[-3000:])
-                try:
-                    if httpx2.get(f"{url}/ready").status_code == 200:
-                        break
-                except httpx2.TransportError:
-                    pass
-                time.sleep(0.25)
-            else:
-                pytest.fail("the service is not ready after a minute")
-            yield Served(url, data)
-        finally:
-            process.terminate()
-            try:
-                process.wait(20)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-
-
 @pytest.fixture(scope="session")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     """One service for all; each test makes what it needs under names of its own."""
-    with serving(tmp_path_factory.mktemp("served")) as found:
+    with serving(tmp_path_factory.mktemp("served"), RCSA_IDENT_JOB_WORKERS="1") as found:
         yield found
 
 
@@ -167,7 +118,7 @@ def opened(browser: Browser, served: Served) -> Iterator[Callable[..., Page]]:
 
 @pytest.fixture(scope="session")
 def result(tmp_path_factory: pytest.TempPathFactory) -> str:
-    return result_text(tmp_path_factory.mktemp("result"))
+    return by_hand.result_text(tmp_path_factory.mktemp("result"))
 
 
 @pytest.fixture(scope="session")

@@ -10,10 +10,9 @@ import pytest
 from playwright.sync_api import expect
 
 from api.client import Client
-from tests.api.conftest import example
-from tests.api.test_serve import command
-from tests.cli import by_hand
-from tests.web.conftest import SAMPLES, Served, drop, fault_beside, serving
+from tests.fixtures import by_hand
+from tests.fixtures.service import Served, command, example, serving
+from tests.web.conftest import SAMPLES, drop, fault_beside
 
 WIDTHS = (360, 768, 1280, 2560)
 #: Names as somebody might give them who means ill.

@@ -13,7 +13,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from api.client import Client
-from tests.web.conftest import ROOT, SAMPLES, Served, drop
+from tests.fixtures.service import Served
+from tests.web.conftest import ROOT, SAMPLES, drop
 
 #: Every fourth cut: an identification in seconds.
 EVERY = 4

@@ -55,7 +55,7 @@ def test_process_damping_needs_both_its_numbers(opened, shop: str):
 
 
 def test_tested_cuts_stand_beside_the_limit(opened, client: Client, shop: str, tmp_path: Path):
-    """As a German spreadsheet writes them, and as the example does; told right or not as the service counts."""
+    """As a German spreadsheet writes them, and as the example does; right or not as the service counts."""
     page = opened(f"#/change?machine={shop}&tooling=T1&tooling=T1-long")
     expect(page.locator(".chart.lobes .main-svg").first).to_be_visible(timeout=30_000)
     file = tmp_path / "Schnitte.csv"
@@ -63,7 +63,9 @@ def test_tested_cuts_stand_beside_the_limit(opened, client: Client, shop: str, t
     file.write_text("\ufeff" + "\n".join(lines), "utf-8")
     chosen(page, file)
     told = page.locator(".tested-cuts .reads li")
-    expect(told).to_have_text([f"{name}: 2 of 3 told right (67 %), 1 chattered where none was expected" for name in ("T1", "T1-long")])
+    expect(told).to_have_text(
+        [f"{name}: 2 of 3 classified correctly (67 %), 1 chattered where none was expected" for name in ("T1", "T1-long")]
+    )
     expect(page.locator(".tested-cuts .legend li")).to_have_text(["○stable", "✕chatter"])
     # the deepest cut is in the picture
     assert page.evaluate("document.querySelector('.chart.lobes').layout.yaxis.range[1]") > 30.0

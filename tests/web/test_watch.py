@@ -8,8 +8,8 @@ import pytest
 
 from api.client import Client
 from api.stream_client import ForceStream
-from tests.api.streaming import hello, result, signals, tooling
-from tests.web.conftest import Served
+from tests.fixtures.force_stream import hello, result, signals, tooling
+from tests.fixtures.service import Served
 
 pytest.importorskip("playwright")
 from playwright.sync_api import expect

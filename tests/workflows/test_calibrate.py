@@ -16,7 +16,7 @@ from rcsa_ident.machining_setup import Campaign, Cut, Tooling, Workpiece
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 from rcsa_ident.workflows.calibrate import calibrate, measure_force
-from tests.workflows.dynamometer import COEFFICIENTS, CUTTER, DOWN, RPM, SLOT, TRUE, plan, true_force
+from tests.fixtures.dynamometer import COEFFICIENTS, CUTTER, DOWN, RPM, SLOT, TRUE, plan, true_force
 
 RATE = 25600.0
 SENSORS = (Sensor("fx", Quantity.FORCE, Dof.X), Sensor("fy", Quantity.FORCE, Dof.Y))
@@ -170,7 +170,7 @@ def test_a_force_along_the_axis_gives_the_axial_coefficients(signal):
     assert found.forces.of("K_ac")[0] == pytest.approx(0.15 * TRUE[0], rel=0.03)
     assert found.forces.of("K_ae")[0] == pytest.approx(2e3, rel=0.1)
     assert found.forces.coefficients.axial_ratio == pytest.approx(0.15, rel=0.03)
-    assert found.notes == ("no air cuts: zero is taken from the sensors as it is",)
+    assert found.notes == ("no air cuts: the sensors' own zero level is used",)
 
 
 def test_nothing_usable():

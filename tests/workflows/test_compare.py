@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -15,7 +16,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from rcsa_ident.workflows.compare import LocalMode, Place, compare, frac, local_modes, matched
-from tests.workflows.in_process import MACHINES, RPM, modal_machine, softening_spindle
+from tests.workflows.in_process import BAND, MACHINES, RPM, modal_machine, softening_spindle
 
 OMEGA = 2.0 * np.pi * np.arange(300.0, 3800.0, 4.0)
 SPEED = 15000.0 * RPM
@@ -80,11 +81,8 @@ def test_the_flange_shows_it_more_than_the_tip():
 
 def test_bands_hold(identification):
     """With a posterior every response has one; a flange's is that of its modes."""
-    from rcsa_ident.identification.posterior import MachineAxis
-    from rcsa_ident.machine.spindle import Spindle
-
-    machine = {a: MachineAxis(Spindle(p.modes), p.joint, p.posterior) for a, p in identification.axes.items()}
-    h = machine[Dof.X].spindle.receptance(OMEGA).values[:, 0, 0]
+    machine = replace(identification.machine, identified_band=BAND)
+    h = machine.identified[Dof.X].spindle.receptance(OMEGA).values[:, 0, 0]
     (found,) = compare(machine, {(Place.FLANGE, Dof.X): (OMEGA, 1.1 * h)})
     assert found.deviation is not None
     assert np.all(found.deviation[0] >= 0.0)
@@ -141,11 +139,12 @@ def test_frac_sees_shapes_only(scale, seed):
 
 
 def test_what_is_refused():
-    machine = {Dof.X: modal_machine(softening_spindle(), SPEED)[Dof.X]}
+    whole = modal_machine(softening_spindle(), SPEED)
+    machine = replace(whole, flanges=whole.flanges[:1])
     h = measured(Place.TIP, Dof.X, 0.0)
     with pytest.raises(InputError, match="an identified axis"):
         compare(machine, {(Place.TIP, Dof.Y): (OMEGA, h)}, assembly())
     with pytest.raises(InputError, match="the tooling that was clamped"):
         compare(machine, {(Place.TIP, Dof.X): (OMEGA, h)})
     with pytest.raises(InputError, match="eight at least"):
-        compare(machine, {(Place.TIP, Dof.X): (OMEGA, h)}, assembly(), band=(0.0, OMEGA[4]))
+        compare(replace(machine, known=(0.0, OMEGA[4])), {(Place.TIP, Dof.X): (OMEGA, h)}, assembly())

@@ -83,7 +83,7 @@ def test_one_stickout_parts_less():
     one = calibrate_contact([tap(0.05, rng)])
     three = calibrate_contact([tap(s, rng) for s in (0.05, 0.07, 0.09)])
     assert np.all(one.log_std > 3.0 * three.log_std)
-    assert any("told together only" in note for note in one.notes)
+    assert any("determined only together" in note for note in one.notes)
 
 
 def test_what_a_low_band_cannot_tell():
@@ -92,7 +92,7 @@ def test_what_a_low_band_cannot_tell():
     prior = Contact(2e10, 6e5, 1e5, 40.0)
     found = calibrate_contact([tap(0.05, rng, band=(0.0, 2.0 * np.pi * 1500.0))], prior)
     assert not all(found.told)
-    assert any("hardly tell" in note for note in found.notes)
+    assert any("hardly determined" in note for note in found.notes)
     for name, told, std in zip(NAMES, found.told, found.log_std, strict=True):
         if not told:
             assert abs(np.log(getattr(found.contact, name) / getattr(prior, name))) < 2.5 * np.log(10.0)

@@ -7,24 +7,29 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.observer import relative_error, virtual_cut
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
-from rcsa_ident.identification.posterior import MachineAxis
+from rcsa_ident.machine.flange_machine import FlangeMachine
+from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.observer.tuning import PaperWalk, Resonators
 from rcsa_ident.report.forces import force_history, observer_frf
 from rcsa_ident.signals.measurement import NO_AIR
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.workflows.estimate_forces import observe, trigger_speed, wear_of
-from rcsa_ident.workflows.speeds import MachineOverSpeed
-from tests.observer.flange_machine import BAND, flange_machine, paper_cut
+from tests.fixtures import by_hand
+from tests.fixtures.flange_machine import BAND, flange_machine, paper_cut
+from tests.fixtures.virtual_cut import relative_error, virtual_cut
 
 RPM = np.pi / 30.0
 
 
-def watch(cut, air=None, teeth=2, machine=None, band=BAND, speed=12000.0 * RPM, **options):
-    return observe(machine or flange_machine(), paper_cut().tooling.assembly, teeth, cut, air, band, speed, **options)
+def watch(cut, air=None, teeth=2, machine=None, speed=12000.0 * RPM, **options):
+    return observe(machine or flange_machine(), paper_cut().tooling.assembly, teeth, cut, air, speed, **options)
+
+
+def known_in(band):
+    return replace(flange_machine(), known=band)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +53,7 @@ def test_speed_and_noise_come_from_the_record(found):
 def test_the_fundamental_below_the_identified_band_is_said(found):
     assert found.band[0] < 2.0 * np.pi * 400.0 < BAND[0]
     assert any("400 Hz, lies below the identified band" in note for note in found.notes)
-    higher = watch(paper_cut().cut, paper_cut().air, band=(2.0 * np.pi * 700.0, BAND[1]))
+    higher = watch(paper_cut().cut, paper_cut().air, machine=known_in((2.0 * np.pi * 700.0, BAND[1])))
     assert any("harmonics below 490 Hz are left out" in note for note in higher.notes)
     assert higher.band[0] > 2.0 * np.pi * 400.0
 
@@ -59,12 +64,36 @@ def test_a_missing_air_cut_is_said():
 
 def test_one_axis_alone_is_watched(found):
     whole = flange_machine()
-    only = watch(paper_cut().cut, paper_cut().air, machine=MachineOverSpeed({Dof.Y: whole.whole[Dof.Y]}))
+    only = watch(paper_cut().cut, paper_cut().air, machine=replace(whole, flanges=whole.flanges[1:]))
     assert only.estimate.axes == (Dof.Y,)
     # speed and angle to the air cut come from fewer channels
     np.testing.assert_allclose(
         only.estimate.force[4000:, 0], found.estimate.force[4000:, 1], atol=0.03 * np.abs(found.estimate.force).max()
     )
+
+
+def measured(low_hz, high_hz, step_hz=5.0):
+    """The same machine, its flange as a tap test in this range would give it."""
+    grid = 2.0 * np.pi * np.arange(low_hz, high_hz, step_hz)
+    flanges = tuple(MeasuredFlange(flange.receptance(grid)) for flange in flange_machine().flanges)
+    return FlangeMachine(flanges, flanges[0].band, flange_machine().joint, ends=True)
+
+
+def test_a_measured_flange_gives_the_forces_of_its_modes(found):
+    """From where the identified machine's band begins; beyond what was measured nothing is asked for, and nothing told."""
+    alone = watch(paper_cut().cut, paper_cut().air, machine=measured(373.0, 4400.0))
+    assert 2.0 * np.pi * 373.0 <= alone.band[0] < alone.band[1] <= 2.0 * np.pi * 4400.0
+    for response in alone.response.values():
+        assert response.omega[0] >= 2.0 * np.pi * 373.0
+        assert response.omega[-1] <= 2.0 * np.pi * 4400.0
+    settled = slice(4000, None)
+    difference = np.std(alone.estimate.force[settled] - found.estimate.force[settled], axis=0)
+    assert np.all(difference < 0.01 * np.std(found.estimate.force[settled], axis=0))
+    assert np.all(relative_error(alone.estimate.force, paper_cut().force, paper_cut().cut.rate) < 0.03)
+    # a range that begins above the tooth-passing frequency
+    high = watch(paper_cut().cut, paper_cut().air, machine=measured(450.0, 4400.0))
+    assert high.band[0] == 2.0 * np.pi * 450.0
+    assert any("harmonics below 450 Hz are left out" in note for note in high.notes)
 
 
 def test_sensors_that_lag_and_lose_are_undone():
@@ -90,7 +119,7 @@ def test_a_trigger_tells_the_speed(found):
         assert trigger_speed(with_trigger(paper_cut().cut, speed, pulses)) == pytest.approx(speed, rel=0.01)
     by_trigger = watch(with_trigger(paper_cut().cut, speed), paper_cut().air, speed=None, method=PaperWalk())
     assert by_trigger.spindle_speed == pytest.approx(speed, rel=1e-6)
-    with pytest.raises(InputError, match="speed-rpm"):
+    with pytest.raises(InputError, match="spindle_speed"):
         watch(paper_cut().cut, speed=None)
     still = with_trigger(paper_cut().cut, 0.0)
     with pytest.raises(Unsteady, match="trigger"):
@@ -99,16 +128,13 @@ def test_a_trigger_tells_the_speed(found):
 
 def test_the_posterior_widens_the_bands(found):
     """Of a machine whose C31 is uncertain by a known share: the force is, too."""
-    from tests.workflows.test_tip import posterior_of
-
-    machine = {}
-    for axis, shift in ((Dof.X, 1.0), (Dof.Y, 0.95)):
-        posterior = posterior_of(shift, softening=False)
-        machine[axis] = MachineAxis(None, None, posterior)  # type: ignore[arg-type]
+    machine = replace(by_hand.machine(rivals=0), identified_band=BAND)
     certain = {
-        axis: MachineAxis(None, None, replace(part.posterior, covariance=0.0 * part.posterior.covariance)) for axis, part in machine.items()
+        axis: replace(part, posterior=replace(part.posterior, covariance=0.0 * part.posterior.covariance))
+        for axis, part in machine.identified.items()
     }
-    one, two = (watch(paper_cut().cut, paper_cut().air, machine=MachineOverSpeed(m), method=PaperWalk()) for m in (machine, certain))
+    machines = (machine, replace(machine, identified=certain))
+    one, two = (watch(paper_cut().cut, paper_cut().air, machine=each, method=PaperWalk()) for each in machines)
     for i, axis in enumerate(one.estimate.axes):
         assert one.model_error[axis] > 0.0
         assert two.model_error[axis] == 0.0
@@ -119,7 +145,7 @@ def test_the_posterior_widens_the_bands(found):
 def test_wear_of_the_paper_case(found):
     """Through machine, sensors and observer: K_tc and K_rc of the virtual workpiece (902 MPa, 0.26), no edges."""
     made = paper_cut()
-    from benchmarks.observer import CASE
+    from tests.fixtures.virtual_cut import CASE
 
     worn = wear_of(found, Cutter(2, 0.012, made.tooling.cutter.helix), CASE)
     assert worn.separable
@@ -142,7 +168,7 @@ def test_bad_records_are_refused_in_a_sentence():
     # no later part of the signal has a sensor more
     assert not isinstance(missing.value, Unsteady)
     with pytest.raises(InputError, match="band"):
-        watch(cut, band=(2.0 * np.pi * 20000.0, 2.0 * np.pi * 30000.0))
+        watch(cut, machine=known_in((2.0 * np.pi * 20000.0, 2.0 * np.pi * 30000.0)))
 
 
 def test_figures_have_units_and_bands(found):

@@ -11,7 +11,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.parameters import AxisLayout, pack, simple_axis
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.workflows.identify import mode_deviations
-from tests.cli import by_hand
+from tests.fixtures import by_hand
 
 
 def identification_of(posterior):

@@ -9,17 +9,17 @@ import pytest
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import MillingProcess
-from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.experiment_design import Volume
+from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.parameters import AxisLayout, AxisParameters, pack
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machine.spindle import Spindle
-from rcsa_ident.workflows.lobes import LobeConditions, tooling_lobes
+from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.workflows.plan import CutConstraints, line_noise, plan_cuts
-from rcsa_ident.workflows.tip import tooltip
-from tests.identification.conftest import open_shop
+from tests.fixtures.virtual_shop import open_shop
 
 TOOLINGS = Path(__file__).parents[2] / "data" / "machines" / "toolings"
 RPM = np.pi / 30.0
@@ -42,7 +42,12 @@ def machine_of(deviation=0.05, seed=1):
         posterior = Posterior(theta, np.diag(own**2), AxisLayout(4))
         modes, joint = posterior.machine(axis)
         machine[axis] = MachineAxis(Spindle(modes), joint, posterior)
-    return machine
+    return IdentifiedMachine(machine, (2.0 * np.pi * BAND[0], 2.0 * np.pi * BAND[1]))
+
+
+def with_axes(machine, **axes):
+    """The same machine with some of its axes alone, or changed."""
+    return replace(machine, identified={Dof(name): part for name, part in axes.items()})
 
 
 @pytest.fixture(scope="module")
@@ -73,11 +78,9 @@ def test_every_cut_is_stable_by_the_lobes_and_some_that_are_not_were_there(plann
         assert own
         speeds = np.array([c.conditions.spindle_speed for c in own])
         depths = np.array([c.conditions.axial_depth for c in own])
-        response = tooltip(machine_of(), tooling.assembly, omega, bands=False)
+        tip, process = machine_of().tip(tooling, omega, spread=False), MillingProcess(tooling.cutter, COEFFICIENTS, ALLOWED.engagement)
         for factor in (0.99, 1.0, 1.01):
-            lobes = tooling_lobes(
-                response, LobeConditions(MillingProcess(tooling.cutter, COEFFICIENTS, ALLOWED.engagement), factor * speeds, 0.01)
-            )
+            lobes = stability_lobes(tip, process, factor * speeds, 0.01)
             assert np.all(lobes.limit_depth >= 1.499 * depths)
 
 
@@ -103,8 +106,9 @@ def test_the_band_before_any_cut_is_that_of_the_tooltip(toolings, targets):
     omega = 2.0 * np.pi * np.linspace(*BAND, 400)
     for tooling, known in zip(targets, before, strict=True):
         # by finite differences of the coupled machine, on other frequencies
-        response = tooltip(machine, tooling.assembly, omega)
-        parts = [np.sum(np.square(response.deviation[a])) / np.sum(np.abs(response.tip(a)) ** 2) for a in (Dof.X, Dof.Y)]
+        tip = machine.tip(tooling, omega)
+        entries = [(Coordinate("tip", axis),) * 2 for axis in (Dof.X, Dof.Y)]
+        parts = [np.sum(np.square(tip.deviation()[e])) / np.sum(np.abs(tip.between(*(str(c) for c in e))) ** 2) for e in entries]
         assert known == pytest.approx(np.sqrt(np.mean(parts)), rel=0.01)
 
 
@@ -141,7 +145,7 @@ def test_a_wanted_band_takes_no_more_cuts_than_it_must(planned, toolings, target
 def test_a_band_out_of_reach_is_said_with_how_far_it_goes(toolings, targets):
     found = plan(toolings, targets, 3, wanted=1e-5)
     assert len(found.cuts) == 3
-    assert "0.001 % is not reached: 3 cuts come to" in found.warnings[0]
+    assert "0.001 % is not reached: 3 cuts give" in found.warnings[0]
 
 
 def test_fewer_cuts_than_asked_for_are_said(toolings, targets):
@@ -151,9 +155,10 @@ def test_fewer_cuts_than_asked_for_are_said(toolings, targets):
 
 
 def test_without_a_posterior_or_a_stable_cut_there_is_no_plan(toolings, targets):
-    machine = machine_of()
+    x, y = machine_of().identified.values()
+    half = with_axes(machine_of(), x=replace(x, posterior=None), y=y)
     with pytest.raises(InputError, match="posterior"):
-        plan(toolings, targets, machine={Dof.X: replace(machine[Dof.X], posterior=None), Dof.Y: machine[Dof.Y]})
+        plan(toolings, targets, machine=half)
     with pytest.raises(InputError, match=r"none of .* stable with a margin of 1\.5 .*the deepest stable one would be"):
         plan(toolings, targets, allowed=replace(ALLOWED, depths=(0.05,)))
     with pytest.raises(InputError, match="at least one tooling"):
@@ -178,7 +183,7 @@ def test_most_information_is_another_plan(planned, toolings, targets):
 
 
 def test_a_machine_with_one_axis_has_a_plan(toolings, targets):
-    found = plan(toolings, targets, 2, machine={Dof.Y: machine_of()[Dof.Y]})
+    found = plan(toolings, targets, 2, machine=with_axes(machine_of(), y=machine_of().identified[Dof.Y]))
     assert len(found.cuts) == 2
     assert found.band[-1].max() < found.band[0].max()
 

@@ -14,7 +14,7 @@ from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement, Reading
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.workflows.speed_bands import speed_bands, split_by_speed
-from tests.cli import by_hand
+from tests.fixtures import by_hand
 
 
 def reading(number, speed, tooling="T1", usable=True):

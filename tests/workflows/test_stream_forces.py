@@ -10,27 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.observer import CASE, relative_error
-from benchmarks.turning import TurningCut, turning_cut
 from rcsa_ident.errors import InputError
 from rcsa_ident.workflows.estimate_forces import MonitoredCut, observe
 from rcsa_ident.workflows.stream_forces import LONGEST_BRIDGE, LiveObserver, live_observer
-from tests.observer.flange_machine import BAND, flange_machine
-
-RATE = 25600.0
-SECOND = int(RATE)
-
-
-@cache
-def turning() -> TurningCut:
-    return turning_cut(RATE)
-
-
-@cache
-def streamed(wander: float = 0.0, sag: float = 0.0, seconds: float = 3.0):
-    """Samples and true forces: in air for a second and a half."""
-    parts = list(turning().blocks(seconds, 1.5, 4096, wander, sag))
-    return np.concatenate([p[0] for p in parts]), np.concatenate([p[1] for p in parts])
+from tests.fixtures.flange_machine import flange_machine
+from tests.fixtures.force_stream import RATE, SECOND, streamed, turning
+from tests.fixtures.virtual_cut import CASE, relative_error
 
 
 @cache
@@ -38,7 +23,7 @@ def designed(air: bool = True) -> MonitoredCut:
     samples = streamed()[0][:SECOND] if air else streamed()[0][2 * SECOND : 2 * SECOND + SECOND // 2]
     record = turning().recording(samples)
     assembly = turning().made.tooling.assembly
-    return observe(flange_machine(), assembly, 2, record, record if air else None, BAND, CASE.spindle_speed)
+    return observe(flange_machine(), assembly, 2, record, record if air else None, CASE.spindle_speed)
 
 
 @cache

@@ -46,7 +46,7 @@ export function libraryDrawing(name) {
   return image;
 }
 
-/** The drawing of keys that are not saved; throws the `Problem` of what can not be drawn. */
+/** The drawing of keys that are not saved; throws the `Problem` of what cannot be drawn. */
 export async function drawn(keys, signal) {
   return (await send("POST", "toolings/drawing", { json: keys, signal })).text();
 }

@@ -1,4 +1,4 @@
-// Cuts that were tried: CUTS.csv as the commands read it, marks in the chart, and how many are told right.
+// Cuts that were tried: CUTS.csv as the commands read it, marks in the chart, and how many are classified correctly.
 import { Problem } from "./api.js";
 import { h } from "./dom.js";
 
@@ -56,7 +56,7 @@ export function toldRight(tally) {
     tally.chatter_stable ? `${tally.chatter_stable} stable beyond the limit` : null,
     tally.stable_marginal + tally.chatter_marginal ? `${tally.stable_marginal + tally.chatter_marginal} marginal` : null,
   ].filter(Boolean);
-  const words = decided ? [`${right} of ${decided} told right (${Math.round(100 * tally.share_right)} %)`, ...more] : more;
+  const words = decided ? [`${right} of ${decided} classified correctly (${Math.round(100 * tally.share_right)} %)`, ...more] : more;
   return words.join(", ");
 }
 

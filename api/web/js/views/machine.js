@@ -131,7 +131,7 @@ async function forget(machine, fault) {
   if (
     !(await confirmed(
       `Forget ${machine.name}?`,
-      "Its identification and its campaigns go with it. This can not be taken back.",
+      "Its identification and its campaigns go with it. This cannot be undone.",
       "Forget it",
     ))
   )

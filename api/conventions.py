@@ -1,0 +1,120 @@
+"""What all routes of the interface have in common: parameters, documented answers, entity tags, pages of lists."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, TypeVar
+
+from fastapi import Header, Path, Query, Request
+
+from api.problems import MEDIA_TYPE, Problem, title
+from api.schemas.common import ID_PATTERN, NAME_PATTERN
+from api.stores.entities import ABSENT, Taken
+
+Item = TypeVar("Item")
+MachineId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a machine.")]
+ToolingName = Annotated[str, Path(pattern=NAME_PATTERN, description="Name in the library.")]
+CampaignId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a campaign.")]
+KeyId = Annotated[str, Path(pattern=ID_PATTERN)]
+After = Annotated[str, Query(pattern=r"^[A-Za-z0-9 ._+()-]{0,64}$", description="`next` of the previous page.")]
+Limit = Annotated[int, Query(ge=1, le=200, description="Largest number of items.")]
+Repeat = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        pattern=r"^[\x21-\x7e]{1,128}$",
+        description="A repeated request with this key gets the first answer, for a day.",
+    ),
+]
+
+_WHY = {
+    400: "The body cannot be read.",
+    401: "There is no valid API key.",
+    403: "The API key does not have the scope.",
+    404: "It does not exist, or belongs to another group.",
+    408: "The body arrives too slowly.",
+    409: "The name, or the idempotency key with another body, is already in use.",
+    412: "The stored content does not match If-Match or If-None-Match.",
+    413: "The body is too large.",
+    415: "The body is of another type.",
+    422: "The input is not usable; the fields at fault are named.",
+    429: "There are too many requests with this API key.",
+    503: "Too many queries are waiting for an answer, or the database does not answer.",
+}
+_ALWAYS = (401, 403, 429, 503)
+#: Statuses of routes with a body.
+BODY = (400, 408, 413, 415, 422)
+
+
+def problems(*statuses: int, always: Sequence[int] = _ALWAYS) -> dict[int | str, dict[str, Any]]:
+    """Return the problem documents of a route for OpenAPI, including those of every guarded route."""
+    schema = {"$ref": "#/components/schemas/ProblemDocument"}
+    found: dict[int | str, dict[str, Any]] = {}
+    for status in sorted({*statuses, *always}):
+        found[status] = {"description": f"{title(status)}. {_WHY[status]}", "content": {MEDIA_TYPE: {"schema": schema}}}
+        if status in (429, 503):
+            found[status]["headers"] = {"Retry-After": {"description": "Seconds.", "schema": {"type": "string"}}}
+    return found
+
+
+def guard(scope: str, **further: Any) -> dict[str, Any]:
+    """Return the OpenAPI extra that names the scope a route requires; `Guarded` reads it."""
+    return {"x-scope": scope, **further}
+
+
+def tagged(digest: str) -> dict[str, str]:
+    """Return the header that carries an entity tag."""
+    return {"ETag": f'"{digest}"'}
+
+
+def unchanged(request: Request, digest: str) -> bool:
+    """Whether If-None-Match contains this digest."""
+    tags = request.headers.get("if-none-match", "")
+    return any(tag.strip().removeprefix("W/") in ("*", f'"{digest}"') for tag in tags.split(","))
+
+
+def expected(request: Request, there: Callable[[], str | None]) -> str | None:
+    """Return the digest that a conditional write expects: `ABSENT` with If-None-Match: *, None without a condition.
+
+    Parameters
+    ----------
+    there : callable
+        Returns the current digest; called for If-Match: * only.
+    """
+    if request.headers.get("if-none-match", "").strip() == "*":
+        return ABSENT
+    tags = [tag.strip() for tag in request.headers.get("if-match", "").split(",") if tag.strip()]
+    if not tags:
+        return None
+    if "*" in tags or len(tags) > 1:
+        found = there()
+        return found if found is not None and ("*" in tags or f'"{found}"' in tags) else "nothing that is there"
+    return tags[0].strip('"')
+
+
+def page(rows: Sequence[Item], limit: int, cursor: Callable[[Item], str]) -> tuple[Sequence[Item], str | None]:
+    """Return at most `limit` of `limit + 1` rows, and the cursor of the next page."""
+    return (rows[:limit], cursor(rows[limit - 1])) if len(rows) > limit else (rows, None)
+
+
+def found_or_404(thing: Item | None, what: str) -> Item:
+    """Return a thing that exists, else answer 404."""
+    if thing is None:
+        raise Problem(404, f"there is no such {what}")
+    return thing
+
+
+def in_use(taken: Taken, name: str | None, repeat: str | None) -> Problem:
+    """Return the problem of a name, or an idempotency key, that is already in use."""
+    what = str(taken)
+    found = str(name if what == "name" else repeat)
+    return Problem(409, f"the {what} is already in use", [{"field": what, "found": found, "allowed": f"another {what}"}])
+
+
+def utf8(raw: bytes) -> str:
+    """Return a body as text, else answer 422."""
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise Problem(422, f"line {line} of the body is not UTF-8", [{"field": "body", "found": "no UTF-8", "allowed": "UTF-8"}]) from None

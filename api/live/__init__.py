@@ -1,0 +1,1 @@
+"""What clients follow while it happens: streams of forces, and jobs."""

@@ -1,0 +1,176 @@
+"""Jobs as their clients follow them: submission, state, waiting, server-sent events, result and cancellation."""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from collections.abc import AsyncIterator, Mapping
+from typing import Annotated, Any
+
+from fastapi import Header, Path, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import JSONResponse, StreamingResponse
+
+from api.components import Components
+from api.conventions import found_or_404, in_use
+from api.jobs.event_feed import Crowded
+from api.problems import Problem
+from api.schemas.common import ID_PATTERN
+from api.schemas.jobs import JobAnswer
+from api.security import now
+from api.stores.entities import Taken
+from api.stores.jobs import OPEN, Full, Job
+
+EVENTS = "text/event-stream"
+#: Retry-After [s], and interval of the heartbeat of an event stream without events [s].
+AGAIN, HEARTBEAT = "2", 15.0
+#: Longest wait of a request for the end of a job [s].
+LONGEST_WAIT = 30.0
+JobId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a job.")]
+Prefer = Annotated[
+    str | None, Header(max_length=200, description="`wait=N`: answer when the job has ended, after N s (at most 30) at the latest.")
+]
+Seen = Annotated[
+    str | None, Header(alias="Last-Event-ID", pattern=r"^\d{1,18}$", description="Number of the last event that the client knows.")
+]
+RETRY = {"Retry-After": {"description": "Seconds.", "schema": {"type": "string"}}}
+ACCEPTED: dict[str, Any] = {
+    "model": JobAnswer,
+    "description": "The job is accepted; it survives restarts of the service.",
+    "headers": {"Location": {"description": "Of the job.", "schema": {"type": "string"}}, **RETRY},
+}
+_EVENT: dict[str, Any] = {
+    "type": "object",
+    "description": "One event of the stream; its data is JSON.",
+    "properties": {
+        "event": {"enum": ["progress", "trace", "fit", "note", "end"]},
+        "data": {"type": "string"},
+        "id": {"type": "string"},
+        "retry": {"type": "integer"},
+    },
+    "required": ["event", "data"],
+}
+STREAM: dict[str, Any] = {
+    "description": "Server-sent events: `progress` and `end` with the job, `trace` with axis, stage, cost and seconds, `fit` with axis, "
+    "frequency_hz, measured_abs and model_abs [m/N], `note` with a text: a sentence of the job's story. It ends with `end`.",
+    "content": {EVENTS: {"schema": _EVENT}},
+}
+
+
+def answer(job: Job) -> JobAnswer:
+    """Return a job as clients see it."""
+    names = ("id", "kind", "machine", "campaign", "state", "created", "started", "finished", "status")
+    columns = {name: getattr(job, name) for name in names}
+    texts = {name: None if text is None else json.loads(text) for name, text in (("progress", job.progress), ("problem", job.problem))}
+    return JobAnswer.model_validate(columns | texts)
+
+
+def place(job: Job) -> str:
+    """Return the path of a job."""
+    return f"/v1/{'lobes' if job.kind == 'lobes' else 'identifications'}/{job.id}"
+
+
+def accepted(job: Job) -> JSONResponse:
+    """Return the answer 202 to a submitted job."""
+    return JSONResponse(answer(job).model_dump(mode="json"), 202, {"Location": place(job), "Retry-After": AGAIN})
+
+
+def submit(components: Components, job: Job, texts: Mapping[str, str], repeat: tuple[str, str] | None) -> Job:
+    """Store a job, which a worker then carries out."""
+    try:
+        return components.store.jobs.add(job, texts, components.settings.job_queue, repeat)
+    except Taken as taken:
+        raise in_use(taken, None, repeat and repeat[0]) from None
+    except Full:
+        raise Problem(503, f"{components.settings.job_queue} jobs are waiting already", headers={"Retry-After": "60"}) from None
+    except KeyError:
+        raise Problem(404, "there is no such machine") from None
+
+
+def job_of(components: Components, group: str, id: str, kind: str) -> Job:
+    """Return a job of a group and kind."""
+    found = components.store.jobs.get(group, id)
+    return found_or_404(found if found is not None and found.kind == kind else None, "job")
+
+
+async def awaited(components: Components, group: str, id: str, kind: str, prefer: str | None) -> Job:
+    """Return a job, where the client prefers so after it has ended."""
+    job = await run_in_threadpool(job_of, components, group, id, kind)
+    wanted = re.search(r"(?:^|[,;\s])wait\s*=\s*\"?(\d{1,6})", prefer or "")
+    end = time.monotonic() + min(float(wanted[1]) if wanted else 0.0, LONGEST_WAIT)
+    while job.state in OPEN and time.monotonic() < end:
+        await components.feeds.wait(id, job.events, end - time.monotonic())
+        job = await run_in_threadpool(job_of, components, group, id, kind)
+    return job
+
+
+def cancel(components: Components, group: str, id: str, kind: str, response: Response) -> JobAnswer:
+    """Cancel a job; one that has ended answers 409."""
+    job_of(components, group, id, kind)
+    job, cancelled = found_or_404(components.store.jobs.cancel(group, id, now()), "job")
+    if not cancelled:
+        raise Problem(409, f"the job has already ended: its state is {job.state}")
+    response.headers["Location"] = place(job)
+    return answer(job)
+
+
+def finished(components: Components, group: str, id: str, kind: str, name: str) -> str:
+    """Return a result of a finished job."""
+    job = job_of(components, group, id, kind)
+    if job.state != "done":
+        raise Problem(409, f"the job has no result: its state is {job.state}", headers={"Retry-After": AGAIN} if job.state in OPEN else {})
+    return found_or_404(components.store.jobs.text(id, name), "result")
+
+
+async def events(components: Components, group: str, id: str, kind: str, seen: str | None) -> StreamingResponse:
+    """Return the stream of a job's events after a number."""
+    job = await run_in_threadpool(job_of, components, group, id, kind)
+    try:
+        watching = components.feeds.stream()
+        watching.__enter__()
+    except Crowded:
+        raise Problem(503, "too many event streams of jobs are open", headers={"Retry-After": "30"}) from None
+
+    async def stream() -> AsyncIterator[str]:
+        try:
+            async for part in _events(components, job, int(seen or 0)):
+                yield part
+        finally:
+            watching.__exit__(None, None, None)
+
+    return StreamingResponse(stream(), media_type=EVENTS, headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"})
+
+
+async def _events(components: Components, job: Job, after: int) -> AsyncIterator[str]:
+    end = time.monotonic() + components.settings.watch_seconds
+    # the current state first, without a number: it is not an event that could be missed
+    yield f"retry: 2000\n{_event(None, 'progress', answer(job).model_dump_json())}"
+    while time.monotonic() < end:
+        found = await components.feeds.events(job.id, after)
+        for event in found:
+            after = event.number
+            if event.kind in ("progress", "end"):
+                current = await run_in_threadpool(components.store.jobs.find, job.id)
+                if current is None:
+                    return
+                yield _event(after, event.kind, answer(current).model_dump_json())
+            else:
+                yield _event(after, event.kind, event.data)
+            if event.kind == "end":
+                return
+        if found:
+            continue
+        current = await run_in_threadpool(components.store.jobs.find, job.id)
+        if current is None:
+            return
+        if current.state not in OPEN:
+            # the client reconnected after the end
+            yield _event(None, "end", answer(current).model_dump_json())
+            return
+        if not await components.feeds.wait(job.id, after, min(HEARTBEAT, max(end - time.monotonic(), 0.0))):
+            yield ": still there\n\n"
+
+
+def _event(number: int | None, kind: str, data: str) -> str:
+    return ("" if number is None else f"id: {number}\n") + f"event: {kind}\ndata: {data}\n\n"

@@ -1,0 +1,119 @@
+"""What a query names, as the store has it: machines, toolings, campaigns and their recordings; 404 where one is not there."""
+
+from __future__ import annotations
+
+import functools
+import json
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from api.components import Components
+from api.conventions import found_or_404
+from api.files import NORMALISED
+from api.problems import Problem
+from api.reading.campaign_text import campaign_of_text
+from api.reading.reader_tasks import recording_and_air
+from api.schemas.toolings import ToolingKeys
+from api.stores.campaigns import Campaign, Recording
+from api.stores.entities import Document, Machine
+from api.work.forces import ReadPair
+from api.work.requests import MachineText, ToolingSource
+from rcsa_ident.errors import InputError
+from rcsa_ident.signals.recording import Sensor
+
+
+def known_machine(components: Components, group: str, id: str) -> MachineText:
+    """Return the identification of a machine that one can compute with."""
+    document = identification_of(components, group, id)
+    if not json.loads(document.summary)["axes"]:
+        raise InputError("machine", "an identification that has failed", "a machine with an identification of axis X, Y or both")
+    return MachineText(document.digest, document.text)
+
+
+def machine_of(components: Components, group: str, id: str) -> Machine:
+    """Return a machine of a group."""
+    return found_or_404(components.store.machines.get(group, id), "machine")
+
+
+def identification_of(components: Components, group: str, id: str) -> Document:
+    """Return the identification of a machine, as it was written."""
+    machine_of(components, group, id)
+    return found_or_404(components.store.identifications.get(group, id), "identification of the machine")
+
+
+def tooling_source(components: Components, group: str, tooling: str | ToolingKeys, number: int = 1) -> ToolingSource:
+    """Return a tooling from the library, or as it came; without a name it has a number."""
+    if isinstance(tooling, ToolingKeys):
+        return ToolingSource(tooling.name or f"tooling {number}", keys=tooling.model_dump(exclude_unset=True, exclude_none=True))
+    document = components.store.toolings.get(group, tooling)
+    if document is None:
+        raise Problem(404, f"there is no tooling {tooling}")
+    return ToolingSource(tooling, document.text)
+
+
+def known_campaign(components: Components, group: str, id: str) -> Campaign:
+    """Return a campaign of a group."""
+    return found_or_404(components.store.campaigns.get(group, id), "campaign")
+
+
+@dataclass(frozen=True, slots=True)
+class Uploaded:
+    """A cut's recording in a campaign, with what the campaign says of it; speed in rad/s."""
+
+    machine: str
+    tooling: ToolingSource
+    cut: Path
+    air: Path | None
+    sensors: tuple[Sensor, ...]
+    rate: float
+    speed: float
+
+
+def uploaded(components: Components, group: str, campaign: str, recording: str) -> Uploaded:
+    """Return a cut's recording that was uploaded; its air cut is the campaign's, where it is there."""
+    row = known_campaign(components, group, campaign)
+    name = unicodedata.normalize("NFC", recording)
+    declared = campaign_of_text(row.text)
+    cut = next((each for each in declared.cuts if each.recording == Path(name)), None)
+    if cut is None:
+        raise Problem(404, f"the campaign has no cut with a recording {recording}")
+    kept = _kept(components, group, campaign, name)
+    found = json.loads(kept.found)
+    air = None if cut.air is None else components.store.recordings.get(group, campaign, cut.air.name)
+    tooling = ToolingSource(cut.tooling, json.loads(row.text)["toolings"][cut.tooling])
+    sensors = channels_of(found["channels"], declared.sensors)
+    still = None if air is None else components.files.path(group, NORMALISED, air.normalised)
+    path = components.files.path(group, NORMALISED, kept.normalised)
+    return Uploaded(row.machine, tooling, path, still, sensors, found["sampling_rate_hz"], cut.conditions.spindle_speed)
+
+
+def air_cut(components: Components, group: str, campaign: str, recording: str) -> ReadPair:
+    """Return what reads an uploaded recording alone."""
+    kept = _kept(components, group, campaign, unicodedata.normalize("NFC", recording))
+    return pair_reader(components.files.path(group, NORMALISED, kept.normalised), None)
+
+
+def _kept(components: Components, group: str, campaign: str, name: str) -> Recording:
+    return found_or_404(components.store.recordings.get(group, campaign, name), "recording")
+
+
+def pair_reader(cut: Path, air: Path | None) -> ReadPair:
+    """Return what reads a recording and its air cut in a worker."""
+    return functools.partial(recording_and_air, cut, air)
+
+
+def channels_of(names: Sequence[str], sensors: tuple[Sensor, ...]) -> tuple[Sensor, ...]:
+    """Return the sensors of channels, in their order."""
+    known = {sensor.name: sensor for sensor in sensors}
+    if len(set(names)) < len(names):
+        raise InputError("channels", list(names), "each channel once")
+    for name in names:
+        if name not in known:
+            raise InputError("channels", name, f"some of {', '.join(known)}")
+    found = tuple(known[name] for name in names)
+    kinds = [(sensor.quantity, sensor.axis) for sensor in found]
+    if len(set(kinds)) < len(kinds):
+        raise InputError("channels", list(names), "at most one channel for each quantity and axis")
+    return found

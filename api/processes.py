@@ -1,0 +1,85 @@
+"""Child processes of the service: spawned, with one thread of computation each, and gone when the service is, however it ends."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from multiprocessing.context import SpawnContext, SpawnProcess
+from typing import Any
+
+#: A child that has lived this long [s] is not counted as one that fails at once.
+LIVED = 60.0
+
+
+def spawn_context() -> SpawnContext:
+    """Return the context in which children start: they inherit neither threads nor locks, and compute on one core each."""
+    # the libraries read these when a child first imports them
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    return multiprocessing.get_context("spawn")
+
+
+def follow_parent() -> None:
+    """In a child: end this process as soon as its parent has ended, even by SIGKILL."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def follow() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
+
+
+class Child(SpawnProcess):
+    """A process that is started at once and follows its parent.
+
+    Parameters
+    ----------
+    call : callable
+        What it does; importable by name.
+    *arguments
+        That cross processes.
+    name : str
+    """
+
+    def __init__(self, call: Callable[..., None], *arguments: Any, name: str) -> None:
+        spawn_context()
+        super().__init__(target=call, args=arguments, name=name, daemon=True)
+        self.born = time.monotonic()
+        self.start()
+
+    def run(self) -> None:
+        follow_parent()
+        # Ctrl-C reaches the whole group of processes: the service takes it and ends its children
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        super().run()
+
+    def end(self, seconds: float) -> None:
+        """Wait for the process, at most so long, then kill it."""
+        self.join(seconds)
+        if self.is_alive():
+            self.kill()
+            self.join()
+
+
+class BackOff:
+    """The pause before a child is started again: none at first, then 1, 2, 4 … 30 s while it fails soon after each start.
+
+    Parameters
+    ----------
+    at_once : int
+        Restarts in succession that come without a pause.
+    """
+
+    def __init__(self, at_once: int = 1) -> None:
+        self.at_once, self.failures = at_once, 0
+
+    def pause(self, child: Child) -> float:
+        """Return the pause [s] after the end of a child."""
+        self.failures = self.failures + 1 if time.monotonic() - child.born < LIVED else 1
+        return 0.0 if self.failures <= self.at_once else min(2.0 ** (self.failures - self.at_once - 1), 30.0)

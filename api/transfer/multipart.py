@@ -1,0 +1,140 @@
+"""Parser of multipart/form-data that works on the stream: files never stay in memory."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Collection
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass
+
+from fastapi import Request
+from python_multipart.exceptions import FormParserError
+from python_multipart.multipart import MultipartParser, parse_options_header
+
+from api.components import Components
+from api.files import Part
+from api.problems import Problem
+from api.reading.campaign_text import recording_name
+from api.reading.uploads import Received
+from api.transfer.body_stream import blocks, complete, new_part, write
+
+FORM = "multipart/form-data"
+MOST_PARTS, LARGEST_TEXT = 1000, 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """Header of a part.
+
+    Parameters
+    ----------
+    field : str
+    name : str or None
+        Last part of the file name; None where the part is not a file.
+    """
+
+    field: str
+    name: str | None
+
+
+async def events(request: Request, components: Components) -> AsyncIterator[Head | bytes | None]:
+    """Yield the head of each part, its content in pieces, and None at its end.
+
+    Raises
+    ------
+    Problem
+        400 where the body is not a complete form, 408 and 413 as from `blocks`.
+    """
+    options = parse_options_header(request.headers.get("content-type", ""))[1]
+    found: list[Head | bytes | None] = []
+    heads: dict[bytes, bytes] = {}
+    name, value, count, whole = bytearray(), bytearray(), 0, False
+
+    def begin() -> None:
+        nonlocal count
+        count += 1
+        if count > MOST_PARTS:
+            raise Problem(413, f"the body is too large: at most {MOST_PARTS} parts")
+        heads.clear()
+
+    def header() -> None:
+        heads[bytes(name).lower()] = bytes(value)
+        name.clear()
+        value.clear()
+
+    def end() -> None:
+        nonlocal whole
+        whole = True
+
+    try:
+        parser = MultipartParser(
+            options.get(b"boundary", b""),
+            {
+                "on_part_begin": begin,
+                "on_header_field": lambda data, start, end: name.extend(data[start:end]),
+                "on_header_value": lambda data, start, end: value.extend(data[start:end]),
+                "on_header_end": header,
+                "on_headers_finished": lambda: found.append(_head(heads)),
+                "on_part_data": lambda data, start, end: found.append(bytes(data[start:end])),
+                "on_part_end": lambda: found.append(None),
+                "on_end": end,
+            },
+        )
+        if not options.get(b"boundary"):
+            raise FormParserError
+        async for block in blocks(request, components):
+            parser.write(bytes(block))
+            for each in found:
+                yield each
+            found.clear()
+        parser.finalize()
+        if not whole:
+            # the parser accepts a truncated last part
+            raise FormParserError
+    except FormParserError:
+        raise Problem(400, "the body cannot be read: it is not complete multipart/form-data") from None
+
+
+def _head(heads: dict[bytes, bytes]) -> Head:
+    options = parse_options_header(heads.get(b"content-disposition", b""))[1]
+    name = options.get(b"filename")
+    found = None if name is None else recording_name(name.decode("utf-8", "replace"))
+    return Head(options.get(b"name", b"").decode("utf-8", "replace"), found)
+
+
+@asynccontextmanager
+async def form(
+    request: Request, components: Components, group: str, texts: Collection[str], files: Collection[str]
+) -> AsyncIterator[tuple[dict[str, bytes], dict[str, tuple[str, Received]]]]:
+    """Texts and files of a form by field; files are on the disk until the end of the context.
+
+    Raises
+    ------
+    Problem
+        422 for an unknown or repeated field, 413 for a text that is too long.
+    """
+    found: dict[str, bytes] = {}
+    received: dict[str, tuple[str, Received]] = {}
+    async with AsyncExitStack() as stack:
+        head, text, part, seen = Head("", None), bytearray(), None, 0
+        async for event in events(request, components):
+            if isinstance(event, Head):
+                head, text, part = event, bytearray(), None
+                if head.field in found or head.field in received or head.field not in {*texts, *files}:
+                    allowed = f"each once: {', '.join([*texts, *files])}"
+                    fault = {"field": head.field[:80] or "part", "found": "such a part", "allowed": allowed}
+                    raise Problem(422, f"a part of the form: found {head.field[:80]!r}, allowed is {allowed}", [fault])
+                if head.field in files:
+                    part = await stack.enter_async_context(new_part(components, group))
+            elif event is None:
+                if isinstance(part, Part):
+                    received[head.field] = (head.name or "", await complete(part))
+                else:
+                    found[head.field] = bytes(text)
+            elif isinstance(part, Part):
+                seen += len(event)
+                await write(components, group, part, event, seen)
+            else:
+                text += event
+                if len(text) > LARGEST_TEXT:
+                    raise Problem(413, f"the body is too large: {head.field} has at most {LARGEST_TEXT // 1000} kB")
+        yield found, received

@@ -1,0 +1,202 @@
+"""A receptance with what is not known of it: how it changes along independent directions, one standard deviation each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.receptance import Receptance
+
+Places = NDArray[np.intp]
+#: Largest change of a receptance between two nodes of `thinned`, as a share; quintics go through six nodes.
+CHANGE = 0.065
+#: Widest distance of two such nodes, in lines, and how much it grows from line to line.
+WIDEST, GROWTH = 16.0, 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Variation:
+    """Changes of a block of a receptance; the blocks of several variations do not overlap.
+
+    Parameters
+    ----------
+    members : tuple of int
+        Rows, and as well columns, of the receptance that the block covers, b of them.
+    change : complex array, shape (p, n, b, b)
+        Along each of p independent directions, per standard deviation.
+    """
+
+    members: tuple[int, ...]
+    change: ComplexArray
+
+
+class Spread(Protocol):
+    """Computes variations where they are asked for: along all directions at all frequencies they would take seconds."""
+
+    @property
+    def covers(self) -> frozenset[int]:
+        """Rows of the receptance that vary."""
+        ...
+
+    def at(self, places: Places) -> tuple[Variation, ...]:
+        """Return the variations at some of the receptance's frequencies, by their places."""
+        ...
+
+    def guides(self) -> ComplexArray:
+        """Return curves that change as quickly from line to line as the variations do, shape (g, n)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class UncertainReceptance(Receptance):
+    """A receptance and its spread; sums of variations with independent standard normal weights are draws of it.
+
+    Parameters
+    ----------
+    omega, values, rows, cols
+        As of a `Receptance`; rows and columns are the same.
+    variation : Spread or None
+        None where the receptance is taken for exact.
+    """
+
+    variation: Spread | None = None
+
+    @property
+    def spread(self) -> ComplexArray:
+        """Changes along all p independent directions, per standard deviation, shape (p, n, r, r); p is 0 without any."""
+        r = len(self.rows)
+        parts = self._variations()
+        found = np.zeros((sum(len(part.change) for part in parts), self.omega.size, r, r), dtype=complex)
+        first = 0
+        for part in parts:
+            own = slice(first, first + len(part.change))
+            for i, row in enumerate(part.members):
+                for j, col in enumerate(part.members):
+                    found[own, :, row, col] = part.change[:, :, i, j]
+            first += len(part.change)
+        return found
+
+    def deviation(self) -> dict[tuple[Coordinate, Coordinate], tuple[FloatArray, FloatArray]]:
+        """Return the standard deviations of real and imaginary part, shape (n,) each, of every entry that has one."""
+        found = {}
+        for part in self._variations():
+            real = np.sqrt(np.sum(part.change.real**2, axis=0))
+            imaginary = np.sqrt(np.sum(part.change.imag**2, axis=0))
+            for i, row in enumerate(part.members):
+                for j, col in enumerate(part.members):
+                    found[self.rows[row], self.cols[col]] = real[:, i, j], imaginary[:, i, j]
+        return found
+
+    @property
+    def complete(self) -> bool:
+        """Whether there is a spread of every row; only then draws mean something."""
+        return self.variation is not None and len(self.variation.covers) == len(self.rows)
+
+    def thinned(self) -> UncertainReceptance:
+        """Return the same at a part of the frequencies: close where it changes from line to line, far apart where a quintic suffices."""
+        if self.variation is None:
+            return self
+        entries = self.values.reshape(self.omega.size, -1).T
+        return self.at_places(nodes_of([*entries[np.any(entries != 0.0, axis=1)], *self.variation.guides()]))
+
+    def at_places(self, places: Places) -> UncertainReceptance:
+        """Return the same at some of its frequencies."""
+        variation = None if self.variation is None else _Part(self.variation, places)
+        return UncertainReceptance(self.omega[places], self.values[places], self.rows, self.cols, variation)
+
+    def drawn(self, draws: int, rng: np.random.Generator) -> ComplexArray:
+        """Return receptances drawn from the spread, shape (draws, n, r, r)."""
+        parts = self._variations()
+        found = np.broadcast_to(self.values, (draws, *self.values.shape)).copy()
+        # one draw after the other, so that more draws begin with the same ones
+        weights = [[rng.standard_normal(len(part.change)) for part in parts] for _ in range(draws)]
+        for k, part in enumerate(parts):
+            change = _weighted(np.array([row[k] for row in weights]), part.change)
+            for i, row in enumerate(part.members):
+                for j, col in enumerate(part.members):
+                    found[:, :, row, col] += change[:, :, i, j]
+        return found
+
+    def _variations(self) -> tuple[Variation, ...]:
+        return () if self.variation is None else self.variation.at(np.arange(self.omega.size))
+
+    def __str__(self) -> str:
+        return f"{Receptance.__str__(self)}{'' if self.variation is None else ', with its spread'}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A spread at some of the frequencies."""
+
+    whole: Spread
+    places: Places
+
+    @property
+    def covers(self) -> frozenset[int]:
+        return self.whole.covers
+
+    def at(self, places: Places) -> tuple[Variation, ...]:
+        return self.whole.at(self.places[places])
+
+    def guides(self) -> ComplexArray:
+        return self.whole.guides()[:, self.places]
+
+
+@dataclass(frozen=True, slots=True)
+class Mixed:
+    """A spread between two others whose directions are the same ones: straight lines from the first to the second.
+
+    Parameters
+    ----------
+    first, second : Spread
+    share : float
+        From 0, the first, to 1, the second.
+    """
+
+    first: Spread
+    second: Spread
+    share: float
+
+    @property
+    def covers(self) -> frozenset[int]:
+        """Rows that vary: the same at both ends."""
+        return self.first.covers
+
+    def at(self, places: Places) -> tuple[Variation, ...]:
+        """Return the variations between those of both ends."""
+        pairs = zip(self.first.at(places), self.second.at(places), strict=True)
+        return tuple(Variation(a.members, (1.0 - self.share) * a.change + self.share * b.change) for a, b in pairs)
+
+    def guides(self) -> ComplexArray:
+        """Return the curves of both ends."""
+        return np.concatenate([self.first.guides(), self.second.guides()])
+
+
+def _weighted(weights: FloatArray, change: ComplexArray) -> ComplexArray:
+    """Return weights @ change without making the weights complex first, shapes (d, p), (p, n, b, b) -> (d, n, b, b)."""
+    parts = np.ascontiguousarray(change).reshape(len(change), -1).view(float)
+    found: ComplexArray = (weights @ parts).view(complex)
+    return found.reshape(len(weights), *change.shape[1:])
+
+
+def nodes_of(curves: Sequence[ComplexArray]) -> Places:
+    """Return places between whose neighbours no curve changes by more than `CHANGE`, first and last among them."""
+    step = np.zeros(curves[0].size - 1)
+    for curve in curves:
+        size = np.abs(curve)
+        step = np.maximum(step, np.abs(np.diff(curve)) / np.maximum(np.maximum(size[1:], size[:-1]), 1e-300))
+    # lines from node to node; they grow gently, for a quintic's six nodes should stand at like distances
+    distance = np.clip(CHANGE / np.maximum(step, 1e-300), 1.0, WIDEST)
+    ramp = GROWTH * np.arange(step.size)
+    distance = np.minimum.accumulate(distance - ramp) + ramp
+    distance = (np.minimum.accumulate((distance + ramp)[::-1])[::-1]) - ramp
+    # a share of a node for each line; its sum passes a whole number where a node stands
+    count = np.concatenate([[0.0], np.cumsum(1.0 / distance)])
+    nodes = np.flatnonzero(np.diff(np.floor(count * (1.0 + 1e-12)), prepend=-1.0) > 0.0)
+    return frozen(np.unique(np.concatenate([nodes, [count.size - 1]])), np.intp)

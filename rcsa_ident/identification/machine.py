@@ -1,0 +1,179 @@
+"""An identified machine: modes and joint with what the records leave open, at any spindle speed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.posterior import MachineAxis, Posterior
+from rcsa_ident.identification.status import Status
+from rcsa_ident.machine.flange_part import FlangePart
+from rcsa_ident.machine.machine import Machine
+from rcsa_ident.machine.tip import Side
+from rcsa_ident.machining_setup import Workpiece
+from rcsa_ident.signals.recording import Sensor
+from rcsa_ident.units import to_hz
+
+#: Unknowns times frequencies up to which the machine's side of the coupling is kept: 100 bytes each.
+MOST_KEPT = 1_000_000
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class IdentifiedMachine(Machine):
+    """A machine as its cuts have shown it.
+
+    Parameters
+    ----------
+    identified : mapping of Dof to MachineAxis
+        From all cuts.
+    identified_band : (float, float) [rad/s]
+        Lowest and highest identified line.
+    speed_models : tuple of ((float, float), mapping of Dof to MachineAxis)
+        Lowest and highest spindle speed [rad/s] of single ranges, each with what its cuts say for themselves.
+    speed : float or None [rad/s]
+        At which it stands; None is the middle of the campaign's speeds.
+    status : Status
+    reasons : tuple of str
+        Why it is not simply converged.
+    identified_workpiece : Workpiece or None
+        That the campaign cut.
+    sensors : tuple of Sensor
+        That it was recorded with.
+    name : str
+        The campaign's.
+    """
+
+    identified: Mapping[Dof, MachineAxis]
+    identified_band: tuple[float, float]
+    speed_models: tuple[tuple[tuple[float, float], Mapping[Dof, MachineAxis]], ...] = ()
+    speed: float | None = None
+    status: Status = Status.CONVERGED
+    reasons: tuple[str, ...] = ()
+    identified_workpiece: Workpiece | None = None
+    sensors: tuple[Sensor, ...] = ()
+    name: str = ""
+    kept_sides: tuple[Side, ...] = field(default=(), repr=False)
+
+    @cached_property
+    def parts(self) -> tuple[FlangePart, ...]:
+        """The bending planes of X and Y."""
+        return tuple(part.part(axis, self.speed) for axis, part in self.identified.items())
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Lowest and highest identified frequency [rad/s]."""
+        return self.identified_band
+
+    @property
+    def softening_range(self) -> tuple[float, float] | None:
+        """Lowest and highest spindle speed [rad/s] between which this one model changes; None where it does not."""
+        return next((r for r in (part.softening_range for part in self.identified.values()) if r is not None), None)
+
+    @property
+    def speed_range(self) -> tuple[float, float] | None:
+        """Lowest and highest spindle speed [rad/s] between which it is known how it changes; None where it does not change."""
+        known = [each for each in (self.softening_range, *(speeds for speeds, _ in self.speed_models)) if each is not None]
+        return (min(low for low, _ in known), max(high for _, high in known)) if known else None
+
+    @property
+    def unknowns(self) -> int:
+        """Directions of the posterior of all axes, of the model that has most of them."""
+        models = (self.identified, *(axes for _, axes in self.speed_models))
+        return max(sum(0 if part.posterior is None else part.posterior.theta.size for part in each.values()) for each in models)
+
+    @property
+    def prepared(self) -> bool:
+        """Whether a further tooling costs milliseconds, its spread included."""
+        return bool(self.kept_sides) and all(side.part.doubt is None or side.ends is not None for side in self.kept_sides)
+
+    @property
+    def workpiece(self) -> Workpiece | None:
+        """That the campaign cut."""
+        return self.identified_workpiece
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What speaks against everything that is computed with it."""
+        return () if self.status is Status.CONVERGED else (f"the identification is {self.status}: {'; '.join(self.reasons)}",)
+
+    def posteriors(self) -> dict[Dof, Posterior]:
+        """Return what a further identification may start from, axis by axis.
+
+        Raises
+        ------
+        InputError
+            An axis has none, as after the published method.
+        """
+        found = {axis: part.posterior for axis, part in self.identified.items() if part.posterior is not None}
+        for axis in self.identified:
+            if axis not in found:
+                allowed = "a result of the default method, with unknowns and covariance of each axis"
+                raise InputError(f"axes.{axis.upper()}", "no covariance", allowed)
+        return found
+
+    def at(self, speed: float | None) -> IdentifiedMachine:
+        """Return the machine at a spindle speed [rad/s]; the nearest model answers, and outside its speeds it stays as it is there."""
+        if speed is None:
+            return self
+        model = self._model(speed)
+        return model if model.softening_range is None else replace(model, speed=speed, kept_sides=())
+
+    def models(self, speeds: FloatArray) -> list[tuple[IdentifiedMachine, NDArray[np.intp]]]:
+        """Return each model that answers at some of the speeds [rad/s], and the places of those."""
+        if not self.speed_models:
+            return [(self, np.arange(speeds.size))]
+        number = np.array([self._number(speed) for speed in speeds.tolist()])
+        # in the order in which the speeds ask for them
+        return [(self._single(k), np.flatnonzero(number == k)) for k in dict.fromkeys(number.tolist())]
+
+    def sides(self, omega: FloatArray) -> tuple[Side, ...]:
+        """Return what a tip feels of the machine at some frequencies [rad/s]: what is kept, where these are the same."""
+        if self.kept_sides and np.array_equal(omega, self.kept_sides[0].omega):
+            return self.kept_sides
+        return super().sides(omega)
+
+    def kept(self, spread: bool = True) -> IdentifiedMachine:
+        """Return the same machine with what a tip feels of it at `lines` worked out: a new tooling then costs milliseconds.
+
+        A machine that changes with the speed, or with too many unknowns to keep them all, is returned as it is.
+
+        Parameters
+        ----------
+        spread : bool
+            Also what the records leave open.
+        """
+        if self.prepared or (self.kept_sides and not spread):
+            return self
+        omega = self.lines()
+        if self.speed_range is not None or self.unknowns * omega.size > MOST_KEPT:
+            return self
+        sides = self.sides(omega)
+        return replace(self, kept_sides=tuple(side.kept() for side in sides) if spread else sides)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # what is kept for speed would cost more on its way to another process than to work out there
+        return {name: value for name, value in self.__dict__.items() if name != "parts"} | {"kept_sides": ()}
+
+    def _number(self, speed: float) -> int:
+        ranges = [speeds for speeds, _ in self.speed_models]
+        return min(range(len(ranges)), key=lambda k: max(ranges[k][0] - speed, speed - ranges[k][1], 0.0))
+
+    def _single(self, number: int) -> IdentifiedMachine:
+        return replace(self, identified=self.speed_models[number][1], speed_models=(), kept_sides=())
+
+    def _model(self, speed: float) -> IdentifiedMachine:
+        return self._single(self._number(speed)) if self.speed_models else self
+
+    def __str__(self) -> str:
+        modes = [f"{axis.upper()} {part.spindle.modes.omega_n.size} modes" for axis, part in self.identified.items()]
+        low, high = (to_hz(w) for w in self.identified_band)
+        changes = "" if self.speed_range is None else ", changes with speed"
+        return f"{self.name or 'machine'}: {', '.join(modes)}, {low:.0f} to {high:.0f} Hz, {self.status}{changes}"

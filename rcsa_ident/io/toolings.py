@@ -1,0 +1,100 @@
+"""TOOLING.toml, written: what `rcsa_ident.io.setups` reads."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rcsa_ident.io.files import write_text
+from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Material
+
+_CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
+
+
+def write_tooling(path: str | Path, tooling: Tooling) -> None:
+    """Write a tooling's file; run-out belongs to a clamping and is left away."""
+    write_text(path, tooling_text(tooling_keys(tooling)))
+
+
+def tooling_keys(tooling: Tooling) -> dict[str, Any]:
+    """Return a tooling as its file holds it, in the machinist's units."""
+    cutter, assembly = tooling.cutter, tooling.assembly
+    materials = dict(MATERIALS)
+    for segment in (*assembly.tool, *assembly.holder):
+        if segment.material not in materials.values():
+            materials[f"material {len(materials) - len(MATERIALS) + 1}"] = segment.material
+    names = {material: name for name, material in materials.items()}
+    data: dict[str, Any] = {
+        "name": tooling.name,
+        "cutter": {"teeth": cutter.teeth, "diameter_mm": 1e3 * cutter.diameter, "helix_deg": float(np.degrees(cutter.helix))},
+        "tool": {"stickout_mm": 1e3 * assembly.stickout, "segments": [_segment(s, names) for s in assembly.tool]},
+        "holder": {"insertion_mm": 1e3 * assembly.insertion, "segments": [_segment(s, names) for s in assembly.holder]},
+    }
+    if np.ptp(cutter.pitch) > 1e-9:
+        data["cutter"]["pitch_deg"] = np.degrees(cutter.pitch).tolist()
+    if assembly.contact is not None:
+        data["contact"] = {key: getattr(assembly.contact, key) for key in _CONTACT}
+    own = {name: material for name, material in materials.items() if name not in MATERIALS}
+    return data | ({"materials": {name: _material(material) for name, material in own.items()}} if own else {})
+
+
+def tooling_text(data: Mapping[str, Any], notes: Sequence[str] = ()) -> str:
+    """Return the text of a tooling file of its keys.
+
+    Parameters
+    ----------
+    data : mapping
+    notes : sequence of str
+        Remarks in front of it.
+    """
+    lines = [f"# {note}" for note in notes]
+    lines.append(f"name = {json.dumps(data['name'], ensure_ascii=False)}")
+    for key in ("cutter", "tool", "holder", "contact"):
+        if key not in data:
+            continue
+        lines.append(f"[{key}]")
+        lines += [f"{name} = {_value(value)}" for name, value in data[key].items() if name != "segments"]
+        if "segments" in data[key]:
+            lines += ["segments = [", *(f"  {_inline(segment)}," for segment in data[key]["segments"]), "]"]
+    for name, material in data.get("materials", {}).items():
+        lines += [f"[materials.{json.dumps(name)}]", *(f"{key} = {_value(value)}" for key, value in material.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _segment(segment: BeamSegment, names: Mapping[Material, str]) -> dict[str, Any]:
+    found: dict[str, Any] = {"length_mm": 1e3 * segment.length, "outer_diameter_mm": 1e3 * segment.diameter}
+    if segment.end_diameter is not None:
+        found["end_diameter_mm"] = 1e3 * segment.end_diameter
+    if segment.inner_diameter:
+        found["inner_diameter_mm"] = 1e3 * segment.inner_diameter
+    found["material"] = names[segment.material]
+    if segment.area is not None and segment.second_moment is not None:
+        found |= {"area_mm2": 1e6 * segment.area, "second_moment_mm4": 1e12 * segment.second_moment}
+    return found
+
+
+def _material(material: Material) -> dict[str, float]:
+    return {
+        "youngs_modulus_gpa": 1e-9 * material.youngs_modulus,
+        "density": material.density,
+        "poisson": material.poisson,
+        "loss_factor": material.loss_factor,
+    }
+
+
+def _inline(segment: Mapping[str, Any]) -> str:
+    return "{ " + ", ".join(f"{k} = {_value(v)}" for k, v in segment.items()) + " }"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, list):
+        return f"[{', '.join(map(_value, value))}]"
+    # metres and back leave a last digit that nobody wrote
+    return str(value) if isinstance(value, int) else repr(round(value, 9)) if abs(value) < 1e6 else repr(float(value))

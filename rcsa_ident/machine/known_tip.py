@@ -1,0 +1,92 @@
+"""The tip of one tooling, measured or written down as modes: in the place of a machine, for that tooling alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.dynamics.uncertain import UncertainReceptance
+from rcsa_ident.errors import InputError
+from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
+from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.stability.lobes import uncoupled_planes
+from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.units import from_hz
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class KnownTip(TipSource):
+    """The tip of one tooling, from tap tests or from a modal model; whatever tooling is named, it answers for that one.
+
+    Parameters
+    ----------
+    known : Receptance or TipModes
+        Over ``tip.x`` and ``tip.y``.
+    """
+
+    known: Receptance | TipModes
+
+    @property
+    def band(self) -> None:
+        """A tip that was measured says itself where it ends."""
+        return
+
+    def lines(self, beyond: float = 1.0) -> FloatArray:
+        """Return the frequencies at which it was measured, or those that resolve its modes."""
+        del beyond
+        return (self.known.receptance() if isinstance(self.known, TipModes) else self.known).omega
+
+    def tip(
+        self,
+        tooling: Tooling | ToolAssembly,
+        omega: FloatArray | None = None,
+        spread: bool = True,
+        stiffness_spread: float = STIFFNESS_SPREAD,
+    ) -> UncertainReceptance | TipModes:
+        """Return the tip as it is known, whatever tooling is named."""
+        del tooling, omega, spread, stiffness_spread
+        if isinstance(self.known, TipModes):
+            return self.known
+        return UncertainReceptance(self.known.omega, self.known.values, self.known.rows, self.known.cols)
+
+    def __str__(self) -> str:
+        return f"of one tooling: {self.known}"
+
+
+def measured_tip(
+    curves: Mapping[Dof, tuple[FloatArray, ComplexArray]], cross: Mapping[tuple[Dof, Dof], tuple[FloatArray, ComplexArray]] | None = None
+) -> Receptance:
+    """Return the tip's 2 x 2 receptance of measured FRFs.
+
+    Parameters
+    ----------
+    curves : mapping of Dof to (frequency [Hz], values [m/N])
+        A direction that is missing is rigid.
+    cross : mapping of (response, force) to (frequency [Hz], values [m/N]), optional
+        Of two directions that are both there; one of the two stands for the other, too, as Maxwell's reciprocity has it.
+    """
+    planes = {}
+    for axis, (frequency, values) in curves.items():
+        tip = (Coordinate("tip", axis),)
+        planes[axis] = Receptance(from_hz(frequency), np.asarray(values)[:, None, None], tip, tip)
+    both = uncoupled_planes(planes.get(Dof.X), planes.get(Dof.Y))
+    if not cross:
+        return both
+    missing = [axis for axis in (Dof.X, Dof.Y) if axis not in planes]
+    if missing:
+        raise InputError("cross FRF", f"one without an FRF in {missing[0].upper()}", "FRFs in both directions beside it")
+    full = both.values.copy()
+    places = {Dof.X: 0, Dof.Y: 1}
+    for (response, force), (frequency, values) in cross.items():
+        if not np.array_equal(from_hz(frequency), both.omega):
+            raise InputError("cross FRF", f"{np.size(frequency)} frequencies", f"the {both.omega.size} frequencies of the direct FRFs")
+        full[:, places[response], places[force]] = values
+        if (force, response) not in cross:
+            full[:, places[force], places[response]] = values
+    return Receptance(both.omega, full, both.rows, both.cols)

@@ -1,0 +1,197 @@
+"""A machine: whatever stands behind the flange, ready to take a tool-holder.
+
+An identified spindle, a measured or decoupled flange and a robot at a posture differ in what they know of themselves; a tooling is coupled
+to all of them in the same way, and nobody downstream asks which of them it is.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+from rcsa_ident.dynamics.uncertain import UncertainReceptance
+from rcsa_ident.machine.flange_part import FlangePart
+from rcsa_ident.machine.responses import at_ends, at_flange, respond_over
+from rcsa_ident.machine.tip import Side, tip_over_sides
+from rcsa_ident.machining_setup import Tooling, Workpiece
+from rcsa_ident.shown import Drawn, Shown
+from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.tool_holder.model import tool_holder_receptance
+
+#: Lower end of the receptances that limits are computed from, and their step [Hz].
+LOWEST, STEP = 100.0, 1.0
+#: Relative standard deviation of a tool-holder's stiffness that stands for its mesh.
+STIFFNESS_SPREAD = 5e-4
+
+
+class TipSource(Shown, ABC):
+    """Whoever knows what the tip of a tooling does: a machine that takes any, or a test of one."""
+
+    @property
+    @abstractmethod
+    def band(self) -> tuple[float, float] | None:
+        """Lowest and highest frequency at which it is known [rad/s]; None where it is known at all."""
+
+    @property
+    def speed_range(self) -> tuple[float, float] | None:
+        """Lowest and highest spindle speed [rad/s] between which it is known how it changes; None where it does not change."""
+        return None
+
+    @property
+    def unknowns(self) -> int:
+        """Independent directions in which it may differ from what is believed."""
+        return 0
+
+    @property
+    def prepared(self) -> bool:
+        """Whether a further tooling costs milliseconds, its spread included."""
+        return True
+
+    @property
+    def workpiece(self) -> Workpiece | None:
+        """What was cut, where that is known: its coefficients serve a cut that names none."""
+        return None
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What speaks against everything that is computed with it."""
+        return ()
+
+    def at(self, speed: float | None) -> TipSource:
+        """Return what answers at a spindle speed [rad/s], by default at the middle of the speeds that it is known at."""
+        del speed
+        return self
+
+    def models(self, speeds: FloatArray) -> Sequence[tuple[TipSource, NDArray[np.intp]]]:
+        """Return each model that answers at some of the speeds [rad/s], and the places of those."""
+        return [(self, np.arange(speeds.size))]
+
+    @abstractmethod
+    def lines(self, beyond: float = 1.0) -> FloatArray:
+        """Return the frequencies [rad/s] of its receptances, up to so many times the highest at which it is known."""
+
+    @abstractmethod
+    def tip(
+        self,
+        tooling: Tooling | ToolAssembly,
+        omega: FloatArray | None = None,
+        spread: bool = True,
+        stiffness_spread: float = STIFFNESS_SPREAD,
+    ) -> UncertainReceptance | TipModes:
+        """Return what the tip of a tooling does."""
+
+
+class Machine(TipSource, Drawn):
+    """What stands behind the flange.
+
+    A subclass says what it is by `parts` and `band`, and what else it knows of itself: how it changes with the speed (`at`, `models`,
+    `speed_range`), and what speaks against it (`remarks`).
+    """
+
+    @property
+    @abstractmethod
+    def parts(self) -> tuple[FlangePart, ...]:
+        """Directions of the flange that feel each other, group by group."""
+
+    @property
+    def ends(self) -> bool:
+        """Whether it answers at no frequency beyond `band`, as a measurement does."""
+        return False
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """Directions of the flange that are known."""
+        return tuple(c for part in self.parts for c in part.coordinates)
+
+    @property
+    def axes(self) -> tuple[Dof, ...]:
+        """Machine axes along which the tip moves."""
+        return tuple(c.dof for c in self.coordinates if not c.dof.is_slope)
+
+    def lines(self, beyond: float = 1.0) -> FloatArray:
+        """Return frequencies [rad/s] 1 Hz apart, from 100 Hz or below up to so many times the highest at which the machine is known."""
+        assert self.band is not None
+        low, high = (w / (2.0 * np.pi) for w in self.band)
+        return 2.0 * np.pi * np.arange(min(LOWEST, low), beyond * high + 0.5 * STEP, STEP)
+
+    def at(self, speed: float | None) -> Machine:
+        """Return the machine at a spindle speed [rad/s], by default at the middle of the speeds that it is known at."""
+        del speed
+        return self
+
+    def kept(self, spread: bool = True) -> Machine:
+        """Return the same machine, with what many toolings share worked out, where that saves time; of its spread only if asked."""
+        del spread
+        return self
+
+    def sides(self, omega: FloatArray) -> tuple[Side, ...]:
+        """Return what a tip feels of the machine at some frequencies [rad/s]."""
+        omega = frozen(omega)
+        return tuple(Side.of(part, omega) for part in self.parts)
+
+    def receptance(self, omega: FloatArray, axes: Sequence[Dof] | None = None) -> UncertainReceptance:
+        """Return the receptance at the flange, over all its coordinates.
+
+        Parameters
+        ----------
+        omega : array, shape (n,) [rad/s]
+        axes : sequence of Dof, default all
+            Only these machine axes, and what they feel of others.
+        """
+        return respond_over(self._along(axes), frozen(omega), at_flange)
+
+    def coupled(self, tooling: Tooling | ToolAssembly, omega: FloatArray, axes: Sequence[Dof] | None = None) -> UncertainReceptance:
+        """Return the receptances of a tooling on the machine between tip and spindle, translations and slopes.
+
+        Parameters
+        ----------
+        tooling : Tooling or ToolAssembly
+        omega : array, shape (n,) [rad/s]
+        axes : sequence of Dof, default all
+            Only these machine axes, and what they feel of others.
+
+        Returns
+        -------
+        UncertainReceptance
+            Points ``tip`` and ``spindle``; the tool-holder is taken for exact.
+        """
+        holder = tool_holder_receptance(_assembly(tooling), frozen(omega))
+        return respond_over(self._along(axes), frozen(omega), at_ends, holder)
+
+    def tip(
+        self,
+        tooling: Tooling | ToolAssembly,
+        omega: FloatArray | None = None,
+        spread: bool = True,
+        stiffness_spread: float = STIFFNESS_SPREAD,
+    ) -> UncertainReceptance:
+        """Return the tip's receptance of a tooling on the machine, over ``tip.x`` and ``tip.y`` with their cross terms.
+
+        Parameters
+        ----------
+        tooling : Tooling or ToolAssembly
+        omega : array, shape (n,) [rad/s], default the machine's `lines`
+            Ascending.
+        spread : bool
+            With what is not known of the machine, where something is; it is computed where it is asked for.
+        stiffness_spread : float
+            Standard deviation of the tool-holder's stiffness, as a share: the mesh alone by default; 0.01 for a modulus from a handbook.
+        """
+        sides = self.sides(self.lines() if omega is None else omega)
+        tip = tip_over_sides(sides, _assembly(tooling), stiffness_spread)
+        return tip if spread else replace(tip, variation=None)
+
+    def _along(self, axes: Sequence[Dof] | None) -> list[FlangePart]:
+        """The parts that some axes feel."""
+        return [part for part in self.parts if axes is None or any(c.dof in axes for c in part.coordinates)]
+
+
+def _assembly(tooling: Tooling | ToolAssembly) -> ToolAssembly:
+    return tooling.assembly if isinstance(tooling, Tooling) else tooling

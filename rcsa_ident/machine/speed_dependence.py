@@ -1,0 +1,98 @@
+"""Tips over the spindle's speed: speeds that are close together share one receptance, those of a machine that stays share the same one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.dynamics.uncertain import Mixed, UncertainReceptance
+from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
+from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.tool_holder.geometry import ToolAssembly
+
+#: Speeds of one block share one tip receptance: relative width of a block.
+BLOCK = 0.025
+#: Largest ratio of speeds over which the spread that the posterior leaves is taken for a straight line.
+STRAIGHT = 1.6
+
+
+def tips_over_speed(
+    machine: TipSource,
+    tooling: Tooling | ToolAssembly,
+    omega: FloatArray,
+    speeds: FloatArray,
+    spread: bool = True,
+    stiffness_spread: float = STIFFNESS_SPREAD,
+) -> Iterator[tuple[NDArray[np.intp], UncertainReceptance | TipModes]]:
+    """Yield the tip for each block of speeds that share one, beside the places of these speeds.
+
+    Parameters
+    ----------
+    machine : TipSource
+    tooling : Tooling or ToolAssembly
+    omega : array, shape (k,) [rad/s]
+        Of the receptances.
+    speeds : array, shape (n,) [rad/s]
+        In any order; each is in one block.
+    spread : bool
+        With what is not known of the machine.
+    stiffness_spread : float
+        Standard deviation of the tool-holder's stiffness, as a share.
+    """
+    for model, places in machine.models(speeds):
+        own, known = speeds[places], model.speed_range
+        if known is None:
+            yield places, model.tip(tooling, omega, spread, stiffness_spread)
+            continue
+        tips = _ChangingTip(model, tooling, omega, own, known, spread, stiffness_spread)
+        for block in _blocks(own, known):
+            yield places[block], tips.at(own[block])
+
+
+def _blocks(speeds: FloatArray, known: tuple[float, float]) -> list[NDArray[np.intp]]:
+    """Places of the speeds of each block; what lies beyond the known range belongs to its ends."""
+    number = np.floor(np.log(np.clip(speeds, *known) / known[0]) / np.log1p(BLOCK)).astype(int)
+    return [np.flatnonzero(number == n) for n in np.unique(number)]
+
+
+class _ChangingTip:
+    """Tips of one model that changes: each its own, with a spread that is interpolated between a few."""
+
+    def __init__(
+        self,
+        model: TipSource,
+        tooling: Tooling | ToolAssembly,
+        omega: FloatArray,
+        speeds: FloatArray,
+        known: tuple[float, float],
+        spread: bool,
+        stiffness_spread: float,
+    ) -> None:
+        self.model, self.tooling, self.omega, self.known, self.stiffness_spread = model, tooling, omega, known, stiffness_spread
+        self.anchors, self.tips = np.zeros(0), list[UncertainReceptance | TipModes]()
+        if spread:
+            low, high = np.clip([speeds.min(), speeds.max()], *known)
+            pieces = int(np.ceil(np.log(high / low) / np.log(STRAIGHT)))
+            self.anchors = np.linspace(low, high, pieces + 1) if high > (1.0 + BLOCK) * low else np.array([0.5 * (low + high)])
+            self.tips = [self._tip(speed, True) for speed in self.anchors.tolist()]
+
+    def _tip(self, speed: float, spread: bool) -> UncertainReceptance | TipModes:
+        return self.model.at(speed).tip(self.tooling, self.omega, spread, self.stiffness_spread)
+
+    def at(self, speeds: FloatArray) -> UncertainReceptance | TipModes:
+        """Return the tip at the middle of a block's speeds."""
+        speed = float(np.mean(np.clip([speeds.min(), speeds.max()], *self.known)))
+        tip = self._tip(speed, False)
+        if not self.tips or isinstance(tip, TipModes):
+            return tip
+        # the directions are those of the covariance, the same at all speeds: their responses can be interpolated
+        place = float(np.interp(speed, self.anchors, np.arange(self.anchors.size)))
+        first = min(int(place), self.anchors.size - 1)
+        ends = (self.tips[first], self.tips[min(first + 1, self.anchors.size - 1)])
+        known = [end.variation for end in ends if isinstance(end, UncertainReceptance) and end.variation is not None]
+        return replace(tip, variation=Mixed(known[0], known[1], place - first)) if len(known) == 2 else tip

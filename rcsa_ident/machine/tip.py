@@ -1,0 +1,251 @@
+"""The tip of a tool-holder on a machine: C11 = A11 - A12 (A22 + W)^-1 A21, and how it varies with what is not known of W.
+
+The identified machine's spread has a hundred directions; each costs two machines at every frequency that is asked for. So variations are
+computed where they are asked for, and those of W, which are the same for every tooling, can be kept (`kept`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.coupling._kernels import tip_changes, tips_over
+from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.uncertain import Places, UncertainReceptance, Variation
+from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange
+from rcsa_ident.tool_holder.geometry import ToolAssembly, stiffened
+from rcsa_ident.tool_holder.model import tool_holder_poles
+
+#: Of a tool-holder's receptances (translation and slope of the tip, then of the flange): tip, tip over flange, flange over tip, flange.
+_ENTRIES = ((0, 0), (0, 2), (0, 3), (2, 0), (3, 0), (2, 2), (2, 3), (3, 2), (3, 3))
+
+
+def _none() -> ComplexArray:
+    return np.zeros((0, 0, 0, 0), dtype=complex)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ends:
+    """W at both ends of each step of a part, as the kernels read them.
+
+    Parameters
+    ----------
+    ahead, behind : complex arrays, shape (n, p, 3) for one plane, (p, n, b, b) for planes that feel each other
+        One plane: translation, both, slope; asked for at some frequencies, all directions of each, so they stand together in memory.
+    """
+
+    ahead: ComplexArray
+    behind: ComplexArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Side:
+    """One part of a machine behind the flange, at frequencies that many toolings share.
+
+    Parameters
+    ----------
+    part : FlangePart
+    omega : array, shape (n,) [rad/s]
+    nominal : complex array, shape (n, b, b)
+        W of what is believed.
+    ends : Ends or None
+        At all frequencies where it is kept, else computed for each question.
+    """
+
+    part: FlangePart
+    omega: FloatArray
+    nominal: ComplexArray
+    doubt: Doubt | None = None
+    rivals: ComplexArray = field(default_factory=_none)
+    ends: Ends | None = None
+
+    @classmethod
+    def of(cls, part: FlangePart, omega: FloatArray) -> Side:
+        """Return a part at some frequencies, its doubts left for later."""
+        return cls(part, omega, frozen(part.believed.interface(omega), np.complex128))
+
+    @property
+    def single(self) -> bool:
+        """Whether it is one bending plane."""
+        return len(self.part.coordinates) == 2
+
+    @property
+    def axes(self) -> tuple[Coordinate, ...]:
+        """The tip's translations that it moves."""
+        return tuple(Coordinate("tip", c.dof) for c in self.part.coordinates if not c.dof.is_slope)
+
+    def doubted(self) -> Side:
+        """Return the same with what is not known of it, without the steps' ends."""
+        if self.part.doubt is None or self.doubt is not None:
+            return self
+        doubt = self.part.doubt()
+        size = len(self.part.coordinates)
+        rivals = np.array([c.interface(self.omega) for c in doubt.rivals]).reshape(-1, self.omega.size, size, size)
+        return replace(self, doubt=doubt, rivals=rivals)
+
+    def kept(self) -> Side:
+        """Return the same with the ends of all steps at all frequencies."""
+        side = self.doubted()
+        return side if side.doubt is None or side.ends is not None else replace(side, ends=side.ends_at(np.arange(self.omega.size))[0])
+
+    def ends_at(self, places: Places) -> tuple[Ends, Places]:
+        """Return the ends of all steps, and where those of `places` stand in them."""
+        if self.ends is not None:
+            return self.ends, places
+        assert self.doubt is not None
+        omega = self.omega[places]
+        ahead, behind = ([_laid(c.interface(omega), self.single) for c in row] for row in _both(self.doubt))
+        if self.single:
+            return Ends(*(np.array(each).reshape(-1, omega.size, 3).transpose(1, 0, 2).copy() for each in (ahead, behind))), np.arange(
+                omega.size
+            )
+        size = len(self.part.coordinates)
+        return Ends(*(np.array(each).reshape(-1, omega.size, size, size) for each in (ahead, behind))), np.arange(omega.size)
+
+
+def _both(doubt: Doubt) -> tuple[list[JointedFlange], list[JointedFlange]]:
+    return [step.ahead for step in doubt.steps], [step.behind for step in doubt.steps]
+
+
+def _laid(w: ComplexArray, single: bool) -> ComplexArray:
+    """Translation, both and slope of a plane's W, shape (n, 3)."""
+    return np.stack([w[:, 0, 0], 0.5 * (w[:, 0, 1] + w[:, 1, 0]), w[:, 1, 1]], axis=1) if single else w
+
+
+def _planes(w: ComplexArray) -> ComplexArray:
+    """The same with the frequencies last, shape (..., n, 2, 2) -> (..., 3, n)."""
+    return np.stack([w[..., 0, 0], 0.5 * (w[..., 0, 1] + w[..., 1, 0]), w[..., 1, 1]], axis=-2)
+
+
+class Holder:
+    """A tool-holder's free receptances between tip and flange, alike in both bending planes.
+
+    Parameters
+    ----------
+    assembly : ToolAssembly
+    omega : array, shape (n,) [rad/s]
+    """
+
+    def __init__(self, assembly: ToolAssembly, omega: FloatArray) -> None:
+        free = tool_holder_poles(assembly, float(omega[-1])).entries(omega, _ENTRIES)
+        to, back = free[1:3], free[3:5]
+        self.free = free
+        self.tip_tip, self.flange = free[0].copy(), np.stack([free[5], 0.5 * (free[6] + free[7]), free[8]])
+        self.carried = np.stack([to[0] * back[0], to[0] * back[1] + to[1] * back[0], to[1] * back[1]])
+
+    def at(self, places: Places) -> Holder:
+        """Return the same at some of the frequencies."""
+        part = object.__new__(Holder)
+        part.free = self.free[:, places]
+        part.tip_tip, part.flange, part.carried = self.tip_tip[places], self.flange[:, places], self.carried[:, places]
+        return part
+
+    def tip(self, w: ComplexArray) -> ComplexArray:
+        """Return C11 of the translations for W, shape (..., n, b, b) -> (..., n, b / 2, b / 2), at this holder's frequencies."""
+        if w.shape[-1] == 2:
+            rows = np.ascontiguousarray(_planes(w))
+            found: ComplexArray = tips_over(self.tip_tip, self.flange, self.carried, rows.reshape(-1, *rows.shape[-2:]))
+            return found.reshape(*w.shape[:-2], 1, 1)
+        return self._tip_of_planes(w)
+
+    def _tip_of_planes(self, w: ComplexArray) -> ComplexArray:
+        """The same where planes feel each other: the holder's blocks stand on the diagonal, once for each plane."""
+        count, n = w.shape[-1] // 2, self.tip_tip.size
+        unit = np.eye(count)
+        a12, a21, a22 = self.free[1:3].T, self.free[3:5].T, self.free[5:9].T.reshape(n, 2, 2)
+        forward = np.einsum("ab,ni->nabi", unit, a12).reshape(n, count, 2 * count)
+        back = np.einsum("ab,ni->naib", unit, a21).reshape(n, 2 * count, count)
+        middle = np.einsum("ab,nij->naibj", unit, a22).reshape(n, 2 * count, 2 * count)
+        tip_tip = self.tip_tip[:, None, None] * unit
+        found: ComplexArray = tip_tip - forward @ np.linalg.solve(middle + w, np.broadcast_to(back, (*w.shape[:-1], count)))
+        return found
+
+    def changes(self, side: Side, places: Places) -> ComplexArray:
+        """Return C11's change along each step of a part, shape (p, k, b / 2, b / 2), per standard deviation; places are this holder's."""
+        assert side.doubt is not None
+        weight = np.array([step.weight for step in side.doubt.steps])
+        ends, own = side.ends_at(places)
+        if side.single:
+            if weight.size == 0:
+                return np.zeros((0, places.size, 1, 1), dtype=complex)
+            found: ComplexArray = tip_changes(self.tip_tip, self.flange, self.carried, ends.ahead, ends.behind, weight, own)
+            return found[:, :, None, None]
+        return weight[:, None, None, None] * (self.tip(ends.ahead[:, own]) - self.tip(ends.behind[:, own]))
+
+
+@dataclass(frozen=True, eq=False)
+class TipSpread:
+    """How a tip varies: with the machine's steps and rivals, and with the tool-holder's stiffness.
+
+    Parameters
+    ----------
+    sides : sequence of Side
+    members : tuple of (tuple of int), one for each side
+        Where its translations stand in the tip's receptance.
+    holder : Holder
+    assembly : ToolAssembly
+    stiffness_spread : float
+        Standard deviation of the tool-holder's stiffness, as a share.
+    """
+
+    sides: Sequence[Side]
+    members: tuple[tuple[int, ...], ...]
+    holder: Holder
+    assembly: ToolAssembly
+    stiffness_spread: float
+
+    @property
+    def covers(self) -> frozenset[int]:
+        """Rows of the tip's receptance that vary."""
+        return frozenset(m for side, members in zip(self.sides, self.members, strict=True) if side.part.doubt is not None for m in members)
+
+    @cached_property
+    def _known(self) -> list[tuple[Side, tuple[int, ...]]]:
+        return [(s.doubted(), m) for s, m in zip(self.sides, self.members, strict=True) if s.part.doubt is not None]
+
+    def at(self, places: Places) -> tuple[Variation, ...]:
+        """Return the variations at some of the frequencies."""
+        holder, omega = self.holder.at(places), self.sides[0].omega[places]
+        stiffer = Holder(stiffened(self.assembly, self.stiffness_spread), omega) if self.stiffness_spread > 0.0 else None
+        found = []
+        for side, members in self._known:
+            here = holder.tip(side.nominal[places])
+            rows = [holder.changes(side, places), holder.tip(side.rivals[:, places]) - here]
+            if stiffer is not None:
+                rows.append((stiffer.tip(side.nominal[places]) - here)[None])
+            change = np.concatenate(rows)
+            found.append(Variation(members, change if len(change) else np.zeros((1, *here.shape), dtype=complex)))
+        return tuple(found)
+
+    def guides(self) -> ComplexArray:
+        """Return the tips of the rivals, each entry a curve."""
+        curves = [self.holder.tip(side.rivals).transpose(0, 2, 3, 1).reshape(-1, side.omega.size) for side, _ in self._known]
+        return np.concatenate([np.zeros((0, self.sides[0].omega.size), dtype=complex), *curves])
+
+
+def tip_over_sides(sides: Sequence[Side], assembly: ToolAssembly, stiffness_spread: float) -> UncertainReceptance:
+    """Return the tip's receptance of a tooling on a machine, with its spread where something is not known.
+
+    Parameters
+    ----------
+    sides : sequence of Side
+        All parts of the machine, at the same frequencies.
+    assembly : ToolAssembly
+    stiffness_spread : float
+        Standard deviation of the tool-holder's stiffness, as a share.
+    """
+    omega = sides[0].omega
+    holder = Holder(assembly, omega)
+    axes = [c for side in sides for c in side.axes]
+    values, members = np.zeros((omega.size, len(axes), len(axes)), dtype=complex), []
+    for side in sides:
+        own = tuple(axes.index(c) for c in side.axes)
+        values[:, own[0] : own[-1] + 1, own[0] : own[-1] + 1] = holder.tip(side.nominal)
+        members.append(own)
+    known = any(side.part.doubt is not None for side in sides)
+    spread = TipSpread(tuple(sides), tuple(members), holder, assembly, stiffness_spread) if known else None
+    return UncertainReceptance(omega, values, tuple(axes), tuple(axes), spread)

@@ -1,0 +1,378 @@
+"""What a machinist asks of stability lobes: which speed for a depth, how to remove most, how far a planned cut is from chatter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.cutting.power import SpindleDrive, spindle_load
+from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.errors import InputError, positive
+from rcsa_ident.shown import Drawn, Shown
+from rcsa_ident.stability.pockets import least_within_tolerance, peaks
+from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, StabilityLobes
+from rcsa_ident.stability.tested_cuts import Tally
+from rcsa_ident.units import to_cm3_per_min, to_rpm
+
+
+class Bound(StrEnum):
+    """What ends the depth at a speed."""
+
+    CHATTER = "chatter"
+    POWER = "power"
+    TORQUE = "torque"
+    SPEED = "speed"
+    DEPTH = "depth"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class UsableDepths(Shown):
+    """How deep one may cut at each speed, and what stands against more.
+
+    Parameters
+    ----------
+    spindle_speed : array, shape (n,) [rad/s]
+        Rising.
+    limit : array, shape (n,) [m]
+        The stability limit, up to the largest depth.
+    stable : array, shape (n,) [m]
+        The recommended depth by stability alone: the limit less what is held back of it.
+    by_power, by_torque : array, shape (n,) [m]
+        By what the spindle has, up to the largest depth.
+    depth : array, shape (n,) [m]
+        The smallest of them; 0 beyond the spindle's highest speed.
+    bound : tuple of Bound, length n
+    removal_rate : array, shape (n,) [m^3/s], or None
+        At that depth; None without a feed.
+    """
+
+    spindle_speed: FloatArray
+    limit: FloatArray
+    stable: FloatArray
+    by_power: FloatArray
+    by_torque: FloatArray
+    depth: FloatArray
+    bound: tuple[Bound, ...]
+    removal_rate: FloatArray | None
+
+    def __post_init__(self) -> None:
+        for name in self._arrays:
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    @property
+    def _arrays(self) -> tuple[str, ...]:
+        names = ("spindle_speed", "limit", "stable", "by_power", "by_torque", "depth")
+        return names if self.removal_rate is None else (*names, "removal_rate")
+
+    @property
+    def removal(self) -> FloatArray:
+        """The removal rate, shape (n,) [m^3/s].
+
+        Raises
+        ------
+        InputError
+            Without a feed per tooth it is not known.
+        """
+        if self.removal_rate is None:
+            raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: the removal rate grows with it")
+        return self.removal_rate
+
+    def between(self, low: float, high: float) -> UsableDepths:
+        """Return what is known of a range of speeds [rad/s]."""
+        inside = (self.spindle_speed >= low * (1.0 - 1e-9)) & (self.spindle_speed <= high * (1.0 + 1e-9))
+        arrays = {"removal_rate": None} | {name: getattr(self, name)[inside] for name in self._arrays}
+        return UsableDepths(**arrays, bound=tuple(b for b, there in zip(self.bound, inside, strict=True) if there))
+
+    def __str__(self) -> str:
+        if self.spindle_speed.size == 0:
+            return "no speeds"
+        speed, depth = to_rpm(self.spindle_speed), 1e3 * self.depth
+        return f"{speed[0]:.0f} to {speed[-1]:.0f} rev/min: recommended depth {depth.min():.2f} to {depth.max():.2f} mm"
+
+
+def usable_depths(
+    lobes: StabilityLobes,
+    process: MillingProcess,
+    drive: SpindleDrive,
+    tolerance: float = TOLERANCE,
+    probability: float = PROBABILITY,
+    reserve: float = RESERVE,
+) -> UsableDepths:
+    """Return how deep one may cut at each speed.
+
+    Parameters
+    ----------
+    lobes : StabilityLobes
+        Speeds rise.
+    process : MillingProcess
+        Power, torque and removal rate grow with its feed per tooth; a drive whose power and torque have no limit does without.
+    drive : SpindleDrive
+    tolerance, probability, reserve : float
+        What is held back: see `StabilityLobes.recommended_depth`.
+    """
+    speed = lobes.spindle_speed
+    stable = lobes.recommended_depth(tolerance, probability, reserve)
+    torque, power = drive.torque_at(speed), drive.power_at(speed)
+    removal_rate = None
+    if process.feed_per_tooth is not None:
+        # all grow in proportion to the depth
+        load = spindle_load(process.cutter, process.conditions(1.0, 1.0), process.coefficients)
+        torque, power = torque / load.torque, power / (load.torque * speed)
+    elif np.any(np.isfinite(drive.torque) | np.isfinite(drive.power)):
+        raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: power and torque grow with it")
+    by_torque, by_power = np.minimum(torque, lobes.max_depth), np.minimum(power, lobes.max_depth)
+    table = np.stack([stable, by_power, by_torque])
+    depth = table.min(axis=0)
+    which = table.argmin(axis=0)
+    names = (Bound.CHATTER, Bound.POWER, Bound.TORQUE)
+    whole = (1.0 - reserve) * lobes.max_depth * (1.0 - 1e-12)
+    bound = [
+        Bound.SPEED if d == 0.0 else Bound.DEPTH if d >= whole else names[k] for d, k in zip(depth.tolist(), which.tolist(), strict=True)
+    ]
+    if process.feed_per_tooth is not None:
+        removal_rate = depth * load.removal_rate * speed
+    return UsableDepths(speed, lobes.nominal, stable, by_power, by_torque, depth, tuple(bound), removal_rate)
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class OperatingPoint(Shown):
+    """A cut that is recommended.
+
+    Parameters
+    ----------
+    spindle_speed : float [rad/s]
+    depth : float [m]
+    limit : float [m]
+        The stability limit there, up to the largest depth.
+    bound : Bound
+        What stands against more depth.
+    removal_rate : float or None [m^3/s]
+        None without a feed, as are power and torque.
+    power : float or None [W]
+    torque : float or None [N m]
+    """
+
+    spindle_speed: float
+    depth: float
+    limit: float
+    bound: Bound
+    removal_rate: float | None
+    power: float | None
+    torque: float | None
+
+    def __str__(self) -> str:
+        depths = f"stability limit {1e3 * self.limit:.2f} mm, recommended {1e3 * self.depth:.2f} mm"
+        ended = "" if self.bound is Bound.CHATTER else f" (ended by {self.bound})"
+        removed = "" if self.removal_rate is None else f", {to_cm3_per_min(self.removal_rate):.0f} cm³/min"
+        taken = "" if self.power is None else f", {1e-3 * self.power:.2g} kW"
+        return f"{to_rpm(self.spindle_speed):.0f} rev/min: {depths}{ended}{removed}{taken}"
+
+
+def highest_removal(usable: UsableDepths, process: MillingProcess, count: int = 3) -> list[OperatingPoint]:
+    """Return the cuts that remove most, one for each pocket, the best first."""
+    found = []
+    # whatever the feed is, the removal rate grows with speed and depth
+    level = usable.depth * usable.spindle_speed if usable.removal_rate is None else usable.removal_rate
+    for speed, _ in peaks(usable.spindle_speed, level, count):
+        place = int(np.argmin(np.abs(usable.spindle_speed - speed)))
+        at, depth, limit = (float(values[place]) for values in (usable.spindle_speed, usable.depth, usable.limit))
+        if depth <= 0.0:
+            continue
+        if process.feed_per_tooth is None:
+            found.append(OperatingPoint(at, depth, limit, usable.bound[place], None, None, None))
+        else:
+            load = spindle_load(process.cutter, process.conditions(at, depth), process.coefficients)
+            found.append(OperatingPoint(at, depth, limit, usable.bound[place], load.removal_rate, load.power, load.torque))
+    return found
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class SpeedWindow(Shown):
+    """Speeds at which a depth is allowed.
+
+    Parameters
+    ----------
+    low, high : float [rad/s]
+    best : float [rad/s]
+        Where most is allowed; the middle where that is so at several.
+    allowed : float [m]
+        What is allowed there.
+    """
+
+    low: float
+    high: float
+    best: float
+    allowed: float
+
+    @property
+    def width(self) -> float:
+        """Width over the middle."""
+        return (self.high - self.low) / (0.5 * (self.high + self.low))
+
+    def __str__(self) -> str:
+        best = f"up to {1e3 * self.allowed:.2f} mm at {to_rpm(self.best):.0f} rev/min"
+        return f"{to_rpm(self.low):.0f} to {to_rpm(self.high):.0f} rev/min, {best}"
+
+
+def speed_windows(usable: UsableDepths, depth: float) -> list[SpeedWindow]:
+    """Return the ranges of speed in which a depth is allowed, the one with the most reserve first; ends by straight lines."""
+    depth = positive("depth", depth, "m")
+    speed, allowed = usable.spindle_speed, usable.depth
+    good = allowed >= depth
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
+    found = []
+    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        low = _crossing(speed, allowed, first - 1, depth) if first > 0 else float(speed[0])
+        high = _crossing(speed, allowed, end - 1, depth) if end < speed.size else float(speed[-1])
+        top = float(allowed[first:end].max())
+        best = first + np.flatnonzero(allowed[first:end] >= top * (1.0 - 1e-12))
+        found.append(SpeedWindow(low, high, 0.5 * float(speed[best[0]] + speed[best[-1]]), top))
+    return sorted(found, key=lambda w: (-w.allowed, -w.width))
+
+
+def _crossing(speed: FloatArray, level: FloatArray, place: int, value: float) -> float:
+    """Where the line from `place` to the next meets a value."""
+    a, b = float(level[place]), float(level[place + 1])
+    return float(speed[place] + (value - a) / (b - a) * (speed[place + 1] - speed[place]))
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class PlannedCut(Shown):
+    """How a cut stands that somebody wants to make.
+
+    Parameters
+    ----------
+    spindle_speed : float [rad/s]
+    depth : float [m]
+    limit : float [m]
+        Infinite where it is stable up to the depth that was asked for.
+    robust_limit : float [m]
+        The lowest within the tolerance of the speed and with the probability that were asked for.
+    chatter_frequency : float or None [rad/s]
+        Of the vibration at the limit; None where it is stable up to the depth that was asked for.
+    slower, faster : float or None [rad/s]
+        The nearest speeds at which the same depth is on the other side of the limit; None if the range holds none.
+    probability : float or None
+        That it is stable, where machines were drawn.
+    load : float
+        Share of the power or of the torque that it takes, the larger of both; 0 without known limits.
+    power : float [W]
+    torque : float [N m]
+    removal_rate : float [m^3/s]
+    """
+
+    spindle_speed: float
+    depth: float
+    limit: float
+    robust_limit: float
+    chatter_frequency: float | None
+    slower: float | None
+    faster: float | None
+    probability: float | None
+    load: float
+    power: float
+    torque: float
+    removal_rate: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether the machine as it was identified allows it."""
+        return self.depth <= self.limit
+
+    @property
+    def margin(self) -> float:
+        """Share of the cut's depth by which the limit lies above it; negative above the limit."""
+        return self.limit / self.depth - 1.0
+
+    def __str__(self) -> str:
+        limit = "no stability limit in the depths asked for" if self.limit == np.inf else f"stability limit {1e3 * self.limit:.2f} mm"
+        sure = "" if self.probability is None else f", stable with {100.0 * self.probability:.0f} % probability"
+        state = "stable" if self.stable else "chatter"
+        return f"{to_rpm(self.spindle_speed):.0f} rev/min, {1e3 * self.depth:.2f} mm: {state}, {limit}{sure}"
+
+
+def planned_cut(
+    lobes: StabilityLobes,
+    process: MillingProcess,
+    drive: SpindleDrive,
+    speed: float,
+    depth: float,
+    tolerance: float = TOLERANCE,
+    probability: float = PROBABILITY,
+) -> PlannedCut:
+    """Return how a cut stands; its speed is one of those of the lobes (`pad_speeds` puts it among them)."""
+    depth = positive("depth", depth, "m")
+    speeds = lobes.spindle_speed
+    place = int(np.argmin(np.abs(speeds - positive("speed", speed, "rad/s"))))
+    if abs(speeds[place] - speed) > 1e-6 * speed or depth > lobes.max_depth:
+        raise InputError("planned cut", f"{speed:g} rad/s and {depth:g} m", f"a speed of the lobes and at most {lobes.max_depth:g} m")
+    nominal = lobes.nominal
+    other = (nominal >= depth) != (nominal[place] >= depth)
+    below, above = np.flatnonzero(other[:place]), np.flatnonzero(other[place + 1 :])
+    slower = _crossing(speeds, nominal, int(below[-1]), depth) if below.size else None
+    faster = _crossing(speeds, nominal, place + int(above[0]), depth) if above.size else None
+    load = spindle_load(process.cutter, process.conditions(speed, depth), process.coefficients)
+    power, torque = drive.power_at(speeds[place : place + 1])[0], drive.torque_at(speeds[place : place + 1])[0]
+    with np.errstate(divide="ignore"):
+        share = float(np.max(np.array([load.power, load.torque]) / np.array([power, torque])))
+    lowest = least_within_tolerance(speeds, lobes.limit_quantile(probability), tolerance)[place]
+    return PlannedCut(
+        float(speeds[place]),
+        depth,
+        float(lobes.limit_depth[place]),
+        float(lowest),
+        None if lobes.stable[place] else float(lobes.chatter_frequency[place]),
+        slower,
+        faster,
+        lobes.probability(place, depth),
+        share,
+        load.power,
+        load.torque,
+        load.removal_rate,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Advice(Drawn):
+    """Which cuts a tooling can make, and which of them is recommended.
+
+    Parameters
+    ----------
+    tooling : str
+        Its name.
+    stickout : float or None [m]
+    lobes : StabilityLobes
+        At the speeds that were asked for.
+    usable : UsableDepths
+        What is recommended at each of them, within power and torque.
+    recommended : tuple of OperatingPoint
+        The cuts that remove most, one for each pocket, the best first.
+    windows : tuple of SpeedWindow
+        Speeds at which a depth is recommended, where one was asked for.
+    planned : tuple of PlannedCut
+    tested : Tally or None
+        How many of the cuts that were tried the limits tell right.
+    remarks : tuple of str
+        What the user should know.
+    """
+
+    tooling: str
+    stickout: float | None
+    lobes: StabilityLobes
+    usable: UsableDepths
+    recommended: tuple[OperatingPoint, ...]
+    windows: tuple[SpeedWindow, ...]
+    planned: tuple[PlannedCut, ...]
+    tested: Tally | None
+    remarks: tuple[str, ...]
+
+    @property
+    def common(self) -> FloatArray | None:
+        """What is stable on all machines that were drawn, shape (n,) [m]; None where none were."""
+        return None if self.lobes.drawn is None else self.lobes.limit_quantile(1.0)
+
+    def __str__(self) -> str:
+        return f"{self.tooling}: {self.recommended[0]}" if self.recommended else f"{self.tooling}: no cut is recommended"

@@ -1,0 +1,87 @@
+"""The stability methods by name: a further one is a file beside this one and a line in `MethodName`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from enum import StrEnum
+from importlib import import_module
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
+
+from rcsa_ident.errors import InputError
+
+if TYPE_CHECKING:
+    from rcsa_ident.arrays import FloatArray
+    from rcsa_ident.cutting.process import MillingProcess
+    from rcsa_ident.dynamics.receptance import Receptance
+    from rcsa_ident.stability.result import StabilityLobes
+    from rcsa_ident.stability.tip_modes import TipModes
+
+
+class MethodName(StrEnum):
+    """Names of all methods: ``full-discretisation`` is the class `FullDiscretisation` in `full_discretisation`."""
+
+    ZERO_ORDER = "zero-order"
+    MULTI_FREQUENCY = "multi-frequency"
+    SEMI_DISCRETISATION = "semi-discretisation"
+    FULL_DISCRETISATION = "full-discretisation"
+    TIME_DOMAIN = "time-domain"
+
+
+class StabilityMethod(Protocol):
+    """A published way to the stability limit, and what can be said of it before it is used."""
+
+    #: As users call it.
+    name: ClassVar[str]
+    #: What it works on; a receptance can be computed from modes, modes have to be fitted to a receptance.
+    needs: ClassVar[Literal["receptance", "modes"]]
+    #: For one speed at 4000 rev/min, on one core of a plain server; lobes come closer as a spindle turns slower.
+    seconds_per_speed: ClassVar[float]
+    #: Whether it also says how fast a vibration grows at any depth, so that `stability_map` takes it.
+    gives_maps: ClassVar[bool]
+
+    def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
+        """Return the limit at each speed; the arguments have been checked."""
+        ...
+
+
+class _Methods(Mapping[str, type[StabilityMethod]]):
+    """Imports a method when it is asked for: listing the names imports nothing."""
+
+    def __getitem__(self, name: str) -> type[StabilityMethod]:
+        member = MethodName._value2member_map_.get(name)
+        if member is None:
+            raise KeyError(name)
+        found: type[StabilityMethod] = getattr(
+            import_module(f"rcsa_ident.stability.{member.name.lower()}"), member.name.title().replace("_", "")
+        )
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return (name.value for name in MethodName)
+
+    def __len__(self) -> int:
+        return len(MethodName)
+
+
+#: All methods by their names.
+METHODS: Mapping[str, type[StabilityMethod]] = _Methods()
+
+
+def method_named(name: str, field: str = "method") -> StabilityMethod:
+    """Return a method with its default settings.
+
+    Parameters
+    ----------
+    name : str
+        One of `MethodName`.
+    field : str
+        What the user calls the name, for the error.
+
+    Raises
+    ------
+    InputError
+        If there is no such method.
+    """
+    if name not in METHODS:
+        raise InputError(field, name, f"one of {', '.join(METHODS)}")
+    return METHODS[name]()

@@ -1,0 +1,89 @@
+"""Levels over spindle speed: where they are highest, and how low they are near a speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.errors import InputError
+
+#: Two peaks are one pocket unless the level between them falls below this share of the higher one.
+POCKET = 0.85
+#: A speed beyond those that were asked for may lie this much below what a tolerance needs, as a share.
+COARSE = 0.9
+
+
+def peaks(speed: FloatArray, level: FloatArray, count: int = 3) -> list[tuple[float, float]]:
+    """Return the speeds at which a level is highest, one for each pocket, the best first.
+
+    Parameters
+    ----------
+    speed, level : array, shape (n,)
+        In any order; an infinite level is one, too.
+    count : int
+        At most so many.
+
+    Returns
+    -------
+    list of (float, float)
+        Speed and level of the peaks; the middle of a plateau.
+    """
+    order = np.argsort(speed)
+    speed, limit = np.asarray(speed)[order], np.asarray(level)[order]
+    edges = np.flatnonzero(np.concatenate([[True], limit[1:] != limit[:-1]]))
+    ends = np.concatenate([edges[1:], [limit.size]]) - 1
+    level = limit[edges]
+    outside = np.concatenate([[-np.inf], level, [-np.inf]])
+    tops = [k for k in range(level.size) if level[k] > outside[k] and level[k] > outside[k + 2]]
+    width = speed[ends] - speed[edges]
+    tops.sort(key=lambda k: (-level[k], -width[k]))
+    chosen: list[int] = []
+    for k in tops:
+        # an infinite limit and its neighbour are pockets of their own: something finite lies between them
+        if all(np.min(level[min(k, c) : max(k, c) + 1]) < POCKET * level[k] for c in chosen):
+            chosen.append(k)
+    return [(float(0.5 * (speed[edges[k]] + speed[ends[k]])), float(level[k])) for k in chosen[:count]]
+
+
+def least_within_tolerance(speed: FloatArray, limit: FloatArray, tolerance: float) -> FloatArray:
+    """Return the smallest limit within a share of each speed on both sides, shape (n,).
+
+    Parameters
+    ----------
+    speed : array, shape (n,)
+        Rising; nothing is known beyond its ends.
+    limit : array, shape (n,)
+        Finite; straight lines in between.
+    tolerance : float
+        As 0.02 for 2 %.
+    """
+    if not 0.0 <= tolerance < 0.5:
+        raise InputError("tolerance", tolerance, "a share from 0 to below 0.5")
+    if np.any(np.diff(speed) < 0.0):
+        raise InputError("speeds", np.asarray(speed).tolist(), "speeds that rise [rad/s]")
+    if tolerance == 0.0:
+        return np.array(limit, dtype=float)
+    low, high = speed * (1.0 - tolerance), speed * (1.0 + tolerance)
+    least = np.minimum(np.interp(low, speed, limit), np.interp(high, speed, limit))
+    first, last = np.searchsorted(speed, low), np.searchsorted(speed, high, side="right")
+    # a speed lies within its own tolerance, so that no range is empty; one that ends with the last speed ends before the infinity
+    ranges = np.stack([first, last], axis=1).ravel()
+    within = np.minimum.reduceat(np.append(limit, np.inf), ranges)[::2]
+    return np.minimum(least, within)
+
+
+def pad_speeds(speeds: FloatArray, tolerance: float, also: Sequence[float] = ()) -> FloatArray:
+    """Return the speeds with as many beyond both ends as a tolerance needs, and some of their own between them, rising."""
+    speeds = np.unique(np.asarray(speeds, dtype=float))
+    step = float(np.min(np.diff(speeds), initial=0.02 * speeds[0] if speeds.size < 2 else np.inf))
+    inner = np.concatenate([speeds, np.asarray(also, dtype=float)])
+    low, high = inner.min() * (1.0 - tolerance), inner.max() * (1.0 + tolerance)
+    below = np.arange(speeds[0] - step, low - step, -step) if low < speeds[0] else np.zeros(0)
+    above = np.arange(speeds[-1] + step, high + step, step) if high > speeds[-1] else np.zeros(0)
+    # a coarse step leads far out, down to a standstill: where it does, the tolerance's own end will do
+    below, above = np.where(below > COARSE * low, below, low), np.where(COARSE * above < high, above, high)
+    found = np.unique(np.concatenate([inner, below, above]))
+    # the same speed twice, but for its last digit
+    return found[np.concatenate([[True], np.diff(found) > 1e-9 * found[1:]])]

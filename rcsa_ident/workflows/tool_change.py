@@ -1,0 +1,287 @@
+"""After a tool change: what the tip does, which cuts are stable, which one is recommended.
+
+Command line, service, page, report and a script ask here, so that all of them say the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.cutting.power import SpindleDrive
+from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.dynamics.uncertain import UncertainReceptance
+from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
+from rcsa_ident.machine.speed_dependence import tips_over_speed
+from rcsa_ident.machining_setup import CutSpec, Tooling
+from rcsa_ident.stability.advice import Advice, highest_removal, planned_cut, speed_windows, usable_depths
+from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.lobes import DRAWS, both_directions, stability_lobes
+from rcsa_ident.stability.methods import StabilityMethod
+from rcsa_ident.stability.pockets import pad_speeds
+from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, StabilityLobes
+from rcsa_ident.stability.stability_map import MonodromyMethod, StabilityMap, stability_map
+from rcsa_ident.stability.surface_error import SurfaceError, surface_location_error
+from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, tally
+from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes
+from rcsa_ident.stability.zero_order import ZeroOrder
+from rcsa_ident.units import to_hz, to_rpm
+
+#: How far beyond the identified band receptances are computed where a method fits modes to them: those above it are the tool's own.
+BEYOND = 1.5
+#: Seconds for a line and an unknown of the posterior, and further seconds for a speed with bands.
+_SPREAD_SECONDS, _BAND_SECONDS = 1e-6, 2e-4
+#: Unequal pitch costs the zero-order method so many times as much; a machine that changes with speed so many further seconds.
+_PITCH_FACTOR, _CHANGING_SECONDS = 30.0, 4.0
+_UNLIMITED = SpindleDrive.flat(None, None, None)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TipAnswer:
+    """What the tip of a tooling does.
+
+    Parameters
+    ----------
+    tooling : Tooling
+    tip : UncertainReceptance
+    remarks : tuple of str
+        What the user should know.
+    """
+
+    tooling: Tooling
+    tip: UncertainReceptance
+    remarks: tuple[str, ...]
+
+
+def tooltip(
+    machine: TipSource,
+    tooling: Tooling,
+    omega: FloatArray | None = None,
+    speed: float | None = None,
+    spread: bool = True,
+    stiffness_spread: float = STIFFNESS_SPREAD,
+) -> TipAnswer:
+    """Return the tip's receptance of a tooling on a machine.
+
+    Parameters
+    ----------
+    machine : TipSource
+    tooling : Tooling
+    omega : array, shape (n,) [rad/s], default the machine's `lines`
+    speed : float or None [rad/s]
+        Spindle speed, for a machine that changes with it.
+    spread : bool
+        With what the records leave open.
+    stiffness_spread : float
+        Standard deviation of the tool-holder's stiffness, as a share.
+    """
+    tip = machine.at(speed).tip(tooling, omega, spread, stiffness_spread)
+    if isinstance(tip, TipModes):
+        lines = tip.receptance().omega if omega is None else omega
+        tip = UncertainReceptance(lines, tip.response(lines), TIP, TIP)
+    remarks = [*machine.remarks, *([] if speed is None else _outside(machine, np.array([speed])))]
+    if machine.band is not None and tip.omega.max() > 1.001 * machine.band[1]:
+        top = to_hz(machine.band[1])
+        remarks.append(f"the machine is known up to {top:.0f} Hz; above that the receptance is extrapolated")
+    return TipAnswer(tooling, tip, tuple(remarks))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ToolChange:
+    """A tooling on a machine, and the cut that is asked about.
+
+    Parameters
+    ----------
+    machine : TipSource
+    tooling : Tooling
+    cut : CutSpec
+    speeds : array, shape (n,) [rad/s]
+        Rising.
+    max_depth : float [m]
+        Depths beyond it are not of interest.
+    method : StabilityMethod
+    draws : int
+        Machines drawn from what the records leave open; 0 leaves it aside.
+    stiffness_spread : float
+        Standard deviation of the tool-holder's stiffness, as a share.
+    """
+
+    machine: TipSource
+    tooling: Tooling
+    cut: CutSpec
+    speeds: FloatArray
+    max_depth: float
+    method: StabilityMethod = ZeroOrder()  # noqa: RUF009 - frozen
+    draws: int = DRAWS
+    stiffness_spread: float = STIFFNESS_SPREAD
+
+    @property
+    def process(self) -> MillingProcess:
+        """What cuts what, and how."""
+        return self.cut.process(self.tooling.cutter, self.machine.workpiece)
+
+    @property
+    def omega(self) -> FloatArray:
+        """Frequencies of the receptances that the limits are computed from, shape (k,) [rad/s]."""
+        return self.machine.lines(BEYOND if self.method.needs == "modes" else 1.0)
+
+    @property
+    def seconds(self) -> float:
+        """About how long the limits take on one core of a plain server [s]."""
+        zero_order = isinstance(self.method, ZeroOrder)
+        each = self.method.seconds_per_speed + (_BAND_SECONDS if self.draws else 0.0)
+        # lobes come closer as a spindle turns slower
+        found = each * float(np.sum(4000.0 / to_rpm(self.speeds)))
+        if zero_order and np.ptp(self.process.cutter.pitch) > 1e-9:
+            found *= _PITCH_FACTOR
+        if not (zero_order and self.machine.prepared):
+            found += _CHANGING_SECONDS if self.machine.speed_range is not None else 0.0
+            found += spread_seconds(self.machine, self.omega) if self.draws else 0.0
+        return found
+
+    def limits(self, speeds: FloatArray | None = None, max_depth: float | None = None, draws: int | None = None) -> StabilityLobes:
+        """Return the stability limits at rising speeds, each asked of the machine as it is at that speed; by default as asked for."""
+        speeds = np.unique(self.speeds if speeds is None else speeds)
+        depth, draws = self.max_depth if max_depth is None else max_depth, self.draws if draws is None else draws
+        process, parts, order = self.process, [], []
+        for places, tip in tips_over_speed(self.machine, self.tooling, self.omega, speeds, draws > 0, self.stiffness_spread):
+            order.append(places)
+            parts.append(stability_lobes(tip, process, speeds[places], depth, self.method, draws))
+        return StabilityLobes.joined(parts, order)
+
+    def remarks(self, lobes: StabilityLobes) -> tuple[str, ...]:
+        """Return what speaks against limits."""
+        band = self.machine.band
+        outside = None if band is None else _outside_band(lobes, band)
+        said = [*self.machine.remarks, *lobes.warnings, *([outside] if outside else []), *_outside(self.machine, self.speeds)]
+        return tuple(dict.fromkeys(said))
+
+
+def advise(
+    change: ToolChange,
+    drive: SpindleDrive = _UNLIMITED,
+    tolerance: float = TOLERANCE,
+    probability: float = PROBABILITY,
+    reserve: float = RESERVE,
+    depth: float | None = None,
+    planned: Sequence[tuple[float, float]] = (),
+    tested: TestedCuts | None = None,
+) -> Advice:
+    """Return the stability limits of a tooling, and what is recommended within them.
+
+    Parameters
+    ----------
+    change : ToolChange
+    drive : SpindleDrive
+        What the spindle has; without a feed per tooth its power and torque cannot be asked.
+    tolerance, probability, reserve : float
+        What a recommendation holds back: see `StabilityLobes.recommended_depth`.
+    depth : float or None [m]
+        At which speeds may one cut so deep?
+    planned : sequence of (speed [rad/s], depth [m])
+        How far are these cuts from chatter?
+    tested : TestedCuts or None
+        Cuts that were tried: how many do the limits tell right?
+    """
+    process = change.process
+    wide = _limits_beside(change, pad_speeds(change.speeds, tolerance, [speed for speed, _ in planned]))
+    low, high = float(np.min(change.speeds)), float(np.max(change.speeds))
+    usable = usable_depths(wide, process, drive, tolerance, probability, reserve).between(low, high)
+    lobes = wide.between(low, high)
+    return Advice(
+        change.tooling.name,
+        change.tooling.assembly.stickout,
+        lobes,
+        usable,
+        tuple(highest_removal(usable, process)),
+        () if depth is None else tuple(speed_windows(usable, depth)),
+        tuple(planned_cut(wide, process, drive, speed, at, tolerance, probability) for speed, at in planned),
+        None if tested is None else classify_tested_cuts(change, tested),
+        change.remarks(lobes),
+    )
+
+
+def _limits_beside(change: ToolChange, speeds: FloatArray) -> StabilityLobes:
+    """Limits at the speeds that were asked for, among further ones beside them."""
+    if change.machine.speed_range is None:
+        return change.limits(speeds)
+    # close speeds share the machine at their middle, which those that nobody has asked for shall not move
+    known = np.unique(change.speeds)
+    asked = np.searchsorted(known, speeds * (1.0 - 1e-9)) < np.searchsorted(known, speeds * (1.0 + 1e-9))
+    places = [np.flatnonzero(part) for part in (asked, ~asked) if part.any()]
+    return StabilityLobes.joined([change.limits(speeds[own]) for own in places], places)
+
+
+def classify_tested_cuts(change: ToolChange, cuts: TestedCuts) -> Tally:
+    """Return how many tested cuts lie on the side of the limit where they were seen, each asked at its own speed."""
+    deepest = 1.01 * float(cuts.axial_depth.max())
+    lobes = change.limits(cuts.spindle_speed, max(change.max_depth, deepest), draws=0)
+    return tally(cuts, lobes.limit_depth[np.searchsorted(lobes.spindle_speed, cuts.spindle_speed)])
+
+
+def map_of(change: ToolChange, depths: int = 100, full: bool = False) -> StabilityMap:
+    """Return the map of stable cuts up to the largest depth: above the first loss of stability a cut may be stable again.
+
+    Parameters
+    ----------
+    change : ToolChange
+        Its method, if that gives maps, else full-discretisation.
+    depths : int
+        Equal steps of the depth.
+    full : bool
+        Compute every point.
+    """
+    method = change.method if isinstance(change.method, MonodromyMethod) else FullDiscretisation()
+    speeds, depth = np.unique(change.speeds), change.max_depth * np.arange(1, depths + 1) / depths
+    parts = []
+    for places, tip in tips_over_speed(change.machine, change.tooling, change.machine.lines(BEYOND), speeds, spread=False):
+        modes = tip if isinstance(tip, TipModes) else fitted_modes(both_directions(tip))[0]
+        parts.append(stability_map(modes, change.process, speeds[places], depth, method, full))
+    return StabilityMap.joined(parts)
+
+
+def surface_of(change: ToolChange, depth: float) -> SurfaceError:
+    """Return the surface location error at a depth [m], each speed with the machine as it is there."""
+    speeds = np.unique(change.speeds)
+    error, parts = np.zeros((speeds.size, 0)), list[SurfaceError]()
+    for places, tip in tips_over_speed(change.machine, change.tooling, change.machine.lines(BEYOND), speeds, spread=False):
+        part = surface_location_error(tip if isinstance(tip, TipModes) else both_directions(tip), change.process, speeds[places], depth)
+        error = np.zeros((speeds.size, part.height.size)) if not parts else error
+        error[places] = part.error
+        parts.append(part)
+    warnings = tuple(dict.fromkeys(warning for part in parts for warning in part.warnings))
+    return SurfaceError(speeds, parts[0].height, error, parts[0].wall, warnings)
+
+
+def spread_seconds(machine: TipSource, omega: FloatArray) -> float:
+    """Return about how long the spread of a tip at some frequencies takes where nothing is worked out before [s]."""
+    return _SPREAD_SECONDS * machine.unknowns * omega.size
+
+
+def _outside_band(lobes: StabilityLobes, band: tuple[float, float]) -> str | None:
+    """A sentence where the limiting vibration lies outside the band in which the machine is known, else None."""
+    low, high = (to_hz(w) for w in band)
+    frequency = to_hz(lobes.chatter_frequency[np.isfinite(lobes.chatter_frequency)])
+    outside = (frequency < low) | (frequency > high)
+    if not outside.any():
+        return None
+    worst = float(frequency[outside][np.argmax(np.abs(frequency[outside] - 0.5 * (low + high)))])
+    return (
+        f"at {int(outside.sum())} of {lobes.spindle_speed.size} speeds chatter is expected outside the identified band "
+        f"{low:.0f}-{high:.0f} Hz (as far as {worst:.0f} Hz): the machine is extrapolated there"
+    )
+
+
+def _outside(machine: TipSource, speeds: FloatArray) -> list[str]:
+    """A sentence where a machine that changes with speed is asked for speeds that it was not cut at."""
+    known = machine.speed_range
+    # the last digit of a speed that was written in rev/min is nobody's wish
+    if known is None or (speeds.min() >= known[0] * (1.0 - 1e-9) and speeds.max() <= known[1] * (1.0 + 1e-9)):
+        return []
+    low, high = (to_rpm(speed) for speed in known)
+    return [
+        f"the machine was identified from {low:.0f} to {high:.0f} rev/min; outside this range its dynamics at the nearest speed are used"
+    ]

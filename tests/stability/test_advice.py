@@ -1,0 +1,132 @@
+"""What a machinist asks, on limits made by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import Engagement
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.power import SpindleDrive, spindle_load
+from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.errors import InputError
+from rcsa_ident.stability.advice import Bound, highest_removal, planned_cut, speed_windows, usable_depths
+from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE
+from tests.stability.written import lobes
+
+PROCESS = MillingProcess(Cutter(4, 12e-3), CuttingCoefficients(900e6, 0.3), Engagement(0.0, np.pi), feed_per_tooth=1e-4)
+FREE = SpindleDrive.flat()
+
+
+def usable(limits, process=PROCESS, drive=FREE, tolerance=0.0, probability=0.95, reserve=0.0):
+    """What is usable where nothing is held back of the limit."""
+    return usable_depths(limits, process, drive, tolerance, probability, reserve)
+
+
+def test_power_torque_and_chatter_each_have_their_range():
+    depth = np.array([2.0, 9.0, 9.0, 9.0, 3.0, 9.0, 9.0]) * 1e-3
+    drive = SpindleDrive.flat(power=5e3, torque=4.0, max_speed=1050.0)
+    found = usable(lobes(depth, deepest=8e-3), PROCESS, drive)
+    load = spindle_load(PROCESS.cutter, PROCESS.conditions(1.0, 1.0), PROCESS.coefficients)
+    np.testing.assert_allclose(found.by_torque[:6], 4.0 / load.torque)
+    np.testing.assert_allclose(found.by_power[:6], np.minimum(5e3 / (load.torque * found.spindle_speed[:6]), 8e-3))
+    assert found.depth[6] == 0.0
+    # 5.8 mm by torque; power would end it earlier only beyond 1250 rad/s
+    assert [str(b) for b in found.bound] == ["chatter", "torque", "torque", "torque", "chatter", "torque", "speed"]
+    np.testing.assert_allclose(found.removal_rate, found.depth * 12e-3 * 4e-4 * found.spindle_speed / (2.0 * np.pi))
+    np.testing.assert_array_equal(found.limit, np.minimum(depth, 8e-3))
+    assert usable(lobes(depth, deepest=3e-3)).bound[1] is Bound.DEPTH
+    weak = usable(lobes(depth), PROCESS, SpindleDrive.flat(power=2e3))
+    assert weak.bound[5] is Bound.POWER
+    best = highest_removal(found, PROCESS)
+    assert best[0].spindle_speed == pytest.approx(1000.0)
+    assert best[0].torque == pytest.approx(4.0)
+    assert best[0].power == pytest.approx(4000.0)
+    assert best[0].removal_rate == pytest.approx(found.removal_rate.max())
+    assert best[0].limit == 8e-3
+
+
+def test_a_reserve_and_a_tolerance_come_off_the_stable_depth():
+    here = lobes(np.array([4.0, 2.0, 6.0]) * 1e-3, [100.0, 110.0, 120.0])
+    found = usable(here, tolerance=0.05, reserve=0.2)
+    np.testing.assert_allclose(found.stable, 0.8 * np.array([3.0, 2.0, 3.6]) * 1e-3)
+    np.testing.assert_array_equal(found.between(105.0, 120.0).depth, found.depth[1:])
+
+
+def test_what_is_held_back_is_what_the_lobes_recommend():
+    here = lobes(np.array([4.0, 2.0, np.inf]) * 1e-3, [100.0, 110.0, 120.0], np.array([[3e-3, 1e-3, 9e-3], [5e-3, 4e-3, np.inf]]))
+    found = usable_depths(here, PROCESS, FREE)
+    np.testing.assert_array_equal(found.stable, here.recommended_depth())
+    np.testing.assert_array_equal(found.stable, here.recommended_depth(TOLERANCE, PROBABILITY, RESERVE))
+
+
+def test_without_a_feed_the_deepest_fast_cut_is_recommended_and_power_cannot_be_asked():
+    still = replace(PROCESS, feed_per_tooth=None)
+    here = lobes(np.array([1.0, 3.0, 1.0, 2.5, 1.0]) * 1e-3)
+    found, fed = usable(here, still, FREE), usable(here, PROCESS, FREE)
+    assert found.removal_rate is None
+    np.testing.assert_array_equal(found.depth, fed.depth)
+    assert found.bound == fed.bound
+    with pytest.raises(InputError, match="feed per tooth"):
+        _ = found.removal
+    points, wanted = highest_removal(found, still), highest_removal(fed, PROCESS)
+    assert [(p.spindle_speed, p.depth, p.limit, p.bound) for p in points] == [(p.spindle_speed, p.depth, p.limit, p.bound) for p in wanted]
+    assert all((p.removal_rate, p.power, p.torque) == (None, None, None) for p in points)
+    assert found.between(600.0, 700.0).removal_rate is None
+    # a speed limit needs no feed
+    assert usable(here, still, SpindleDrive.flat(max_speed=650.0)).bound[2] is Bound.SPEED
+
+
+def test_windows_of_a_depth_end_where_the_limit_meets_it():
+    found = speed_windows(usable(lobes(np.array([1.0, 3.0, 1.0, 4.0, 4.0]) * 1e-3)), 2e-3)
+    assert [(w.low, w.high, w.best) for w in found] == [
+        (pytest.approx(700.0 + 100.0 / 3.0), 900.0, pytest.approx(850.0)),
+        (pytest.approx(550.0), pytest.approx(650.0), pytest.approx(600.0)),
+    ]
+    assert [w.allowed for w in found] == pytest.approx([4e-3, 3e-3])
+    assert found[1].width == pytest.approx(100.0 / 600.0)
+    assert speed_windows(usable(lobes([1e-3, 1e-3])), 2e-3) == []
+
+
+def test_a_planned_cut_and_its_way_to_the_limit():
+    here = lobes(
+        np.array([1.0, 3.0, 4.0, 1.0, np.inf]) * 1e-3, drawn=np.array([[1.0, 3.0, 1.0, 1.0, 3.0], [1.0, 3.0, 4.0, 1.0, 9.0]]) * 1e-3
+    )
+    cut = planned_cut(here, PROCESS, SpindleDrive.flat(power=1e3), 700.0, 2e-3, tolerance=0.0)
+    assert cut.stable
+    assert cut.margin == pytest.approx(1.0)
+    assert (cut.slower, cut.faster) == (pytest.approx(550.0), pytest.approx(700.0 + 200.0 / 3.0))
+    assert cut.probability == 0.5
+    assert cut.robust_limit == pytest.approx(1e-3)
+    assert cut.power == pytest.approx(900e6 * cut.removal_rate)
+    assert cut.load == pytest.approx(cut.power / 1e3)
+    unstable = planned_cut(here, PROCESS, FREE, 800.0, 2e-3, tolerance=0.0)
+    assert not unstable.stable
+    assert unstable.margin == pytest.approx(-0.5)
+    assert unstable.slower == pytest.approx(700.0 + 200.0 / 3.0)
+    assert unstable.faster == pytest.approx(800.0 + 100.0 / 9.0)
+    edge = planned_cut(here, PROCESS, FREE, 900.0, 2e-3, tolerance=0.0)
+    assert edge.faster is None
+    assert edge.margin == np.inf
+    assert edge.load == 0.0
+    with pytest.raises(InputError, match="planned cut"):
+        planned_cut(here, PROCESS, FREE, 710.0, 2e-3)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: usable(lobes([1e-3, 2e-3]), replace(PROCESS, feed_per_tooth=None), SpindleDrive.flat(power=1e3)), "feed_per_tooth"),
+        (lambda: usable(lobes([1e-3, 2e-3]), replace(PROCESS, feed_per_tooth=None), SpindleDrive.flat(torque=1.0)), "feed_per_tooth"),
+        (lambda: usable(lobes([1e-3, 2e-3]), reserve=1.0), "reserve"),
+        (lambda: usable(lobes([2e-3, 1e-3], [600.0, 500.0])), "speeds that rise"),
+        (lambda: speed_windows(usable(lobes([1e-3, 1e-3])), 0.0), "depth"),
+        (lambda: planned_cut(lobes([1e-3, 1e-3]), PROCESS, FREE, 500.0, 11e-3), "at most 0.01 m"),
+    ],
+)
+def test_what_can_not_be_asked(call, words):
+    with pytest.raises(InputError, match=words):
+        call()
