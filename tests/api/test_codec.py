@@ -82,6 +82,7 @@ def same(a, b) -> bool:
     return a == b
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=examples(60, 300))
 @given(VALUES)
 def test_what_is_told_comes_back(value):

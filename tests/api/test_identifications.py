@@ -52,6 +52,7 @@ def done(tmp_path_factory):
     store.close()
 
 
+@pytest.mark.slow
 def test_an_identification_from_end_to_end(done):
     client, machine, campaign, id, *_ = done
     job = client.job(id)
@@ -81,6 +82,7 @@ def test_an_identification_from_end_to_end(done):
     assert client.send("GET", f"/machines/{machine}/identification").text == client.result(id)
 
 
+@pytest.mark.slow
 def test_it_is_what_the_commands_find(done, tmp_path):
     """Same recordings and seed, same file, byte for byte."""
     client, _, _, id, *_ = done
@@ -96,6 +98,7 @@ def test_it_is_what_the_commands_find(done, tmp_path):
     assert (tmp_path / "RESULT.json").read_text(encoding="utf-8") == client.result(id)
 
 
+@pytest.mark.slow
 def test_what_is_told_on_the_way(done):
     client, _, _, id, *_ = done
     events = list(client.events(id))
@@ -112,6 +115,7 @@ def test_what_is_told_on_the_way(done):
     assert all(value > 0.0 for value in fit["model_abs"])
 
 
+@pytest.mark.slow
 def test_a_lost_connection_goes_on_where_it_was_lost(done):
     client, _, _, id, *_ = done
     text = client.http.get(f"/v1/identifications/{id}/events").text
@@ -125,12 +129,14 @@ def test_a_lost_connection_goes_on_where_it_was_lost(done):
         assert rest.text.rstrip().splitlines()[-2] == "event: end"
 
 
+@pytest.mark.slow
 def test_the_same_key_is_the_same_job(done):
     client, _, campaign, id, *_ = done
     assert client.identify_campaign(campaign, seed=3, repeat="k").id == id
     refused(409, client.identify_campaign, campaign, seed=4, repeat="k")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("killed_after", [1, 4])
 def test_a_killed_job_goes_on_and_finds_the_same(done, killed_after):
     """The process is gone after so many steps: what was remembered is not done again, and the answer is the same to the last bit."""
@@ -147,6 +153,7 @@ def test_a_killed_job_goes_on_and_finds_the_same(done, killed_after):
     assert all(steps.texts[second, name] == engine.texts[id, name] for name in names)
 
 
+@pytest.mark.slow
 def test_a_job_that_an_earlier_version_began_starts_over(done):
     """Its steps are in a form that nobody reads any more: the same bytes come out as if it had never begun, and it says so."""
     client, _, campaign, id, engine, store, folder = done
@@ -169,6 +176,7 @@ def test_a_job_that_an_earlier_version_began_starts_over(done):
     assert "starts over from its recordings" in notes[0]
 
 
+@pytest.mark.slow
 def test_what_a_job_keeps_is_documented(done):
     """Nouns that methods promise to answer with, and none of the equations behind them."""
     *_, id, engine, _, _ = done
@@ -189,6 +197,7 @@ def test_what_a_job_keeps_is_documented(done):
     assert {name.split(".")[1] for name in names if name[0].isdigit()} == {phase.name.lower() for phase in (Phase.SEARCH, Phase.BOTH_AXES)}
 
 
+@pytest.mark.slow
 def test_going_on_from_an_earlier_answer(done):
     client, machine, campaign, _, _, store, folder = done
     before = client.send("GET", f"/machines/{machine}/identification").text
@@ -203,6 +212,7 @@ def test_going_on_from_an_earlier_answer(done):
     assert len(engine.computed) >= 4
 
 
+@pytest.mark.slow
 def test_lists(done):
     client, machine, campaign, id, *_ = done
     found = list(client.jobs(limit=1, machine=machine, campaign=campaign))
@@ -229,7 +239,7 @@ def test_what_can_not_be_identified(client, store, tmp_path, result):
     for axis in bare["axes"].values():
         del axis["covariance"]
     client.identify(machine, json.dumps(bare))
-    assert "without a covariance" in refused(422, client.identify_campaign, empty, start=True).detail
+    assert "no covariance" in refused(422, client.identify_campaign, empty, start=True).detail
     assert list(client.jobs()) == []
 
 
@@ -292,6 +302,7 @@ def test_cancelled_while_it_waits(client, store, tmp_path):
     refused(409, client.found_modes, id)
 
 
+@pytest.mark.slow
 def test_cancelled_while_it_runs(client, store, tmp_path):
     """It stops within moments, has no result, and the machine stays as it was."""
     machine = client.make_machine("M").id

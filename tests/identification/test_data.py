@@ -59,6 +59,7 @@ def campaigns(draw):
     ]
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(campaigns())
 def test_every_line_is_there_once_with_its_own_holder(cuts):

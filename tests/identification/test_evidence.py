@@ -21,6 +21,8 @@ from rcsa_ident.identification.status import Status
 from rcsa_ident.remarks import says
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, open_shop
 
+pytestmark = pytest.mark.slow
+
 SMALL = EvidenceSelection(search=SearchSettings(modes=8, population=4, generations=2, steps=6), candidates=2)
 #: For what must not crash, whatever comes out.
 TINY = EvidenceSelection(search=SearchSettings(modes=3, population=2, generations=1, steps=1), candidates=1)

@@ -133,6 +133,7 @@ def found(few):
     return QUICK.run(few, 4)
 
 
+@pytest.mark.slow
 def test_same_seed_same_result(few, found):
     told = []
     again, other = QUICK.run(few, 4, progress=told.append), QUICK.run(few, 5)

@@ -40,6 +40,7 @@ def test_tested_cuts_are_drawn_and_counted():
     assert [a.get_ylabel() for a in axes] == ["axial depth [mm]", "chatter [Hz]"]
 
 
+@pytest.mark.slow
 def test_flips_are_marked_only_where_there_are_some():
     flip = np.zeros(81, dtype=bool)
     assert "period doubling" not in svg(stability_figure(LOBES), "t")
@@ -58,6 +59,7 @@ def test_the_wall_has_its_own_axis():
     np.testing.assert_allclose(mean.get_ydata(), 1.5 * np.cos(SPEED / 100.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 3, 4])
 def test_cases_stand_side_by_side(count):
     panels = [Panel(f"case {i}: $A_b & <up>", LOBES, {"idle": 1.1 * LIMIT}, JUDGED if i else None) for i in range(count)]
@@ -99,6 +101,7 @@ def test_the_band_and_the_depth_that_is_stable_at_any_speed_are_named():
     assert "stable at any speed" not in bare
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["png", "svg"])
 def test_the_same_figure_gives_the_same_file(tmp_path, suffix):
     for name in "ab":

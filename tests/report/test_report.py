@@ -136,6 +136,7 @@ def parsed(text):
     return tags
 
 
+@pytest.mark.slow
 def test_the_page_is_whole_and_self_contained(found, campaign, readings):
     text = report_html(found, campaign, readings, [page_of(), page_of("T2")], {"recordings": 1.5})
     tags = parsed(text)
@@ -159,6 +160,7 @@ def test_the_page_is_whole_and_self_contained(found, campaign, readings):
         assert unit in words
 
 
+@pytest.mark.slow
 def test_what_the_records_do_not_tell_is_marked(found, campaign, readings):
     text = report_html(found, campaign, readings)
     rows = {
@@ -173,6 +175,7 @@ def test_what_the_records_do_not_tell_is_marked(found, campaign, readings):
     }
 
 
+@pytest.mark.slow
 def test_the_truth_appears_only_where_it_is_known(found, campaign, readings):
     without = report_html(found, campaign, readings, [page_of()])
     truth = page_of().tip
@@ -181,6 +184,7 @@ def test_the_truth_appears_only_where_it_is_known(found, campaign, readings):
     assert "1.2 %" in known
 
 
+@pytest.mark.slow
 def test_the_same_figure_gives_the_same_text():
     page = page_of()
     one, two = (svg(tooltip_frf(page.frequency, page.tip, page.deviation), "a") for _ in range(2))
@@ -218,6 +222,7 @@ def test_rows_say_what_a_recording_is_worth(readings):
     assert rows[2].signal_to_noise_db == {}
 
 
+@pytest.mark.slow
 def test_the_page_says_what_was_found_beside_the_machine(found, campaign, readings):
     text = report_html(found, campaign, readings, deviations={Dof.X: (2.0 * np.pi * np.array([1.234, 56.78]), np.array([1e-4, 0.02]))})
     words = " ".join(" ".join(parsed(text).text).split())
@@ -230,6 +235,7 @@ def test_the_page_says_what_was_found_beside_the_machine(found, campaign, readin
     assert "1591.5 57 4.00 2.0 1.000 − 1.000 i" in words
 
 
+@pytest.mark.slow
 def test_without_deviations_there_are_no_columns_for_them(found, campaign, readings):
     words = " ".join(" ".join(parsed(report_html(found, campaign, readings)).text).split())
     assert "795.8 5.00 1.000 − 1.000 i" in words

@@ -66,6 +66,7 @@ def probability(found, depths):
     return np.array([[found.probability(place, depth) for place, depth in enumerate(row)] for row in depths])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "draws"), [(ZeroOrder(), 400), (MultiFrequency(), 40)])
 def test_probability_of_stability_of_a_scale(method, draws):
     """With G (1 + 0.1 z) the limit is a / (1 + 0.1 z): a cut of depth d is stable where z < 10 (a / d - 1)."""

@@ -86,6 +86,7 @@ UNEQUAL: dict[str, tuple[Table, MillingProcess, float]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", UNEQUAL)
 def test_slow_twin(name):
     modes, process, depth = UNEQUAL[name]

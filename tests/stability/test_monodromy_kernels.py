@@ -62,6 +62,7 @@ def test_solve():
         np.testing.assert_allclose(right, expected, rtol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_largest_of_hessenberg(seed):
     rng = np.random.default_rng(seed)
@@ -80,6 +81,7 @@ def test_largest_of_hessenberg(seed):
     assert np.linalg.norm(vector) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_largest_of_a_rotation():
     """Eigenvalues of one magnitude all round the circle."""
     matrix = np.zeros((6, 6))

@@ -36,6 +36,7 @@ def measured(place, axis, speed):
     return frequency_response(model, OMEGA, speed, inputs=(f"{col}.{axis}",), outputs=(f"{row}.{axis}",))[:, 0, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", [Dof.X, Dof.Y])
 def test_in_process_is_in_process(axis):
     """At the speed of the identification all four responses agree with the machine: the comparison itself adds nothing."""
@@ -49,6 +50,7 @@ def test_in_process_is_in_process(axis):
             assert identified.compliance == pytest.approx(hammer.compliance, rel=0.03)
 
 
+@pytest.mark.slow
 def test_softening_shows_as_it_is():
     """Idle (speed 0, with noise) against in process: each mode's change is the machine's own, from its full equations at both speeds."""
     rng = np.random.default_rng(1)
@@ -71,6 +73,7 @@ def test_softening_shows_as_it_is():
     assert np.min(found.band_frac[1]) < found.frac
 
 
+@pytest.mark.slow
 def test_the_flange_shows_it_more_than_the_tip():
     """The tool is the machine's most compliant part, and it does not soften."""
     machine = modal_machine(softening_spindle(), SPEED)
@@ -92,6 +95,7 @@ def test_bands_hold(identification):
     assert bare.deviation is None
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(
     first=st.floats(500.0, 1200.0),
@@ -138,6 +142,7 @@ def test_frac_sees_shapes_only(scale, seed):
     assert frac(a, b) == pytest.approx(frac(scale * b, a))
 
 
+@pytest.mark.slow
 def test_what_is_refused():
     whole = modal_machine(softening_spindle(), SPEED)
     machine = replace(whole, flanges=whole.flanges[:1])

@@ -44,12 +44,14 @@ def with_trigger(cut, speed, pulses=1):
     return Recording(cut.rate, np.column_stack([cut.samples, signal]), (*cut.sensors, sensor))
 
 
+@pytest.mark.slow
 def test_speed_and_noise_come_from_the_record(found):
     assert found.spindle_speed == pytest.approx(paper_cut().spindle_speed, rel=1e-6)
     for noise in found.noise.values():
         assert noise == pytest.approx(2e-9, rel=0.2)
 
 
+@pytest.mark.slow
 def test_the_fundamental_below_the_identified_band_is_said(found):
     assert found.band[0] < 2.0 * np.pi * 400.0 < BAND[0]
     assert any("400 Hz, lies below the identified band" in note for note in found.notes)
@@ -58,10 +60,12 @@ def test_the_fundamental_below_the_identified_band_is_said(found):
     assert higher.band[0] > 2.0 * np.pi * 400.0
 
 
+@pytest.mark.slow
 def test_a_missing_air_cut_is_said():
     assert NO_AIR in watch(paper_cut().cut).notes
 
 
+@pytest.mark.slow
 def test_one_axis_alone_is_watched(found):
     whole = flange_machine()
     only = watch(paper_cut().cut, paper_cut().air, machine=replace(whole, flanges=whole.flanges[1:]))
@@ -79,6 +83,7 @@ def measured(low_hz, high_hz, step_hz=5.0):
     return FlangeMachine(flanges, flanges[0].band, flange_machine().joint, ends=True)
 
 
+@pytest.mark.slow
 def test_a_measured_flange_gives_the_forces_of_its_modes(found):
     """From where the identified machine's band begins; beyond what was measured nothing is asked for, and nothing told."""
     alone = watch(paper_cut().cut, paper_cut().air, machine=measured(373.0, 4400.0))
@@ -96,6 +101,7 @@ def test_a_measured_flange_gives_the_forces_of_its_modes(found):
     assert any("harmonics below 450 Hz are left out" in note for note in high.notes)
 
 
+@pytest.mark.slow
 def test_sensors_that_lag_and_lose_are_undone():
     """The same cut seen through slower sensors: the forces stay, without their delay."""
     slow = virtual_cut(gap_delay=60e-6, gap_bandwidth=7000.0, acceleration_delay=20e-6)
@@ -106,6 +112,7 @@ def test_sensors_that_lag_and_lose_are_undone():
     assert np.all(relative_error(worse.force, slow.force, slow.cut.rate) > 0.3)
 
 
+@pytest.mark.slow
 def test_a_narrow_bandwidth_keeps_few_harmonics():
     narrow = watch(paper_cut().cut, paper_cut().air, bandwidth=2.0 * np.pi * 1000.0)
     spectrum = np.abs(np.fft.rfft(narrow.estimate.force[4096:8192] * np.hanning(4096)[:, None], axis=0))
@@ -113,6 +120,7 @@ def test_a_narrow_bandwidth_keeps_few_harmonics():
     assert spectrum[frequency > 2500.0].max() < 0.05 * spectrum[frequency < 1100.0].max()
 
 
+@pytest.mark.slow
 def test_a_trigger_tells_the_speed(found):
     speed = paper_cut().spindle_speed
     for pulses in (1, 3):
@@ -126,6 +134,7 @@ def test_a_trigger_tells_the_speed(found):
         watch(still, speed=None)
 
 
+@pytest.mark.slow
 def test_the_posterior_widens_the_bands(found):
     """Of a machine whose C31 is uncertain by a known share: the force is, too."""
     machine = replace(by_hand.machine(rivals=0), identified_band=BAND)
@@ -142,6 +151,7 @@ def test_the_posterior_widens_the_bands(found):
         np.testing.assert_allclose(own**2, bare**2 + one.model_error[axis] ** 2, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_wear_of_the_paper_case(found):
     """Through machine, sensors and observer: K_tc and K_rc of the virtual workpiece (902 MPa, 0.26), no edges."""
     made = paper_cut()
@@ -171,6 +181,7 @@ def test_bad_records_are_refused_in_a_sentence():
         watch(cut, machine=known_in((2.0 * np.pi * 20000.0, 2.0 * np.pi * 30000.0)))
 
 
+@pytest.mark.slow
 def test_figures_have_units_and_bands(found):
     history = force_history(found.estimate, found.spindle_speed)
     assert [ax.get_ylabel() for ax in history.axes] == ["force X [N]", "force Y [N]"]

@@ -70,6 +70,7 @@ def planned(toolings, targets):
     return plan(toolings, targets, 8)
 
 
+@pytest.mark.slow
 def test_every_cut_is_stable_by_the_lobes_and_some_that_are_not_were_there(planned, toolings):
     assert planned.unstable > 0
     omega = 2.0 * np.pi * np.arange(100.0, 4300.0, 1.0)
@@ -84,6 +85,7 @@ def test_every_cut_is_stable_by_the_lobes_and_some_that_are_not_were_there(plann
             assert np.all(lobes.limit_depth >= 1.499 * depths)
 
 
+@pytest.mark.slow
 def test_speeds_are_allowed_whole_and_a_percent_apart(planned, toolings):
     for cuts in (planned.cuts, planned.even_cuts):
         assert len(cuts) == 8
@@ -94,12 +96,14 @@ def test_speeds_are_allowed_whole_and_a_percent_apart(planned, toolings):
             assert np.all((rpm > 7999.0) & (rpm < 20001.0))
 
 
+@pytest.mark.slow
 def test_bands_fall_with_every_cut(planned, targets):
     assert planned.targets == tuple(t.name for t in targets)
     assert planned.band.shape == (9, 2)
     assert np.all(np.diff(planned.band, axis=0) < 0.0)
 
 
+@pytest.mark.slow
 def test_the_band_before_any_cut_is_that_of_the_tooltip(toolings, targets):
     machine = machine_of(1e-3)
     before = plan(toolings, targets, 1, machine=machine).band[0]
@@ -112,16 +116,19 @@ def test_the_band_before_any_cut_is_that_of_the_tooltip(toolings, targets):
         assert known == pytest.approx(np.sqrt(np.mean(parts)), rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_plan_beats_even_speeds(planned):
     assert np.mean(planned.band[-1] ** 2) < np.mean(planned.even**2)
 
 
+@pytest.mark.slow
 def test_the_same_call_gives_the_same_plan(planned, toolings, targets):
     again = plan(toolings, targets, 8)
     assert again.cuts == planned.cuts
     np.testing.assert_array_equal(again.band, planned.band)
 
 
+@pytest.mark.slow
 def test_fewest_says_how_many_and_whether(planned):
     widest = planned.band.max(axis=1)
     assert planned.fewest(widest[3]).cuts == 3
@@ -132,6 +139,7 @@ def test_fewest_says_how_many_and_whether(planned):
         planned.fewest(0.0)
 
 
+@pytest.mark.slow
 def test_a_wanted_band_takes_no_more_cuts_than_it_must(planned, toolings, targets):
     wanted = float(planned.band[4].max())
     found = plan(toolings, targets, 8, wanted=wanted)
@@ -176,6 +184,7 @@ def test_what_may_not_be_allowed(change, words):
         replace(ALLOWED, **change)
 
 
+@pytest.mark.slow
 def test_most_information_is_another_plan(planned, toolings, targets):
     other = plan(toolings, targets, 8, goal=Volume())
     assert {(c.tooling, c.conditions.spindle_speed) for c in other.cuts} != {(c.tooling, c.conditions.spindle_speed) for c in planned.cuts}
