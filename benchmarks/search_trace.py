@@ -33,7 +33,7 @@ from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import NoiseWeightedCost, PaperGeneticAlgorithm
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import Layout, joint_of, modes_of, plain, split, unpack
+from rcsa_ident.identification.parameters import Layout, flange_layout, flange_modes, joint_of, split, unpack
 from rcsa_ident.identification.progress import Stage, Step
 from rcsa_ident.identification.search import starts
 
@@ -90,7 +90,7 @@ class Candidates:
         # the flange's motion as one output, as the default's exploration has it
         data = data.summed()
         self.misfit = Misfit(data, method.priors, (SHARE,))
-        self.layout = plain(method.search.modes)
+        self.layout = flange_layout(method.search.modes)
         self.nuisance = np.zeros((len(data.cut_ids), 2))
         omega = data.axes[0].omega
         band = float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))
@@ -215,7 +215,7 @@ SEARCHES: dict[str, Callable[[IdentificationData, int, float], Recorder]] = {
 def machine_at(theta: FloatArray, layout: Layout) -> tuple[ModalModel, LumpedJoint]:
     """Return modes and joint of a vector of one axis, at the campaign's middle speed."""
     (part,), joint = split(theta, layout)
-    return modes_of(unpack(part, layout.axes[0]), AXIS), joint_of(joint)
+    return flange_modes(unpack(part, layout.axes[0]), AXIS), joint_of(joint)
 
 
 def perform(scratch: Path, machine: str, method: str, seed: int, seconds: float) -> dict[str, Any]:

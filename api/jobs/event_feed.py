@@ -61,7 +61,7 @@ class EventFeeds:
         bell = asyncio.Event()
         self.bells.setdefault(job, set()).add(bell)
         if self.looking is None or self.looking.done():
-            self.looking = asyncio.create_task(self._look())
+            self.looking = asyncio.create_task(self._poll())
         try:
             while self.numbers.get(job, 0) <= after:
                 try:
@@ -76,7 +76,7 @@ class EventFeeds:
                 del self.bells[job]
                 self.numbers.pop(job, None)
 
-    async def _look(self) -> None:
+    async def _poll(self) -> None:
         while self.bells:
             try:
                 found = await asyncio.to_thread(self.jobs.numbers, list(self.bells))

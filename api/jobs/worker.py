@@ -129,15 +129,15 @@ class JobWorker:
                         log.error("another worker has taken this one for dead", extra={"fields": {"worker": self.id}})
                         os._exit(3)
                     last_beat = now
-                self.look()
+                self.submit_accepted()
                 if now - last_round >= ROUND:
-                    self.round()
+                    self.reconcile()
                     last_round = now
             except Unavailable as error:
                 log.warning("the database does not answer", exc_info=error)
         self.jobs.leave(self.id, self.token)
 
-    def look(self) -> None:
+    def submit_accepted(self) -> None:
         """Hand all accepted jobs to the engine, including those whose service died between row and submission."""
         open = {job.id: job for job in self.jobs.open()}
         for id, job in open.items():
@@ -145,7 +145,7 @@ class JobWorker:
                 self.backend.submit(id, PRIORITY.get(job.kind, 10))
         self.submitted = set(open)
 
-    def round(self) -> None:
+    def reconcile(self) -> None:
         """Take over jobs of dead workers, delete finished ones from the engine, and submit again those that it has lost."""
         # in this order: a job accepted in between is open and not yet in the engine
         carried = {each.job: each for each in self.backend.carried()}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn
-from rcsa_ident.cli.identify import Method, leave, read_and_judge, result_of, search, warn_left_out
+from rcsa_ident.cli.identify import Method, exit_by_status, read_and_judge, result_of, search, warn_left_out
 from rcsa_ident.cli.processes import Processes, workers
 from rcsa_ident.errors import InputError
 from rcsa_ident.units import from_rpm, to_hz, to_rpm
@@ -82,7 +82,7 @@ def demo(
             + f"; together {sum(stages.seconds.values()):.1f} s"
         )
         say(f"written: {out / 'report.html'}, RESULT.json, {len(pages)} FRFs, {len(pages)} lobes")
-    leave(found)
+    exit_by_status(found)
 
 
 def _folder(out: Path) -> None:

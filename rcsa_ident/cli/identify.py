@@ -107,9 +107,9 @@ def identify(
         known = None if start is None else read_start(start)
         campaign, readings = read_and_judge(campaign_dir, pool, stages)
         if speed_bands > 1:
-            from rcsa_ident.workflows.speed_bands import divided
+            from rcsa_ident.workflows.speed_bands import split_by_speed
 
-            divided(readings, speed_bands)
+            split_by_speed(readings, speed_bands)
         found = search(campaign, readings, method, seed, pool, stages, known)
         bands = search_bands(campaign, readings, speed_bands, found, seed, pool, stages)
     from rcsa_ident.workflows.identify import mode_deviations
@@ -138,7 +138,7 @@ def identify(
         warn_left_out(data)
         say(", ".join(f"{name} {seconds:.1f} s" for name, seconds in stages.seconds.items()))
         say(f"written: {out}" + (f", {report}" if report else ""))
-    leave(found)
+    exit_by_status(found)
 
 
 def read_and_judge(folder: Path, pool: Workers, stages: Stages) -> tuple[Campaign, list[Reading]]:
@@ -233,7 +233,7 @@ def warn_left_out(data: dict[str, Any]) -> None:
         warn(f"{cut['id']} left out: {cut['reason']}")
 
 
-def leave(found: Identification) -> None:
+def exit_by_status(found: Identification) -> None:
     """End with exit code 3 unless there is an answer that may be used."""
     if not found.at_minimum:
         raise typer.Exit(NOT_CONVERGED)

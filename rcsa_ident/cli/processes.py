@@ -104,13 +104,13 @@ class Workers:
     cluster: ClusterMap | None = None
 
     def map(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterable[Any]:
-        """Few long tasks."""
+        """Return the results of few long tasks, in their order."""
         if self.cluster is not None:
             return self.cluster(function, tasks)
         return map(function, tasks) if self.pool is None else _Shared(self.pool, function, list(tasks)).run(self.helpers)
 
     def map_many(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterable[Any]:
-        """Many short tasks, sent some at a time."""
+        """Return the results of many short tasks, which are sent some at a time."""
         if self.pool is None and self.cluster is None:
             return map(function, tasks)
         tasks = list(tasks)

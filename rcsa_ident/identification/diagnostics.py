@@ -15,7 +15,8 @@ from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import JOINT
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.identification.result import IdentificationCode
+from rcsa_ident.identification.result import Identification, IdentificationCode
+from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.flange_part import JointedFlange
 from rcsa_ident.remarks import Remark
 
@@ -31,8 +32,32 @@ MOST_BAD_CUTS = 0.1
 #: Half of the lines must carry at least this many times their noise (its amplitude's root mean square).
 LEAST_SIGNAL = 3.0
 #: A posterior narrower than this share of its prior was told by the data.
-TOLD = 0.5
+INFORMED = 0.5
 _JOINT = ("translational stiffness", "rotational stiffness", "translational damping", "rotational damping")
+
+
+def not_finite(data: IdentificationData) -> list[Remark]:
+    """Return which of the inputs hold something else than finite numbers; a line may have an infinite variance, which says nothing."""
+    found = []
+    for axis in data.axes:
+        inputs = {
+            "lines": np.isfinite(axis.lines),
+            "variances of the lines": ~np.isnan(axis.variance),
+            "receptances of the tool-holders": np.isfinite(np.hstack([axis.flange, axis.tip])),
+            "slopes of the simulated forces": np.isfinite(axis.force_slope),
+        }
+        wrong = [words for words, fine in inputs.items() if not np.all(fine)]
+        name = str(axis.axis).upper()
+        found += [Remark(IdentificationCode.NO_FINITE_FIT, f"{name}: not all {words} are finite numbers") for words in wrong]
+    return found
+
+
+def failed(data: IdentificationData, seed: int, method: str) -> Identification:
+    """Return the answer where no machine has a finite misfit to the data."""
+    words = "no machine has a finite misfit to the lines: units of recordings, toolings or coefficients may be wrong"
+    reasons = not_finite(data) or [Remark(IdentificationCode.NO_FINITE_FIT, words)]
+    nothing = np.zeros(0)
+    return Identification(Status.FAILED, tuple(reasons), seed, method, {}, (), nothing, nothing, nothing, ())
 
 
 def diagnose(
@@ -124,7 +149,7 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
     layout, priors = solution.layout, misfit.priors
     deviation = np.sqrt(np.diag(covariance))
     for name, std in zip(_JOINT, deviation[layout.joint], strict=True):
-        if std > TOLD * priors.joint_spread:
+        if std > INFORMED * priors.joint_spread:
             note(
                 IdentificationCode.JOINT_UNKNOWN,
                 f"joint: the {name} cannot be separated from the flange's own compliance (known to within a factor of {np.exp(std):.1f}); "
@@ -143,7 +168,7 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
             )
     for c, coefficient in enumerate(data.coefficients):
         std, before = deviation[layout.force][c], data.coefficient_spread[c]
-        if std > TOLD * before and coefficient.term is not ForceTerm.RUNOUT:
+        if std > INFORMED * before and coefficient.term is not ForceTerm.RUNOUT:
             share = 100.0 * min(std, before)
             words = f"{coefficient}: hardly determined by the cuts; its standard deviation is {share:.1f} %, close to the prior's"
             note(IdentificationCode.COEFFICIENT_UNKNOWN, words)

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.data import IdentificationData
-from rcsa_ident.identification.diagnostics import diagnose, remarks
+from rcsa_ident.identification.diagnostics import diagnose, failed, not_finite, remarks
 from rcsa_ident.identification.joint_fit import AxisSearch, axis_search, fit_jointly
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
-from rcsa_ident.identification.method import Phase, perform
+from rcsa_ident.identification.method import Phase, finite, perform
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import GIVE_UP_SOON, Report, cut_weights, drop_modes, exchange_modes, model_error
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, parameter_names, unpack
@@ -74,20 +75,30 @@ class EvidenceSelection:
         progress : callable, optional
             Told of every step; with a pool's map it has to be picklable.
         """
+        if not_finite(data):
+            return failed(data, seed, self.name)
+        try:
+            searched = self._search(data, seed, map, progress)
+            return _result(self, data, searched, seed, map, progress)
+        except (ArithmeticError, np.linalg.LinAlgError):
+            return failed(data, seed, self.name)
+
+    def _search(self, data: IdentificationData, seed: int, map: Map, progress: Progress | None) -> list[AxisSearch]:
+        """Return the search of each axis, again from new starts until one has come to the same answer twice."""
         sequence = np.random.SeedSequence(seed)
         summed = data.summed()
         parts = [summed.only(a.axis).with_smooth_errors(SMOOTH_ERROR) for a in data.axes]
         searched: list[AxisSearch] = []
         for _ in range(ATTEMPTS):
             tasks = [SearchAxis(self, part, own, progress) for part, own in zip(parts, sequence.spawn(len(parts)), strict=True)]
-            found = list(map(perform, tasks))
+            found = finite(map(perform, tasks))
             if len(found) == 2:
                 both = zip(parts, found, found[::-1], strict=True)
-                found = list(map(perform, [SearchFromOtherAxis(self, part, own, other, progress) for part, own, other in both]))
+                found = finite(map(perform, [SearchFromOtherAxis(self, part, own, other, progress) for part, own, other in both]))
             searched = [a.joined(b) for a, b in zip(searched, found, strict=True)] if searched else found
             if self.start is not None or any(s.confirmed for s in searched):
                 break
-        return _result(self, data, searched, seed, map, progress)
+        return searched
 
 
 def _report_to(axis: str, trace: list[Step], progress: Progress | None) -> Report:
@@ -115,15 +126,11 @@ class SearchAxis:
     progress : callable or None
     """
 
+    phase: ClassVar[Phase] = Phase.SEARCH
     method: EvidenceSelection
     data: IdentificationData
     sequence: np.random.SeedSequence
     progress: Progress | None
-
-    @property
-    def phase(self) -> Phase:
-        """The search."""
-        return Phase.SEARCH
 
     def run(self) -> AxisSearch:
         """Explore, refine, learn the noise, and let the evidence choose the modes."""
@@ -138,7 +145,9 @@ class SearchAxis:
             theta = np.concatenate([theta, force])
             refined.append(refine(misfit, theta, Layout((layout,), force.size), nuisance, 60, grid=32))
             report(Stage.REFINE, refined[-1].cost, refined[-1])
-        refined.sort(key=lambda s: s.cost)
+        refined = sorted((s for s in refined if np.isfinite(s.cost)), key=lambda s: s.cost)
+        if not refined:
+            raise FloatingPointError("no start has a finite misfit")
         best = refined[0]
         for _ in range(4):
             share = model_error(best, misfit)
@@ -180,16 +189,12 @@ class SearchFromOtherAxis:
     progress : callable or None
     """
 
+    phase: ClassVar[Phase] = Phase.OTHER_AXIS
     method: EvidenceSelection
     data: IdentificationData
     own: AxisSearch
     other: AxisSearch
     progress: Progress | None
-
-    @property
-    def phase(self) -> Phase:
-        """From the other axis."""
-        return Phase.OTHER_AXIS
 
     def run(self) -> AxisSearch:
         """Refine the other axis' answer, and drop the modes that this axis does not need."""

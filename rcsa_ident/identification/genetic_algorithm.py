@@ -7,7 +7,7 @@ force's phase is tied to the record; here each cut is granted its best delay on 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification._kernels import best_grid_misfit, modal_cross_frf
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
-from rcsa_ident.identification.method import Phase, perform
+from rcsa_ident.identification.diagnostics import failed, not_finite
+from rcsa_ident.identification.method import Phase, finite, perform
 from rcsa_ident.identification.progress import Progress, Stage, Step
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
 from rcsa_ident.identification.status import Status
@@ -151,10 +152,15 @@ class PaperGeneticAlgorithm:
         progress : callable, optional
             Told of every step; with a pool's map it has to be picklable.
         """
+        if not_finite(data):
+            return failed(data, seed, self.name)
         sequences = np.random.SeedSequence(seed).spawn(len(data.axes))
         seeds = [int(s.generate_state(1)[0]) for s in sequences]
         tasks = [GeneticSearch(self, data.only(a.axis), own, progress) for a, own in zip(data.axes, seeds, strict=True)]
-        found = list(map(perform, tasks))
+        try:
+            found = finite(map(perform, tasks))
+        except FloatingPointError:
+            return failed(data, seed, self.name)
         axes, reasons, trace = {}, [], []
         problem = None
         for axis, (x, costs) in zip(data.axes, found, strict=True):
@@ -315,18 +321,14 @@ class GeneticSearch:
     progress : callable or None
     """
 
+    phase: ClassVar[Phase] = Phase.SEARCH
     method: PaperGeneticAlgorithm
     data: IdentificationData
     seed: int
     progress: Progress | None = None
 
-    @property
-    def phase(self) -> Phase:
-        """The search."""
-        return Phase.SEARCH
-
     def run(self) -> tuple[FloatArray, list[float]]:
-        """Return the answer."""
+        """Return best variables and costs."""
         from pymoo.algorithms.soo.nonconvex.ga import GA
         from pymoo.core.problem import Problem
         from pymoo.optimize import minimize
@@ -351,5 +353,7 @@ class GeneticSearch:
 
         settings = {"seed": self.seed, "callback": follow, "verbose": False}
         found = minimize(Vectorised(), GA(pop_size=method.population), ("n_gen", method.generations), **settings)
+        if found.X is None or not np.isfinite(best[-1]):
+            raise FloatingPointError("no candidate of finite cost")
         step = max(len(best) // 500, 1)
         return np.asarray(found.X, dtype=float), best[::step]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
-from rcsa_ident.identification.method import Phase, perform
+from rcsa_ident.identification.method import Phase, finite, perform
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import Report, cut_weights, evidence, exchange_modes, grow_modes, model_error
 from rcsa_ident.identification.parameters import Layout, pack, unpack
@@ -113,7 +114,7 @@ def _from_several_starts(data: IdentificationData, priors: Priors, searched: lis
     starts, until two have come to the same answer.
     """
     tasks = [JointStart(data, priors, searched, *start) for start in STARTS]
-    found = list(map(perform, tasks[:2]))
+    found = finite(map(perform, tasks[:2]))
     for task in tasks[2:]:
         found.sort(key=lambda candidate: candidate.cost)
         if found[1].cost - found[0].cost < SAME_POLISH:
@@ -138,16 +139,12 @@ class JointStart:
         Axis whose joint and force it starts from; None is the mean over the axes.
     """
 
+    phase: ClassVar[Phase] = Phase.BOTH_AXES
     data: IdentificationData
     priors: Priors
     searched: list[AxisSearch]
     coarse: float
     source: int | None
-
-    @property
-    def phase(self) -> Phase:
-        """Both axes."""
-        return Phase.BOTH_AXES
 
     def run(self) -> Candidate:
         """Return the polished candidate."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
 
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.progress import Progress
@@ -22,22 +25,38 @@ class Phase(StrEnum):
 class Task(Protocol):
     """What a method gives to its map, through `perform`: the same task, the same answer, to the last bit.
 
-    It answers with arrays, numbers, `Candidate` or `AxisSearch`, which a service may keep in place of doing the task again.
+    It answers with arrays, numbers, `Candidate` or `AxisSearch`, which a service may keep in place of doing the task again. Where its
+    numbers lead nowhere finite it raises ArithmeticError or LinAlgError.
     """
 
-    @property
-    def phase(self) -> Phase:
-        """The part that it belongs to, the same for all tasks of a call."""
-        ...
+    #: The part that it belongs to, the same for all tasks of a call.
+    phase: ClassVar[Phase]
 
     def run(self) -> Any:
-        """Return the answer."""
+        """Return the task's answer."""
         ...
 
 
 def perform(task: Task) -> Any:
-    """Return a task's answer: the one function that methods map."""
-    return task.run()
+    """Return a task's answer, None where its numbers lead nowhere finite: the one function that methods map."""
+    try:
+        return task.run()
+    except (ArithmeticError, np.linalg.LinAlgError):
+        return None
+
+
+def finite(answers: Iterable[Any]) -> list[Any]:
+    """Return the answers of a phase.
+
+    Raises
+    ------
+    FloatingPointError
+        If one of them is none.
+    """
+    found = list(answers)
+    if any(answer is None for answer in found):
+        raise FloatingPointError("a task without a finite answer")
+    return found
 
 
 class Method(Protocol):

@@ -35,12 +35,12 @@ class Residual:
     cuts: FloatArray
 
     def minus(self, other: Residual, factor: float = 1.0) -> Residual:
-        """Return self - factor other."""
+        """Return the residual less another one times a factor."""
         lines = tuple(a - factor * b for a, b in zip(self.lines, other.lines, strict=True))
         return Residual(lines, self.own - factor * other.own, self.cuts - factor * other.cuts)
 
     def times(self, factor: float) -> Residual:
-        """Return factor self."""
+        """Return the residual times a factor."""
         return Residual(tuple(factor * a for a in self.lines), factor * self.own, factor * self.cuts)
 
     @property
@@ -240,7 +240,7 @@ class Misfit:
         self.priors = priors
         self.model_error = model_error
         self.cut_weight = np.ones(len(data.cut_ids)) if cut_weight is None else cut_weight
-        self._axes = tuple(_AxisLines(a, data.relative_speed, f, self.cut_weight) for a, f in zip(data.axes, model_error, strict=True))
+        self._axes = tuple(_WeightedLines(a, data.relative_speed, f, self.cut_weight) for a, f in zip(data.axes, model_error, strict=True))
         # lines of all axes, cut by cut: a cut's delay and angle are the same for both
         cut = np.concatenate([a.cut for a in self._axes])
         self._order = np.argsort(cut, kind="stable")
@@ -418,7 +418,7 @@ class Misfit:
         return place, np.where(known, -np.sqrt(prior.delay_weight) / self.data.spindle_speed, 0.0)
 
 
-class _AxisLines:
+class _WeightedLines:
     """Lines of one axis as rows, output after output at each point, with what never changes about them."""
 
     def __init__(self, axis: AxisData, relative_speed: FloatArray, model_error: float, cut_weight: FloatArray) -> None:

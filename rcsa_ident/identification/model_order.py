@@ -191,6 +191,8 @@ def promising(solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, 
         # what the nearest rank-one shape keeps of the promise
         kept = np.array([shapes[k, 0] ** 2, shapes[k, 0] * shapes[k, 1], shapes[k, 1] ** 2])
         promise[k] = 2.0 * kept @ right + kept @ matrix @ kept
+    if not np.all(np.isfinite(promise)):
+        raise FloatingPointError("no finite promise of another mode")
     best = promise.reshape(len(NEW_DAMPING), PLACES).argmin(axis=0) * PLACES + np.arange(PLACES)
     hill = promise[best]
     # one of each hill: its neighbours lead to the same place
@@ -293,8 +295,8 @@ def _share(squares: FloatArray, noise: FloatArray, size: FloatArray, freedom: fl
     """Solve for the share by bisection of its logarithm: the sum falls with it."""
     low, high = smallest, 1.0
     # lines of nothing, in a record without noise, say nothing about shares
-    told = (noise > 0.0) | (size > 0.0)
-    squares, noise, size = squares[told], noise[told], size[told]
+    informative = (noise > 0.0) | (size > 0.0)
+    squares, noise, size = squares[informative], noise[informative], size[informative]
     if np.sum(squares / (noise + 0.5 * low**2 * size)) <= freedom:
         return smallest
     for _ in range(60):

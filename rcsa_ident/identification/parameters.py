@@ -116,7 +116,7 @@ class Layout:
         return slice(self.size - self.clampings, self.size)
 
 
-def plain(*modes: int) -> Layout:
+def flange_layout(*modes: int) -> Layout:
     """Return the layout of axes with so many modes each, and a joint."""
     return Layout(tuple(AxisLayout(m) for m in modes))
 
@@ -325,7 +325,7 @@ def joint_of(logs: FloatArray) -> LumpedJoint:
     return LumpedJoint(k_t, k_r, c_t, c_r)
 
 
-def modes_of(axis: AxisParameters, dof: Dof) -> ModalModel:
+def flange_modes(axis: AxisParameters, dof: Dof) -> ModalModel:
     """Return the axis as complex modes at the flange ([inprocess], eq. 13), in SI, sorted by frequency."""
     lever = np.array([1.0, 1.0 / LEVER])
     residual = axis.residual @ axis.residual.T * np.outer(lever, lever)

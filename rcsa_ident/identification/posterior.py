@@ -12,7 +12,7 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, joint_of, modes_of, unpack
+from rcsa_ident.identification.parameters import JOINT, AxisLayout, flange_modes, joint_of, unpack
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation
 from rcsa_ident.machine.spindle import Spindle
 
@@ -69,7 +69,7 @@ class Posterior:
         layout = self.layout if vector.size == self.theta.size else self.layout_of(vector.size - JOINT)
         middle, half = self.speed_range
         x = 0.0 if speed is None or half == 0.0 else float(np.clip((speed - middle) / half, -1.0, 1.0))
-        return modes_of(unpack(vector[:-JOINT], layout).at(x), axis), joint_of(vector[-JOINT:])
+        return flange_modes(unpack(vector[:-JOINT], layout).at(x), axis), joint_of(vector[-JOINT:])
 
     def layout_of(self, size: int) -> AxisLayout:
         """Return the layout of a rival whose part without the joint has this size."""

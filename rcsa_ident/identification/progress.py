@@ -63,4 +63,4 @@ class Silent:
     """A progress callable that tells nobody: what one becomes in a process from which it reaches no one."""
 
     def __call__(self, step: Step) -> None:
-        """Leave it."""
+        """Leave the step unsaid."""

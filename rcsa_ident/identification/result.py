@@ -27,8 +27,9 @@ from rcsa_ident.signals.recording import Sensor
 
 
 class IdentificationCode(StrEnum):
-    """What may be said of an identification: first the reasons for doubt, then what the data cannot tell."""
+    """What may be said of an identification: why it has failed, reasons for doubt, and what the data cannot tell."""
 
+    NO_FINITE_FIT = "no-finite-fit"
     NOT_CONVERGED = "not-converged"
     WEAK_SIGNAL = "weak-signal"
     UNEXPLAINED = "unexplained"

@@ -13,9 +13,9 @@ from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import (
     DAMPING_UNIT,
     AxisLayout,
+    flange_layout,
     lower_triangle,
     pack,
-    plain,
     selected,
     split,
     unpack,
@@ -58,7 +58,7 @@ def starts(count: int, modes: int, band_hz: tuple[float, float], misfit: Misfit,
     rng : numpy.random.Generator
     """
     low, high = band_hz
-    theta = np.zeros((count, plain(modes).size))
+    theta = np.zeros((count, flange_layout(modes).size))
     frequency = rng.uniform(low, 1.08 * high, (count, modes))
     frequency[:, 0] = rng.uniform(0.2, 0.6, count) * low
     frequency[:, 1] = rng.uniform(1.3, 2.0, count) * high
@@ -99,7 +99,7 @@ def explore(
     from pymoo.operators.mutation.pm import PM
 
     first = starts(settings.population, settings.modes, band_hz, misfit, rng)
-    layout = plain(settings.modes)
+    layout = flange_layout(settings.modes)
     centre, reach = first.mean(axis=0), np.full(first.shape[1], 6.0)
     problem = Problem(n_var=first.shape[1], n_obj=1, xl=np.minimum(centre - reach, -reach), xu=np.maximum(centre + reach, reach))
     algorithm = GA(
@@ -134,7 +134,7 @@ def explore(
 
 def _by_frequency(theta: FloatArray, modes: int) -> FloatArray:
     """Sort the modes by frequency, so that crossover mixes like with like."""
-    (part,), joint = split(theta, plain(modes))
+    (part,), joint = split(theta, flange_layout(modes))
     order = np.argsort(part[:modes], kind="stable")
     if np.array_equal(order, np.arange(modes)):
         return theta

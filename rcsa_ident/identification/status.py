@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class Status(StrEnum):
-    """May the answer be used?"""
+    """May the answer be used? With doubts where it is suspect; one that has failed has no axes."""
 
     CONVERGED = "converged"
     SUSPECT = "suspect"

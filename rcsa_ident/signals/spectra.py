@@ -114,8 +114,8 @@ def _blocks(n: int, period: float) -> tuple[np.ndarray, int]:
     """
     turns = int(n / period)
     # k blocks tell 1 - 1 / k^2 of what the samples in them know of the speed
-    told = {k: (turns // k) * k * (1.0 - 1.0 / k**2) for k in range(2, 11) if turns // k >= 2}
-    blocks = max(told, key=lambda k: told[k]) if told else 2
+    information = {k: (turns // k) * k * (1.0 - 1.0 / k**2) for k in range(2, 11) if turns // k >= 2}
+    blocks = max(information, key=lambda k: information[k]) if information else 2
     length = min(max(round(turns // blocks * period), 1), n // blocks)
     starts = np.round(np.arange(blocks) * max(turns // blocks, 1) * period).astype(int)
     return np.minimum(starts, n - length) + max(n - length - starts[-1], 0) // 2, length

@@ -75,7 +75,7 @@ class SteadyRecord:
 
     @property
     def displacement(self) -> FloatArray:
-        """Displacement channels in the steady part, shape (n, axes) [m]."""
+        """Samples of the displacement channels in the steady part, shape (n, axes) [m]."""
         return self.recording.samples[self.part][:, self.columns[: len(self.axes)]]
 
     def segments(self, order: np.ndarray, count: int) -> ComplexArray:

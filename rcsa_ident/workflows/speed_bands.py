@@ -50,11 +50,11 @@ def speed_bands(campaign: Campaign, readings: Sequence[Reading], count: int, met
     InputError
         If a band has too few cuts with one of the toolings.
     """
-    jobs = [_BandJob(method, speeds, data_of(campaign, cuts), seed) for speeds, cuts in divided(readings, count)]
+    jobs = [_BandJob(method, speeds, data_of(campaign, cuts), seed) for speeds, cuts in split_by_speed(readings, count)]
     return list(map(_identify_band, jobs))
 
 
-def divided(readings: Sequence[Reading], count: int) -> list[tuple[tuple[float, float], list[Reading]]]:
+def split_by_speed(readings: Sequence[Reading], count: int) -> list[tuple[tuple[float, float], list[Reading]]]:
     """Return `count` equal ranges of speed [rad/s], each with its usable cuts.
 
     Raises

@@ -150,8 +150,8 @@ def test_a_job_of_another_version_starts_over_and_says_so(store, machine):
     assert steps.computed == []
     worker = worker_of(store, Carried(id, "over"))
     worker.submitted = {id}
-    worker.round()
-    worker.look()
+    worker.reconcile()
+    worker.submit_accepted()
     assert worker.backend.calls == [("forget", id), ("submit", id, 10)]
     steps.texts.clear()
     state, notes = carried()
@@ -320,17 +320,17 @@ def worker_of(store, *carried):
 def test_what_was_accepted_is_handed_over_once(store, machine):
     ids = [store.jobs.add(job(machine), {}, 10).id, store.jobs.add(job(machine, kind="lobes"), {}, 10).id]
     worker = worker_of(store)
-    worker.look()
-    worker.look()
+    worker.submit_accepted()
+    worker.submit_accepted()
     assert worker.backend.calls == [("submit", ids[0], 10), ("submit", ids[1], 1)]
 
 
 def test_what_the_engine_has_lost_is_handed_over_again(store, machine):
     id = store.jobs.add(job(machine), {}, 10).id
     worker = worker_of(store)
-    worker.look()
-    worker.round()
-    worker.look()
+    worker.submit_accepted()
+    worker.reconcile()
+    worker.submit_accepted()
     assert worker.backend.calls == [("submit", id, 10)] * 2
 
 
@@ -349,7 +349,7 @@ def test_what_the_engine_has_lost_is_handed_over_again(store, machine):
 def test_a_round_of_an_open_job(store, machine, state, executor, current, expected):
     id = running(store, machine)
     worker = worker_of(store, Carried(id, state, executor, current))
-    worker.round()
+    worker.reconcile()
     assert worker.backend.calls == ([] if expected is None else [(expected, id)])
 
 
@@ -357,7 +357,7 @@ def test_a_round_of_what_has_ended(store, machine):
     id = running(store, machine)
     store.jobs.cancel("A", id, now())
     worker = worker_of(store, Carried(id, "waiting"), Carried("gone", "over"))
-    worker.round()
+    worker.reconcile()
     assert worker.backend.calls == [("forget", "gone", id)] or worker.backend.calls == [("forget", *sorted([id, "gone"]))]
 
 
@@ -368,16 +368,16 @@ def test_a_job_of_one_that_lives_elsewhere_is_left_to_it(store, machine, monkeyp
     worker = worker_of(store, Carried(id, "running", "other", current))
     moment = [time.monotonic()]
     monkeypatch.setattr("api.jobs.worker.time.monotonic", lambda: moment[0])
-    worker.round()
+    worker.reconcile()
     moment[0] += 0.9 * LEASE
     store.jobs.beat("other", "w")
-    worker.round()
+    worker.reconcile()
     moment[0] += 0.9 * LEASE
-    worker.round()
+    worker.reconcile()
     assert worker.backend.calls == []
     # not a sign of it for too long
     moment[0] += 0.2 * LEASE
-    worker.round()
+    worker.reconcile()
     # what another version has remembered helps nobody: the engine forgets it, and the job starts over
     assert worker.backend.calls == [("resume", id)] + ([] if current else [("forget", id)])
 
@@ -387,7 +387,7 @@ def test_a_job_that_another_has_just_taken_over_is_left_to_it(store, machine):
     store.jobs.claim(Worker("third", "elsewhere", "1:1", "t3"), None)
     store.jobs.take(id, "w", "t3")
     worker = worker_of(store, Carried(id, "running", "dead"))
-    worker.round()
+    worker.reconcile()
     assert worker.backend.calls == []
 
 

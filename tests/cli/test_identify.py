@@ -11,7 +11,8 @@ from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.identification.result import IdentificationCode, Status
+from rcsa_ident.identification.diagnostics import failed
+from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_campaign
@@ -39,7 +40,7 @@ def without_covariance(data):
     return data
 
 
-def failed(data):
+def without_axes(data):
     return data | {"status": "failed", "axes": {}}
 
 
@@ -52,7 +53,7 @@ def published(data):
     [
         (without_covariance, ["axes.X", "found no covariance", "a result of the default method"]),
         (published, ["axes.X", "found no covariance", "a result of the default method"]),
-        (failed, ["axes", "the identification has failed"]),
+        (without_axes, ["axes", "the identification has failed"]),
         (lambda data: {"seed": 1}, ["schema_version", "found nothing"]),
         (lambda data: [], ["content", "an empty list"]),
     ],
@@ -160,7 +161,7 @@ def test_a_method_sees_the_cuts_of_its_band_alone(tmp_path, small_campaign, monk
     [
         ({"reasons": (Remark(IdentificationCode.NOT_CONVERGED, "it was still gaining"),)}, 3),
         ({"reasons": (Remark(IdentificationCode.FEW_CUTS, "not converged, says a tooling of that name"),)}, 0),
-        ({"status": Status.FAILED, "axes": {}}, 3),
+        (None, 3),
     ],
 )
 def test_the_exit_code_follows_the_code_and_not_the_words(tmp_path, small_campaign, monkeypatch, change, code):
@@ -171,11 +172,15 @@ def test_the_exit_code_follows_the_code_and_not_the_words(tmp_path, small_campai
             pass
 
         def run(self, data, seed, map, progress=None):
-            return replace(by_hand.identification(), **change)
+            return failed(data, seed, "default") if change is None else replace(by_hand.identification(), **change)
 
     monkeypatch.setattr(evidence, "EvidenceSelection", Found)
     monkeypatch.setattr("rcsa_ident.io.identifications._delays", lambda *_: {})
     out = tmp_path / "R.json"
-    run("identify", small_campaign, "--out", out, "--processes", 1, code=code)
+    report = ["--report", tmp_path / "report.html"] if change is None else []
+    run("identify", small_campaign, "--out", out, "--processes", 1, *report, code=code)
     # it is written, whatever it is worth
-    assert read_result(out)["status"] == ("failed" if change.get("status") else "suspect")
+    data = read_result(out)
+    assert data["status"] == ("failed" if change is None else "suspect")
+    assert data["reasons"]
+    assert (data["axes"] == {}) is (change is None)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import DAMPING_UNIT, JOINT, plain
+from rcsa_ident.identification.parameters import DAMPING_UNIT, JOINT, flange_layout
 from rcsa_ident.identification.priors import Priors
 
 
@@ -54,7 +54,7 @@ def vector_of(layout, frequency_hz, seed=1):
 
 def machine_vector(frequency_hz, seed=1):
     """A vector of one axis, its flange the only output."""
-    return vector_of(plain(len(frequency_hz)), (frequency_hz,), seed)
+    return vector_of(flange_layout(len(frequency_hz)), (frequency_hz,), seed)
 
 
 def own(theta):

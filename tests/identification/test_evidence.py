@@ -10,6 +10,7 @@ from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification.evidence import EvidenceSelection
+from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.method import Phase
 from rcsa_ident.identification.parameters import AxisLayout, parameter_names
 from rcsa_ident.identification.preview import Preview
@@ -373,3 +374,43 @@ def test_odd_data_end_in_a_status(shop, campaign, name):
         assert np.all(np.isfinite(result.posterior.covariance))
         assert np.isfinite(result.chi2_per_point)
     assert all(np.isfinite(value) and np.isfinite(std) for value, std in found.coefficients.values())
+
+
+HOPELESS = {
+    "a line that is no number": ("lines", lambda x: np.where(np.arange(x.shape[0])[:, None, None] == 3, np.nan, x)),
+    "a variance that is no number": ("variance", lambda v: np.where(np.arange(v.shape[0])[:, None] == 3, np.nan, v)),
+    "a tool-holder without a receptance": ("flange", lambda a: np.nan * a),
+    "forces without slopes": ("force_slope", lambda s: np.inf * (1.0 + s)),
+    "lines of another universe": ("lines", lambda x: 1e150 * x),
+    "lines of which nothing is known": ("variance", lambda v: np.inf * v),
+}
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("name", HOPELESS)
+def test_data_without_a_finite_fit_end_as_failed(shop, campaign, name):
+    """No traceback and no machine: a status, a reason and its code."""
+    field, spoil = HOPELESS[name]
+    data = shop.prepare(campaign[2][::8], spread=(0.05, 0.05, 0.0, 0.0))
+    spoilt = replace(data, axes=(replace(data.axes[0], **{field: spoil(getattr(data.axes[0], field))}), *data.axes[1:]))
+    # the published method weighs no variances, and does not mind what unit the lines have
+    methods = [TINY] if "of" in name.split() else [TINY, PaperGeneticAlgorithm(generations=2)]
+    for method in methods:
+        found = method.run(spoilt, 3)
+        assert found.status is Status.FAILED
+        assert not found.at_minimum
+        assert (found.axes, found.cut_ids, found.seed, found.method) == ({}, (), 3, method.name)
+        assert {reason.code for reason in found.reasons} == {IdentificationCode.NO_FINITE_FIT}
+        if "no number" in name:
+            assert found.reasons[0].startswith("X: not all ")
+
+
+def test_a_task_without_a_finite_answer_ends_the_search_wherever_it_ran(shop, campaign):
+    """As a service keeps it: the answer None of a task stands for it."""
+    data = shop.prepare(campaign[2][::8])
+    for lost in (Phase.SEARCH, Phase.OTHER_AXIS, Phase.BOTH_AXES):
+
+        def forgetful(function, tasks, lost=lost):
+            return [None if task.phase is lost else function(task) for task in tasks]
+
+        assert TINY.run(data, 3, forgetful).status is Status.FAILED

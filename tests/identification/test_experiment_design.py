@@ -27,7 +27,7 @@ from rcsa_ident.identification.experiment_design import (
 )
 from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import AxisLayout, Layout, plain
+from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_layout
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.tool_holder.model import tool_holder_receptance
@@ -277,7 +277,7 @@ def test_the_tips_changes_are_those_of_the_bands(shop, posteriors):
 
 def test_the_expected_band_is_that_of_an_identification_which_made_the_cuts(few, shop):
     theta = machine_vector((600.0, 1400.0, 2600.0))
-    data, _ = remade(few.only(Dof.X), theta, plain(3), np.random.default_rng(8), noise=1e-2)
+    data, _ = remade(few.only(Dof.X), theta, flange_layout(3), np.random.default_rng(8), noise=1e-2)
     axis = data.axes[0]
     # the first campaign has every second cut
     early = np.isin(axis.cut, np.arange(0, len(data.cut_ids), 2))
@@ -285,7 +285,7 @@ def test_the_expected_band_is_that_of_an_identification_which_made_the_cuts(few,
 
     def identified(part):
         misfit = Misfit(replace(data, axes=(part,)), Priors(), (5e-4,))
-        solution = refine(misfit, theta, plain(3), np.zeros((len(data.cut_ids), 2)), 100, grid=32)
+        solution = refine(misfit, theta, flange_layout(3), np.zeros((len(data.cut_ids), 2)), 100, grid=32)
         return Posterior(solution.theta, np.linalg.inv(solution.evaluation.hessian), AxisLayout(3))
 
     first, second = identified(axis.of(early)), identified(axis)

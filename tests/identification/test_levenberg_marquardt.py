@@ -6,11 +6,11 @@ import pytest
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import AxisLayout, Layout, plain
+from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_layout
 from rcsa_ident.identification.priors import Priors
 from tests.identification.models import machine_vector, remade, vector_of
 
-LAYOUT = plain(3)
+LAYOUT = flange_layout(3)
 
 
 @pytest.fixture(scope="module")

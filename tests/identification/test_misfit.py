@@ -5,7 +5,7 @@ import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.misfit import DELAY_UNIT, Misfit, Residual
-from rcsa_ident.identification.parameters import AxisLayout, Layout, plain
+from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_layout
 from rcsa_ident.identification.priors import Priors
 from tests.identification.models import vector_of
 
@@ -53,7 +53,7 @@ def dense(misfit, theta, layout, nuisance):
 @pytest.fixture(scope="module", params=KINDS)
 def case(request, few, rich):
     if request.param == "plain":
-        return Case(few, plain(3, 2), "plain")
+        return Case(few, flange_layout(3, 2), "plain")
     layout = Layout((AxisLayout(3, True, True), AxisLayout(2, True, True)), len(rich.coefficient_spread), rich.clampings)
     return Case(rich, layout, "all")
 
@@ -248,18 +248,22 @@ def test_two_outputs_add_up_to_the_model_of_one(rich):
     nuisance = np.zeros((len(rich.cut_ids), 2))
     both = Misfit(rich, Priors(), SHARES).evaluate(theta, layout, nuisance).models
     parts = [theta[layout.axis(i)][: layout.axes[i].core] for i in range(2)]
-    one = Misfit(rich.summed(), Priors(), SHARES).evaluate(np.concatenate([*parts, theta[layout.joint]]), plain(3, 2), nuisance).models
+    one = (
+        Misfit(rich.summed(), Priors(), SHARES)
+        .evaluate(np.concatenate([*parts, theta[layout.joint]]), flange_layout(3, 2), nuisance)
+        .models
+    )
     for two, single in zip(both, one, strict=True):
         np.testing.assert_allclose(two.sum(axis=1), single[:, 0], rtol=1e-9)
 
 
 def test_a_cut_that_one_axis_did_not_see(few):
-    theta = vector_of(plain(3, 2), FREQUENCIES)
+    theta = vector_of(flange_layout(3, 2), FREQUENCIES)
     x, y = few.axes
     data = replace(few, axes=(x, y.of(y.cut != 2)))
     alone = Misfit(data.only(Dof.Y), Priors(), (0.02,))
-    vector = theta[plain(3).axis(0).stop :]
-    found = alone.evaluate(vector, plain(2), np.zeros((len(data.cut_ids), 2)), grid=16, normal=True)
+    vector = theta[flange_layout(3).axis(0).stop :]
+    found = alone.evaluate(vector, flange_layout(2), np.zeros((len(data.cut_ids), 2)), grid=16, normal=True)
     assert np.all(np.isfinite(found.hessian))
     assert np.all(np.isfinite(found.linear.gradient))
     np.testing.assert_array_equal(found.linear.follow(np.ones(vector.size))[2], 0.0)
@@ -268,7 +272,7 @@ def test_a_cut_that_one_axis_did_not_see(few):
     assert std[2] == pytest.approx(data.cut_prior.tooth_period[2] / np.sqrt(12.0))
     rows = np.random.default_rng(1).standard_normal((found.residual.lines[0].size, 3))
     assert all(np.all(np.isfinite(part)) for part in found.linear.border(0, rows, found.residual))
-    both = Misfit(data, Priors(), SHARES).evaluate(theta, plain(3, 2), np.zeros((len(data.cut_ids), 2)), grid=16, normal=True)
+    both = Misfit(data, Priors(), SHARES).evaluate(theta, flange_layout(3, 2), np.zeros((len(data.cut_ids), 2)), grid=16, normal=True)
     assert np.all(np.isfinite(both.hessian))
 
 
@@ -277,13 +281,13 @@ def test_a_line_of_nothing_without_noise_keeps_its_place(few):
     lines = np.array(axis.lines)
     lines[3] = 0.0
     data = replace(few.only(Dof.X), axes=(replace(axis, lines=lines, variance=np.zeros_like(axis.variance)),))
-    theta = vector_of(plain(3), FREQUENCIES[:1])
-    found = Misfit(data, Priors(), (0.02,)).evaluate(theta, plain(3), np.zeros((len(data.cut_ids), 2)), 16)
+    theta = vector_of(flange_layout(3), FREQUENCIES[:1])
+    found = Misfit(data, Priors(), (0.02,)).evaluate(theta, flange_layout(3), np.zeros((len(data.cut_ids), 2)), 16)
     assert np.isfinite(found.cost)
 
 
 def test_a_cut_that_counts_less(few):
-    theta, layout = vector_of(plain(3, 2), FREQUENCIES), plain(3, 2)
+    theta, layout = vector_of(flange_layout(3, 2), FREQUENCIES), flange_layout(3, 2)
     weight = np.ones(len(few.cut_ids))
     weight[4] = 0.01
     nuisance = np.zeros((len(few.cut_ids), 2))

@@ -17,14 +17,14 @@ from rcsa_ident.identification.model_order import (
     model_error,
     promising,
 )
-from rcsa_ident.identification.parameters import AxisLayout, Layout, pack, plain, unpack, with_mode, without_mode
+from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_layout, pack, unpack, with_mode, without_mode
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import Stage
 from tests.identification.models import machine_vector, own, remade, vector_of
 from tests.identification.test_parameters import receptance
 
 BAND = (530.0, 4300.0)
-TRUE = plain(3)
+TRUE = flange_layout(3)
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_evidence_prefers_the_true_number_of_modes(few, theta):
     rng = np.random.default_rng(6)
     data, _ = remade(few.only(Dof.X), theta, TRUE, rng, noise=5e-3)
     misfit = Misfit(data, Priors(), (5e-4,))
-    full = refine(misfit, with_two_more(theta, rng), plain(5), nothing(data), 80, grid=32)
+    full = refine(misfit, with_two_more(theta, rng), flange_layout(5), nothing(data), 80, grid=32)
     seen = []
     best = drop_modes(full, misfit, lambda stage, value, solution: seen.append((stage, value, solution.layout)))
     assert best.layout == TRUE
@@ -83,7 +83,7 @@ def poor(request, known, theta):
     """The best that can be done without one of the modes."""
     data, misfit, right = known
     left = without_mode(unpack(own(theta), TRUE.axes[0]), request.param)
-    found = refine(misfit, np.concatenate([pack(left), theta[-4:]]), plain(2), nothing(data), 60, grid=32)
+    found = refine(misfit, np.concatenate([pack(left), theta[-4:]]), flange_layout(2), nothing(data), 60, grid=32)
     assert evidence(found, misfit) > evidence(right, misfit) + 100.0
     return request.param, found
 
@@ -108,7 +108,7 @@ def test_promise_of_a_weak_mode_is_kept(known, theta, place):
     # at a place of the grid
     frequency = np.geomspace(0.3 * BAND[0], 2.5 * BAND[1], 30)[place]
     more = with_mode(unpack(own(theta), TRUE.axes[0]), 2.0 * np.pi * frequency, tuple(shape), 0.06)
-    lines, delay = remade(known[0], np.concatenate([pack(more), theta[-4:]]), plain(4), np.random.default_rng(3), noise=0.0)
+    lines, delay = remade(known[0], np.concatenate([pack(more), theta[-4:]]), flange_layout(4), np.random.default_rng(3), noise=0.0)
     misfit = Misfit(lines, Priors(), (1e-3,))
     without = refine(misfit, theta, TRUE, np.stack([delay, 0.0 * delay], axis=1), 60)
     first = promising(without, misfit, 0, BAND)[0]
@@ -159,12 +159,12 @@ def test_exchange_leaves_the_right_model_alone(known):
 
 
 def test_grow_adds_a_mode_to_each_axis_though_nothing_asks_for_it(few):
-    theta = vector_of(plain(3, 2), ((600.0, 1400.0, 2600.0), (900.0, 2100.0)))
-    data, _ = remade(few, theta, plain(3, 2), np.random.default_rng(4), noise=5e-3)
+    theta = vector_of(flange_layout(3, 2), ((600.0, 1400.0, 2600.0), (900.0, 2100.0)))
+    data, _ = remade(few, theta, flange_layout(3, 2), np.random.default_rng(4), noise=5e-3)
     misfit = Misfit(data, Priors(), (5e-4, 5e-4))
-    right = refine(misfit, theta, plain(3, 2), nothing(data), 60, grid=32)
+    right = refine(misfit, theta, flange_layout(3, 2), nothing(data), 60, grid=32)
     grown = grow_modes(right, misfit, BAND)
-    assert grown.layout == plain(4, 3)
+    assert grown.layout == flange_layout(4, 3)
     # the data do not pay for them, and what was there stays
     assert evidence(grown, misfit) > evidence(right, misfit)
     assert sum(grown.evaluation.chi2) < sum(right.evaluation.chi2) * 1.001

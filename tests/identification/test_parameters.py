@@ -14,11 +14,11 @@ from rcsa_ident.identification.parameters import (
     AxisLayout,
     Layout,
     chain,
+    flange_layout,
+    flange_modes,
     joint_of,
-    modes_of,
     pack,
     parameter_names,
-    plain,
     scaled_joint,
     selected,
     split,
@@ -84,7 +84,7 @@ def test_every_vector_is_a_passive_reciprocal_machine(drawn, x):
     layout, part = drawn
     axis = unpack(part, layout)
     omega = 2.0 * np.pi * np.geomspace(1.0, 20000.0, 150)
-    values = modes_of(axis.at(x), Dof.X).receptance(omega).values
+    values = flange_modes(axis.at(x), Dof.X).receptance(omega).values
     assert dissipation(omega, values).min() > -1e-9
     np.testing.assert_allclose(values, np.swapaxes(values, 1, 2), rtol=1e-12)
     expected = receptance(axis, omega, x)[:, :2, :2]
@@ -121,7 +121,7 @@ def test_overdamped_modes_are_real_poles():
     part[2:6] = [1.0, 0.3, -0.5, 1.0]
     part[6:9] = np.log(100.0), 20.0, np.log(90.0)  # damping ratios above 1
     axis = unpack(part, AxisLayout(2))
-    modes = modes_of(axis, Dof.Y)
+    modes = flange_modes(axis, Dof.Y)
     omega = 2.0 * np.pi * np.linspace(10.0, 3000.0, 50)
     np.testing.assert_allclose(modes.receptance(omega).values, receptance(axis, omega)[:, :2, :2], rtol=1e-7)
     assert np.sum(modes.zeta == 1.0) >= 2
@@ -238,8 +238,8 @@ def test_every_unknown_has_one_place(axes, coefficients, clampings):
 
 
 def test_plain_layout():
-    assert plain(2, 3) == Layout((AxisLayout(2), AxisLayout(3)))
-    assert plain(4).size == 4 + 8 + 10 + 3 + 4
+    assert flange_layout(2, 3) == Layout((AxisLayout(2), AxisLayout(3)))
+    assert flange_layout(4).size == 4 + 8 + 10 + 3 + 4
 
 
 def test_joint():

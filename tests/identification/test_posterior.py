@@ -6,7 +6,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.levenberg_marquardt import refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, plain, unpack
+from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, flange_layout, unpack
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.machine.spindle import Spindle
@@ -47,9 +47,9 @@ def spread(posterior, tip, speed=None):
 
 
 def posterior_at(few, theta, noise):
-    data, _ = remade(few.only(Dof.X), theta, plain(3), np.random.default_rng(8), noise=noise)
+    data, _ = remade(few.only(Dof.X), theta, flange_layout(3), np.random.default_rng(8), noise=noise)
     misfit = Misfit(data, Priors(), (1e-6,))
-    solution = refine(misfit, theta, plain(3), np.zeros((len(data.cut_ids), 2)), 100, grid=32)
+    solution = refine(misfit, theta, flange_layout(3), np.zeros((len(data.cut_ids), 2)), 100, grid=32)
     return Posterior(solution.theta, np.linalg.inv(solution.evaluation.hessian), THREE)
 
 

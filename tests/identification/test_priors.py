@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from rcsa_ident.identification.parameters import AxisLayout, Layout, plain
+from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_layout
 from rcsa_ident.identification.priors import Priors, log_volume, prior_rows
 
 PRIORS = Priors(
@@ -18,8 +18,8 @@ PRIORS = Priors(
 )
 UNIT = 30.0  # of the damping factor [sqrt(rad/s)]
 LAYOUTS = {
-    "one mode": plain(1),
-    "two axes": plain(2, 4),
+    "one mode": flange_layout(1),
+    "two axes": flange_layout(2, 4),
     "fixture": Layout((AxisLayout(3, fixture=True),), coefficients=2),
     "everything": Layout((AxisLayout(2, True, True), AxisLayout(3, True, True)), coefficients=3, clampings=2),
 }
@@ -113,6 +113,6 @@ def test_log_volume_is_that_of_the_information(layout, spreads):
 
 def test_wider_priors_fill_more():
     narrow, wide = Priors(shape=0.5), Priors(shape=5.0)
-    assert log_volume(plain(3), narrow) - log_volume(plain(3), wide) == pytest.approx(2.0 * 6 * np.log(10.0))
+    assert log_volume(flange_layout(3), narrow) - log_volume(flange_layout(3), wide) == pytest.approx(2.0 * 6 * np.log(10.0))
     fixture = Layout((AxisLayout(3, fixture=True),))
     assert log_volume(fixture, narrow) - log_volume(fixture, wide) == pytest.approx(2.0 * 9 * np.log(10.0))

@@ -11,7 +11,7 @@ import pytest
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.identification.machine import IdentifiedMachine
-from rcsa_ident.identification.parameters import AxisLayout, joint_of, modes_of, pack, simple_axis
+from rcsa_ident.identification.parameters import AxisLayout, flange_modes, joint_of, pack, simple_axis
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine
@@ -80,7 +80,7 @@ def coupled_by_hand(posterior, axis, assembly, x):
     stiffness = np.outer(natural, natural) * (np.eye(2) + x * change)
     squares, turn = np.linalg.eigh(stiffness)
     turned = replace(physics, omega_n=np.sqrt(squares), psi=turn.T @ physics.psi, factor=turn.T @ lower)
-    return couple(holder, modes_of(turned, axis).receptance(OMEGA), joint_of(LOGS))["tip", "tip"][:, 0, 0]
+    return couple(holder, flange_modes(turned, axis).receptance(OMEGA), joint_of(LOGS))["tip", "tip"][:, 0, 0]
 
 
 @pytest.mark.parametrize(("speed", "x"), [(None, 0.0), (1500.0, 0.0), (2100.0, 1.0), (1200.0, -0.5), (9000.0, 1.0)])

@@ -13,7 +13,7 @@ from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement, Reading
 from rcsa_ident.signals.verdict import RecordCode, Verdict
-from rcsa_ident.workflows.speed_bands import divided, speed_bands
+from rcsa_ident.workflows.speed_bands import speed_bands, split_by_speed
 from tests.fixtures import by_hand
 
 
@@ -40,7 +40,7 @@ class Echo:
 def test_bands_are_equal_ranges_and_every_usable_cut_is_in_one():
     readings = [reading(k, speed) for k, speed in enumerate(np.linspace(800.0, 2000.0, 30))]
     readings.append(reading(99, 1500.0, usable=False))
-    bands = divided(readings, 3)
+    bands = split_by_speed(readings, 3)
     assert [speeds for speeds, _ in bands] == [pytest.approx(p) for p in ((800.0, 1200.0), (1200.0, 1600.0), (1600.0, 2000.0))]
     for (low, high), cuts in bands:
         speeds = [each.measurement.spindle_speed for each in cuts]
@@ -52,14 +52,14 @@ def test_a_band_with_too_few_cuts_of_a_tooling_is_refused_with_the_number():
     readings = [reading(k, speed) for k, speed in enumerate(np.linspace(800.0, 2000.0, 40))]
     readings += [reading(k, speed, "T2") for k, speed in enumerate(np.linspace(800.0, 1500.0, 20))]
     with pytest.raises(InputError) as error:
-        divided(readings, 2)
+        split_by_speed(readings, 2)
     for word in ("speed_bands", "3 cuts with T2", "13369 to 19099 rev/min", "at least 8 cuts", "2 bands"):
         assert word in str(error.value)
 
 
 def test_no_usable_cut_is_said():
     with pytest.raises(InputError, match="none of 1 usable"):
-        divided([reading(0, 900.0, usable=False)], 2)
+        split_by_speed([reading(0, 900.0, usable=False)], 2)
 
 
 def test_each_band_is_identified_from_its_own_cuts(tmp_path):
