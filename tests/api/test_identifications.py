@@ -239,7 +239,7 @@ def test_what_can_not_be_identified(client, store, tmp_path, result):
     for axis in bare["axes"].values():
         del axis["covariance"]
     client.identify(machine, json.dumps(bare))
-    assert "without a covariance" in refused(422, client.identify_campaign, empty, start=True).detail
+    assert "no covariance" in refused(422, client.identify_campaign, empty, start=True).detail
     assert list(client.jobs()) == []
 
 

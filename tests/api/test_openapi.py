@@ -26,12 +26,9 @@ from api.stores.jobs import Event, Job, Outcome
 from tests.api.identifying import carried
 from tests.api.in_process import embedded, service
 from tests.api.recordings import recording
-from tests.fixtures.effort import examples
 from tests.fixtures.service import example
 
-BOUNDED = settings(
-    max_examples=examples(6, 20), deadline=None, database=None, phases=[Phase.generate], suppress_health_check=list(HealthCheck)
-)
+BOUNDED = settings(max_examples=20, deadline=None, database=None, phases=[Phase.generate], suppress_health_check=list(HealthCheck))
 
 
 def operations(schema):
@@ -179,4 +176,4 @@ def test_the_api_keeps_to_its_description(tmp_path, result, fuzzing):
                     # nothing about it can be wrong
                     assert mode is schemathesis.GenerationMode.NEGATIVE
             assert fuzzed.statuses, operation.label
-            assert len(fuzzed.statuses) > 1 or operation.path in NOTHING_TO_SAY
+            assert len(fuzzed.statuses) > 1 or operation.path in NOTHING_TO_SAY, (operation.label, fuzzed.statuses)

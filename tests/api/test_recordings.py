@@ -12,7 +12,8 @@ import pytest
 
 from api.files import NORMALISED, UPLOADS
 from api.reading.samples import read_normalised
-from rcsa_ident.io.recordings import read_recording, write_hdf5
+from rcsa_ident.io.hdf5 import write_hdf5
+from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.api.in_process import refused, service
 from tests.api.recordings import RATE, RPM, channels, content, declared, pair
@@ -139,7 +140,7 @@ def test_a_wrong_unit_leaves_a_note(client, campaign, tmp_path):
     assert any("flange_x has a peak-to-peak amplitude of" in note for note in found.verdict.notes)
     tiny = {name: values * 1e-5 for name, values in channels(1).items()}
     found = client.upload(campaign, made(tmp_path, "c1_cut.h5", 1, **tiny))
-    assert sum("are its unit and sensitivity right?" in note for note in found.verdict.notes) >= 2
+    assert sum("check its unit and sensitivity" in note for note in found.verdict.notes) >= 2
 
 
 @pytest.mark.parametrize("kind", FORMATS)

@@ -74,13 +74,13 @@ def test_kernels_see_arrays_and_scalars_only(path):
                 assert "parallel" not in words, f"{function.name}: {words}"
 
 
-def tests_of(path: Path) -> Path:
+def file_of_tests(path: Path) -> Path:
     """Of ``room/_kernels.py`` they stand in ``tests/room/test_kernels.py``."""
     return ROOT / "tests" / path.parent.relative_to(PACKAGE) / f"test{path.name}"
 
 
 def test_kernels_have_their_tests():
-    assert not [path for path in KERNELS if not tests_of(path).exists()]
+    assert not [path for path in KERNELS if not file_of_tests(path).exists()]
 
 
 def test_kernels_need_no_types():
@@ -94,7 +94,7 @@ def test_kernels_need_no_types():
 @pytest.mark.slow
 def test_kernels_without_the_compiler():
     """The same tests, with the kernels as plain Python: no result rests on what the compiler lets pass."""
-    tests = [str(tests_of(path)) for path in KERNELS]
+    tests = [str(file_of_tests(path)) for path in KERNELS]
     passes(sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests, NUMBA_DISABLE_JIT="1")
 
 

@@ -50,8 +50,8 @@ def published(data):
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
-        (without_covariance, ["axes.X", "no covariance (method default)"]),
-        (published, ["axes.X", "no covariance (method paper)", "a result of the default method"]),
+        (without_covariance, ["axes.X", "found no covariance", "a result of the default method"]),
+        (published, ["axes.X", "found no covariance", "a result of the default method"]),
         (failed, ["axes", "the identification has failed"]),
         (lambda data: {"seed": 1}, ["schema_version", "found nothing"]),
         (lambda data: [], ["content", "an empty list"]),

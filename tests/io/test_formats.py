@@ -18,7 +18,8 @@ from typer.testing import CliRunner
 from rcsa_ident.cli import app
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.recordings import READERS, read_recording, write_hdf5
+from rcsa_ident.io.hdf5 import write_hdf5
+from rcsa_ident.io.recordings import READERS, read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.fixtures.recording_formats import FORMATS
 

@@ -53,7 +53,7 @@ def test_a_band_with_too_few_cuts_of_a_tooling_is_refused_with_the_number():
     readings += [reading(k, speed, "T2") for k, speed in enumerate(np.linspace(800.0, 1500.0, 20))]
     with pytest.raises(InputError) as error:
         divided(readings, 2)
-    for word in ("--speed-bands", "3 cuts with T2", "13369 to 19099 rev/min", "at least 8 cuts", "2 bands"):
+    for word in ("speed_bands", "3 cuts with T2", "13369 to 19099 rev/min", "at least 8 cuts", "2 bands"):
         assert word in str(error.value)
 
 
