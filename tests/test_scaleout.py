@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 import operator
 import os
-import shutil
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,9 +15,8 @@ from rcsa_ident.cli import app
 from rcsa_ident.errors import InputError
 from rcsa_ident.scaleout import ClusterLost, cluster_map
 from tests.fixtures import scaleout_tasks as tasks
+from tests.fixtures.campaign import part_of_the_sample_runs
 from tests.fixtures.waiting import until
-
-SAMPLES = Path(__file__).resolve().parents[1] / "data" / "sample_runs"
 
 
 @pytest.fixture(scope="module")
@@ -168,17 +165,8 @@ def test_a_task_that_ends_its_worker():
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
-    """Every eighth cut of the sample runs."""
-    folder = tmp_path_factory.mktemp("few")
-    shutil.copytree(SAMPLES / "toolings", folder / "toolings")
-    (folder / "recordings").mkdir()
-    head, *cuts = (SAMPLES / "campaign.toml").read_text(encoding="utf-8").split("[[cuts]]")
-    for cut in cuts[::8]:
-        for kind in ("cut", "air"):
-            name = next(line.split('"')[1] for line in cut.splitlines() if line.startswith(f"{kind} ="))
-            shutil.copyfile(SAMPLES / name, folder / name)
-    (folder / "campaign.toml").write_text(head + "".join("[[cuts]]" + cut for cut in cuts[::8]), encoding="utf-8")
-    return folder
+    """Every eighth cut of the sample runs, along X."""
+    return part_of_the_sample_runs(tmp_path_factory.mktemp("few"), 8, "x")
 
 
 @pytest.mark.slow

@@ -26,7 +26,6 @@ from rcsa_ident.identification.progress import Stage, Step
 from rcsa_ident.machining_setup import CutSpec
 from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.verdict import RecordCode, Verdict
-from tests.fixtures.effort import examples
 
 DTYPES = st.sampled_from(["<f8", ">f8", "<c16", "<i8", "<i4", "<u2", "?", "<f4"])
 ARRAYS = DTYPES.flatmap(lambda kind: arrays.arrays(kind, arrays.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=4)))
@@ -83,7 +82,7 @@ def same(a, b) -> bool:
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=examples(60, 300))
+@settings(deadline=None, max_examples=60)
 @given(VALUES)
 def test_what_is_told_comes_back(value):
     text = encode(value)

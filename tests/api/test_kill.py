@@ -31,7 +31,10 @@ from tests.fixtures import by_hand
 from tests.fixtures.service import command, example, serving
 from tests.fixtures.waiting import PATIENCE, until
 
-pytestmark = pytest.mark.skipif(os.name != "posix" or not Path("/proc/self/stat").exists(), reason="processes are looked up in /proc")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(os.name != "posix" or not Path("/proc/self/stat").exists(), reason="processes are looked up in /proc"),
+]
 
 
 def descendants(pid: int) -> list[int]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,7 @@ import pytest
 from rcsa_ident.io.identifications import identification_to_json
 from rcsa_ident.io.results import write_result
 from tests.fixtures import by_hand
-from tests.fixtures.paths import SAMPLES
+from tests.fixtures.campaign import part_of_the_sample_runs
 
 
 @pytest.fixture
@@ -48,13 +47,4 @@ def tooling_file(tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def small_campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Every fourth cut of the sample runs."""
-    folder = tmp_path_factory.mktemp("small")
-    shutil.copytree(SAMPLES / "toolings", folder / "toolings")
-    (folder / "recordings").mkdir()
-    head, *cuts = (SAMPLES / "campaign.toml").read_text(encoding="utf-8").split("[[cuts]]")
-    for cut in cuts[::4]:
-        for kind in ("cut", "air"):
-            name = next(line.split('"')[1] for line in cut.splitlines() if line.startswith(f"{kind} ="))
-            shutil.copyfile(SAMPLES / name, folder / name)
-    (folder / "campaign.toml").write_text(head + "".join("[[cuts]]" + cut for cut in cuts[::4]), encoding="utf-8")
-    return folder
+    return part_of_the_sample_runs(tmp_path_factory.mktemp("small"), 4)

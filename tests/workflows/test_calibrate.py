@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ SENSORS = (Sensor("fx", Quantity.FORCE, Dof.X), Sensor("fy", Quantity.FORCE, Dof
 RESONANCE = ((3200.0, 0.03), (2700.0, 0.04))
 
 
+@cache
 def simulated(seed, depth, engagement, resonance=(), duration=0.8):
     """Two clampings of five feeds each: conditions with true speeds, and long noise-free forces."""
     rng = np.random.default_rng(seed)
