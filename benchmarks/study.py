@@ -30,7 +30,6 @@ from benchmarks.machines import CONDITIONS, EVALUATION, random_machine, under
 from benchmarks.page import DOCS, append_row, draw_study, read_rows, write_block
 from benchmarks.study_table import AIMS, line, table
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.cli.simulation import simulate_campaign
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import WIDE, NoiseWeightedCost, PaperGeneticAlgorithm
@@ -42,6 +41,7 @@ from rcsa_ident.io.results import read_result, write_result
 from rcsa_ident.io.setups import read_campaign, read_tooling
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.samples import simulate_campaign
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.stability.tip_modes import TIP

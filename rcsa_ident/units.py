@@ -6,11 +6,11 @@ Powers of ten (mm, µm, MPa) are written in line beside the name that carries th
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, overload
+
+from rcsa_ident.errors import InputError, positive
 
 if TYPE_CHECKING:  # commands start without numpy
-    from typing import Any
-
     from numpy.typing import NDArray
 
 Number = TypeVar("Number", float, "NDArray[Any]")
@@ -67,3 +67,56 @@ def to_cm3_per_min(rate: Number) -> Number:
     60.0
     """
     return 6e7 * rate
+
+
+@overload
+def rpm(first: float) -> float: ...
+@overload
+def rpm(first: float, last: float, step: float) -> NDArray[Any]: ...
+def rpm(first: float, last: float | None = None, step: float | None = None) -> Any:
+    """Return a spindle speed, or the speeds from the first to the last one, in rad/s from rev/min.
+
+    >>> round(rpm(12_000), 3)
+    1256.637
+    >>> to_rpm(rpm(4000, 5000, 250), 6).tolist()
+    [4000.0, 4250.0, 4500.0, 4750.0, 5000.0]
+    """
+    return from_rpm(_steps(first, last, step, "rev/min"))
+
+
+@overload
+def hz(first: float) -> float: ...
+@overload
+def hz(first: float, last: float, step: float) -> NDArray[Any]: ...
+def hz(first: float, last: float | None = None, step: float | None = None) -> Any:
+    """Return an angular frequency, or those from the first to the last one, in rad/s from hertz.
+
+    >>> round(hz(50.0), 3)
+    314.159
+    >>> to_hz(hz(100.0, 300.0, 100.0)).round(9).tolist()
+    [100.0, 200.0, 300.0]
+    """
+    return from_hz(_steps(first, last, step, "Hz"))
+
+
+def _steps(first: float, last: float | None, step: float | None, unit: str) -> Any:
+    if last is None and step is None:
+        return positive("value", first, unit)
+    if last is None or step is None:
+        raise InputError("last and step", "one of them", f"both, or neither [{unit}]")
+    return inclusive(first, last, step, ("first", "last", "step"), unit)
+
+
+def inclusive(first: float, last: float, step: float, names: tuple[str, str, str], unit: str) -> Any:
+    """Return first, first + step, ... up to last, which is one of them if the steps meet it."""
+    import numpy as np
+
+    for name, value in zip(names, (first, last, step), strict=True):
+        if not (value > 0.0 and value - value == 0.0):
+            raise InputError(name, value, f"a finite number above 0 [{unit}]")
+    if last < first:
+        raise InputError(names[1], last, f"{names[0]} ({first:g}) or more [{unit}]")
+    count = int(np.floor((last - first) / step * (1.0 + 1e-12) + 1e-9)) + 1
+    if count > 1_000_000:
+        raise InputError(names[2], step, f"a step that gives at most 1000000 values [{unit}]")
+    return first + step * np.arange(count)

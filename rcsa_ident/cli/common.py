@@ -165,18 +165,3 @@ def writable(path: Path, option: str = "--out") -> Path:
     if not os.access(path.parent, os.W_OK):
         raise InputError(option, "a folder without permission to write", "a file that can be written", str(path))
     return path
-
-
-def inclusive(first: float, last: float, step: float, names: tuple[str, str, str], unit: str) -> Any:
-    """Return first, first + step, ... up to last, which is one of them if the steps meet it."""
-    import numpy as np
-
-    for name, value in zip(names, (first, last, step), strict=True):
-        if not (value > 0.0 and value - value == 0.0):
-            raise InputError(name, value, f"a finite number above 0 [{unit}]")
-    if last < first:
-        raise InputError(names[1], last, f"{names[0]} ({first:g}) or more [{unit}]")
-    count = int(np.floor((last - first) / step * (1.0 + 1e-12) + 1e-9)) + 1
-    if count > 1_000_000:
-        raise InputError(names[2], step, f"a step that gives at most 1000000 values [{unit}]")
-    return first + step * np.arange(count)

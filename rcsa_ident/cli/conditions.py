@@ -6,10 +6,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rcsa_ident.cli.common import inclusive
 from rcsa_ident.cli.options import CutOptions, DriveOptions, SpeedOptions, Strategy, TipOptions
 from rcsa_ident.errors import InputError
-from rcsa_ident.units import from_rpm
+from rcsa_ident.units import from_rpm, inclusive
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rcsa_ident import units
-from rcsa_ident.cli.common import Json, answers, emit, inclusive, say, warn, writable
+from rcsa_ident.cli.common import Json, answers, emit, say, warn, writable
 from rcsa_ident.cli.lobes import ResultFile
 from rcsa_ident.cli.results import read_identified, tell
 from rcsa_ident.errors import InputError
@@ -84,7 +84,7 @@ def export(
     else:
         band = data["band_hz"]
         low, high = math.ceil(band[0]) if from_hz is None else from_hz, band[1] if to_hz is None else to_hz
-        frequency = inclusive(low, high, step_hz, ("--from-hz", "--to-hz", "--step-hz"), "Hz")
+        frequency = units.inclusive(low, high, step_hz, ("--from-hz", "--to-hz", "--step-hz"), "Hz")
         if frequency[-1] > 1.001 * band[1] or frequency[0] < 0.999 * band[0]:
             warn(f"the machine was identified from {band[0]:.0f} to {band[1]:.0f} Hz; outside the FRF is extrapolated")
         grid = units.from_hz(frequency)

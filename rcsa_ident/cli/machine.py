@@ -20,7 +20,7 @@ def simulate(
     json_: Json = False,
 ) -> None:
     """Record a campaign on the virtual machine."""
-    from rcsa_ident.cli.simulation import simulate_campaign as run
+    from rcsa_ident.samples import simulate_campaign as run
 
     stages = Stages(quiet=json_)
     with stages.stage("cuts") as progress, workers(processes, ("rcsa_ident.workflows.simulate",)) as pool:

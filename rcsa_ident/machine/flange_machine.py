@@ -12,7 +12,7 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.receptance import Receptance, Substructure
 from rcsa_ident.errors import InputError
-from rcsa_ident.machine.flange_part import Candidate, FlangePart, independent_parts
+from rcsa_ident.machine.flange_part import FlangePart, JointedFlange, independent_parts
 from rcsa_ident.machine.machine import STEP, Machine
 from rcsa_ident.units import to_hz
 
@@ -61,7 +61,7 @@ class FlangeMachine(Machine):
             look = flange.receptance(frozen(np.linspace(*self.known, 5)))
             for group in independent_parts(look):
                 own = flange if group == look.rows else _Group(flange, group)
-                found.append(FlangePart(group, Candidate(own, self.joint)))
+                found.append(FlangePart(group, JointedFlange(own, self.joint)))
         return tuple(found)
 
     @property

@@ -101,6 +101,11 @@ class Machine(TipSource, Drawn):
         """Directions of the flange that feel each other, group by group."""
 
     @property
+    def ends(self) -> bool:
+        """Whether it answers at no frequency beyond `band`, as a measurement does."""
+        return False
+
+    @property
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Directions of the flange that are known."""
         return tuple(c for part in self.parts for c in part.coordinates)

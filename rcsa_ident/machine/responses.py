@@ -14,9 +14,9 @@ from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import Places, UncertainReceptance, Variation
-from rcsa_ident.machine.flange_part import Candidate, FlangePart
+from rcsa_ident.machine.flange_part import FlangePart, JointedFlange
 
-Respond = Callable[[Candidate, Receptance | None, FloatArray], Receptance]
+Respond = Callable[[JointedFlange, Receptance | None, FloatArray], Receptance]
 _SLOPES = {Dof.X: Dof.SLOPE_X, Dof.Y: Dof.SLOPE_Y}
 
 
@@ -51,7 +51,7 @@ class PartResponse:
     def nominal(self) -> Receptance:
         return self.of(self.part.believed, np.arange(self.omega.size))
 
-    def of(self, candidate: Candidate, places: Places) -> Receptance:
+    def of(self, candidate: JointedFlange, places: Places) -> Receptance:
         holder = self.holder
         if holder is not None and places.size < self.omega.size:
             holder = Receptance(holder.omega[places], holder.values[places], holder.rows, holder.cols)
@@ -93,18 +93,18 @@ class Responses:
         return np.concatenate([np.zeros((0, size), dtype=complex), *rivals])
 
 
-def at_flange(candidate: Candidate, _holder: Receptance | None, omega: FloatArray) -> Receptance:
+def at_flange(candidate: JointedFlange, _holder: Receptance | None, omega: FloatArray) -> Receptance:
     """Return a candidate's receptance at the flange."""
     return candidate.flange.receptance(omega)
 
 
-def at_ends(candidate: Candidate, holder: Receptance | None, omega: FloatArray) -> Receptance:
+def at_ends(candidate: JointedFlange, holder: Receptance | None, omega: FloatArray) -> Receptance:
     """Return a tool-holder's receptances on a candidate, between tip and spindle."""
     assert holder is not None
     return couple(holder, candidate.flange.receptance(omega), candidate.joint)
 
 
-def _values(part: PartResponse, places: Places, candidate: Candidate) -> ComplexArray:
+def _values(part: PartResponse, places: Places, candidate: JointedFlange) -> ComplexArray:
     return part.of(candidate, places).values
 
 

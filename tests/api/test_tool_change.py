@@ -34,6 +34,7 @@ def tooling(tmp_path):
     return by_hand.campaign(tmp_path).toolings["T1"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("softening", [False, True])
 def test_lobes_are_those_of_the_command(client, tmp_path, tooling, softening):
     """With bands, for a machine that stays the same at all speeds and for one that changes."""
@@ -64,6 +65,7 @@ def test_several_toolings_are_compared(shop):
     assert found[0].limit_depth_low_mm is None
 
 
+@pytest.mark.slow
 def test_stable_speeds_are_null(shop):
     client, id = shop
     (found,) = client.lobes(id, "T1", speeds=SPEEDS, max_depth_mm=1e-3).toolings
@@ -88,6 +90,7 @@ def test_the_cut_counts(shop):
     assert not np.allclose(limits(strategy="up"), plain, rtol=1e-2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["zero-order", "full-discretisation"])
 def test_tested_cuts_are_counted(shop, method):
     """Each at its own speed and to its own depth, whatever speeds and depth the lobes are asked for; in any order."""
@@ -144,6 +147,7 @@ def test_advice_has_its_limit_of_work(shop):
     assert "of work" in problem.detail
 
 
+@pytest.mark.slow
 def test_tooltip_is_that_of_the_command(shop, result, tooling, tmp_path):
     client, id = shop
     machine = machine_from_json(json.loads(result), "")
@@ -238,6 +242,7 @@ def test_numbers_that_lead_nowhere_are_told_not_thrown(shop):
     refused(422, client.tooltip, id, example(contact=contact))
 
 
+@pytest.mark.slow
 def test_a_posterior_that_is_too_large_to_keep_is_weighed(shop, monkeypatch):
     """The plain road gives the same limits; where it would take too long it is refused, and so are too many frequencies."""
     client, id = shop

@@ -187,6 +187,7 @@ def coarse(monkeypatch):
         monkeypatch.setattr(module, "warm", lambda: None)
 
 
+@pytest.mark.slow
 def test_a_run_goes_through_files_and_comes_back_as_a_row(scratch, coarse, monkeypatch):
     # the published algorithm, stopped early: fast, far off, and without bands
     monkeypatch.setattr(study, "METHODS", {"quick, bad": PaperGeneticAlgorithm(population=4, generations=2)})
@@ -202,6 +203,7 @@ def test_a_run_goes_through_files_and_comes_back_as_a_row(scratch, coarse, monke
     assert (written["seed"], written["method"]) == (3, "paper")
 
 
+@pytest.mark.slow
 def test_a_search_is_followed_and_measured(scratch, coarse):
     row = search_trace.perform(scratch, "hpm", "differential evolution", 1, 0.3)
     points = np.array(row["points"])
@@ -211,6 +213,7 @@ def test_a_search_is_followed_and_measured(scratch, coarse):
     assert np.all(points[:, 2:] > 0.0)
 
 
+@pytest.mark.slow
 def test_the_default_is_followed_to_its_end(scratch, coarse, monkeypatch):
     quick = EvidenceSelection(search=SearchSettings(modes=3, population=4, generations=1, steps=1), candidates=1)
     monkeypatch.setattr(search_trace, "EvidenceSelection", lambda: quick)

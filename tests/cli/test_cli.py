@@ -29,12 +29,14 @@ def run(*arguments, code=0):
     return result
 
 
+@pytest.mark.slow
 def test_help_names_every_command():
     text = run("--help").output
     for name in ("demo", "check", "identify", "tooltip", "lobes", "simulate", "warm"):
         assert name in text
 
 
+@pytest.mark.slow
 def test_help_imports_nothing_heavy():
     code = (
         "import sys; from rcsa_ident.cli import app\n"
@@ -131,6 +133,7 @@ def test_tooltip_for_machines(tmp_path, result_file, tooling_file):
     assert list(read_frf_csv(tmp_path / "F.csv").bands) == []
 
 
+@pytest.mark.slow
 def test_lobes_from_a_result_and_from_its_own_tip_agree(tmp_path, certain_file, tooling_file):
     speeds = ("--speed-from", 6000, "--speed-to", 12000, "--speed-step", 200)
     run("lobes", certain_file, tooling_file, "--out", tmp_path / "a.csv", *speeds)
@@ -148,6 +151,7 @@ def test_lobes_from_a_result_and_from_its_own_tip_agree(tmp_path, certain_file, 
     assert np.mean((low <= a.limit) & (a.limit <= high)) > 0.9
 
 
+@pytest.mark.slow
 def test_lobes_from_modes_reproduce_the_published_table(tmp_path, tooling_file):
     case = literature.INSPERGER_STEPAN
     mode = "natural_frequency_hz = {}\ndamping_ratio = {}\nmodal_mass_kg = {}\n".format(
@@ -165,6 +169,7 @@ def test_lobes_from_modes_reproduce_the_published_table(tmp_path, tooling_file):
         assert read_lobes_csv(tmp_path / "L.csv").limit[0] == pytest.approx(limit, rel=3e-3)
 
 
+@pytest.mark.slow
 def test_lobes_leave_cells_empty_where_the_cut_is_stable(tmp_path, result_file, tooling_file):
     out = tmp_path / "L.csv"
     answer = run("lobes", result_file, tooling_file, "--out", out, "--max-depth-mm", 0.01, "--speed-step", 4000, "--json").stdout

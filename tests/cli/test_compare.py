@@ -14,6 +14,8 @@ from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_tooling
 from tests.cli.measurements import run
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def hammer(result_file, tmp_path):

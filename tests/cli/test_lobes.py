@@ -57,6 +57,7 @@ def shop(tmp_path):
 SPEEDS = ("--speed-from", 6000, "--speed-to", 16000, "--speed-step", 1000)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["zero-order", "multi-frequency", "semi-discretisation", "full-discretisation", "time-domain"])
 def test_every_method_from_modes_and_from_tap_tests(shop, method):
     """Modes that a method fits to the receptance give the lobes of the modes that were given."""
@@ -70,6 +71,7 @@ def test_every_method_from_modes_and_from_tap_tests(shop, method):
     assert (shop / "a.csv").read_text(encoding="utf-8").splitlines()[0].endswith(",lobe,recommended_depth_mm,flip")
 
 
+@pytest.mark.slow
 def test_a_map_knows_islands_that_the_first_limit_does_not(tmp_path):
     """The helical mill at low immersion: closed islands of period doubling under and above the lobes."""
     (tmp_path / "M.toml").write_text(
@@ -94,6 +96,7 @@ def test_a_map_knows_islands_that_the_first_limit_does_not(tmp_path):
     assert (tmp_path / "L.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_tested_cuts_are_counted_at_their_own_speeds(shop):
     speed = 10013.0
     run("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, "--speed-from", speed, "--speed-to", speed, "--out", shop / "one.csv")
@@ -199,6 +202,7 @@ def test_units_and_records_of_tap_tests(shop):
     assert "record 4" in run(*base, "--frf", f"X={shop}/F.csv#4", code=2).stderr
 
 
+@pytest.mark.slow
 def test_advice_from_modes(shop):
     tip = ("--modes", shop / "M.toml", shop / "T.toml")
     common = ("advise", *tip, *KNOWN, *FEED, "--speed-from", 6000, "--speed-to", 24000, "--max-depth-mm", 15)
@@ -229,6 +233,7 @@ def test_advice_from_modes(shop):
     assert "highest removal rate" in run(*common, "--depth-mm", 40, "--max-depth-mm", 50).stdout
 
 
+@pytest.mark.slow
 def test_advice_compares_stickouts_and_toolings(result_file, tmp_path):
     tool = result_file.parent / "T1.toml"
     base = (*FEED, "--speed-from", 8000, "--speed-to", 16000, "--speed-step", 100)
@@ -249,6 +254,7 @@ def test_advice_compares_stickouts_and_toolings(result_file, tmp_path):
     assert "comparison" in run("advise", result_file, tool, other, *base).stdout
 
 
+@pytest.mark.slow
 def test_probability_counts_the_machines_of_the_posterior(result_file):
     tool = result_file.parent / "T1.toml"
     base = (*FEED, "--speed-from", 11000, "--speed-to", 12000, "--speed-step", 100, "--tolerance", 0, "--reserve", 0)
@@ -330,6 +336,7 @@ def test_the_face_mill_of_the_shared_files(tmp_path):
     assert answer["absolute_frequency_hz"] == pytest.approx(1441.0, abs=1.0)
 
 
+@pytest.mark.slow
 def test_cases_in_process_and_at_standstill(result_file, tmp_path):
     """Cuts at 0.9 and 1.1 of the machine's own limit are classified correctly by it, and not by tap tests of a machine twice as soft."""
     folder, speeds = result_file.parent, ("--speed-from", 9000, "--speed-to", 15000, "--speed-step", 500)

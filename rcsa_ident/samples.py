@@ -1,0 +1,112 @@
+"""Campaigns on the virtual machine, and the sample machine with its toolings that travel with the package."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.machines import MachineFile, read_machine
+from rcsa_ident.io.setups import CAMPAIGN_FILE, read_tooling
+from rcsa_ident.io.simulations import Progress, SimulatedCampaign, write_simulation
+from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.workflows.simulate import simulate, true_flange, true_receptances
+
+#: Cuts of a sample campaign that is made on the spot: three in ten of those in the repository's, and a good answer all the same.
+SAMPLE_CUTS = 24
+
+
+def simulate_campaign(
+    machine: str | Path | MachineFile,
+    out: str | Path,
+    seed: int = 1,
+    progress: Progress | None = None,
+    mapper: Callable[[Callable, Iterable], Iterable] = map,
+) -> SimulatedCampaign:
+    """Let a virtual machine make its cuts; write the campaign into `out` and the truth into ``<out>.truth``.
+
+    Parameters
+    ----------
+    machine : path of a machine file, or what was read from one
+    out : path
+        A folder that does not exist yet, or an empty one.
+    seed : int
+        Same seed, same files.
+    progress : callable of (done, total), optional
+    mapper : callable like `map`, optional
+    """
+    setup = machine if isinstance(machine, MachineFile) else read_machine(machine)
+    toolings = [read_tooling(path) for path in setup.toolings]
+    known = [*toolings, *(read_tooling(path) for path in setup.truth_toolings)]
+    if len({t.name for t in known}) != len(known):
+        raise InputError("cuts.toolings", ", ".join(t.name for t in known), "toolings with different names")
+    cuts = simulate(setup, toolings, seed, mapper)
+    truths = (true_receptances(setup, tooling) for tooling in known)
+    return write_simulation(out, setup, toolings, cuts, truths, true_flange(setup), progress)
+
+
+def sample_data() -> Path:
+    """Return the folder of the virtual machines: inside an installed package, or the repository's ``data/machines``."""
+    package = Path(str(files("rcsa_ident")))
+    for folder in (package / "sample_data", package.parent / "data" / "machines"):
+        if (folder / "hpm.toml").is_file():
+            return folder
+    raise InputError("sample data", "none beside the package", "an installed package, or a checkout of its repository", str(package))
+
+
+def sample_toolings() -> dict[str, Path]:
+    """Return the files of the sample machine's toolings by their names: two that a campaign cuts with, and two that never cut."""
+    return {path.stem: path for path in sorted((sample_data() / "toolings").glob("*.toml"))}
+
+
+def sample_tooling(name: str) -> Tooling:
+    """Return a tooling of the sample machine, as ``S3-PG25-long``, which no sample campaign cuts with."""
+    known = sample_toolings()
+    if name not in known:
+        raise InputError("tooling", name, f"one of {', '.join(known)}")
+    return read_tooling(known[name])
+
+
+def make_sample_campaign(
+    folder: str | Path,
+    cuts: int = SAMPLE_CUTS,
+    seed: int = 1,
+    progress: Progress | None = None,
+    mapper: Callable[[Callable, Iterable], Iterable] = map,
+) -> Path:
+    """Have the sample machine make a campaign, unless the folder holds one already, and return the folder.
+
+    Parameters
+    ----------
+    folder : path
+        What is true of the machine goes beside it, into ``<folder>.truth``; no reader of the folder sees that.
+    cuts : int
+        Half of them with each of two toolings, each with its air cut.
+    seed, progress, mapper
+        As of `simulate_campaign`.
+    """
+    folder = Path(folder)
+    if (folder / CAMPAIGN_FILE).is_file():
+        return folder
+    machine = read_machine(sample_data() / "hpm.toml")
+    each = cuts // len(machine.toolings)
+    if each < 1 or each * len(machine.toolings) != cuts:
+        raise InputError("cuts", cuts, f"a multiple of {len(machine.toolings)}: so many toolings cut")
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError("folder", str(folder), "a campaign, an empty folder, or one that does not exist")
+    speeds = np.linspace(machine.plan.spindle_speeds[0], machine.plan.spindle_speeds[-1], each)
+    machine = replace(machine, plan=replace(machine.plan, spindle_speeds=tuple(speeds.tolist())))
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    # whoever ends it half-way finds no half of a campaign
+    with TemporaryDirectory(dir=folder.parent) as half:
+        made = simulate_campaign(machine, Path(half) / folder.name, seed, progress, mapper)
+        if folder.is_dir():
+            folder.rmdir()
+        made.truth.rename(folder.with_name(made.truth.name))
+        made.folder.rename(folder)
+    return folder
