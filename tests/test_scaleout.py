@@ -201,4 +201,4 @@ def test_verdicts_are_the_same(address, campaign):
 @pytest.mark.slow
 def test_processes_and_a_cluster_do_not_go_together(campaign, tmp_path):
     words = run("identify", campaign, "--out", tmp_path / "R.json", "--dask", "tcp://127.0.0.1:1", "--processes", 2, code=2)
-    assert "one of both" in words
+    assert "one of the two" in words

@@ -110,16 +110,21 @@ def test_after_an_error_no_worker_is_left():
         assert not child.is_alive()
 
 
-CTRL_C = """
-import os, pathlib, signal, sys, time
-sys.path.insert(0, {root!r})
-from rcsa_ident.cli.processes import workers
+#: A module of its own: the helpers do not run the script that starts them.
+WORK = """
+import pathlib, time
 def work(task):
     pathlib.Path({place!r}, str(task)).touch()
     # a signal between a check of the interpreter and one long sleep would wait for the sleep's end
     end = time.monotonic() + 600.0
     while time.monotonic() < end:
         time.sleep(0.01)
+"""
+CTRL_C = """
+import signal, sys
+sys.path.insert(0, {root!r})
+from long_work import work
+from rcsa_ident.cli.processes import workers
 def main():
     try:
         with workers(3, early=()) as pool:
@@ -144,7 +149,8 @@ def test_ctrl_c_ends_all_of_them_without_a_word(tmp_path, at_work):
     place.mkdir()
     script = tmp_path / "script.py"
     root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    script.write_text(CTRL_C.format(root=root, place=str(place)), encoding="utf-8")
+    (tmp_path / "long_work.py").write_text(WORK.format(place=str(place)), encoding="utf-8")
+    script.write_text(CTRL_C.format(root=root), encoding="utf-8")
     with subprocess.Popen(
         [sys.executable, str(script)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as running:
