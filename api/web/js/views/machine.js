@@ -83,8 +83,8 @@ export async function view({ id }, _query, place) {
       ),
     );
     // nothing is known of a measurement beyond its ends
-    const first = measured ? known.band_hz[0] : Math.max(50, known.band_hz[0] * 0.5);
-    get(`machines/${id}/identification/frf?from_hz=${first}`)
+    const first = measured ? "" : `?from_hz=${Math.max(50, known.band_hz[0] * 0.5)}`;
+    get(`machines/${id}/identification/frf${first}`)
       .then((frf) => picture.draw(() => frfFigure([{ ...frf, tooling: machine.name }], { parts: "polar", shown: "both" })))
       .catch((error) => fill(picture, note("bad", error.message)));
   }
