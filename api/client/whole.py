@@ -53,8 +53,9 @@ class Client(Uploads, Jobs):
         self.send("DELETE", f"/machines/{id}")
 
     def identify(self, id: str, result: str | bytes, seen: str | None = None) -> IdentificationSummary:
-        """Write the identification of a machine (content of RESULT.json); `seen` is the etag of the one that it replaces."""
-        headers = {"Content-Type": "application/json", **match(seen)}
+        """Write what is known of a machine (content of RESULT.json or FLANGE.csv); `seen` is the etag of what it replaces."""
+        kind = "application/json" if result.lstrip()[:1] in ("{", b"{") else "text/csv"
+        headers = {"Content-Type": kind, **match(seen)}
         return read(IdentificationSummary, self.send("PUT", f"/machines/{id}/identification", content=result, headers=headers))
 
     def identification(self, id: str) -> Identification:

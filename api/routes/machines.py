@@ -125,7 +125,7 @@ async def frf(
     id: MachineId,
     components: ThisService,
     caller: WhoAsks,
-    from_hz: Annotated[float, Query(ge=1.0, le=20_000.0, allow_inf_nan=False)] = 100.0,
+    from_hz: Annotated[float | None, Query(ge=1.0, le=20_000.0, allow_inf_nan=False)] = None,
     to_hz: Annotated[float | None, Query(ge=1.0, le=20_000.0, allow_inf_nan=False)] = None,
     step_hz: Annotated[float, Query(ge=0.01, le=1000.0, allow_inf_nan=False)] = 2.0,
 ) -> Frf:

@@ -41,7 +41,7 @@ class TipQuery(Body):
 
     machine: Id
     tooling: Tooling
-    from_hz: Hertz = 100.0
+    from_hz: Hertz | None = Field(None, description="By default 100, or where a measured flange begins.")
     to_hz: Hertz | None = Field(None, description="By default the end of the identified band.")
     step_hz: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
     spindle_speed_rpm: Rpm | None = Field(None, description="For a machine that changes with it.")

@@ -84,7 +84,13 @@ def parsed(text: str) -> dict[str, Any]:
 def read(text: str) -> Machine:
     """Return a machine whose receptances are finite, of a RESULT.json or a FLANGE.csv."""
     if not is_result(text):
-        machine = flange_machine_of(text)
+        try:
+            machine = flange_machine_of(text)
+        except InputError as error:
+            if not error.where:
+                raise
+            # a line of the text, not a file of the service
+            raise InputError(f"{error.where.strip()}, {error.field}", error.found, error.allowed) from None
         if to_hz(machine.band[1]) > HIGHEST_HZ:
             raise InputError("frequency_hz", f"up to {to_hz(machine.band[1]):g} Hz", f"at most {HIGHEST_HZ:g} Hz")
         return machine

@@ -57,7 +57,9 @@ class TipRequest:
 
     Parameters
     ----------
-    low, step : float [Hz]
+    low : float or None [Hz]
+        None is 100 Hz, or where a measured flange begins.
+    step : float [Hz]
     high : float or None [Hz]
         None is the end of the identified band.
     speed : float or None [rad/s]
@@ -68,7 +70,7 @@ class TipRequest:
         Longer work is refused.
     """
 
-    low: float
+    low: float | None
     high: float | None
     step: float
     speed: float | None

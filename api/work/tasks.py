@@ -79,7 +79,7 @@ def modes(text: str) -> dict[str, Any]:
     return {key: data.get(key, []) for key in ("status", "reasons", "notes", "band_hz")} | {"axes": axes}
 
 
-def flange_frf(machine: MachineText, lines: tuple[float, float | None, float], work_seconds: float) -> dict[str, Any]:
+def flange_frf(machine: MachineText, lines: tuple[float | None, float | None, float], work_seconds: float) -> dict[str, Any]:
     """Return the spindle's receptance at its flange, translation over force, with the posterior's standard deviations."""
     known = _machines.get(machine, spread=False)
     omega = _lines(known, *lines)
@@ -135,9 +135,10 @@ def _affordable(seconds: float, what: str, most: float) -> None:
         raise TooLong("speeds" if "speeds" in what else "step_hz", found, _ALLOWED.format(most), seconds=seconds)
 
 
-def _lines(known: Machine, low: float, high: float | None, step: float) -> FloatArray:
+def _lines(known: Machine, low: float | None, high: float | None, step: float) -> FloatArray:
     """Frequencies [rad/s], the last one included."""
     assert known.band is not None
+    low = to_hz(known.lowest) if low is None else low
     last = to_hz(known.band[1]) if high is None else high
     count = math.floor((last - low) / step + 1e-9) + 1
     if not 2 <= count <= MOST_LINES:

@@ -37,7 +37,10 @@ def tooltip(
     result: ResultFile,
     tooling: ToolingFile,
     out: Annotated[Path, typer.Option(help="FRF.csv to write, m/N.", show_default=False)],
-    from_: Annotated[float, typer.Option("--from", help="Lowest frequency, Hz.")] = 100.0,
+    from_: Annotated[
+        float | None,
+        typer.Option("--from", help="Lowest frequency, Hz; default: 100, or where a measured flange begins.", show_default=False),
+    ] = None,
     to: Annotated[
         float | None, typer.Option("--to", help="Highest frequency, Hz; default: end of the identified band.", show_default=False)
     ] = None,
@@ -64,7 +67,8 @@ def tooltip(
     machine = read_machine(result)
     tool = read_tooling(tooling)
     last = to_hz(machine.band[1]) if to is None else to  # type: ignore[index]
-    frequency = inclusive(from_, last, step, ("--from", "--to", "--step"), "Hz")
+    first = to_hz(machine.lowest) if from_ is None else from_
+    frequency = inclusive(first, last, step, ("--from", "--to", "--step"), "Hz")
     stages = Stages(quiet=json_)
     with stages.stage("tooltip"):
         found = ask(machine, tool, from_hz(frequency), spindle_speed, bands, share)

@@ -106,6 +106,12 @@ class Machine(TipSource, Drawn):
         return False
 
     @property
+    def lowest(self) -> float:
+        """Frequency [rad/s] at which curves begin unless another is asked for: 100 Hz, or where a measurement begins."""
+        assert self.band is not None
+        return self.band[0] if self.ends else 2.0 * np.pi * LOWEST
+
+    @property
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Directions of the flange that are known."""
         return tuple(c for part in self.parts for c in part.coordinates)

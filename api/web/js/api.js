@@ -95,6 +95,19 @@ export const post = async (path, json, options = {}) => (await send("POST", path
 export const getText = async (path, accept, options = {}) => (await send("GET", path, { headers: { Accept: accept }, ...options })).text();
 export const getBlob = async (path) => (await send("GET", path)).blob();
 
+let description = null;
+
+/** The description of the interface, asked for once. */
+export function described() {
+  description ??= fetched(new URL("openapi.json", document.baseURI).href, { method: "GET", headers: {} })
+    .then((answer) => answer.json())
+    .catch(() => {
+      description = null;
+      throw problemOf(0, "");
+    });
+  return description;
+}
+
 /** All items of a list that comes in parts. */
 export async function all(path) {
   const found = [];

@@ -34,10 +34,11 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
       const depth = each.limit_depth_mm[k];
       const low = each.limit_depth_low_mm?.[k] ?? null;
       const band = each.limit_depth_low_mm && low !== null ? ` (95 %: ${text("depth", low)})` : "";
-      const limit = depth === null ? `stable up to ${text("depth", maxDepth)}` : `${text("depth", depth)}${band}`;
-      const rate = removal[i] ? ` · ${text("removal", removal[i] * rpm * (depth ?? maxDepth))}` : "";
+      const limit = depth === null ? `limit above ${text("depth", maxDepth)}` : `limit ${text("depth", depth)}${band}`;
+      const deep = each.recommended_depth_mm[k];
+      const rate = removal[i] ? ` · ${text("removal", removal[i] * rpm * deep)}` : "";
       const chatter = each.chatter_frequency_hz[k];
-      return `${limit}${rate}${chatter === null ? "" : ` · ${plain(chatter)} Hz`}`;
+      return `${limit} · recommended ${text("depth", deep)}${rate}${chatter === null ? "" : ` · ${plain(chatter)} Hz`}`;
     });
     data.push({
       x,
@@ -74,7 +75,7 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
     if (cut) {
       data.push({
         x: [cut.spindle_speed_rpm],
-        y: [cut.axial_depth_mm * times],
+        y: [cut.recommended_depth_mm * times],
         type: "scatter",
         mode: "markers",
         marker: { color: ink, size: 11, symbol: "circle", line: { color: colour("paper"), width: 1.5 } },
@@ -117,13 +118,13 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
       hoverformat: ",.0f",
       unifiedhovertitle: { text: "%{x:,.0f} rev/min" },
     }),
-    yaxis: axis(`Depth limit [${unit("depth")}]`, { domain: [0.33, 1], range: [0, top], fixedrange: false }),
+    yaxis: axis(`Axial depth [${unit("depth")}]`, { domain: [0.33, 1], range: [0, top], fixedrange: false }),
     yaxis2: axis("Chatter [Hz]", { domain: [0, 0.25], rangemode: "normal", nticks: 4 }),
   };
   const words = lobes.map((l) => {
     const best = l.best_speeds[0];
     return best
-      ? `${l.tooling}: deepest pocket at ${plain(best.spindle_speed_rpm)} rev/min, ${text("depth", best.limit_depth_mm ?? maxDepth)}`
+      ? `${l.tooling}: highest stability limit at ${plain(best.spindle_speed_rpm)} rev/min, ${text("depth", best.limit_depth_mm ?? maxDepth)}`
       : l.tooling;
   });
   return { data, layout, say: `Stability lobes. ${words.join("; ")}.` };

@@ -6,7 +6,7 @@ import { remember, to } from "../router.js";
 import { allMachines, choose, machine } from "../state.js";
 import { followLobes } from "../jobs.js";
 import { plain, q, text, unit } from "../units.js";
-import { bodyOf, checked, METHODS, NUMBERS } from "./change_question.js";
+import { bodyOf, checked, methods, NUMBERS, QUICK } from "./change_question.js";
 import { results } from "./change_results.js";
 
 const MOST = 12;
@@ -14,7 +14,12 @@ const MOST = 12;
 const FURTHER = ["method", "material", "deep", "ktc", "krc", "land", "dent", "power", "torque"];
 
 export async function view(_args, query, place) {
-  const [machines, toolings, { items: materials }] = await Promise.all([allMachines(), all("toolings"), get("materials")]);
+  const [machines, toolings, { items: materials }, kinds] = await Promise.all([
+    allMachines(),
+    all("toolings"),
+    get("materials"),
+    methods(),
+  ]);
   const asked = query.get("machine");
   if (asked && machines.some((m) => m.id === asked)) choose(asked);
   const here = machine();
@@ -22,7 +27,7 @@ export async function view(_args, query, place) {
   if (!here)
     return void add(
       place,
-      empty("No machine yet", "Lobes need a machine that has been identified.", link(to(""), "Begin with a machine", "button primary")),
+      empty("No machine yet", "Lobes need a machine that has been identified or measured.", link(to(""), "Begin with a machine", "button primary")),
     );
   if (!here.identification || !here.identification.axes.length) {
     return void add(
@@ -69,9 +74,11 @@ export async function view(_args, query, place) {
     ["+X", "-X", "+Y", "-Y"].map((d) => [d, d.replace("-", "−")]),
     query.get("fd") ?? "+X",
   );
-  const method = select(METHODS, query.get("method") ?? "zero-order");
+  const method = select(kinds, query.get("method") ?? QUICK);
+  // a measured flange says nothing of a workpiece
+  const measured = here.identification.status === "measured";
   const material = select(
-    [["", "As in the identification"], ...materials.map((each) => [each.name, each.name])],
+    [["", measured ? "Choose one, or write coefficients" : "As in the identification"], ...materials.map((each) => [each.name, each.name])],
     query.get("material") ?? "",
   );
   let tested = { name: "", cuts: [] };
@@ -125,7 +132,7 @@ export async function view(_args, query, place) {
     conditions,
     h(
       "details",
-      { open: FURTHER.some((key) => query.has(key) && query.get(key) !== "zero-order") },
+      { open: measured || FURTHER.some((key) => query.has(key) && query.get(key) !== QUICK) },
       h("summary", null, "Material, spindle, method"),
       field("Material", material, { name: "cut.material" }),
       source,
@@ -162,7 +169,7 @@ export async function view(_args, query, place) {
     material: material.value,
     ...Object.fromEntries(NUMBERS.map(([key, , usual]) => [key, fields[key].input.base === usual ? null : fields[key].input.base])),
   });
-  const slow = () => method.value !== "zero-order";
+  const slow = () => method.value !== QUICK;
 
   async function compute() {
     remember("change", state());
@@ -226,7 +233,7 @@ export async function view(_args, query, place) {
 /** Lobes, advice and tooltip FRFs of a query; the slower methods come from a job that tells how far it is. */
 async function answers(body, signal, place, late) {
   const { lobes: question, tips, advice } = body;
-  const quick = question.method === "zero-order";
+  const quick = question.method === QUICK;
   const lobes = quick
     ? post("lobes", question, { signal })
     : followLobes(question, signal, (words, share) => {

@@ -1,14 +1,16 @@
 // What is asked after a tool change: its fields, what they become, and what can be seen to be wrong before anything is sent.
-import { Problem } from "../api.js";
+import { described, Problem } from "../api.js";
 import { text } from "../units.js";
 
-export const METHODS = [
-  ["zero-order", "Zero order: at once"],
-  ["multi-frequency", "Multi-frequency"],
-  ["semi-discretisation", "Semi-discretisation"],
-  ["full-discretisation", "Full discretisation"],
-  ["time-domain", "Time domain: slowest"],
-];
+/** The method that answers at once. */
+export const QUICK = "zero-order";
+
+/** All methods that the service has, as [name, words]. */
+export async function methods() {
+  const names = (await described()).components.schemas.MethodName.enum;
+  return names.map((name) => [name, name[0].toUpperCase() + name.slice(1) + (name === QUICK ? ": at once" : "")]);
+}
+
 // what an address may say: name in the query, kind, default, where it goes in the body
 export const NUMBERS = [
   ["im", "percent", 50, "cut.immersion", 0.1, 100, "Radial immersion"],
@@ -39,7 +41,7 @@ export function bodyOf(id, names, fields, { strategy, direction, method, materia
   if (material) cut.material = material;
   const speeds = { from_rpm: value("from"), to_rpm: value("to"), step_rpm: value("step") };
   const lobes = { machine: id, toolings: names, cut, speeds, max_depth_mm: value("deep"), method };
-  const advice = value("fz") === null || method !== "zero-order" ? null : { ...lobes };
+  const advice = value("fz") === null || method !== QUICK ? null : { ...lobes };
   if (advice && value("power") !== null) advice.max_power_kw = value("power");
   if (advice && value("torque") !== null) advice.max_torque_nm = value("torque");
   if (tested.length) lobes.tested = tested;

@@ -6,7 +6,7 @@ import { frfFigure, lobeFigure, removalPer } from "../figures.js";
 import { failed, quantity } from "../forms.js";
 import { testedCuts, testedLegend, toldRight } from "../tested.js";
 import { plain, q, u } from "../units.js";
-import { headline, reserve } from "./headline.js";
+import { headline, limitOf, recommended, reserve } from "./headline.js";
 
 let parts = "polar";
 let shown = "both";
@@ -17,7 +17,7 @@ export function results(place, found, { toolings, body, tested, ontested }) {
   const feed = question.cut.feed_per_tooth_mm ?? null;
   const removal = summaries.map((t) => (feed === null || !t ? null : removalPer(t, question.cut.immersion, feed)));
   const several = found.lobes.length > 1;
-  fill(place, headline(found, removal, question), warnings(found));
+  fill(place, headline(found, question), warnings(found));
   add(
     place,
     lobesCard(found, removal, question, tested, ontested),
@@ -51,13 +51,12 @@ function lobesCard(found, removal, question, tested, ontested) {
     lobeFigure(found.lobes, {
       maxDepth: question.max_depth_mm,
       removal,
-      recommended: found.advice?.map((a) => a.highest_removal[0]),
+      recommended: found.lobes.map((_, i) => recommended(found, i)[0]),
       tested: tested.cuts,
     }),
   );
   const first = found.lobes[0];
-  const start =
-    found.advice?.[0]?.highest_removal[0]?.spindle_speed_rpm ?? first.best_speeds[0]?.spindle_speed_rpm ?? first.spindle_speed_rpm[0];
+  const start = recommended(found, 0)[0]?.spindle_speed_rpm ?? first.spindle_speed_rpm[0];
   const speed = quantity("At a speed of", "speed", start);
   const read = h("ul", { class: "reads", "aria-live": "polite" });
   const show = () => {
@@ -76,12 +75,15 @@ function lobesCard(found, removal, question, tested, ontested) {
               "li",
               null,
               several(found) ? h("strong", null, `${lobes.tooling}: `) : null,
-              depth === null ? ["stable up to ", q("depth", question.max_depth_mm)] : ["stable to ", q("depth", depth)],
+              "stability limit ",
+              limitOf({ limit_depth_mm: depth }, question),
               low !== undefined && low !== null && high
                 ? [" (95 %: ", q("depth", low, { bare: true }), " to ", q("depth", high), ")"]
                 : null,
-              removal[i] ? [" · ", q("removal", removal[i] * lobes.spindle_speed_rpm[k] * (depth ?? question.max_depth_mm))] : null,
-              chatter === null ? null : ` · beyond it chatter at ${plain(chatter)} Hz`,
+              ", recommended depth ",
+              q("depth", lobes.recommended_depth_mm[k]),
+              removal[i] ? [" · ", q("removal", removal[i] * lobes.spindle_speed_rpm[k] * lobes.recommended_depth_mm[k])] : null,
+              chatter === null ? null : ` · beyond the limit chatter at ${plain(chatter)} Hz`,
               lobes.flip[k] ? " · period doubling" : null,
             );
           }),
@@ -105,8 +107,8 @@ function lobesCard(found, removal, question, tested, ontested) {
     h(
       "p",
       { class: "small soft" },
-      "Stable below the line. Shaded around it: where 95 % of the machines lie that the records allow. Diamonds: the deepest pockets. ",
-      "Dot: what is recommended. Hover for depth, removal rate and chatter frequency; drag to look closer, double click to come back.",
+      "The line is the stability limit. Shaded around it: where 95 % of the machines lie that the records allow. Diamonds: the highest ",
+      "limits. Dot: the recommended cut. Hover for limit, recommended depth and chatter frequency; drag to look closer, double click to come back.",
     ),
     h("div", { class: "reader" }, speed, read),
   );
@@ -212,7 +214,7 @@ function comparison(found, summaries, question) {
     lobes,
     i,
     stickout: summaries[i]?.stickout_mm ?? null,
-    best: found.advice?.[i]?.highest_removal[0] ?? null,
+    best: recommended(found, i)[0] ?? null,
     pocket: lobes.best_speeds[0] ?? null,
   }));
   const top = Math.max(...rows.map((r) => r.best?.removal_rate_cm3_per_min ?? 0));
@@ -222,31 +224,38 @@ function comparison(found, summaries, question) {
     number: true,
     cell: (r) => q(kind, value(r) ?? null, { bare: true, digits }),
   });
-  const depthOf = (pocket) => (pocket ? (pocket.limit_depth_mm ?? question.max_depth_mm) : null);
+  const limit = (name, cut) => ({
+    name,
+    unit: u("depth"),
+    number: true,
+    cell: (r) => (cut(r) ? limitOf(cut(r), question, { bare: true }) : null),
+  });
   const columns = [
     {
       name: "Tooling",
       cell: (r) => [
         h("span", { class: `key line ${SERIES[r.i % SERIES.length]}`, "aria-hidden": "true" }),
         r.lobes.tooling,
-        r.best && r.best.removal_rate_cm3_per_min === top ? h("div", { class: "soft small" }, "removes most") : null,
+        top && r.best?.removal_rate_cm3_per_min === top ? h("div", { class: "soft small" }, "removes most") : null,
       ],
     },
     column("Stickout", "length", (r) => r.stickout, 1),
-    column("Always stable", "depth", (r) => r.lobes.absolute_limit_mm),
-    column("Pocket at", "speed", (r) => r.pocket?.spindle_speed_rpm),
-    column("its depth", "depth", (r) => depthOf(r.pocket)),
-    column("Set", "speed", (r) => r.best?.spindle_speed_rpm),
-    column("and cut", "depth", (r) => r.best?.axial_depth_mm),
+    column("Stable at any speed", "depth", (r) => r.lobes.absolute_limit_mm),
+    column("Highest limit at", "speed", (r) => r.pocket?.spindle_speed_rpm),
+    limit("stability limit", (r) => r.pocket),
+    column("Recommended speed", "speed", (r) => r.best?.spindle_speed_rpm),
+    column("recommended depth", "depth", (r) => r.best?.recommended_depth_mm),
+    limit("stability limit", (r) => r.best),
     column("Removes", "removal", (r) => r.best?.removal_rate_cm3_per_min),
   ];
-  const box = card("Side by side", null, table("Toolings side by side", columns, rows), found.advice ? reserve(null, question) : null);
+  const box = card("Side by side", null, table("Toolings side by side", columns, rows), reserve(found.lobes, question));
   box.classList.add("wide");
   return box;
 }
 
 function lobesCsv(lobes) {
-  const lines = ["tooling,spindle_speed_rpm,limit_depth_mm,chatter_frequency_hz,lobe,limit_depth_low_mm,limit_depth_high_mm"];
+  const head = ["tooling", "spindle_speed_rpm", "limit_depth_mm", "chatter_frequency_hz", "lobe"];
+  const lines = [[...head, "limit_depth_low_mm", "limit_depth_high_mm", "recommended_depth_mm"].join(",")];
   for (const each of lobes) {
     each.spindle_speed_rpm.forEach((rpm, k) =>
       lines.push(
@@ -258,6 +267,7 @@ function lobesCsv(lobes) {
           each.lobe[k],
           each.limit_depth_low_mm?.[k],
           each.limit_depth_high_mm?.[k],
+          each.recommended_depth_mm[k],
         ]
           .map((v) => v ?? "")
           .join(","),

@@ -1,95 +1,91 @@
-// What to set, in words: a speed, a depth, and why.
+// What to set, in words: a speed, the recommended depth beside the stability limit, and why.
 import { SERIES } from "../charts.js";
 import { h } from "../dom.js";
 import { libraryDrawing } from "../drawing.js";
 import { plain, q, text } from "../units.js";
 
+/** The recommended cuts of a tooling: within power and torque where these were asked for. */
+export const recommended = (found, i) => found.advice?.[i]?.highest_removal ?? found.lobes[i].recommended;
+
 /** What to set, said first: a speed, a depth, and why. */
-export function headline(found, removal, question) {
+export function headline(found, question) {
   const cards = found.lobes.length;
   const articles = found.lobes.map((lobes, i) => {
-    const advice = found.advice?.[i];
-    const best = advice?.highest_removal[0];
-    const pocket = lobes.best_speeds[0];
+    const [best, ...further] = recommended(found, i);
     const drawing = h("div", { class: "mini" }, libraryDrawing(lobes.tooling));
     const key = h("span", { class: `key line ${SERIES[i % SERIES.length]}`, "aria-hidden": "true" });
-    if (!best && !pocket) {
+    if (!best) {
       const limit = lobes.absolute_limit_mm;
+      const below = limit === null ? "" : ` Stable below ${text("depth", limit)} everywhere.`;
       return h(
         "article",
         { class: "best" },
         h("h2", null, key, lobes.tooling),
-        h(
-          "p",
-          null,
-          limit === null
-            ? `Stable at every speed up to ${text("depth", question.max_depth_mm)}.`
-            : `No pocket between these speeds; stable below ${text("depth", limit)} everywhere.`,
-        ),
+        h("p", null, `No cut is recommended at these speeds.${below}`),
         drawing,
       );
     }
-    const rpm = best?.spindle_speed_rpm ?? pocket.spindle_speed_rpm;
-    const depth = best?.axial_depth_mm ?? pocket.limit_depth_mm ?? question.max_depth_mm;
-    const further = best
-      ? advice.highest_removal.slice(1, 3).map((p) => [p.spindle_speed_rpm, p.axial_depth_mm])
-      : lobes.best_speeds.slice(1, 3).map((b) => [b.spindle_speed_rpm, b.limit_depth_mm ?? question.max_depth_mm]);
     return h(
       "article",
-      { class: "best", dataset: { tooling: lobes.tooling, rpm: String(rpm) } },
+      { class: "best", dataset: { tooling: lobes.tooling, rpm: String(best.spindle_speed_rpm) } },
       h("h2", null, key, lobes.tooling),
       h(
         "p",
         { class: "set" },
-        h("span", { class: "figure" }, h("output", null, plain(rpm)), h("span", { class: "of" }, " rev/min")),
-        h(
-          "span",
-          { class: "figure" },
-          h("span", { class: "of" }, best ? "cut " : "up to "),
-          q("depth", depth),
-          h("span", { class: "of" }, " deep"),
-        ),
+        h("span", { class: "figure" }, h("output", null, plain(best.spindle_speed_rpm)), h("span", { class: "of" }, " rev/min")),
+        h("span", { class: "figure" }, h("span", { class: "of" }, "recommended depth "), q("depth", best.recommended_depth_mm)),
       ),
-      best
-        ? h(
-            "p",
-            null,
-            q("removal", best.removal_rate_cm3_per_min),
-            " · ",
-            q("power", best.power_kw),
-            " · ",
-            q("torque", best.torque_nm),
-            ` · ${bounds(best.bound)}`,
-          )
-        : h("p", null, "The limit itself, without a reserve."),
+      h(
+        "p",
+        null,
+        "stability limit ",
+        limitOf(best, question),
+        best.bound === undefined
+          ? null
+          : [
+              " · ",
+              q("removal", best.removal_rate_cm3_per_min),
+              " · ",
+              q("power", best.power_kw),
+              " · ",
+              q("torque", best.torque_nm),
+              ` · ${bounds(best.bound)}`,
+            ],
+      ),
       further.length
         ? h(
             "p",
             { class: "soft" },
             "Or ",
-            further.map(([speed, deep], k) => [k ? " and " : "", `${plain(speed)}\u00a0rev/min at `, q("depth", deep)]),
+            further.map((cut, k) => [
+              k ? " and " : "",
+              `${plain(cut.spindle_speed_rpm)}\u00a0rev/min at `,
+              q("depth", cut.recommended_depth_mm),
+              " (limit ",
+              limitOf(cut, question),
+              ")",
+            ]),
           )
         : null,
-      best && cards === 1 ? reserve(pocket, question) : null,
+      cards === 1 ? reserve([lobes], question, lobes.best_speeds[0]) : null,
       drawing,
     );
   });
-  return h("section", { class: `bests${cards === 1 ? " one" : ""}`, "aria-label": "Best speeds" }, articles);
+  return h("section", { class: `bests${cards === 1 ? " one" : ""}`, "aria-label": "Recommended cuts" }, articles);
 }
 
+/** The stability limit of a cut or a speed; null is none up to the depth that was asked for. */
+export const limitOf = (cut, question, options) =>
+  cut.limit_depth_mm === null ? ["above ", q("depth", question.max_depth_mm, options)] : q("depth", cut.limit_depth_mm, options);
+
 /** How sure the recommendation is, and what it stays away from. */
-export function reserve(pocket, question) {
+export function reserve(lobes, question, pocket = null) {
+  const banded = lobes.some((each) => each.limit_depth_low_mm);
   return h(
     "p",
     { class: "soft small reserve" },
-    "10 % below the limit that 95 % of the machines allowed by the records reach, with the speed right within 1 %.",
-    pocket
-      ? [
-          ` The deepest pocket itself: ${plain(pocket.spindle_speed_rpm)} rev/min, `,
-          q("depth", pocket.limit_depth_mm ?? question.max_depth_mm),
-          ".",
-        ]
-      : null,
+    `The recommended depth is 10 % below the stability limit${banded ? " that 95 % of the machines allowed by the records reach" : ""}, with the speed right within 1 %.`,
+    pocket ? [` Highest stability limit: ${plain(pocket.spindle_speed_rpm)} rev/min, `, limitOf(pocket, question), "."] : null,
   );
 }
 

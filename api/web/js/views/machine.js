@@ -8,10 +8,13 @@ import { go, to } from "../router.js";
 import { allMachines } from "../state.js";
 import { modesCards, notes } from "./modes.js";
 
+const JSON_TYPE = "application/json";
+const CSV = "text/csv";
+
 export function statusMark(machine) {
   const known = machine.identification;
   if (!known) return mark("idle", "not identified");
-  return mark({ converged: "good", suspect: "doubt" }[known.status] ?? "bad", known.status);
+  return mark({ converged: "good", measured: "good", suspect: "doubt" }[known.status] ?? "bad", known.status);
 }
 
 export async function view({ id }, _query, place) {
@@ -42,7 +45,9 @@ export async function view({ id }, _query, place) {
     );
     return;
   }
-  const modes = await get(`machines/${id}/identification/modes`);
+  // a flange that was measured has a receptance, and no modes
+  const measured = known.status === "measured";
+  const modes = measured ? null : await get(`machines/${id}/identification/modes`);
   add(
     place,
     known.reasons.length
@@ -55,8 +60,8 @@ export async function view({ id }, _query, place) {
       place,
       h(
         "div",
-        { class: "split" },
-        h("div", { class: "view" }, modesCards(modes)),
+        { class: modes ? "split" : "view" },
+        modes && h("div", { class: "view" }, modesCards(modes)),
         h(
           "div",
           { class: "view" },
@@ -65,16 +70,25 @@ export async function view({ id }, _query, place) {
             null,
             legend(known.axes.map((axis, k) => ({ name: `${axis} direction`, series: SERIES[k] }))),
             picture,
-            h("p", { class: "small soft" }, "Machine and spindle alone, without a tool-holder. Shaded: 95 % band."),
+            h(
+              "p",
+              { class: "small soft" },
+              modes
+                ? "Machine and spindle alone, without a tool-holder. Shaded: 95 % band."
+                : "Machine and spindle alone, as they were measured: taken for exact.",
+            ),
           ),
-          notes(modes),
+          modes && notes(modes),
         ),
       ),
     );
-    get(`machines/${id}/identification/frf?from_hz=${Math.max(50, known.band_hz[0] * 0.5)}`)
+    // nothing is known of a measurement beyond its ends
+    const first = measured ? "" : `?from_hz=${Math.max(50, known.band_hz[0] * 0.5)}`;
+    get(`machines/${id}/identification/frf${first}`)
       .then((frf) => picture.draw(() => frfFigure([{ ...frf, tooling: machine.name }], { parts: "polar", shown: "both" })))
       .catch((error) => fill(picture, note("bad", error.message)));
   }
+  const file = measured ? "FLANGE.csv" : "RESULT.json";
   add(
     place,
     card(
@@ -89,13 +103,14 @@ export async function view({ id }, _query, place) {
             type: "button",
             onclick: async () => {
               try {
-                save("RESULT.json", await getText(`machines/${id}/identification`, "application/json"), "application/json");
+                const kind = measured ? CSV : JSON_TYPE;
+                save(file, await getText(`machines/${id}/identification`, kind), kind);
               } catch (error) {
                 failed(fault, error);
               }
             },
           },
-          "RESULT.json",
+          file,
         ),
         link(to("identification"), "All identifications", "button"),
       ),
@@ -104,14 +119,15 @@ export async function view({ id }, _query, place) {
   );
 }
 
-/** A result from the command line, for a machine. */
+/** A result or a measured flange from the command line, for a machine. */
 function upload(machine, fault) {
-  const input = h("input", { type: "file", accept: ".json,application/json", id: "result-file" });
+  const input = h("input", { type: "file", accept: `.json,.csv,${JSON_TYPE},${CSV}`, id: "result-file" });
   input.addEventListener("change", async () => {
     const file = input.files[0];
     if (!file) return;
     try {
-      await send("PUT", `machines/${machine.id}/identification`, { body: file, headers: { "Content-Type": "application/json" } });
+      const kind = /\.csv$/i.test(file.name) ? CSV : JSON_TYPE;
+      await send("PUT", `machines/${machine.id}/identification`, { body: file, headers: { "Content-Type": kind } });
       await allMachines(true);
       window.dispatchEvent(new Event("refresh"));
     } catch (error) {
@@ -122,8 +138,20 @@ function upload(machine, fault) {
   return h(
     "details",
     null,
-    h("summary", null, "Take over a result from the command line"),
-    h("div", { class: "field" }, h("label", { for: "result-file" }, "RESULT.json of ", h("code", null, "rcsa-ident identify")), input),
+    h("summary", null, "Take over a result or a measured flange from the command line"),
+    h(
+      "div",
+      { class: "field" },
+      h(
+        "label",
+        { for: "result-file" },
+        "RESULT.json of ",
+        h("code", null, "rcsa-ident identify"),
+        ", or FLANGE.csv of ",
+        h("code", null, "rcsa-ident decouple"),
+      ),
+      input,
+    ),
   );
 }
 

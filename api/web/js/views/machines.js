@@ -59,7 +59,7 @@ function machineCard(machine) {
       ? h(
           "p",
           null,
-          `Axes ${known.axes.join(" and ") || "none"}, ${Math.round(known.band_hz[0])} to ${Math.round(known.band_hz[1])} Hz, from “${known.campaign}”.`,
+          `Axes ${known.axes.join(" and ") || "none"}, ${Math.round(known.band_hz[0])} to ${Math.round(known.band_hz[1])} Hz, ${known.status === "measured" ? "measured at the flange" : `from “${known.campaign}”`}.`,
         )
       : h("p", { class: "soft" }, "Nothing is known of its dynamics yet."),
     h(
