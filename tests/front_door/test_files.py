@@ -51,7 +51,8 @@ def test_tooling(nouns, tmp_path):
         again = ri.read_tooling(tooling.save(tmp_path / "TOOL.toml"))
         assert str(again) == str(tooling)
         tips = [nouns.machine.tip(each, spread=False).values for each in (tooling, again)]
-        np.testing.assert_allclose(tips[1], tips[0], rtol=1e-9)
+        # a length that differs in its last digit may change the mesh
+        np.testing.assert_allclose(tips[1], tips[0], rtol=1e-6)
         np.testing.assert_allclose(again.cutter.pitch, tooling.cutter.pitch, rtol=1e-12)
     assert made.save(tmp_path / "TOOL.svg").read_text().startswith("<svg")
 
@@ -122,7 +123,7 @@ def test_forces_need_equal_steps(tmp_path):
 
 def test_modes_and_tap_tests_of_a_tip(nouns, tmp_path):
     (tmp_path / "MODES.toml").write_text("[[x]]\nnatural_frequency_hz = 922.0\ndamping_ratio = 0.011\nmodal_mass_kg = 0.03993\n")
-    assert str(ri.read_modes(tmp_path / "MODES.toml")) == "1 modes of the tip, 922 to 922 Hz"
+    assert str(ri.read_modes(tmp_path / "MODES.toml")) == "tip: 1 mode at 922 Hz"
     path = nouns.tip.save(tmp_path / "FRF.csv")
     for tip in (ri.read_tap_tests(x=path, y=path), ri.read_tap_tests(y=path)):
         assert np.array_equal(tip.between("tip.y", "tip.y"), nouns.tip.between("tip.y", "tip.y"))

@@ -13,13 +13,15 @@ import rcsa_ident as ri
 from tests.fixtures.paths import ROOT
 
 #: Promised: a name that is taken away here is taken away from every script.
-NAMES = """
-    MATERIALS BeamSegment Contact Coordinate CutSpec Cutter CuttingCoefficients Dof Engagement FullDiscretisation InputError KnownTip
-    MillingProcess MultiFrequency ProcessDamping Quantity Receptance SemiDiscretisation Sensor SpeedVariation SpindleDrive TimeDomain TipModes
-    Tooling ZeroOrder advise clamped connect estimate_forces hz identify material normal_modes plot_lobes read_campaign read_forces
-    read_lobes read_machine read_modes read_recording read_result read_tap_tests read_tip read_tooling rpm sample_campaign sample_tooling
-    stability_lobes stability_map surface_location_error
-""".split()
+NAMES = [
+    "MATERIALS", "BeamSegment", "Contact", "Coordinate", "CutSpec", "Cutter", "CuttingCoefficients", "Dof", "Engagement",
+    "FullDiscretisation", "InputError", "KnownTip", "MillingProcess", "MultiFrequency", "ProcessDamping", "Quantity",
+    "Receptance", "SemiDiscretisation", "Sensor", "SpeedVariation", "SpindleDrive", "TimeDomain", "TipModes", "Tooling",
+    "ZeroOrder", "advise", "clamped", "connect", "estimate_forces", "hz", "identify", "material", "normal_modes", "plot_lobes",
+    "read_campaign", "read_forces", "read_lobes", "read_machine", "read_modes", "read_recording", "read_result", "read_tap_tests",
+    "read_tip", "read_tooling", "rpm", "sample_campaign", "sample_tooling", "stability_lobes", "stability_map",
+    "surface_location_error",
+]  # fmt: skip
 
 
 def run(code: str, folder=None) -> str:
