@@ -17,9 +17,8 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.machine.spindle import Spindle
-from rcsa_ident.stability.lobes import stability_lobes, uncoupled_planes
-from rcsa_ident.workflows.tip import MachineAxis, tooltip
+from rcsa_ident.machine.flange_machine import FlangeMachine
+from rcsa_ident.stability.lobes import stability_lobes
 
 TOOLING = Path(__file__).resolve().parent.parent / "data" / "machines" / "toolings" / "S3-PG25-long.toml"
 
@@ -29,11 +28,10 @@ def run() -> list[dict[str, Any]]:
     tooling = read_tooling(TOOLING)
     frequency = np.linspace(300.0, 4300.0, 4000)
     omega = 2.0 * np.pi * frequency
-    machine = {axis: _machine(axis) for axis in (Dof.X, Dof.Y)}
+    machine = _machine()
     coefficients, engagement = CuttingCoefficients(902e6, 0.26), Engagement.from_immersion(0.5, "down")
     speeds = np.arange(4000.0, 20001.0, 50.0) * np.pi / 30.0
-    response = tooltip(machine, tooling.assembly, omega, bands=False)
-    tip = uncoupled_planes(response.coupled[Dof.X], response.coupled[Dof.Y])
+    tip = machine.tip(tooling, omega)
 
     def ours() -> np.ndarray:
         return stability_lobes(tip, MillingProcess(tooling.cutter, coefficients, engagement), speeds, 1.0).limit_depth
@@ -57,18 +55,18 @@ def run() -> list[dict[str, Any]]:
 
     def chain() -> np.ndarray:
         fresh = read_tooling(TOOLING)
-        answer = tooltip(machine, fresh.assembly, omega, bands=False)
-        both = uncoupled_planes(answer.coupled[Dof.X], answer.coupled[Dof.Y])
-        return stability_lobes(both, MillingProcess(fresh.cutter, coefficients, engagement), speeds, 1.0).limit_depth
+        answer = machine.tip(fresh, omega)
+        return stability_lobes(answer, MillingProcess(fresh.cutter, coefficients, engagement), speeds, 1.0).limit_depth
 
     rows.append(row("tooling file -> tooltip FRF (4000 frequencies) -> zero-order lobes", best_of(chain) * 1e3, None, "ms", "no peer"))
     return rows
 
 
-def _machine(axis: Dof) -> MachineAxis:
+def _machine() -> FlangeMachine:
     omega_n = 2.0 * np.pi * np.array([180.0, 998.0, 1820.0, 2330.0, 3970.0])
     psi = np.array([[0.08, 0.4], [0.15, 1.5], [0.25, 3.0], [0.2, 4.0], [0.15, 8.0]])
-    return MachineAxis(Spindle(normal_modes(omega_n, np.full(5, 0.05), psi, plane("flange", axis))), LumpedJoint(3e9, 6e6, 2e3, 10.0))
+    flanges = tuple(normal_modes(omega_n, np.full(5, 0.05), psi, plane("flange", axis)) for axis in (Dof.X, Dof.Y))
+    return FlangeMachine(flanges, (2.0 * np.pi * 300.0, 2.0 * np.pi * 4300.0), LumpedJoint(3e9, 6e6, 2e3, 10.0))
 
 
 def _textbook(tip: Receptance, alpha: np.ndarray, stiffness: float, teeth: int, speeds: np.ndarray) -> np.ndarray:

@@ -29,22 +29,23 @@ from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.identifications import machine_from_json, speed_bands_from_json
+from rcsa_ident.identification.machine import IdentifiedMachine
+from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.machines import MachineFile
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machining_setup import Tooling
-from rcsa_ident.stability.lobes import StabilityMethod
+from rcsa_ident.stability.lobes import stability_lobes
+from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.multi_frequency import MultiFrequency
+from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.virtual.limit import STEP, multiplier, true_limit
 from rcsa_ident.virtual.milling import mill_cut
 from rcsa_ident.virtual.reduction import Poles, ReducedRotor, poles, reduced
 from rcsa_ident.virtual.rotor import rotor
-from rcsa_ident.workflows.lobes import LobeConditions, stability_probability, tooling_lobes
-from rcsa_ident.workflows.speeds import MachineOverSpeed
-from rcsa_ident.workflows.tip import TooltipResponse, tooltip
 
 RPM = np.pi / 30.0
 #: Speeds per tooling, where around each the truth is looked at, and the change beyond which a speed is left out.
@@ -129,23 +130,24 @@ class Truth:
 class Found:
     """A tooling on an identified machine."""
 
-    machine: MachineOverSpeed
+    machine: IdentifiedMachine
     tooling: Tooling
-    alone: TooltipResponse | None = None
+    alone: UncertainReceptance | None = None
 
-    def response(self, speed: float) -> TooltipResponse:
-        """Return the tip's response at a speed, with its spread."""
+    def tip(self, speed: float) -> UncertainReceptance:
+        """Return the tip's receptance at a speed, with its spread."""
         if self.machine.speed_range is not None:
-            return tooltip(self.machine.at(speed), self.tooling.assembly, 2.0 * np.pi * FREQUENCY, True, speed)
+            return self.machine.at(speed).tip(self.tooling, 2.0 * np.pi * FREQUENCY)
         if self.alone is None:
-            self.alone = tooltip(self.machine.whole, self.tooling.assembly, 2.0 * np.pi * FREQUENCY, True)
+            self.alone = self.machine.tip(self.tooling, 2.0 * np.pi * FREQUENCY)
         return self.alone
 
 
-def asked(truth: Truth, speed: float, method: StabilityMethod) -> LobeConditions:
-    """Return the question for one speed."""
+def asked(truth: Truth, tip: Receptance, speed: float, method: StabilityMethod, draws: int) -> StabilityLobes:
+    """Return the limit at one speed."""
     plan, known = truth.setup.plan, truth.setup.workpiece.coefficients
-    return LobeConditions(MillingProcess(truth.tooling.cutter, known, plan.engagement, plan.feed_angle), np.array([speed]), DEEPEST, method)
+    process = MillingProcess(truth.tooling.cutter, known, plan.engagement, plan.feed_angle)
+    return stability_lobes(tip, process, np.array([speed]), DEEPEST, method, draws)
 
 
 def compare(truth: Truth, found: Found, rng: np.random.Generator, cuts: int) -> dict[str, Any]:
@@ -155,8 +157,8 @@ def compare(truth: Truth, found: Found, rng: np.random.Generator, cuts: int) -> 
     around = np.array([[truth.limit(share * speed) for share in AROUND] for speed in speeds])
     limits: dict[str, list[float]] = {}
     for speed in speeds:
-        for name, limit in _limits(truth, found, speed):
-            limits.setdefault(name, []).append(limit)
+        for name, lobes in _limits(truth, found, speed):
+            limits.setdefault(name, []).append(float(lobes.limit_depth[0]))
     drawn = [_cut(truth, found, low + (high - low) * rng.random(), rng) for _ in range(cuts)]
     return {
         "speeds_rpm": (speeds / RPM).tolist(),
@@ -167,12 +169,11 @@ def compare(truth: Truth, found: Found, rng: np.random.Generator, cuts: int) -> 
     }
 
 
-def _limits(truth: Truth, found: Found, speed: float) -> Iterator[tuple[str, float]]:
-    tip, response = truth.tip(speed), found.response(speed)
+def _limits(truth: Truth, found: Found, speed: float, draws: int = 0) -> Iterator[tuple[str, StabilityLobes]]:
+    true, identified = truth.tip(speed), found.tip(speed)
     for name, method in METHODS.items():
-        question = asked(truth, speed, method)
-        yield f"true receptance, {name}", float(question.lobes(tip).limit_depth[0])
-        yield f"identified, {name}", float(tooling_lobes(response, question).limit_depth[0])
+        yield f"true receptance, {name}", asked(truth, true, speed, method, 0)
+        yield f"identified, {name}", asked(truth, identified, speed, method, draws)
 
 
 def _cut(truth: Truth, found: Found, speed: float, rng: np.random.Generator) -> dict[str, Any]:
@@ -180,12 +181,9 @@ def _cut(truth: Truth, found: Found, speed: float, rng: np.random.Generator) -> 
     limit = truth.limit(speed)
     depth = min(limit * float(np.exp(rng.uniform(*np.log(DEPTHS)))), 0.999 * DEEPEST)
     row = {"rpm": speed / RPM, "depth": depth, "limit": limit, "stable": truth.stable(speed, depth), "settles": truth.settles(speed, depth)}
-    row["said"] = {name: bool(depth < each) for name, each in _limits(truth, found, speed)}
-    row["probability"] = {}
-    for name, method in METHODS.items():
-        share = stability_probability(found.response(speed), asked(truth, speed, method), np.array([depth]), DRAWS)
-        row["probability"][name] = None if share is None else float(share[0, 0])
-    return row
+    limits = dict(_limits(truth, found, speed, DRAWS))
+    said = {name: bool(depth < lobes.limit_depth[0]) for name, lobes in limits.items()}
+    return row | {"said": said, "probability": {name: limits[f"identified, {name}"].probability(0, depth) for name in METHODS}}
 
 
 def evaluate(scratch: Path, machine: str, condition: str, seed: int, cuts: int) -> list[dict[str, Any]]:
@@ -196,7 +194,7 @@ def evaluate(scratch: Path, machine: str, condition: str, seed: int, cuts: int) 
     if not path.exists():
         perform(scratch, run)
     data = read_result(path)
-    identified = MachineOverSpeed(machine_from_json(data, str(path)), speed_bands_from_json(data, str(path)))
+    identified = machine_from_json(data, str(path))
     rows = []
     for place, file in enumerate(setup.truth_toolings):
         tooling = read_tooling(file)

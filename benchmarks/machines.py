@@ -18,8 +18,8 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.machines import MachineFile, read_machine
 from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.machine.known_tip import measured_tip
 from rcsa_ident.stability.lobes import stability_lobes
-from rcsa_ident.workflows.lobes import measured_tip
 from rcsa_ident.workflows.simulate import true_receptances
 
 EVALUATION = tuple(range(1, 11))

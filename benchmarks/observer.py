@@ -19,28 +19,26 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import best_of, row
-from rcsa_ident.io.identifications import machine_from_json, speed_bands_from_json
+from rcsa_ident.identification.machine import IdentifiedMachine
+from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.observer._kernels import kalman_steps
 from rcsa_ident.observer.kalman import KalmanFilter
 from rcsa_ident.observer.tuning import ObserverMethod, PaperWalk, Resonators
 from rcsa_ident.workflows.estimate_forces import MonitoredCut, observe
-from rcsa_ident.workflows.speeds import MachineOverSpeed
 from tests.fixtures.virtual_cut import AXES, BAND_HZ, CASE, VirtualCut, relative_error, true_response, virtual_cut
 
 DATA = Path(__file__).resolve().parent.parent / "data"
 
 
-def identified(result: Path | None = None) -> tuple[MachineOverSpeed, tuple[float, float]]:
-    """Return the sample machine as identified from the sample runs, and the band [rad/s]; `result` saves the minute that it takes."""
+def identified(result: Path | None = None) -> IdentifiedMachine:
+    """Return the sample machine as identified from the sample runs; `result` saves the minute that it takes."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "RESULT.json"
         if result is None:
             command = [sys.executable, "-m", "rcsa_ident.cli", "identify", str(DATA / "sample_runs"), "--out", str(path), "--json"]
             subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"})
-        data = read_result(result or path)
-    low, high = (2.0 * np.pi * f for f in data["band_hz"])
-    return MachineOverSpeed(machine_from_json(data, "sample runs"), speed_bands_from_json(data, "sample runs")), (low, high)
+        return machine_from_json(read_result(result or path), "sample runs")
 
 
 def best_lag(estimate: np.ndarray, true: np.ndarray, rate: float) -> tuple[float, np.ndarray]:
@@ -107,14 +105,14 @@ def _whole_row(found: MonitoredCut, cut: VirtualCut, name: str) -> dict[str, Any
     return row(f"observer, {name}: a step and axis with run-out and both sensors", cost * 1e6, None, "us", text)
 
 
-def force_rows(machine: MachineOverSpeed, band: tuple[float, float], cut: VirtualCut) -> list[dict[str, Any]]:
+def force_rows(machine: IdentifiedMachine, cut: VirtualCut) -> list[dict[str, Any]]:
     """Errors and bandwidths of both observers, live and smoothed."""
     rows, rate = [], cut.cut.rate
     methods: Sequence[tuple[str, ObserverMethod]] = (("resonators", Resonators()), ("random walk", PaperWalk()))
     for name, method in methods:
         for smooth in (False, True):
             found = observe(
-                machine, cut.tooling.assembly, cut.tooling.cutter.teeth, cut.cut, cut.air, band, CASE.spindle_speed, method, None, smooth
+                machine, cut.tooling.assembly, cut.tooling.cutter.teeth, cut.cut, cut.air, CASE.spindle_speed, method, None, smooth
             )
             error = relative_error(found.estimate.force, cut.force, rate)
             lag, least = best_lag(found.estimate.force, cut.force, rate)
@@ -146,5 +144,4 @@ def force_rows(machine: MachineOverSpeed, band: tuple[float, float], cut: Virtua
 def run() -> list[dict[str, Any]]:
     """Identify the sample machine, cut on it at a speed of its own, and look at both observers."""
     result = os.environ.get("RCSA_IDENT_OBSERVER_RESULT")
-    machine, band = identified(Path(result) if result else None)
-    return force_rows(machine, band, virtual_cut())
+    return force_rows(identified(Path(result) if result else None), virtual_cut())

@@ -18,14 +18,15 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.io.frf_files import Source, read_tap_tests
+from rcsa_ident.machine.known_tip import measured_tip
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
-from rcsa_ident.stability.lobes import StabilityMethod
+from rcsa_ident.stability.lobes import stability_lobes
+from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, Verdict, tally
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.zero_order import ZeroOrder
-from rcsa_ident.workflows.lobes import LobeConditions, measured_tip
 
 FILES = Path(__file__).resolve().parents[2] / "shared" / "data"
 FACE_MILL = tuple(FILES / f"facemill_{axis}.frf" for axis in "xy")
@@ -43,6 +44,8 @@ def run() -> list[dict[str, Any]]:
     rows = []
     if all(path.exists() for path in FACE_MILL):
         found = face_mill()
+        assert found.absolute_limit is not None
+        assert found.absolute_frequency is not None
         hertz = found.absolute_frequency / (2.0 * np.pi)
         rows.append(row("face mill, zero-order minimum", 1e3 * found.absolute_limit, 1.015, "mm", f"{hertz:.0f} Hz, published 1441 Hz"))
     if CUTS.exists():
@@ -63,7 +66,7 @@ def face_mill() -> StabilityLobes:
     curves = read_tap_tests([Source(path, (axis, axis)) for axis, path in zip("XY", FACE_MILL, strict=True)])
     tip = measured_tip({Dof(axis.lower()): curve for (axis, _), curve in curves.items()})
     process = MillingProcess(Cutter(2, 31.75e-3), CuttingCoefficients(1319.4e6, 788.8 / 1319.4), DOWN)
-    return LobeConditions(process, np.arange(2000.0, 20001.0, 50.0) * np.pi / 30.0, 0.02).lobes(tip)
+    return stability_lobes(tip, process, np.arange(2000.0, 20001.0, 50.0) * np.pi / 30.0, 0.02)
 
 
 def labelled(method: StabilityMethod) -> Tally:
@@ -75,7 +78,8 @@ def labelled(method: StabilityMethod) -> Tally:
     prior = {Dof.X: (782.7, 0.0184, 6.5616e6), Dof.Y: (752.8, 0.0186, 4.8852e6)}
     process = MillingProcess(Cutter(2, 12e-3), CuttingCoefficients(10.95e8, 1.76 / 10.95), DOWN)
     speeds = np.unique(cuts.spindle_speed)
-    found = LobeConditions(process, speeds, 5e-3, method).lobes(TipModes.of({axis: _mode(axis, *mode) for axis, mode in prior.items()}))
+    tip = TipModes.of({axis: _mode(axis, *mode) for axis, mode in prior.items()})
+    found = stability_lobes(tip, process, speeds, 5e-3, method)
     return tally(cuts, found.limit_depth[np.searchsorted(speeds, cuts.spindle_speed)])
 
 

@@ -34,6 +34,7 @@ from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import NoiseWeightedCost, PaperGeneticAlgorithm
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import Layout, joint_of, modes_of, plain, split, unpack
+from rcsa_ident.identification.progress import Stage, Step
 from rcsa_ident.identification.search import starts
 
 CONDITION, AXIS = "no-trigger", Dof.X
@@ -44,7 +45,7 @@ REACH, POPULATION = 6.0, 60
 #: Generations after which the published algorithm is looked at.
 GENERATIONS = (30, 100, 300, 1000, 2500, 5000)
 #: Stages of the default that try one candidate after the other; the last drops modes one by one.
-SIDE_BY_SIDE = ("search", "refine", "modes")
+SIDE_BY_SIDE = (Stage.SEARCH, Stage.REFINE, Stage.MODES)
 #: Best-so-fars this close in time, as a ratio, are one point.
 SPACING = 1.15
 
@@ -106,17 +107,17 @@ class Candidates:
 def by_default(data: IdentificationData, seed: int, seconds: float) -> Recorder:
     """The default method, followed by its progress: what it would go on with at each time."""
     recorder = Recorder()
-    lowest: dict[str, float] = {}
+    lowest: dict[Stage, float] = {}
 
-    def follow(axis: str, stage: str, cost: float, theta: FloatArray, layout: Layout) -> None:
-        kind = "modes" if stage.endswith(" modes") else stage
-        if kind not in lowest:
+    def follow(step: Step) -> None:
+        assert step.candidate is not None
+        if step.stage not in lowest:
             # another stage has another cost
             lowest.clear()
         # of candidates that are tried one after the other the best counts, of all else the latest
-        if kind not in SIDE_BY_SIDE or cost < lowest.get(kind, np.inf):
-            lowest[kind] = cost
-            recorder.add(cost, (np.array(theta), layout))
+        if step.stage not in SIDE_BY_SIDE or step.cost < lowest.get(step.stage, np.inf):
+            lowest[step.stage] = step.cost
+            recorder.add(step.cost, (np.array(step.candidate.theta), step.candidate.layout))
 
     found = EvidenceSelection().run(data, seed, map, follow)
     recorder.points.append((recorder.seconds, np.nan, (found.axes[AXIS].modes, found.axes[AXIS].joint)))
@@ -193,7 +194,7 @@ def by_paper(data: IdentificationData, seed: int, seconds: float, weighted: bool
     for generations in GENERATIONS:
         recorder = Recorder()
         found = replace(method, generations=generations).run(data, seed, map)
-        whole.points.append((recorder.seconds, found.trace[-1][2], (found.axes[AXIS].modes, found.axes[AXIS].joint)))
+        whole.points.append((recorder.seconds, found.trace[-1].cost, (found.axes[AXIS].modes, found.axes[AXIS].joint)))
     return whole
 
 

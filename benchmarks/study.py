@@ -30,24 +30,23 @@ from benchmarks.machines import CONDITIONS, EVALUATION, random_machine, under
 from benchmarks.page import DOCS, append_row, draw_study, read_rows, write_block
 from benchmarks.study_table import AIMS, line, table
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.samples import simulate_campaign
-from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import WIDE, NoiseWeightedCost, PaperGeneticAlgorithm
-from rcsa_ident.identification.posterior import MachineAxis
 from rcsa_ident.io.curves import read_frf_csv
 from rcsa_ident.io.identifications import identification_to_json, machine_from_json
 from rcsa_ident.io.machines import MachineFile, read_machine
 from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.io.results import read_result, write_result
 from rcsa_ident.io.setups import read_campaign, read_tooling
+from rcsa_ident.machine.machine import Machine
 from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.samples import simulate_campaign
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.recording import Recording
+from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.workflows.compile_kernels import STEPS
 from rcsa_ident.workflows.identify import Method, data_of, judge, left_out
-from rcsa_ident.workflows.tip import tooltip
 
 MACHINES = Path(__file__).resolve().parent.parent / "data" / "machines"
 #: The machine that lies inside the search space of the published algorithm, seed of its cuts.
@@ -149,7 +148,7 @@ def read_data(folder: Path) -> tuple[Campaign, list[Reading], IdentificationData
     return campaign, readings, data_of(campaign, readings)
 
 
-def compared(machine: dict[Dof, MachineAxis], setup: MachineFile, truth: Path) -> dict[str, dict[str, Any]]:
+def compared(machine: Machine, setup: MachineFile, truth: Path) -> dict[str, dict[str, Any]]:
     """Return errors [X, Y] and coverage of the tooltip FRFs of the toolings that cut and of those that never did."""
     kinds = {"cut": setup.toolings, **{kind: (path,) for kind, path in zip(AIMS, setup.truth_toolings, strict=True)}}
     found: dict[str, dict[str, Any]] = {}
@@ -159,12 +158,13 @@ def compared(machine: dict[Dof, MachineAxis], setup: MachineFile, truth: Path) -
             tooling = read_tooling(path)
             true = read_frf_csv(truth / "tip" / f"{tooling.name}.csv")
             at = np.searchsorted(true.frequency, FREQUENCY - 1e-6)
-            response = tooltip(machine, tooling.assembly, 2.0 * np.pi * FREQUENCY)
-            for axis, name in ((Dof.X, "X"), (Dof.Y, "Y")):
-                error = response.tip(axis) - true.values[name][at]
-                errors.append(relative_error(response.tip(axis), true.values[name][at]))
-                if axis in response.deviation:
-                    deviations.append(in_deviations(error, response.deviation[axis]))
+            tip = machine.tip(tooling, 2.0 * np.pi * FREQUENCY)
+            deviation = tip.deviation()
+            for row in TIP:
+                found_here, true_here = tip.between(str(row), str(row)), true.values[row.dof.upper()][at]
+                errors.append(relative_error(found_here, true_here))
+                if (row, row) in deviation:
+                    deviations.append(in_deviations(found_here - true_here, deviation[row, row]))
         bands = coverage(np.concatenate(deviations)) if deviations else None
         found[kind] = {"errors": [float(f"{e:.4g}") for e in errors], "bands": bands}
     return found

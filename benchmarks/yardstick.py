@@ -12,12 +12,10 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.data import LEVER, IdentificationData
-from rcsa_ident.identification.posterior import MachineAxis
 from rcsa_ident.io.curves import read_frf_csv
 from rcsa_ident.io.machines import MachineFile
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.machine.spindle import Spindle
-from rcsa_ident.workflows.tip import tooltip
+from rcsa_ident.machine.flange_machine import FlangeMachine
 
 #: Model error of the misfit.
 SHARE = 0.02
@@ -33,12 +31,13 @@ class Yardstick:
             tooling = read_tooling(path)
             true = read_frf_csv(truth / "tip" / f"{tooling.name}.csv")
             at = np.searchsorted(true.frequency, FREQUENCY - 1e-6)
-            self.wanted.append((tooling.assembly, true.values[self.axis.upper()][at]))
+            self.wanted.append((tooling, true.values[self.axis.upper()][at]))
 
     def measure(self, modes: ModalModel, joint: LumpedJoint) -> list[float]:
         """Return the mean squared residual of the lines, and the tooltip errors of the toolings that never cut."""
-        machine = {self.axis: MachineAxis(Spindle(modes), joint)}
-        errors = [relative_error(tooltip(machine, a, 2.0 * np.pi * FREQUENCY, bands=False).tip(self.axis), true) for a, true in self.wanted]
+        omega, tip = 2.0 * np.pi * FREQUENCY, f"tip.{self.axis}"
+        machine = FlangeMachine((modes,), (omega[0], omega[-1]), joint)
+        errors = [relative_error(machine.tip(tooling, omega).between(tip, tip), true) for tooling, true in self.wanted]
         return [lines_misfit(self.data, modes, joint), *errors]
 
 

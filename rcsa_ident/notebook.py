@@ -28,8 +28,9 @@ from rcsa_ident.io.lobes import write_advice, write_lobes, write_map
 from rcsa_ident.io.recordings import write_recording
 from rcsa_ident.io.results import write_result
 from rcsa_ident.io.toolings import write_tooling
+from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.known_tip import KnownTip
-from rcsa_ident.machine.machine import FlangeMachine, Machine
+from rcsa_ident.machine.machine import Machine
 from rcsa_ident.machining_setup import Campaign, Tooling
 from rcsa_ident.observer.force import ForceEstimate
 from rcsa_ident.report import figures
@@ -264,7 +265,7 @@ def _(result: Result) -> str:
                 f"{1e3 * abs(row.phi_t):.3f}",
                 f"{1e3 * abs(row.phi_r):.2f}",
             )
-            for row in mode_rows(result.modes[Dof(axis.lower())], deviation)  # type: ignore[arg-type]
+            for row in mode_rows(result.modes[Dof(axis.lower())], deviation)
         ]
         parts.append(_table((f"{axis}: f_n [Hz]", "ζ [%]", "|φ_t| [1e-3]", "|φ_r| [1e-3]"), rows))
     found = result.identification

@@ -13,6 +13,8 @@ from typing import Any
 from rcsa_ident.errors import InputError, RcsaIdentError
 from rcsa_ident.version import __version__
 
+#: What takes a function and tasks and returns the results in the tasks' order: the builtin, a pool's, a cluster's.
+Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 ADDRESS = re.compile(r"(tcp|tls)://(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9.-]+):\d{1,5}")
 _ALLOWED = "the address of a Dask scheduler, as tcp://host:8786"
 

@@ -101,8 +101,8 @@ def identify(
         read = partial(read_cut, campaign.sensors, campaign.sampling_rate)
         readings = workflow.judge(campaign, read, pool.map_many, line.counted("recording"))
         line("searching modes")
-        with pool.listening(line.tell):
-            found = workflow.identify(campaign, readings, chosen, seed, pool.map)
+        with pool.listening(line.tell) as told:
+            found = workflow.identify(campaign, readings, chosen, seed, pool.map, None if line.stream is None else told)
         result = Result.of(found, campaign, readings)
         line.last = str(result)
     return result

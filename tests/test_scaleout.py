@@ -55,6 +55,7 @@ def run(*arguments: object, code: int = 0) -> str:
     return result.output
 
 
+@pytest.mark.slow
 def test_results_in_order_from_several_processes(address):
     with cluster_map(address) as spread:
         assert spread.slots == 2
@@ -68,12 +69,14 @@ def test_results_in_order_from_several_processes(address):
     assert os.getpid() not in processes
 
 
+@pytest.mark.slow
 def test_the_same_task_twice_is_done_twice(address):
     with cluster_map(address) as spread:
         found = list(spread(tasks.late, [3.0] * 6))
     assert len(found) == 6
 
 
+@pytest.mark.slow
 def test_an_error_comes_as_it_was_raised(address):
     with cluster_map(address) as spread:
         answers = spread(tasks.picky, [1, 2, 3])
@@ -83,6 +86,7 @@ def test_an_error_comes_as_it_was_raised(address):
     assert (caught.value.field, caught.value.found, caught.value.where) == ("task", 2, "here")
 
 
+@pytest.mark.slow
 def test_what_is_not_done_is_cancelled(address, tmp_path):
     with cluster_map(address) as spread, pytest.raises(ValueError, match="the first"):
         list(spread(tasks.marks, [(str(tmp_path), i) for i in range(12)]))
@@ -91,6 +95,7 @@ def test_what_is_not_done_is_cancelled(address, tmp_path):
     assert len(list(tmp_path.iterdir())) <= 4
 
 
+@pytest.mark.slow
 def test_an_iterator_left_alone_cancels_too(address, tmp_path):
     with cluster_map(address) as spread:
         answers = spread(tasks.marks, [(str(tmp_path), i) for i in range(1, 20)])
@@ -126,6 +131,7 @@ def test_without_workers():
         pass
 
 
+@pytest.mark.slow
 def test_another_release(address, monkeypatch):
     monkeypatch.setattr("rcsa_ident.scaleout.__version__", "0.0.0")
     with pytest.raises(InputError, match=r"0\.0\.0 on all of them"), cluster_map(address):
@@ -138,6 +144,7 @@ def test_without_dask(monkeypatch):
         pass
 
 
+@pytest.mark.slow
 def test_importing_loads_no_dask():
     import subprocess
 
@@ -145,6 +152,7 @@ def test_importing_loads_no_dask():
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_a_task_that_ends_its_worker():
     import dask
     from distributed import LocalCluster
@@ -173,6 +181,7 @@ def campaign(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_an_identification_is_the_same_byte_for_byte(address, campaign, tmp_path, monkeypatch):
     here, there = tmp_path / "here.json", tmp_path / "there.json"
     run("identify", campaign, "--out", here, "--processes", 1)
@@ -182,12 +191,14 @@ def test_an_identification_is_the_same_byte_for_byte(address, campaign, tmp_path
     assert there.read_bytes() == here.read_bytes()
 
 
+@pytest.mark.slow
 def test_verdicts_are_the_same(address, campaign):
     here, there = (json.loads(run("check", campaign, "--json", *how)) for how in (("--processes", 1), ("--dask", address)))
     assert here == there
     assert here["usable"] == here["cuts"] > 8
 
 
+@pytest.mark.slow
 def test_processes_and_a_cluster_do_not_go_together(campaign, tmp_path):
     words = run("identify", campaign, "--out", tmp_path / "R.json", "--dask", "tcp://127.0.0.1:1", "--processes", 2, code=2)
-    assert "one of both" in words
+    assert "one of the two" in words

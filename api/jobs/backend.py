@@ -6,7 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-#: Returns the stored result of a step by its name, or computes and stores it.
+#: What an unfinished job remembers belongs to this version: raise it when steps change their order, names or texts.
+#: A job that began with another version starts over.
+VERSION = "2"
+#: Returns the stored text of a step by its name, or computes and stores it.
 Remember = Callable[[str, Callable[[], str]], str]
 #: Carries out the job of an id; a repetition gives the same result.
 Carry = Callable[[str, Remember], None]

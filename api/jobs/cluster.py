@@ -8,12 +8,12 @@ from contextlib import ExitStack
 from typing import Any
 
 from rcsa_ident.errors import InputError
-from rcsa_ident.scaleout import ClusterLost, cluster_map
+from rcsa_ident.scaleout import ClusterLost, Map, cluster_map
 
 log = logging.getLogger("rcsa_ident.jobs")
 
 
-def over_cluster(address: str) -> Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]:
+def over_cluster(address: str) -> Map:
     """Return a map over the workers of a cluster; a job does not fail because the cluster cannot be reached."""
 
     def spread(function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Any]:

@@ -13,19 +13,22 @@ from typing import Any, Literal
 
 import numpy as np
 
-#: Module and name of every noun that may be told; a later release may read what an earlier one wrote as long as its fields stay.
+from rcsa_ident.remarks import Remark
+
+#: Module and name of every noun that may be written; a later release may read what an earlier one wrote as long as its fields stay.
 NOUNS = (
     "rcsa_ident.dynamics.coordinates.Dof",
+    "rcsa_ident.remarks.Remark",
+    "rcsa_ident.signals.verdict.RecordCode",
     "rcsa_ident.signals.verdict.Verdict",
     "rcsa_ident.signals.frf.AxisLines",
     "rcsa_ident.signals.measurement.CutMeasurement",
     "rcsa_ident.signals.measurement.Reading",
     "rcsa_ident.identification.parameters.AxisLayout",
     "rcsa_ident.identification.parameters.Layout",
-    "rcsa_ident.identification.misfit.Residual",
-    "rcsa_ident.identification.misfit.Linearisation",
-    "rcsa_ident.identification.misfit.Evaluation",
-    "rcsa_ident.identification.levenberg_marquardt.Solution",
+    "rcsa_ident.identification.candidate.Candidate",
+    "rcsa_ident.identification.progress.Stage",
+    "rcsa_ident.identification.progress.Step",
     "rcsa_ident.identification.joint_fit.AxisSearch",
     "rcsa_ident.cutting.conditions.Engagement",
     "rcsa_ident.cutting.process.ProcessDamping",
@@ -58,19 +61,21 @@ def decode(text: str) -> Any:
     Raises
     ------
     Unknown
-        If it has not.
+        If it has not, or its nouns have other fields now, or are gone.
     """
     try:
         return _value(json.loads(text))
     except Unknown:
         raise
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError, AttributeError, ImportError, RecursionError) as error:
         raise Unknown(f"no text of a known noun ({type(error).__name__})") from error
 
 
 def _plain(value: Any) -> Any:
     if isinstance(value, Enum):
         return {"~enum": [_name(type(value)), value.value]}
+    if isinstance(value, Remark):
+        return {f"~{_name(Remark)}": {"code": _plain(value.code), "sentence": str(value)}}
     if value is None or type(value) in (bool, int, str):
         return value
     if type(value) is float:

@@ -11,10 +11,8 @@ from typing import Any
 from dbos import DBOS, DBOSClient, DBOSConfig
 from dbos import Serializer as _Serializer
 
-from api.jobs.backend import Carried, Carry
+from api.jobs.backend import VERSION, Carried, Carry
 
-#: Version of the steps of unfinished jobs: raise it when steps change their order, names or texts.
-PROTOCOL = "1"
 QUEUE = "jobs"
 #: Interval between two polls for a job [s].
 POLL = 0.5
@@ -58,7 +56,7 @@ class Durable:
             "name": _NAME,
             "system_database_url": self.url,
             "executor_id": executor,
-            "application_version": PROTOCOL,
+            "application_version": VERSION,
             "serializer": Json(),
             "log_level": "WARNING",
             "use_listen_notify": False,
@@ -81,13 +79,13 @@ class Durable:
 
     def submit(self, job: str, priority: int) -> None:
         assert self.client is not None
-        options: Any = {"workflow_name": "carry", "queue_name": QUEUE, "workflow_id": job, "app_version": PROTOCOL, "priority": priority}
+        options: Any = {"workflow_name": "carry", "queue_name": QUEUE, "workflow_id": job, "app_version": VERSION, "priority": priority}
         self.client.enqueue(options, job)
 
     def carried(self) -> Sequence[Carried]:
         assert self.client is not None
         rows = self.client.list_workflows(name="carry", load_input=False, load_output=False)
-        return [Carried(row.workflow_id, _STATES.get(row.status, "over"), row.executor_id, row.app_version == PROTOCOL) for row in rows]
+        return [Carried(row.workflow_id, _STATES.get(row.status, "over"), row.executor_id, row.app_version == VERSION) for row in rows]
 
     def resume(self, job: str) -> None:
         assert self.client is not None

@@ -7,20 +7,22 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from api.jobs.backend import Remember
-from api.jobs.codec import decode, encode
+from api.jobs.backend import VERSION, Remember
+from api.jobs.codec import Unknown, decode, encode
 from api.stores.entities import Unavailable
 from api.stores.jobs import Event, Jobs
 from rcsa_ident.errors import InputError
+from rcsa_ident.scaleout import Map
 
 log = logging.getLogger("rcsa_ident.jobs")
-Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
-#: Intervals between two deliveries of events, two trace events and two curves of one topic [s].
-DELIVERY, WORD, CURVE = 0.4, 0.1, 1.0
-#: Trace events of a job after which their interval doubles, again and again.
+#: Said by a job whose memory is of no use.
+STARTS_OVER = "The job starts over from its recordings: what it had stored was written by another version of the service, or is lost."
+#: Intervals between two deliveries of events, two events of a kind and two curves of one topic [s].
+DELIVERY, PAUSE, CURVE = 0.4, 0.1, 1.0
+#: Events of a job after which their interval doubles, again and again.
 MANY = 1000
 #: Time for a cancelled job to end by itself [s].
 GRACE = 2.0
@@ -30,6 +32,10 @@ PATIENCE = 60.0
 
 class Stopped(Exception):
     """The job has been cancelled or given to another worker."""
+
+
+class Outdated(Exception):
+    """What a step of the job came to was written by another version of the service, and cannot be read."""
 
 
 class Faulty(Exception):
@@ -47,18 +53,28 @@ class JobContext:
     remember : Remember
     leave : callable
         Ends the process with an exit code; the job continues from its last step elsewhere or after a restart.
+    resumed : bool
+        The job had come past its first step before: if that is not remembered, it says so.
     """
 
-    def __init__(self, jobs: Jobs, job: str, token: str, remember: Remember, leave: Callable[[int], Any] = os._exit) -> None:
-        self.jobs, self.job, self.token, self.engine, self.leave = jobs, job, token, remember, leave
+    def __init__(
+        self,
+        jobs: Jobs,
+        job: str,
+        token: str,
+        remember: Remember,
+        leave: Callable[[int], Any] = os._exit,
+        resumed: bool = False,
+    ) -> None:
+        self.jobs, self.job, self.token, self.engine, self.leave, self.resumed = jobs, job, token, remember, leave, resumed
         self.stopped, self.over = threading.Event(), threading.Event()
         self.lock = threading.Lock()
         self.events: list[Event] = []
         self.state: str | None = None
         self.came_further = False
-        self.words = 0
+        self.count = 0
         self.last: dict[str, float] = {}
-        self.thread = threading.Thread(target=self._deliver, daemon=True)
+        self.thread = threading.Thread(target=self._deliver_until_over, daemon=True)
 
     def __enter__(self) -> JobContext:
         self.thread.start()
@@ -68,7 +84,7 @@ class JobContext:
         self.over.set()
         self.thread.join()
         if not self.stopped.is_set():
-            self._tell()
+            self._deliver()
 
     def check(self) -> None:
         """Raise `Stopped` where the job is not to continue here."""
@@ -84,16 +100,34 @@ class JobContext:
             As the step has raised it.
         Faulty
             The step has raised something else.
+        Outdated
+            It is remembered, but by another version of the service.
         """
         self.check()
+        computed = False
+
+        def outcome() -> str:
+            nonlocal computed
+            computed = True
+            return self._outcome(name, compute)
+
         try:
-            text = self.engine(name, lambda: self._outcome(name, compute))
+            text = self.engine(name, outcome)
         except Exception as error:
             # the job belongs to another worker, or the engine fails: no outcome of the job
             log.error("the durable engine has refused a step", exc_info=error, extra={"fields": {"job": self.job, "step": name}})
             self.leave(3)
             raise Stopped from error
-        found = decode(text)
+        if computed and self.resumed:
+            self._add(Event(0, "note", json.dumps({"text": STARTS_OVER})))
+        self.resumed = False
+        found = _read(text)
+        if found is None:
+            if computed:
+                log.error("a step cannot be read back", extra={"fields": {"job": self.job, "step": name}})
+                raise Faulty(name)
+            log.warning("remembered by another version", extra={"fields": {"job": self.job, "step": name}})
+            raise Outdated(name)
         if "refused" in found:
             raise InputError(*found["refused"])
         if "value" not in found:
@@ -104,21 +138,19 @@ class JobContext:
     def _outcome(self, name: str, compute: Callable[[], Any]) -> str:
         # the engine stores results only: it would restore exceptions by rules of its own
         try:
-            text = encode({"value": compute()})
+            text = _text(value=compute())
             self.came_further = True
             return text
         except InputError as error:
-            return encode({"refused": (error.field, str(error.found), error.allowed, error.where)})
+            return _text(refused=(error.field, str(error.found), error.allowed, error.where))
         except Stopped:
-            return encode({})
+            return _text()
         except Exception as error:
             log.error("a step has failed", exc_info=error, extra={"fields": {"job": self.job, "step": name}})
-            return encode({})
+            return _text()
 
-    def map(
-        self, function: Callable[[Any], Any], tasks: Iterable[Any], name: str, stage: str, spread: Callable[..., Any] = map
-    ) -> list[Any]:
-        """Return the results of all tasks in order, each stored as a step.
+    def map(self, function: Callable[[Any], Any], tasks: Sequence[Any], name: str, stage: str, spread: Map = map) -> list[Any]:
+        """Return the results of all tasks in order, each a step of its own.
 
         Parameters
         ----------
@@ -129,20 +161,19 @@ class JobContext:
         spread : callable
             The builtin `map` or that of a pool; tasks without a stored result go through it together.
         """
-        waiting = list(tasks)
         running: Any = None
         found = []
-        for i in range(len(waiting)):
+        for i in range(len(tasks)):
 
             def compute(i: int = i) -> Any:
                 nonlocal running
                 if running is None:
-                    running = iter(spread(function, waiting[i:]))
+                    running = iter(spread(function, tasks[i:]))
                 return next(running)
 
-            self.progress(stage, i, len(waiting))
+            self.progress(stage, i, len(tasks))
             found.append(self.remember(f"{name}.{i}", compute))
-        self.progress(stage, len(waiting), len(waiting))
+        self.progress(stage, len(tasks), len(tasks))
         return found
 
     def progress(self, stage: str, done: int, total: int) -> None:
@@ -151,14 +182,13 @@ class JobContext:
             self.state = json.dumps({"stage": stage, "done": done, "total": total})
         self.check()
 
-    def word(self, kind: str, data: dict[str, Any]) -> None:
+    def event(self, kind: str, data: dict[str, Any]) -> None:
         """Report an event; most events in quick succession are omitted."""
         now = time.monotonic()
-        if now - self.last.get(kind, 0.0) >= WORD * 2.0 ** (self.words // MANY):
+        if now - self.last.get(kind, 0.0) >= PAUSE * 2.0 ** (self.count // MANY):
             self.last[kind] = now
-            self.words += 1
-            with self.lock:
-                self.events.append(Event(0, kind, json.dumps(data, allow_nan=False)))
+            self.count += 1
+            self._add(Event(0, kind, json.dumps(data, allow_nan=False)))
         self.check()
 
     def curve(self, topic: str, data: Callable[[], dict[str, Any] | None]) -> None:
@@ -168,14 +198,16 @@ class JobContext:
             self.last[topic] = now
             found = data()
             if found is not None:
-                text = json.dumps(found, allow_nan=False)
-                with self.lock:
-                    self.events.append(Event(0, "fit", text, topic))
+                self._add(Event(0, "fit", json.dumps(found, allow_nan=False), topic))
         self.check()
 
-    def _deliver(self) -> None:
+    def _add(self, event: Event) -> None:
+        with self.lock:
+            self.events.append(event)
+
+    def _deliver_until_over(self) -> None:
         while not self.over.wait(DELIVERY):
-            if not self._tell():
+            if not self._deliver():
                 job = self.jobs.find(self.job)
                 if job is not None and job.state == "running":
                     # another worker has taken the job over: report nothing more
@@ -187,7 +219,8 @@ class JobContext:
                     self.leave(0)
                 return
 
-    def _tell(self) -> bool:
+    def _deliver(self) -> bool:
+        """Hand over what there is, and return whether the job is still wanted here."""
         with self.lock:
             events, self.events = self.events, []
             state, self.state = self.state, None
@@ -202,3 +235,17 @@ class JobContext:
                     self.leave(1)
                     return False
                 time.sleep(1.0)
+
+
+def _text(**outcome: Any) -> str:
+    """Return what a step came to, with the version that says so."""
+    return encode({"version": VERSION, **outcome})
+
+
+def _read(text: str) -> dict[str, Any] | None:
+    """Return what a step came to; None where another version of the service says so."""
+    try:
+        found = decode(text)
+    except Unknown:
+        return None
+    return found if isinstance(found, dict) and found.get("version") == VERSION else None

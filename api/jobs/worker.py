@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from api.jobs.backend import JobBackend, Remember
-from api.jobs.job_context import Faulty, JobContext, Stopped
+from api.jobs.job_context import Faulty, JobContext, Outdated, Stopped
 from api.stores.entities import Unavailable
 from api.stores.jobs import Job, Jobs, Outcome, Worker
 from rcsa_ident.errors import InputError
@@ -63,11 +63,12 @@ def carry(
 
 
 def _outcome(jobs: Jobs, carrier: Carrier, job: Job, token: str, remember: Remember, leave: Callable[[int], Any]) -> Outcome | None:
-    """Outcome of the job; None where it was stopped."""
+    """Outcome of the job; None where it was stopped, or has to start over."""
     try:
-        with JobContext(jobs, job.id, token, remember, leave) as context:
+        with JobContext(jobs, job.id, token, remember, leave, resumed=job.progress is not None) as context:
             return carrier(job, context)
-    except Stopped:
+    except (Stopped, Outdated):
+        # of an outdated job the engine knows no more than that it is over: it forgets it, and begins anew
         return None
     except InputError as error:
         found = error.found if isinstance(error.found, str) else repr(error.found)
@@ -160,7 +161,10 @@ class JobWorker:
         done = {
             id
             for id, each in carried.items()
-            if each.state == "over" or (each.state == "waiting" and id not in open) or not (each.current or each.executor in names)
+            if each.state == "over"
+            or (each.state == "waiting" and id not in open)
+            # of another version: its executor is dead, or has been replaced by this one under its name
+            or not (each.current or each.executor in names - {self.id})
         }
         if done:
             self.backend.forget(sorted(done))

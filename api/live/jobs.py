@@ -44,7 +44,7 @@ _EVENT: dict[str, Any] = {
     "type": "object",
     "description": "One event of the stream; its data is JSON.",
     "properties": {
-        "event": {"enum": ["progress", "trace", "fit", "end"]},
+        "event": {"enum": ["progress", "trace", "fit", "note", "end"]},
         "data": {"type": "string"},
         "id": {"type": "string"},
         "retry": {"type": "integer"},
@@ -53,7 +53,7 @@ _EVENT: dict[str, Any] = {
 }
 STREAM: dict[str, Any] = {
     "description": "Server-sent events: `progress` and `end` with the job, `trace` with axis, stage, cost and seconds, `fit` with axis, "
-    "frequency_hz, measured_abs and model_abs [m/N]. It ends with `end`.",
+    "frequency_hz, measured_abs and model_abs [m/N], `note` with a text: a sentence of the job's story. It ends with `end`.",
     "content": {EVENTS: {"schema": _EVENT}},
 }
 

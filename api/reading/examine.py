@@ -12,11 +12,12 @@ from api.reading.samples import read_normalised, write_normalised
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import in_si, read_signals
 from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.remarks import Remark
 from rcsa_ident.report.summaries import recording_rows
 from rcsa_ident.signals.measurement import Reading, judge_air, measure_cut
 from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.signals.steady import measured_axes
-from rcsa_ident.signals.verdict import Verdict
+from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.units import to_rpm
 
 
@@ -99,10 +100,10 @@ def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | 
                 coefficients = campaign.workpiece.coefficients
                 reading = measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, coefficients)
     except InputError as error:
-        reading = Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((str(error),)))
+        reading = Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((Remark(RecordCode.UNREADABLE, str(error)),)))
     except (ArithmeticError, np.linalg.LinAlgError):
-        reasons = ("numbers of these samples have no finite answer",)
-        reading = Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict(reasons))
+        reason = Remark(RecordCode.NOT_FINITE, "numbers of these samples have no finite answer")
+        reading = Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((reason,)))
     (row,) = recording_rows([reading])
     verdict = {
         "usable": row.usable,

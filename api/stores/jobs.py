@@ -73,7 +73,7 @@ class Event:
     number : int
         Increases within the job, with gaps.
     kind : str
-        progress, trace, fit or end.
+        progress, trace, fit, note or end.
     data : str
         JSON; empty for progress and end, whose content is the job itself.
     topic : str

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,7 @@ from rcsa_ident.cli.common import (
     warn,
     writable,
 )
-from rcsa_ident.cli.processes import Dask, Processes, Workers, tell, workers_or_cluster
+from rcsa_ident.cli.processes import Dask, Processes, Workers, workers_or_cluster
 from rcsa_ident.errors import InputError
 from rcsa_ident.units import to_rpm
 
@@ -31,13 +31,11 @@ if TYPE_CHECKING:
 
     from rcsa_ident.arrays import FloatArray
     from rcsa_ident.dynamics.coordinates import Dof
-    from rcsa_ident.identification.data import IdentificationData
-    from rcsa_ident.identification.evidence import EvidenceSelection
+    from rcsa_ident.identification.method import Method as IdentificationMethod
     from rcsa_ident.identification.posterior import Posterior
     from rcsa_ident.identification.result import Identification
     from rcsa_ident.machining_setup import Campaign
     from rcsa_ident.signals.measurement import Reading
-    from rcsa_ident.workflows.identify import Map
     from rcsa_ident.workflows.speed_bands import SpeedBand
 
 CampaignFolder = Annotated[Path, typer.Argument(help="Folder with campaign.toml, toolings and recordings.", show_default=False)]
@@ -173,16 +171,6 @@ def read_start(path: Path) -> Mapping[Dof, Posterior]:
         raise error if error.where else error.at(str(path)) from None
 
 
-@dataclass(frozen=True, slots=True)
-class _Telling:
-    """The default method, which says where it is."""
-
-    method: EvidenceSelection
-
-    def run(self, data: IdentificationData, seed: int, map: Map) -> Identification:
-        return self.method.run(data, seed, map, tell)
-
-
 def search(
     campaign: Campaign,
     readings: list[Reading],
@@ -195,7 +183,7 @@ def search(
     """Return the identification by the method of that name; the default one may start from an earlier answer."""
     from rcsa_ident.workflows import identify as workflow
 
-    chosen: workflow.Method
+    chosen: IdentificationMethod
     if method is Method.paper:
         from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 
@@ -203,9 +191,9 @@ def search(
     else:
         from rcsa_ident.identification.evidence import EvidenceSelection
 
-        chosen = _Telling(EvidenceSelection(start=start)) if stages.visible else EvidenceSelection(start=start)
-    with stages.stage("identification") as line, pool.listening(line.tell):
-        return workflow.identify(campaign, readings, chosen, seed, pool.map)
+        chosen = EvidenceSelection(start=start)
+    with stages.stage("identification") as line, pool.listening(line.tell) as progress:
+        return workflow.identify(campaign, readings, chosen, seed, pool.map, progress if stages.visible else None)
 
 
 def search_bands(
@@ -247,7 +235,7 @@ def warn_left_out(data: dict[str, Any]) -> None:
 
 def leave(found: Identification) -> None:
     """End with exit code 3 unless there is an answer that may be used."""
-    if str(found.status) == "failed" or any(reason.startswith("not converged") for reason in found.reasons):
+    if not found.at_minimum:
         raise typer.Exit(NOT_CONVERGED)
     if str(found.status) == "suspect":
         warn("the result is suspect: " + "; ".join(found.reasons))

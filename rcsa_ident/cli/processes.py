@@ -1,4 +1,4 @@
-"""Worker processes beside the main one, which works as well; what they tell on their way."""
+"""Worker processes beside the main one, which works as well, and what is shown of their work while it is done."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing.reduction import ForkingPickler
 from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,13 +23,15 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.scaleout import ClusterMap, cluster_map
 
 if TYPE_CHECKING:
-    from multiprocessing.queues import SimpleQueue
+    from multiprocessing.connection import Connection
+
+    from rcsa_ident.identification.progress import Step
 
 #: Reading and searching do not get faster beyond it.
 MOST_PROCESSES = 8
 #: What a worker imports while the main process still reads the campaign's file.
 EARLY = ("rcsa_ident.io.recordings", "rcsa_ident.workflows.identify", "rcsa_ident.identification.evidence")
-#: Seconds between two words of one process.
+#: Seconds between two steps of one process that are shown.
 PAUSE = 0.1
 
 Processes = Annotated[
@@ -39,18 +42,47 @@ Dask = Annotated[str | None, typer.Option(metavar="ADDRESS", help=DASK_HELP, sho
 #: Takes axis, stage and cost of a search.
 Show = Callable[[str, str, float], None]
 
-# where this process' words go: to the screen in the main process, into the queue in a worker, nowhere by default
-_sink: Callable[[tuple[str, str, float]], None] | None = None
-_last = 0.0
+
+class Relay:
+    """A progress callable whose copies in worker processes tell the process that made it; most of what comes in quick succession is
+    dropped.
+
+    A copy that goes elsewhere, to the machines of a cluster, tells nobody.
+
+    Parameters
+    ----------
+    show : callable or None
+        Takes what is told in this process.
+    line : Connection or None
+        Takes it otherwise: the end of a pipe that several processes write to, each word in one piece.
+    """
+
+    def __init__(self, show: Show | None = None, line: Connection | None = None) -> None:
+        self.show, self.line, self.last = show, line, 0.0
+
+    def __call__(self, step: Step) -> None:
+        """Show a step, or send it."""
+        now = time.monotonic()
+        if now - self.last <= PAUSE:
+            return
+        self.last = now
+        if self.show is not None:
+            self.show(step.axis, step.label, step.cost)
+        elif self.line is not None:
+            # nobody may listen any more
+            with suppress(OSError):
+                self.line.send((step.axis, step.label, step.cost))
+
+    def __reduce__(self) -> tuple[type[Relay], tuple[()]]:
+        return Relay, ()
 
 
-def tell(axis: str, stage: str, cost: float, theta: Any = None, layout: Any = None) -> None:
-    """Say where a search is: a progress callback that may cross processes; most of what comes in quick succession is dropped."""
-    global _last
-    now = time.monotonic()
-    if _sink is not None and now - _last > PAUSE:
-        _last = now
-        _sink((axis, stage, cost))
+def _with_line(relay: Relay) -> tuple[type[Relay], tuple[None, Connection | None]]:
+    return Relay, (None, None if relay.line is None or relay.line.closed else relay.line)
+
+
+# what multiprocessing itself sends to its workers may hold a connection
+ForkingPickler.register(Relay, _with_line)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,15 +95,12 @@ class Workers:
         Processes beside this one.
     pool : ProcessPoolExecutor or None
         None without helpers.
-    words : SimpleQueue or None
-        What the helpers tell.
     cluster : ClusterMap or None
         In place of processes here; it tells nothing on its way.
     """
 
     helpers: int = 0
     pool: ProcessPoolExecutor | None = None
-    words: SimpleQueue[tuple[str, str, float]] | None = None
     cluster: ClusterMap | None = None
 
     def map(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterable[Any]:
@@ -91,26 +120,28 @@ class Workers:
         return (result for results in self.map(_run_chunk, chunks) for result in results)
 
     @contextmanager
-    def listening(self, show: Show) -> Iterator[None]:
-        """Pass what this process and the helpers tell to `show`, from another thread where it comes from them."""
-        global _sink
-        done = threading.Event()
+    def listening(self, show: Show) -> Iterator[Relay]:
+        """Yield a progress callable for this process and the helpers, which calls `show`; from another thread where helpers tell."""
+        if self.pool is None:
+            yield Relay(show)
+            return
+        here, there = multiprocessing.Pipe(duplex=False)
+        over = threading.Event()
 
-        def drain() -> None:
-            while self.words is not None and not done.wait(PAUSE):
-                while not self.words.empty():
-                    show(*self.words.get())
+        def pass_on() -> None:
+            while not over.is_set():
+                if here.poll(PAUSE):
+                    show(*here.recv())
 
-        _sink = lambda word: show(*word)  # noqa: E731
-        thread = threading.Thread(target=drain, daemon=True)
+        thread = threading.Thread(target=pass_on, daemon=True)
         thread.start()
         try:
-            yield
+            yield Relay(show, there)
         finally:
-            _sink = None
-            done.set()
-            # a worker that was ended in the middle of a word would keep the thread waiting for the rest
-            thread.join(1.0)
+            over.set()
+            thread.join()
+            there.close()
+            here.close()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,13 +221,12 @@ def workers(processes: int | None, early: Sequence[str] = EARLY) -> Iterator[Wor
         yield Workers()
         return
     context = multiprocessing.get_context("spawn")
-    words: SimpleQueue[tuple[str, str, float]] = context.SimpleQueue()
-    pool = ProcessPoolExecutor(helpers, context, initializer=_begin, initargs=(words, tuple(early)))
+    pool = ProcessPoolExecutor(helpers, context, initializer=_import, initargs=(tuple(early),))
     try:
         with _no_interrupts(), _no_script():
             for _ in range(helpers):
                 pool.submit(_nothing)
-        yield Workers(helpers, pool, words)
+        yield Workers(helpers, pool)
     except BaseException:
         for child in multiprocessing.active_children():
             child.terminate()
@@ -229,9 +259,7 @@ def _no_script() -> Iterator[None]:
         sys.modules["__main__"] = script
 
 
-def _begin(words: SimpleQueue[tuple[str, str, float]], early: Sequence[str]) -> None:
-    global _sink
-    _sink = words.put
+def _import(early: Sequence[str]) -> None:
     for name in early:
         importlib.import_module(name)
 

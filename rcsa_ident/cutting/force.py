@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from itertools import pairwise
 
 import numpy as np
@@ -12,10 +13,39 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 
+
+class ForceTerm(StrEnum):
+    """What a simulated force changes with, and what is never known exactly of it."""
+
+    TANGENTIAL = "tangential coefficient"
+    RATIO = "radial ratio"
+    TANGENTIAL_EDGE = "tangential edge force"
+    RADIAL_EDGE = "radial edge force"
+    RUNOUT = "run-out"
+
+
 #: What `force_and_slope` varies, in its order.
-SLOPES = ("tangential coefficient", "radial ratio", "tangential edge force", "radial edge force", "run-out")
+SLOPES = tuple(ForceTerm)
 #: A cutter's usual eccentricity in its clamping [m].
 REFERENCE_RUNOUT = 2e-6
+
+
+@dataclass(frozen=True, slots=True)
+class ForceCoefficient:
+    """An unknown of the simulated forces: the logarithm of a cutting coefficient's scale, or a run-out in `REFERENCE_RUNOUT`.
+
+    Parameters
+    ----------
+    term : ForceTerm
+    tooling : str
+        Whose it is; empty where all toolings have it in common.
+    """
+
+    term: ForceTerm
+    tooling: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.term} of {self.tooling}" if self.tooling else str(self.term)
 
 
 def tooth_force(phi: FloatArray, chip: FloatArray, coefficients: CuttingCoefficients) -> FloatArray:

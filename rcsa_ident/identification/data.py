@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.cutting.force import SLOPES
+from rcsa_ident.cutting.force import SLOPES, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
@@ -139,10 +139,10 @@ class IdentificationData:
         Which unknown tooth angle stands between the cut's trigger and its delay; -1 where there is none.
     edge : array, shape (k, 2)
         Time of that trigger's edge [s] and its weight [1/s^2].
-    coefficient_names : tuple of str, length c
-        What is uncertain about the forces: logarithms of cutting coefficients, run-out of each tooling.
-    coefficient_spread : tuple of float, length c
-        Standard deviations of these before any cut.
+    coefficients : tuple of ForceCoefficient, length c
+        What is uncertain about the forces.
+    coefficient_spread : tuple of float, length c or more
+        Their standard deviations; behind them those of smooth errors, which have no name.
     """
 
     cut_ids: tuple[str, ...]
@@ -153,7 +153,7 @@ class IdentificationData:
     cut_prior: CutPrior
     clamping: np.ndarray
     edge: FloatArray
-    coefficient_names: tuple[str, ...] = ()
+    coefficients: tuple[ForceCoefficient, ...] = ()
     coefficient_spread: tuple[float, ...] = ()
 
     @property
@@ -245,10 +245,10 @@ def prepare(
         table[name] = flange, np.stack([a21[:, 0, 0], LEVER * a21[:, 1, 0]], axis=1)
         holder[name] = omega
     uncertain = [c for c, spread in enumerate(coefficient_spread) if spread > 0.0]
-    names = [SLOPES[c] for c in uncertain]
+    coefficients = [ForceCoefficient(SLOPES[c]) for c in uncertain]
     spread = [float(coefficient_spread[c]) for c in uncertain]
     if coefficient_spread:
-        names += [f"{SLOPES[-1]} of {name}" for name in toolings]
+        coefficients += [ForceCoefficient(ForceTerm.RUNOUT, name) for name in toolings]
         spread += [RUNOUT_SPREAD] * len(toolings)
     data = []
     for axis in axes:
@@ -268,7 +268,9 @@ def prepare(
                 cut=np.concatenate([np.full(each.omega.size, k) for k, _, each in present]),
                 flange=np.concatenate([table[m.tooling][0][r] for (_, m, _), r in zip(present, rows, strict=True)]),
                 tip=np.concatenate([table[m.tooling][1][r] for (_, m, _), r in zip(present, rows, strict=True)]),
-                force_slope=np.concatenate([_slopes(each, uncertain, toolings.index(m.tooling), len(names)) for _, m, each in present]),
+                force_slope=np.concatenate(
+                    [_slopes(each, uncertain, toolings.index(m.tooling), len(coefficients)) for _, m, each in present]
+                ),
             )
         )
     speed = np.array([m.spindle_speed for m in measurements])
@@ -283,7 +285,7 @@ def prepare(
         cut_prior=prior,
         clamping=frozen(clamping, np.intp),
         edge=frozen(edge),
-        coefficient_names=tuple(names),
+        coefficients=tuple(coefficients),
         coefficient_spread=tuple(spread),
     )
 

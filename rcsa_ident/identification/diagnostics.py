@@ -1,4 +1,4 @@
-"""Every reason why an answer should not be believed at once, and what the data cannot tell, in words with numbers."""
+"""Every reason why an answer should not be believed at once, and what the data cannot tell, with numbers."""
 
 from __future__ import annotations
 
@@ -7,14 +7,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.cutting.force import SLOPES
+from rcsa_ident.cutting.force import ForceTerm
+from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import JOINT
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.machine.flange_part import Candidate
+from rcsa_ident.identification.result import IdentificationCode
+from rcsa_ident.machine.flange_part import JointedFlange
+from rcsa_ident.remarks import Remark
 
 #: Above this share of unexplained signal the force model or the recordings are wrong.
 WORST_MODEL_ERROR = 0.02
@@ -34,7 +37,7 @@ _JOINT = ("translational stiffness", "rotational stiffness", "translational damp
 
 def diagnose(
     data: IdentificationData, searched: list[AxisSearch], solution: Solution, misfit: Misfit, posteriors: Sequence[Posterior]
-) -> list[str]:
+) -> list[Remark]:
     """Return the reasons for `suspect`.
 
     Parameters
@@ -49,51 +52,60 @@ def diagnose(
     posteriors : sequence of Posterior
         One for each axis.
     """
-    reasons = []
+    reasons: list[Remark] = []
+
+    def doubt(code: IdentificationCode, sentence: str) -> None:
+        reasons.append(Remark(code, sentence))
+
     if not solution.converged:
-        reasons.append(f"not converged: the joint fit was still improving after {solution.steps} steps")
+        words = f"not converged: the joint fit was still improving after {solution.steps} steps"
+        doubt(IdentificationCode.NOT_CONVERGED, words)
     for axis in data.axes:
         noise = np.sqrt(2.0 * axis.noise)
         signal = float(np.median(np.abs(axis.measured) / np.where(noise > 0.0, noise, 1e-300)))
         if signal < LEAST_SIGNAL:
-            reasons.append(
-                f"{str(axis.axis).upper()}: the median signal-to-noise ratio of the lines is {signal:.2g} (at least {LEAST_SIGNAL:g})"
-            )
+            words = f"{str(axis.axis).upper()}: the median signal-to-noise ratio of the lines is {signal:.2g} (at least {LEAST_SIGNAL:g})"
+            doubt(IdentificationCode.WEAK_SIGNAL, words)
     for axis, share in zip(data.axes, misfit.model_error, strict=True):
         if share > WORST_MODEL_ERROR:
-            reasons.append(
+            doubt(
+                IdentificationCode.UNEXPLAINED,
                 f"{str(axis.axis).upper()}: the model leaves {100 * share:.1f} % of each line unexplained "
                 f"(limit {100 * WORST_MODEL_ERROR:g} %): cutting coefficients, toolings, tooth count or sensor signs may be wrong, "
-                "or the dynamics change with speed"
+                "or the dynamics change with speed",
             )
     bad = misfit.cut_weight < 1.0
     if np.mean(bad) > MOST_BAD_CUTS:
-        reasons.append(f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, namely {_named(data, bad, misfit)}")
+        words = f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, namely {_named(data, bad, misfit)}"
+        doubt(IdentificationCode.CONTRADICTING_CUTS, words)
     for axis, found in zip(data.axes, searched, strict=True):
-        if len(found.solutions) > 1 and found.evidences[1] - found.evidences[0] < EVIDENCE_TIE:
-            difference, band = _difference(axis, *found.solutions[:2])
+        if len(found.candidates) > 1 and found.evidences[1] - found.evidences[0] < EVIDENCE_TIE:
+            difference, band = _difference(axis, *found.candidates[:2])
             if difference > max(LARGEST_DIFFERENCE, 3.0 * band):
-                reasons.append(
+                doubt(
+                    IdentificationCode.TWO_SOLUTIONS,
                     f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.1f} % in the machine's "
-                    f"contribution to the tooltip FRF, more than its standard deviation of {100 * band:.1f} % explains"
+                    f"contribution to the tooltip FRF, more than its standard deviation of {100 * band:.1f} % explains",
                 )
     for axis, posterior in zip(data.axes, posteriors, strict=True):
         band = _band(posterior, axis)
         if band > LARGEST_BAND:
-            reasons.append(
+            doubt(
+                IdentificationCode.WIDE_POSTERIOR,
                 f"{str(axis.axis).upper()}: the machine's contribution to the tooltip FRF has a standard deviation of {100 * band:.1f} % "
-                f"(limit {100 * LARGEST_BAND:g} %), several times that with tools that were never cut: more or quieter cuts are needed"
+                f"(limit {100 * LARGEST_BAND:g} %), several times that with tools that were never cut: more or quieter cuts are needed",
             )
     if len(data.toolings) < 2:
-        reasons.append("only one tooling: translation and slope of the flange cannot be separated; cut with a second, different holder")
+        words = "only one tooling: translation and slope of the flange cannot be separated; cut with a second, different holder"
+        doubt(IdentificationCode.ONE_TOOLING, words)
     for t, name in enumerate(data.toolings):
         count = int(np.sum(data.cut_tooling == t))
         if count < FEWEST_CUTS:
-            reasons.append(f"too few cuts: {count} with {name}, at least {FEWEST_CUTS} are needed")
+            doubt(IdentificationCode.FEW_CUTS, f"too few cuts: {count} with {name}, at least {FEWEST_CUTS} are needed")
     return reasons
 
 
-def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covariance: FloatArray) -> list[str]:
+def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covariance: FloatArray) -> list[Remark]:
     """Return what the data cannot tell, and what was done about single cuts.
 
     Parameters
@@ -104,14 +116,19 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
     covariance : array, shape (p, p)
         Covariance of all unknowns.
     """
-    words = []
+    notes: list[Remark] = []
+
+    def note(code: IdentificationCode, sentence: str) -> None:
+        notes.append(Remark(code, sentence))
+
     layout, priors = solution.layout, misfit.priors
     deviation = np.sqrt(np.diag(covariance))
     for name, std in zip(_JOINT, deviation[layout.joint], strict=True):
         if std > TOLD * priors.joint_spread:
-            words.append(
+            note(
+                IdentificationCode.JOINT_UNKNOWN,
                 f"joint: the {name} cannot be separated from the flange's own compliance (known to within a factor of {np.exp(std):.1f}); "
-                "the tooltip FRF depends on both together"
+                "the tooltip FRF depends on both together",
             )
     for i, axis in enumerate(data.axes):
         natural = np.exp(solution.theta[layout.axis(i)][: layout.axes[i].modes]) / (2.0 * np.pi)
@@ -119,20 +136,22 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
         outside = np.sort(natural[(natural < low) | (natural > high)])
         if outside.size:
             listed = ", ".join(f"{f:.0f}" for f in outside)
-            words.append(
+            note(
+                IdentificationCode.MODES_OUTSIDE_BAND,
                 f"{str(axis.axis).upper()}: modes at {listed} Hz lie outside the excited band of {low:.0f} to {high:.0f} Hz: "
-                "they represent all dynamics of the machine outside it"
+                "they represent all dynamics of the machine outside it",
             )
-    for c, name in enumerate(data.coefficient_names):
+    for c, coefficient in enumerate(data.coefficients):
         std, before = deviation[layout.force][c], data.coefficient_spread[c]
-        if std > TOLD * before and name.split(" of ")[0] != SLOPES[-1]:
-            words.append(
-                f"{name}: hardly determined by the cuts; its standard deviation is {100.0 * min(std, before):.1f} %, close to the prior's"
-            )
+        if std > TOLD * before and coefficient.term is not ForceTerm.RUNOUT:
+            share = 100.0 * min(std, before)
+            words = f"{coefficient}: hardly determined by the cuts; its standard deviation is {share:.1f} %, close to the prior's"
+            note(IdentificationCode.COEFFICIENT_UNKNOWN, words)
     bad = misfit.cut_weight < 1.0
     if 0.0 < np.mean(bad) <= MOST_BAD_CUTS:
-        words.append(f"cuts that contradict the others and were given less weight: {_named(data, bad, misfit)}")
-    return words
+        words = f"cuts that contradict the others and were given less weight: {_named(data, bad, misfit)}"
+        note(IdentificationCode.CUTS_WEIGHTED_DOWN, words)
+    return notes
 
 
 def _named(data: IdentificationData, bad: np.ndarray, misfit: Misfit) -> str:
@@ -141,12 +160,12 @@ def _named(data: IdentificationData, bad: np.ndarray, misfit: Misfit) -> str:
     return ", ".join(f"{data.cut_ids[k]} ({1.0 / misfit.cut_weight[k]:.0f} times its variance)" for k in worst[:5]) + rest
 
 
-def _machine_contribution(axis: AxisData) -> Callable[[Candidate], ComplexArray]:
+def _machine_contribution(axis: AxisData) -> Callable[[JointedFlange], ComplexArray]:
     """What a tooltip feels of the machine, a^T (A22 + K^-1 + B)^-1 a with a = A21 of the cut toolings, at the axis' lines."""
     lever = np.array([[1.0, LEVER], [LEVER, LEVER**2]])
     flange = axis.flange[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
 
-    def contribution(machine: Candidate) -> ComplexArray:
+    def contribution(machine: JointedFlange) -> ComplexArray:
         together = flange + lever * machine.interface(axis.omega)
         return np.einsum("ni,ni->n", axis.tip, np.linalg.solve(together, axis.tip[:, :, None])[:, :, 0])
 
@@ -160,10 +179,10 @@ def _band(posterior: Posterior, axis: AxisData) -> float:
     return float(np.linalg.norm(changes) / max(float(np.linalg.norm(value)), 1e-300))
 
 
-def _difference(axis: AxisData, one: Solution, two: Solution) -> tuple[float, float]:
-    """Relative difference of two solutions in what a tooltip feels, and the first one's deviation."""
+def _difference(axis: AxisData, one: Candidate, two: Candidate) -> tuple[float, float]:
+    """Relative difference of two candidates in the machine's contribution to the tooltip FRF, and the first one's deviation."""
     contribution = _machine_contribution(axis)
-    first, second = (_flange_posterior(s) for s in (one, two))
+    first, second = (_flange_posterior(candidate) for candidate in (one, two))
     value, other = (contribution(each.candidate(axis.axis)) for each in (first, second))
     size = np.linalg.norm(value)
     if size == 0.0:
@@ -171,7 +190,7 @@ def _difference(axis: AxisData, one: Solution, two: Solution) -> tuple[float, fl
     return float(np.linalg.norm(value - other) / size), _band(first, axis)
 
 
-def _flange_posterior(solution: Solution) -> Posterior:
-    size = solution.layout.tail + JOINT
-    covariance = np.linalg.inv(solution.evaluation.hessian)[:size, :size]
-    return Posterior(solution.theta[:size], covariance, solution.layout.axes[0])
+def _flange_posterior(candidate: Candidate) -> Posterior:
+    size = candidate.layout.tail + JOINT
+    covariance = np.linalg.inv(candidate.information)[:size, :size]
+    return Posterior(candidate.theta[:size], covariance, candidate.layout.axes[0])

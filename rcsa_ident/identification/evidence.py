@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,20 +11,19 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.diagnostics import diagnose, remarks
-from rcsa_ident.identification.joint_fit import AxisSearch, Map, fit_jointly, ranked
+from rcsa_ident.identification.joint_fit import AxisSearch, axis_search, fit_jointly
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
+from rcsa_ident.identification.method import Phase, perform
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import GIVE_UP_SOON, Report, cut_weights, drop_modes, exchange_modes, model_error
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, parameter_names, unpack
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.progress import BOTH, Progress, Stage, Step
 from rcsa_ident.identification.result import AxisResult, Identification
 from rcsa_ident.identification.search import SearchSettings, explore
 from rcsa_ident.identification.status import Status
-
-#: Told of axis, stage, cost, unknowns and their layout.
-Progress = Callable[[str, str, float, FloatArray, Layout], None]
-
+from rcsa_ident.scaleout import Map
 
 #: Share of the lines by which force model, tool-holder or sensors may be wrong alike at neighbouring frequencies.
 SMOOTH_ERROR = 2e-3
@@ -72,106 +71,145 @@ class EvidenceSelection:
             Same seed, same answer, whatever `map` is.
         map : callable
             The builtin, or a pool's: axes are searched side by side.
-        progress : callable of (axis, stage, cost, theta, layout), optional
-            Called at every step; with a pool's map it has to be picklable.
+        progress : callable, optional
+            Told of every step; with a pool's map it has to be picklable.
         """
         sequence = np.random.SeedSequence(seed)
         summed = data.summed()
         parts = [summed.only(a.axis).with_smooth_errors(SMOOTH_ERROR) for a in data.axes]
         searched: list[AxisSearch] = []
         for _ in range(ATTEMPTS):
-            jobs = [_Job(self, part, own, progress) for part, own in zip(parts, sequence.spawn(len(parts)), strict=True)]
-            found = list(map(_search_axis, jobs))
+            tasks = [SearchAxis(self, part, own, progress) for part, own in zip(parts, sequence.spawn(len(parts)), strict=True)]
+            found = list(map(perform, tasks))
             if len(found) == 2:
-                found = list(map(_from_other_axis, [(job, *pair) for job, pair in zip(jobs, (found, found[::-1]), strict=True)]))
+                both = zip(parts, found, found[::-1], strict=True)
+                found = list(map(perform, [SearchFromOtherAxis(self, part, own, other, progress) for part, own, other in both]))
             searched = [a.joined(b) for a, b in zip(searched, found, strict=True)] if searched else found
             if self.start is not None or any(s.confirmed for s in searched):
                 break
         return _result(self, data, searched, seed, map, progress)
 
 
+def _report_to(axis: str, trace: list[Step], progress: Progress | None) -> Report:
+    """Return what keeps each stage of a search in its trace, and tells of it."""
+
+    def report(stage: Stage, cost: float, solution: Solution) -> None:
+        step = Step(axis, stage, cost, sum(a.modes for a in solution.layout.axes))
+        trace.append(step)
+        if progress is not None:
+            progress(replace(step, candidate=solution.candidate))
+
+    return report
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class _Job:
-    """The search of one axis."""
+class SearchAxis:
+    """The search of one axis, from random starts or from an earlier answer; it answers with an `AxisSearch`.
+
+    Parameters
+    ----------
+    method : EvidenceSelection
+    data : IdentificationData
+        Of one axis, with one output.
+    sequence : SeedSequence
+    progress : callable or None
+    """
 
     method: EvidenceSelection
     data: IdentificationData
     sequence: np.random.SeedSequence
     progress: Progress | None
 
-    def reporter(self, trace: list[tuple[str, str, float]]) -> Report:
-        return _reporter(str(self.data.axes[0].axis), trace, self.progress)
+    @property
+    def phase(self) -> Phase:
+        """The search."""
+        return Phase.SEARCH
 
+    def run(self) -> AxisSearch:
+        """Explore, refine, learn the noise, and let the evidence choose the modes."""
+        method, data, axis = self.method, self.data, self.data.axes[0]
+        trace: list[Step] = []
+        report = _report_to(str(axis.axis), trace, self.progress)
+        band = float(axis.omega.min() / (2 * np.pi)), float(axis.omega.max() / (2 * np.pi))
+        misfit = Misfit(data, method.priors, (method.coarse[1],))
+        force = np.zeros(len(data.coefficient_spread))
+        refined = []
+        for theta, layout, nuisance in self._starts(band, report):
+            theta = np.concatenate([theta, force])
+            refined.append(refine(misfit, theta, Layout((layout,), force.size), nuisance, 60, grid=32))
+            report(Stage.REFINE, refined[-1].cost, refined[-1])
+        refined.sort(key=lambda s: s.cost)
+        best = refined[0]
+        for _ in range(4):
+            share = model_error(best, misfit)
+            misfit = Misfit(data, method.priors, share, cut_weights(best, misfit))
+            best = refine(misfit, best.theta, best.layout, best.evaluation.nuisance, 60, tolerance=1e-3)
+            report(Stage.NOISE, best.cost, best)
+        best = exchange_modes(drop_modes(best, misfit, report), misfit, band, report)
+        # with the right modes less is left unexplained than with the first ones
+        misfit = Misfit(data, method.priors, model_error(best, misfit), cut_weights(best, misfit))
+        best = refine(misfit, best.theta, best.layout, best.evaluation.nuisance, 100)
+        report(Stage.NOISE, best.cost, best)
+        return axis_search(best, misfit, trace)
 
-def _reporter(axis: str, trace: list[tuple[str, str, float]], progress: Progress | None) -> Report:
-    def report(stage: str, cost: float, solution: Solution) -> None:
-        trace.append((axis, stage, cost))
-        if progress is not None:
-            progress(axis, stage, cost, solution.theta, solution.layout)
-
-    return report
-
-
-def _search_axis(job: _Job) -> AxisSearch:
-    method, data = job.method, job.data
-    rng = np.random.default_rng(job.sequence)
-    axis = data.axes[0]
-    trace: list[tuple[str, str, float]] = []
-    report = job.reporter(trace)
-    band = float(axis.omega.min() / (2 * np.pi)), float(axis.omega.max() / (2 * np.pi))
-    coarse, fine = method.coarse
-    known = None if method.start is None else method.start.get(axis.axis)
-    if known is None:
-        population = explore(Misfit(data, method.priors, (coarse,)), method.search, band, rng, report)
-        starts = [(s.theta, s.layout.axes[0], s.evaluation.nuisance) for s in population[: method.candidates]]
-    else:
+    def _starts(self, band: tuple[float, float], report: Report) -> list[tuple[FloatArray, AxisLayout, FloatArray]]:
+        """Unknowns of flange and joint, their layout, and the cuts' delays and angles: explored, or those of the earlier answer."""
+        method, data = self.method, self.data
+        known = None if method.start is None else method.start.get(data.axes[0].axis)
+        if known is None:
+            rng = np.random.default_rng(self.sequence)
+            population = explore(Misfit(data, method.priors, (method.coarse[0],)), method.search, band, rng, report)
+            return [(s.theta, s.layout.axes[0], s.evaluation.nuisance) for s in population[: method.candidates]]
         # the last polish asks again whether the machine changes with speed
         plain = pack(unpack(known.theta[:-JOINT], known.layout))
-        starts = [(np.concatenate([plain, known.theta[-JOINT:]]), AxisLayout(known.layout.modes), np.zeros((len(data.cut_ids), 2)))]
-    misfit = Misfit(data, method.priors, (fine,))
-    force = np.zeros(len(data.coefficient_spread))
-    refined = []
-    for theta, layout, nuisance in starts:
-        theta = np.concatenate([theta, force])
-        refined.append(refine(misfit, theta, Layout((layout,), force.size), nuisance, 60, grid=32))
-        report("refine", refined[-1].cost, refined[-1])
-    refined.sort(key=lambda s: s.cost)
-    best = refined[0]
-    for _ in range(4):
-        share = model_error(best, misfit)
-        misfit = Misfit(data, method.priors, share, cut_weights(best, misfit))
-        best = refine(misfit, best.theta, best.layout, best.evaluation.nuisance, 60, tolerance=1e-3)
-        report("learn noise", best.cost, best)
-    best = exchange_modes(drop_modes(best, misfit, report), misfit, band, report)
-    # with the right modes less is left unexplained than with the first ones
-    misfit = Misfit(data, method.priors, model_error(best, misfit), cut_weights(best, misfit))
-    best = refine(misfit, best.theta, best.layout, best.evaluation.nuisance, 100)
-    report("learn noise", best.cost, best)
-    return ranked([best], misfit, trace)
+        return [(np.concatenate([plain, known.theta[-JOINT:]]), AxisLayout(known.layout.modes), np.zeros((len(data.cut_ids), 2)))]
 
 
-def _from_other_axis(job: tuple[_Job, AxisSearch, AxisSearch]) -> AxisSearch:
-    """Start an axis once more from the other axis' answer: the same spindle, with somewhat other bearings and support."""
-    own_job, own, other = job
-    method, data = own_job.method, own_job.data
-    trace = list(own.trace)
-    report = own_job.reporter(trace)
-    start = other.solutions[0]
-    rough = Misfit(data, method.priors, (method.coarse[1],))
-    misfit = Misfit(data, method.priors, (own.model_error,), own.cut_weight)
-    found = refine(rough, start.theta, start.layout, start.evaluation.nuisance, 60, grid=32)
-    found = drop_modes(refine(misfit, found.theta, found.layout, found.evaluation.nuisance, 100), misfit, give_up=GIVE_UP_SOON)
-    report("from the other axis", found.cost, found)
-    return ranked([*own.solutions, found], misfit, trace)
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchFromOtherAxis:
+    """One more search of an axis, from the other axis' answer: the same spindle, with somewhat other bearings and support.
+
+    It answers with an `AxisSearch` of its own candidates and the new one.
+
+    Parameters
+    ----------
+    method : EvidenceSelection
+    data : IdentificationData
+        Of one axis, with one output.
+    own, other : AxisSearch
+    progress : callable or None
+    """
+
+    method: EvidenceSelection
+    data: IdentificationData
+    own: AxisSearch
+    other: AxisSearch
+    progress: Progress | None
+
+    @property
+    def phase(self) -> Phase:
+        """From the other axis."""
+        return Phase.OTHER_AXIS
+
+    def run(self) -> AxisSearch:
+        """Refine the other axis' answer, and drop the modes that this axis does not need."""
+        method, data, own = self.method, self.data, self.own
+        trace: list[Step] = []
+        report = _report_to(str(data.axes[0].axis), trace, self.progress)
+        rough = Misfit(data, method.priors, (method.coarse[1],))
+        misfit = Misfit(data, method.priors, (own.model_error,), own.cut_weight)
+        found = refine(rough, *self.other.candidates[0].point, 60, grid=32)
+        found = drop_modes(refine(misfit, found.theta, found.layout, found.evaluation.nuisance, 100), misfit, give_up=GIVE_UP_SOON)
+        report(Stage.OTHER_AXIS, found.cost, found)
+        return own.joined(axis_search(found, misfit, trace))
 
 
 def _result(
     method: EvidenceSelection, data: IdentificationData, searched: list[AxisSearch], seed: int, map: Map, progress: Progress | None
 ) -> Identification:
-    trace = [entry for s in searched for entry in s.trace]
-    solution, misfit, chosen = fit_jointly(
-        data.with_smooth_errors(SMOOTH_ERROR), method.priors, searched, _reporter("both", trace, progress), map
-    )
+    trace = [step for s in searched for step in s.trace]
+    report = _report_to(BOTH, trace, progress)
+    solution, misfit, chosen = fit_jointly(data.with_smooth_errors(SMOOTH_ERROR), method.priors, searched, report, map)
     evaluation, force = solution.evaluation, solution.layout.force
     assert evaluation.linear is not None
     covariance = WIDER**2 * np.linalg.inv(evaluation.hessian)
@@ -194,7 +232,7 @@ def _result(
         trace=tuple(trace),
         notes=tuple(remarks(data, solution, misfit, covariance)),
         # the smooth errors stand behind them, unnamed
-        coefficients=dict(zip(data.coefficient_names, scales, strict=False)),
+        coefficients=dict(zip(data.coefficients, scales, strict=False)),
     )
 
 

@@ -6,7 +6,6 @@ force's phase is tied to the record; here each cut is granted its best delay on 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,10 +18,14 @@ from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification._kernels import best_grid_misfit, modal_cross_frf
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
-from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.method import Phase, perform
+from rcsa_ident.identification.progress import Progress, Stage, Step
+from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
 from rcsa_ident.identification.status import Status
+from rcsa_ident.remarks import Remark
+from rcsa_ident.scaleout import Map
 
-Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
+#: Delays that each cut is tried at, over a tooth-passing period.
 GRID = 64
 #: Mean squared residual, at 2 % model error, above which the answer is not to be believed.
 WORST_MISFIT = 4.0
@@ -135,7 +138,7 @@ class PaperGeneticAlgorithm:
         """Name of the method in a result file."""
         return "paper"
 
-    def run(self, data: IdentificationData, seed: int, map: Map = map) -> Identification:
+    def run(self, data: IdentificationData, seed: int, map: Map = map, progress: Progress | None = None) -> Identification:
         """Return the identification; each axis gets a seed of its own.
 
         Parameters
@@ -145,25 +148,30 @@ class PaperGeneticAlgorithm:
             Same seed, same answer, whatever `map` is.
         map : callable
             The builtin, or a pool's.
+        progress : callable, optional
+            Told of every step; with a pool's map it has to be picklable.
         """
         sequences = np.random.SeedSequence(seed).spawn(len(data.axes))
-        jobs = [(self, data.only(a.axis), int(s.generate_state(1)[0])) for a, s in zip(data.axes, sequences, strict=True)]
-        found = list(map(_search, jobs))
+        seeds = [int(s.generate_state(1)[0]) for s in sequences]
+        tasks = [GeneticSearch(self, data.only(a.axis), own, progress) for a, own in zip(data.axes, seeds, strict=True)]
+        found = list(map(perform, tasks))
         axes, reasons, trace = {}, [], []
         problem = None
         for axis, (x, costs) in zip(data.axes, found, strict=True):
             problem = _Problem(self, data.only(axis.axis))
             axes[axis.axis] = problem.result(x)
-            trace += [(str(axis.axis), "generation", float(c)) for c in costs]
+            trace += [Step(str(axis.axis), Stage.GENERATION, float(c), self.modes) for c in costs]
             name, misfit = str(axis.axis).upper(), axes[axis.axis].chi2_per_point
             if misfit > WORST_MISFIT:
-                reasons.append(
+                words = (
                     f"{name}: the modes do not fit the lines, chi² per point is {misfit:.0f} at an error of 2 % (limit {WORST_MISFIT:g})"
                 )
+                reasons.append(Remark(IdentificationCode.LINES_MISSED, words))
             omega = np.linspace(axis.omega.min(), axis.omega.max(), 400)
             worst = float(dissipation(omega, axes[axis.axis].modes.receptance(omega).values).min())
             if worst < -1e-9:
-                reasons.append(f"{name}: the modes are not passive, the real part of the mobility falls to {worst:.2f} of its magnitude")
+                words = f"{name}: the modes are not passive, the real part of the mobility falls to {worst:.2f} of its magnitude"
+                reasons.append(Remark(IdentificationCode.NOT_PASSIVE, words))
         assert problem is not None
         delays = problem.delays(axes[data.axes[-1].axis])
         return Identification(
@@ -294,27 +302,54 @@ def modal_fractions(omega_n: FloatArray, zeta: FloatArray, phi_t: np.ndarray, ph
     return np.ascontiguousarray(np.stack(columns, axis=-1))
 
 
-def _search(job: tuple[PaperGeneticAlgorithm, IdentificationData, int]) -> tuple[FloatArray, list[float]]:
-    from pymoo.algorithms.soo.nonconvex.ga import GA
-    from pymoo.core.problem import Problem
-    from pymoo.optimize import minimize
+@dataclass(frozen=True, slots=True, eq=False)
+class GeneticSearch:
+    """The search of one axis; it answers with the best variables and the best cost of the generations, some five hundred of them.
 
-    method, data, seed = job
-    problem = _Problem(method, data)
-    low, high = problem.bounds()
+    Parameters
+    ----------
+    method : PaperGeneticAlgorithm
+    data : IdentificationData
+        Of one axis.
+    seed : int
+    progress : callable or None
+    """
 
-    class Vectorised(Problem):
-        def __init__(self) -> None:
-            super().__init__(n_var=low.size, n_obj=1, xl=low, xu=high)
+    method: PaperGeneticAlgorithm
+    data: IdentificationData
+    seed: int
+    progress: Progress | None = None
 
-        def _evaluate(self, x, out, *args, **kwargs):
-            out["F"] = problem.costs(np.asarray(x, dtype=float))[:, None]
+    @property
+    def phase(self) -> Phase:
+        """The search."""
+        return Phase.SEARCH
 
-    best: list[float] = []
+    def run(self) -> tuple[FloatArray, list[float]]:
+        """Return the answer."""
+        from pymoo.algorithms.soo.nonconvex.ga import GA
+        from pymoo.core.problem import Problem
+        from pymoo.optimize import minimize
 
-    def follow(algorithm: Any) -> None:
-        best.append(float(algorithm.opt.get("F").min()))
+        method = self.method
+        problem = _Problem(method, self.data)
+        low, high = problem.bounds()
 
-    found = minimize(Vectorised(), GA(pop_size=method.population), ("n_gen", method.generations), seed=seed, callback=follow, verbose=False)
-    step = max(len(best) // 500, 1)
-    return np.asarray(found.X, dtype=float), best[::step]
+        class Vectorised(Problem):
+            def __init__(self) -> None:
+                super().__init__(n_var=low.size, n_obj=1, xl=low, xu=high)
+
+            def _evaluate(self, x, out, *args, **kwargs):
+                out["F"] = problem.costs(np.asarray(x, dtype=float))[:, None]
+
+        best: list[float] = []
+
+        def follow(algorithm: Any) -> None:
+            best.append(float(algorithm.opt.get("F").min()))
+            if self.progress is not None:
+                self.progress(Step(str(self.data.axes[0].axis), Stage.GENERATION, best[-1], method.modes))
+
+        settings = {"seed": self.seed, "callback": follow, "verbose": False}
+        found = minimize(Vectorised(), GA(pop_size=method.population), ("n_gen", method.generations), **settings)
+        step = max(len(best) // 500, 1)
+        return np.asarray(found.X, dtype=float), best[::step]

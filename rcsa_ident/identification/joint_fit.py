@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
+from rcsa_ident.identification.method import Phase, perform
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import Report, cut_weights, evidence, exchange_modes, grow_modes, model_error
 from rcsa_ident.identification.parameters import Layout, pack, unpack
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.progress import Stage, Step
+from rcsa_ident.scaleout import Map
 
-Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 #: Relative range of speeds below which nothing is asked about a change with speed.
 LEAST_SPEED_RANGE = 0.05
 #: Modes per axis beyond what the evidence asks for.
@@ -35,21 +36,22 @@ class AxisSearch:
 
     Parameters
     ----------
-    solutions : list of Solution
-        In the order of their evidence, best first.
+    candidates : list of Candidate
+        By evidence, best first.
     evidences : list of float
+        Minus twice the log evidence of each.
     model_error : float [-]
-        Share of each line that stays unexplained.
+        Share of each line that is left unexplained, as the best search has learned it.
     cut_weight : array, shape (k,)
-        Factor on each cut's weights.
-    trace : list of (axis, stage, cost)
+        Factor on the weights of each cut's lines, as the best search has learned it.
+    trace : list of Step
     """
 
-    solutions: list[Solution]
+    candidates: list[Candidate]
     evidences: list[float]
     model_error: float
     cut_weight: FloatArray
-    trace: list[tuple[str, str, float]]
+    trace: list[Step]
 
     @property
     def confirmed(self) -> bool:
@@ -57,27 +59,17 @@ class AxisSearch:
         return len(self.evidences) > 1 and self.evidences[1] - self.evidences[0] < SAME_ANSWER
 
     def joined(self, other: AxisSearch) -> AxisSearch:
-        """Return both searches' solutions in the order of their evidence; what was learned of the noise is the better one's."""
+        """Return both searches' candidates in the order of their evidence; what was learned of the noise is the better one's."""
         better = self if self.evidences[0] <= other.evidences[0] else other
-        solutions, evidences = [*self.solutions, *other.solutions], [*self.evidences, *other.evidences]
-        order = sorted(range(len(solutions)), key=evidences.__getitem__)
+        candidates, evidences = [*self.candidates, *other.candidates], [*self.evidences, *other.evidences]
+        order = sorted(range(len(candidates)), key=evidences.__getitem__)
         trace = [*self.trace, *other.trace]
-        return AxisSearch([solutions[i] for i in order], [evidences[i] for i in order], better.model_error, better.cut_weight, trace)
+        return AxisSearch([candidates[i] for i in order], [evidences[i] for i in order], better.model_error, better.cut_weight, trace)
 
 
-def ranked(solutions: list[Solution], misfit: Misfit, trace: list[tuple[str, str, float]]) -> AxisSearch:
-    """Return solutions of one axis in the order of their evidence.
-
-    Parameters
-    ----------
-    solutions : list of Solution
-    misfit : Misfit
-        The one in which all were refined.
-    trace : list of (axis, stage, cost)
-    """
-    values = [evidence(s, misfit) for s in solutions]
-    order = sorted(range(len(solutions)), key=values.__getitem__)
-    return AxisSearch([solutions[i] for i in order], [values[i] for i in order], misfit.model_error[0], misfit.cut_weight, trace)
+def axis_search(solution: Solution, misfit: Misfit, trace: list[Step]) -> AxisSearch:
+    """Return the search of one axis that has come to a solution of a misfit."""
+    return AxisSearch([solution.candidate], [evidence(solution, misfit)], misfit.model_error[0], misfit.cut_weight, trace)
 
 
 def fit_jointly(
@@ -96,54 +88,82 @@ def fit_jointly(
     map : callable
         The builtin, or a pool's.
     """
-    found, misfit = _settled(data, priors, _together(data, priors, searched, map), *_noise(searched), report)
+    start = _from_several_starts(data, priors, searched, map).point
+    found, misfit = _refine_and_learn_noise(data, priors, start, *_noise(searched), report)
     middle, half = data.speed_range
     if half > LEAST_SPEED_RANGE * middle:
-        moving, other = _settled(data, priors, _start(data, found, True), misfit.model_error, misfit.cut_weight, report)
+        with_softening = _start(data, found, True)
+        moving, other = _refine_and_learn_noise(data, priors, with_softening, misfit.model_error, misfit.cut_weight, report)
         if evidence(moving, other) < evidence(found, misfit):
             found, misfit = moving, other
     omega = np.concatenate([a.omega for a in data.axes])
     band = float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))
-
     found = exchange_modes(found, misfit, band, report, rounds=2)
     chosen = found
     for _ in range(GROWN):
         found = grow_modes(found, misfit, band)
-        report("grow", found.cost, found)
-    return *_settled(data, priors, found, misfit.model_error, misfit.cut_weight, report), chosen
+        report(Stage.GROW, found.cost, found)
+    return *_refine_and_learn_noise(data, priors, found.candidate.point, misfit.model_error, misfit.cut_weight, report), chosen
 
 
-def _together(data: IdentificationData, priors: Priors, searched: list[AxisSearch], map: Map) -> Solution:
+def _from_several_starts(data: IdentificationData, priors: Priors, searched: list[AxisSearch], map: Map) -> Candidate:
     """Return the axes' answers polished together with one joint and one force.
 
     Where each axis has found its own joint and its own force, what lies between them may end in another valley: from a few
     starts, until two have come to the same answer.
     """
-    jobs = [(data, priors, searched, start) for start in STARTS]
-    found = list(map(_from_start, jobs[:2]))
-    for job in jobs[2:]:
-        found.sort(key=lambda s: s.cost)
+    tasks = [JointStart(data, priors, searched, *start) for start in STARTS]
+    found = list(map(perform, tasks[:2]))
+    for task in tasks[2:]:
+        found.sort(key=lambda candidate: candidate.cost)
         if found[1].cost - found[0].cost < SAME_POLISH:
             break
-        found.append(_from_start(job))
-    return min(found, key=lambda s: s.cost)
+        found.append(task.run())
+    return min(found, key=lambda candidate: candidate.cost)
 
 
-def _from_start(job: tuple[IdentificationData, Priors, list[AxisSearch], tuple[float, int | None]]) -> Solution:
-    """Polish all axes together, first roughly and with the flange's motion alone; joint and force are those of one axis or their mean."""
-    data, priors, searched, (coarse, source) = job
-    best = [s.solutions[0] for s in searched]
-    shares, weight = _noise(searched)
-    chosen = best if source is None else [best[source % len(best)]]
-    layout = Layout(tuple(s.layout.axes[0] for s in best), len(data.coefficient_spread))
-    force = np.zeros(layout.coefficients)
-    named = len(data.coefficient_names)
-    force[:named] = np.mean([s.theta[s.layout.force][:named] for s in chosen], axis=0)
-    joint = np.mean([s.theta[s.layout.joint] for s in chosen], axis=0)
-    theta = np.concatenate([*(s.theta[s.layout.axis(0)] for s in best), joint, force])
-    rough = Misfit(data.summed(), priors, tuple(max(f, coarse) for f in shares), weight)
-    start = refine(rough, theta, layout, best[0].evaluation.nuisance, 40, grid=32)
-    return refine(Misfit(data, priors, shares, weight), *_start(data, start, False), 60)
+@dataclass(frozen=True, slots=True, eq=False)
+class JointStart:
+    """A first polish of all axes together, at first roughly and with the flange's motion alone; it answers with a `Candidate`.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    priors : Priors
+    searched : list of AxisSearch
+        One for each axis.
+    coarse : float
+        Least model error of the rough polish.
+    source : int or None
+        Axis whose joint and force it starts from; None is the mean over the axes.
+    """
+
+    data: IdentificationData
+    priors: Priors
+    searched: list[AxisSearch]
+    coarse: float
+    source: int | None
+
+    @property
+    def phase(self) -> Phase:
+        """Both axes."""
+        return Phase.BOTH_AXES
+
+    def run(self) -> Candidate:
+        """Return the polished candidate."""
+        data, priors = self.data, self.priors
+        best = [s.candidates[0] for s in self.searched]
+        shares, weight = _noise(self.searched)
+        chosen = best if self.source is None else [best[self.source % len(best)]]
+        layout = Layout(tuple(c.layout.axes[0] for c in best), len(data.coefficient_spread))
+        force = np.zeros(layout.coefficients)
+        named = len(data.coefficients)
+        force[:named] = np.mean([c.theta[c.layout.force][:named] for c in chosen], axis=0)
+        joint = np.mean([c.theta[c.layout.joint] for c in chosen], axis=0)
+        theta = np.concatenate([*(c.theta[c.layout.axis(0)] for c in best), joint, force])
+        rough = Misfit(data.summed(), priors, tuple(max(f, self.coarse) for f in shares), weight)
+        start = refine(rough, theta, layout, best[0].nuisance, 40, grid=32)
+        return refine(Misfit(data, priors, shares, weight), *_start(data, start, False), 60).candidate
 
 
 def _noise(searched: list[AxisSearch]) -> tuple[tuple[float, ...], FloatArray]:
@@ -151,20 +171,20 @@ def _noise(searched: list[AxisSearch]) -> tuple[tuple[float, ...], FloatArray]:
     return tuple(s.model_error for s in searched), np.min([s.cut_weight for s in searched], axis=0)
 
 
-def _settled(
+def _refine_and_learn_noise(
     data: IdentificationData,
     priors: Priors,
-    start: Solution | tuple[FloatArray, Layout, FloatArray],
+    start: tuple[FloatArray, Layout, FloatArray],
     shares: tuple[float, ...],
     weight: FloatArray,
     report: Report,
 ) -> tuple[Solution, Misfit]:
     """Polish and learn the noise in turns until it stays."""
-    theta, layout, nuisance = (start.theta, start.layout, start.evaluation.nuisance) if isinstance(start, Solution) else start
+    theta, layout, nuisance = start
     for _ in range(4):
         misfit = Misfit(data, priors, shares, weight)
         found = refine(misfit, theta, layout, nuisance, 300, tolerance=1e-5)
-        report("polish", found.cost, found)
+        report(Stage.POLISH, found.cost, found)
         learned = model_error(found, misfit)
         if all(abs(a / b - 1.0) < 0.05 for a, b in zip(learned, shares, strict=True)):
             break

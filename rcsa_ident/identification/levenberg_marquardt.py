@@ -8,6 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.misfit import DELAY_UNIT, Evaluation, Misfit
 from rcsa_ident.identification.parameters import Layout
 
@@ -46,6 +47,11 @@ class Solution:
     def cost(self) -> float:
         """Sum of squares in standard deviations, those of the priors too."""
         return self.evaluation.cost
+
+    @property
+    def candidate(self) -> Candidate:
+        """The solution without its equations."""
+        return Candidate(self.theta, self.layout, self.evaluation.nuisance, self.cost, self.evaluation.hessian)
 
 
 def refine(

@@ -278,6 +278,10 @@ class Misfit:
         linear = self._linearise(theta, layout, axes, models, gradients, residual, nuisance, prior) if normal else None
         return Evaluation(residual.cost, nuisance, tuple(models), residual, linear)
 
+    def models(self, theta: FloatArray, layout: Layout) -> tuple[ComplexArray, ...]:
+        """Return the model's cross FRFs on the lines of each axis, shapes (n, o) [m/N]; no delay and no noise is in them."""
+        return tuple(self._models(theta, layout, False)[0])
+
     def residual_at(self, theta: FloatArray, layout: Layout, nuisance: FloatArray) -> Residual:
         """Return the residual with the cuts' delays and angles as they are given.
 

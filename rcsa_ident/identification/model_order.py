@@ -14,6 +14,7 @@ from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import AxisParameters, Layout, pack, unpack, with_mode, without_mode
 from rcsa_ident.identification.priors import log_volume, prior_rows
+from rcsa_ident.identification.progress import Stage
 
 #: Walks down end where the evidence lies this far behind the best seen: nothing below comes back from there. The second one is
 #: for a model that a walk has ended with before.
@@ -30,8 +31,8 @@ PLACES = 30
 #: Modes whose frequencies lie closer than this ratio may be one.
 CLOSE = 1.2
 
-#: Told of a stage: its name, the cost or evidence that it came to, its solution.
-Report = Callable[[str, float, Solution], None]
+#: Told of a stage, the cost or evidence that it came to, and its solution.
+Report = Callable[[Stage, float, Solution], None]
 
 
 def evidence(solution: Solution, misfit: Misfit) -> float:
@@ -83,7 +84,7 @@ def drop_modes(solution: Solution, misfit: Misfit, report: Report | None = None,
         here = _polished(tried, misfit, 2, WALK)
         value = evidence(here, misfit)
         if report is not None:
-            report(f"{sum(a.modes for a in here.layout.axes)} modes", value, here)
+            report(Stage.MODES, value, here)
         if value < best_evidence:
             best, best_evidence = here, value
         elif value > best_evidence + give_up:
@@ -120,7 +121,7 @@ def exchange_modes(
         reached = drop_modes(_polished(trials, misfit, 2), misfit, give_up=GIVE_UP_SOON)
         value = evidence(reached, misfit)
         if report is not None:
-            report("exchange", reached.cost, reached)
+            report(Stage.EXCHANGE, reached.cost, reached)
         if value >= best_evidence - 1.0:
             break
         best, best_evidence = reached, value

@@ -13,7 +13,7 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, joint_of, modes_of, unpack
-from rcsa_ident.machine.flange_part import Candidate, Doubt, FlangePart, Step
+from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation
 from rcsa_ident.machine.spindle import Spindle
 
 #: Longest step along a direction of the covariance from which a change is told: logarithms, or of order one.
@@ -88,7 +88,7 @@ class Posterior:
             step = min(size, LONGEST_STEP)
             if step > 0.0:
                 ahead, behind = (self.candidate(axis, self.theta + sign * step * direction, speed) for sign in (1.0, -1.0))
-                steps.append(Step(ahead, behind, size / (2.0 * step)))
+                steps.append(Perturbation(ahead, behind, size / (2.0 * step)))
         return Doubt(tuple(steps), tuple(self.candidate(axis, rival, speed) for rival in self.rivals))
 
     def part(self, axis: Dof, speed: float | None = None) -> FlangePart:
@@ -96,10 +96,10 @@ class Posterior:
         believed = self.candidate(axis, speed=speed)
         return FlangePart(plane("flange", axis), believed, _OpenQuestion(self, axis, speed))
 
-    def candidate(self, axis: Dof, theta: FloatArray | None = None, speed: float | None = None) -> Candidate:
+    def candidate(self, axis: Dof, theta: FloatArray | None = None, speed: float | None = None) -> JointedFlange:
         """Return `machine` as what stands behind the flange."""
         modes, joint = self.machine(axis, theta, speed)
-        return Candidate(modes, joint)
+        return JointedFlange(modes, joint)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +145,7 @@ class MachineAxis:
         """Return this axis as a part of the flange, with what the posterior leaves open, at a spindle speed [rad/s]."""
         if self.posterior is not None:
             return self.posterior.part(axis, speed)
-        return FlangePart(plane("flange", axis), Candidate(self.spindle.modes, self.joint))
+        return FlangePart(plane("flange", axis), JointedFlange(self.spindle.modes, self.joint))
 
     @property
     def softening_range(self) -> tuple[float, float] | None:

@@ -4,22 +4,45 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.cutting.force import ForceCoefficient
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
+from rcsa_ident.identification.progress import Step
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machining_setup import Workpiece
+from rcsa_ident.remarks import Remark, says
 from rcsa_ident.shown import Shown
 from rcsa_ident.signals.measurement import MAX_FREQUENCY
 from rcsa_ident.signals.recording import Sensor
+
+
+class IdentificationCode(StrEnum):
+    """What may be said of an identification: first the reasons for doubt, then what the data cannot tell."""
+
+    NOT_CONVERGED = "not-converged"
+    WEAK_SIGNAL = "weak-signal"
+    UNEXPLAINED = "unexplained"
+    CONTRADICTING_CUTS = "contradicting-cuts"
+    TWO_SOLUTIONS = "two-solutions"
+    WIDE_POSTERIOR = "wide-posterior"
+    ONE_TOOLING = "one-tooling"
+    FEW_CUTS = "few-cuts"
+    LINES_MISSED = "lines-missed"
+    NOT_PASSIVE = "not-passive"
+    JOINT_UNKNOWN = "joint-unknown"
+    MODES_OUTSIDE_BAND = "modes-outside-band"
+    COEFFICIENT_UNKNOWN = "coefficient-unknown"
+    CUTS_WEIGHTED_DOWN = "cuts-weighted-down"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,11 +90,11 @@ class Identification(Shown):
     Parameters
     ----------
     status : Status
-    reasons : tuple of str
+    reasons : tuple of Remark
         Why it is suspect or has failed.
-    notes : tuple of str
+    notes : tuple of Remark
         What the data cannot tell, and what was done about single cuts.
-    coefficients : mapping of str to (float, float)
+    coefficients : mapping of ForceCoefficient to (float, float)
         What was found of the forces' uncertain coefficients and its standard deviation: logarithms of scales, run-outs in units of
         the cutting model's reference.
     seed : int
@@ -81,8 +104,8 @@ class Identification(Shown):
     delay, delay_std : arrays, shape (k,) [s]
         Tooth 1 stands at immersion 0 that much after the record's start.
     spindle_speed : array, shape (k,) [rad/s]
-    trace : tuple of (axis, stage, cost)
-        The steps of the search in their order.
+    trace : tuple of Step
+        The search in order.
     campaign : str
         Its name.
     workpiece : Workpiece or None
@@ -92,7 +115,7 @@ class Identification(Shown):
     """
 
     status: Status
-    reasons: tuple[str, ...]
+    reasons: tuple[Remark, ...]
     seed: int
     method: str
     axes: Mapping[Dof, AxisResult]
@@ -100,12 +123,17 @@ class Identification(Shown):
     delay: FloatArray
     delay_std: FloatArray
     spindle_speed: FloatArray
-    trace: tuple[tuple[str, str, float], ...]
-    notes: tuple[str, ...] = ()
-    coefficients: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    trace: tuple[Step, ...]
+    notes: tuple[Remark, ...] = ()
+    coefficients: Mapping[ForceCoefficient, tuple[float, float]] = field(default_factory=dict)
     campaign: str = ""
     workpiece: Workpiece | None = None
     sensors: tuple[Sensor, ...] = ()
+
+    @property
+    def at_minimum(self) -> bool:
+        """False where the search has failed, or still gained when its steps ran out: there is no answer to be used."""
+        return self.status is not Status.FAILED and not says(self.reasons, IdentificationCode.NOT_CONVERGED)
 
     @property
     def band(self) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from rcsa_ident.identification.parameters import (
     split,
     unpack,
 )
+from rcsa_ident.identification.progress import Stage
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ def explore(
     settings: SearchSettings,
     band_hz: tuple[float, float],
     rng: np.random.Generator,
-    report: Callable[[str, float, Solution], None] | None = None,
+    report: Callable[[Stage, float, Solution], None] | None = None,
 ) -> list[Solution]:
     """Return the last population, best first, for one axis.
 
@@ -122,7 +123,7 @@ def explore(
             reached[inside.tobytes()] = solution
             improved.append(inside)
             if report is not None:
-                report("search", solution.cost, solution)
+                report(Stage.SEARCH, solution.cost, solution)
         # what the steps have gained is inherited (Lamarck's way)
         offspring.set("X", np.array(improved))
         offspring.set("F", np.array([[reached[x.tobytes()].cost] for x in improved]))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.cutting.force import REFERENCE_RUNOUT, SLOPES
+from rcsa_ident.cutting.force import REFERENCE_RUNOUT, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.parameters import JOINT, AxisLayout
@@ -68,7 +68,7 @@ def identification_to_json(
         },
         "sensors": {sensor.name: _sensor_to_json(sensor) for sensor in campaign.sensors},
         "workpiece": workpiece_keys(campaign.workpiece, all_spreads=True),
-        "coefficients": {name: _coefficient(name, *found) for name, found in identification.coefficients.items()},
+        "coefficients": {str(each): _coefficient(each, *found) for each, found in identification.coefficients.items()},
         "band_hz": [to_hz(w) for w in identification.band],
         "axes": _axes_to_json(identification, deviations or {}),
         "delays": _delays(identification, campaign),
@@ -121,9 +121,9 @@ def _axis_to_json(axis: AxisResult, deviation: tuple[FloatArray, FloatArray] | N
     return data
 
 
-def _coefficient(name: str, value: float, std: float) -> dict[str, float]:
+def _coefficient(coefficient: ForceCoefficient, value: float, std: float) -> dict[str, float]:
     """A factor on what the campaign says, or a run-out; with its standard deviation."""
-    if name.startswith(SLOPES[-1]):
+    if coefficient.term is ForceTerm.RUNOUT:
         unit = 1e6 * REFERENCE_RUNOUT
         return {"runout_um": value * unit, "std_um": std * unit}
     scale = math.exp(value)

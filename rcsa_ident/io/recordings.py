@@ -3,32 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.io import hdf5, matlab, parquet, tdms, text_columns, uff_records, wav
-from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 
-__all__ = ["READERS", "in_si", "read_cut", "read_recording", "read_signals", "write_hdf5", "write_recording"]
-
 Reader = Callable[[Path, Sequence[str], float | None], tuple[float, list[FloatArray]]]
+
+
+def _of(module: str) -> Reader:
+    """A format's reader, imported with its library when the first file of that format is read."""
+
+    def read(path: Path, names: Sequence[str], rate: float | None) -> tuple[float, list[FloatArray]]:
+        found: tuple[float, list[FloatArray]] = import_module(f"rcsa_ident.io.{module}").read_channels(path, names, rate)
+        return found
+
+    return read
+
 
 #: A format is a suffix and a function of path, channel names and the campaign's rate, which returns rate and channels.
 READERS: dict[str, Reader] = {
-    ".h5": hdf5.read_channels,
-    ".hdf5": hdf5.read_channels,
-    ".csv": text_columns.read_channels,
-    ".tdms": tdms.read_channels,
-    ".uff": uff_records.read_channels,
-    ".unv": uff_records.read_channels,
-    ".wav": wav.read_channels,
-    ".mat": matlab.read_channels,
-    ".parquet": parquet.read_channels,
+    ".h5": _of("hdf5"),
+    ".hdf5": _of("hdf5"),
+    ".csv": _of("text_columns"),
+    ".tdms": _of("tdms"),
+    ".uff": _of("uff_records"),
+    ".unv": _of("uff_records"),
+    ".wav": _of("wav"),
+    ".mat": _of("matlab"),
+    ".parquet": _of("parquet"),
 }
 
 
@@ -126,6 +134,8 @@ def read_cut(sensors: tuple[Sensor, ...], default_rate: float | None, cut: Cut) 
 
 def write_recording(path: str | Path, recording: Recording) -> None:
     """Write a recording's channels as its sensors gave them; `read_recording` with the same sensors reads it back."""
+    from rcsa_ident.io.hdf5 import write_hdf5
+
     gains = [1.0 if s.quantity is Quantity.TRIGGER else s.sensitivity for s in recording.sensors]
     channels = zip(recording.sensors, recording.samples.T, gains, strict=True)
     write_hdf5(path, recording.rate, {sensor.name: samples * gain for sensor, samples, gain in channels})

@@ -12,8 +12,8 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
+from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.io.machines import MachineFile
-from rcsa_ident.io.recordings import write_hdf5
 from rcsa_ident.io.workpieces import workpiece_keys
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.units import to_rpm

@@ -19,7 +19,7 @@ from rcsa_ident.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Candidate:
+class JointedFlange:
     """A flange and the joint in front of it.
 
     Parameters
@@ -44,18 +44,18 @@ class Candidate:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Step:
+class Perturbation:
     """Two candidates on both sides of the believed one, along a direction that is independent of the others.
 
     Parameters
     ----------
-    ahead, behind : Candidate
+    ahead, behind : JointedFlange
     weight : float
         One standard deviation over the distance of both.
     """
 
-    ahead: Candidate
-    behind: Candidate
+    ahead: JointedFlange
+    behind: JointedFlange
     weight: float
 
 
@@ -65,13 +65,13 @@ class Doubt:
 
     Parameters
     ----------
-    steps : sequence of Step
-    rivals : sequence of Candidate
+    steps : sequence of Perturbation
+    rivals : sequence of JointedFlange
         Other models of the same data: how far each differs is one more direction.
     """
 
-    steps: Sequence[Step] = ()
-    rivals: Sequence[Candidate] = ()
+    steps: Sequence[Perturbation] = ()
+    rivals: Sequence[JointedFlange] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,22 +82,22 @@ class FlangePart:
     ----------
     coordinates : tuple of Coordinate, length b
         Translation and slope, plane by plane.
-    believed : Candidate
+    believed : JointedFlange
     doubt : callable, returns Doubt; or None
         Asked only where a spread is wanted. None where the candidate is taken for exact.
     """
 
     coordinates: tuple[Coordinate, ...]
-    believed: Candidate
+    believed: JointedFlange
     doubt: Callable[[], Doubt] | None = field(default=None)
 
-    def response(self, respond: Callable[[Candidate], ComplexArray]) -> tuple[ComplexArray, ComplexArray | None]:
+    def response(self, respond: Callable[[JointedFlange], ComplexArray]) -> tuple[ComplexArray, ComplexArray | None]:
         """Return what the believed candidate responds, shape (n, ...), and its changes along all directions, shape (p, n, ...).
 
         Parameters
         ----------
         respond : callable
-            Candidate to complex array.
+            JointedFlange to complex array.
         """
         here = respond(self.believed)
         if self.doubt is None:

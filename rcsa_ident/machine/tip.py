@@ -16,7 +16,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.coupling._kernels import tip_changes, tips_over
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.uncertain import Places, UncertainReceptance, Variation
-from rcsa_ident.machine.flange_part import Candidate, Doubt, FlangePart
+from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange
 from rcsa_ident.tool_holder.geometry import ToolAssembly, stiffened
 from rcsa_ident.tool_holder.model import tool_holder_poles
 
@@ -107,7 +107,7 @@ class Side:
         return Ends(*(np.array(each).reshape(-1, omega.size, size, size) for each in (ahead, behind))), np.arange(omega.size)
 
 
-def _both(doubt: Doubt) -> tuple[list[Candidate], list[Candidate]]:
+def _both(doubt: Doubt) -> tuple[list[JointedFlange], list[JointedFlange]]:
     return [step.ahead for step in doubt.steps], [step.behind for step in doubt.steps]
 
 

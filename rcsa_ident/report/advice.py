@@ -85,8 +85,8 @@ def advice_figure(answers: Sequence[Advice]) -> Figure:
         (answer,) = answers
         if answer.usable.removal_rate is None:
             return stability_figure(answer.lobes, answer.recommended, usable=answer.usable)
-        marks = [[_mark(cut) for cut in cuts if cut.removal_rate is not None] for cuts in (answer.recommended, answer.planned)]
-        return usable_figure(answer.usable, *marks, answer.common)
+        recommended, planned = ([_mark(cut) for cut in cuts] for cuts in (answer.recommended, answer.planned))
+        return usable_figure(answer.usable, recommended, planned, answer.common)
     best = {answer.tooling: _mark(answer.recommended[0]) for answer in answers if answer.recommended}
     marks_ = {name: mark._replace(text=f"{to_cm3_per_min(mark.removal_rate):.0f} cm³/min") for name, mark in best.items()}
     return comparison_figure({answer.tooling: answer.usable for answer in answers}, marks_)

@@ -18,20 +18,21 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.identification.progress import BOTH, Stage, Step
 from rcsa_ident.identification.result import AxisResult, Identification
 from rcsa_ident.units import to_hz
 
 #: Distinct for colour-blind readers, too (Okabe & Ito), and dark enough on white.
 COLOURS = {"X": "#0072B2", "Y": "#C8501A"}
 STAGES = {
-    "search": ("genetic search", "#9aa5b1"),
-    "refine": ("refined candidates", "#0072B2"),
-    "learn noise": ("noise learned from the data", "#009E73"),
-    "exchange": ("modes added, merged or removed", "#CC79A7"),
-    "from the other axis": ("started from the other axis", "#E69F00"),
-    "polish": ("joint fit of both axes", "#C8501A"),
-    "grow": ("one mode more than the evidence supports", "#56B4E9"),
-    "generation": ("best of each generation", "#0072B2"),
+    Stage.SEARCH: ("genetic search", "#9aa5b1"),
+    Stage.REFINE: ("refined candidates", "#0072B2"),
+    Stage.NOISE: ("noise learned from the data", "#009E73"),
+    Stage.EXCHANGE: ("modes added, merged or removed", "#CC79A7"),
+    Stage.OTHER_AXIS: ("started from the other axis", "#E69F00"),
+    Stage.POLISH: ("joint fit of both axes", "#C8501A"),
+    Stage.GROW: ("one mode more than the evidence supports", "#56B4E9"),
+    Stage.GENERATION: ("best of each generation", "#0072B2"),
 }
 _TRUTH = "#1f2933"
 _STYLE: dict[Any, Any] = {
@@ -139,15 +140,15 @@ def _without_jumps(degrees: FloatArray) -> FloatArray:
 def convergence(found: Identification) -> Figure:
     """Cost over the search's evaluations, and what the data pay for another mode, a row for each axis."""
     names = [str(axis) for axis in found.axes]
-    counted = any(stage.endswith(" modes") for _, stage, _ in found.trace)
+    counted = any(step.stage is Stage.MODES for step in found.trace)
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(9.6, 2.5 * len(names) + 0.4), layout="constrained")
         grid = figure.subplots(len(names), 2 if counted else 1, squeeze=False, width_ratios=(1.9, 1.0) if counted else (1.0,))
         for row, name in zip(grid, names, strict=True):
-            own = [(stage, cost) for axis, stage, cost in found.trace if axis in (name, "both")]
-            _costs(row[0], [(stage, cost) for stage, cost in own if not stage.endswith(" modes")], name.upper())
+            own = [step for step in found.trace if step.axis in (name, BOTH)]
+            _costs(row[0], [step for step in own if step.stage is not Stage.MODES], name.upper())
             if counted:
-                _evidence(row[1], [(int(stage.split()[0]), cost) for stage, cost in own if stage.endswith(" modes")], name.upper())
+                _evidence(row[1], [step for step in own if step.stage is Stage.MODES], name.upper())
         grid[-1, 0].set_xlabel("evaluation")
         handles: dict[str, Artist] = {}
         for row in grid:
@@ -156,16 +157,16 @@ def convergence(found: Identification) -> Figure:
     return figure
 
 
-def _costs(ax: Axes, trace: Sequence[tuple[str, float]], name: str) -> None:
-    cost = np.array([c for _, c in trace])
+def _costs(ax: Axes, trace: Sequence[Step], name: str) -> None:
+    cost = np.array([step.cost for step in trace])
     number = np.arange(1, cost.size + 1)
     for stage, (label, colour) in STAGES.items():
         # thousands of generations look the same as hundreds of them
-        chosen = [i for i, (s, _) in enumerate(trace) if s == stage and np.isfinite(cost[i])]
+        chosen = [i for i, step in enumerate(trace) if step.stage is stage and np.isfinite(cost[i])]
         chosen = chosen[:: max(1, len(chosen) // 400)]
         if chosen:
             ax.plot(number[chosen], cost[chosen], "o", ms=3.5, color=colour, label=label)
-    searched = [i for i, (s, _) in enumerate(trace) if s == "search"]
+    searched = [i for i, step in enumerate(trace) if step.stage is Stage.SEARCH]
     if searched:
         ax.plot(number[searched], np.minimum.accumulate(cost[searched]), color="#52606d", lw=1.2, label="best so far")
     if cost.size and np.nanmin(cost) > 0.0:
@@ -174,10 +175,10 @@ def _costs(ax: Axes, trace: Sequence[tuple[str, float]], name: str) -> None:
     ax.set_ylabel("cost [–]")
 
 
-def _evidence(ax: Axes, trace: Sequence[tuple[int, float]], name: str) -> None:
+def _evidence(ax: Axes, trace: Sequence[Step], name: str) -> None:
     best: dict[int, float] = {}
-    for count, value in trace:
-        best[count] = min(value, best.get(count, np.inf))
+    for step in trace:
+        best[step.modes] = min(step.cost, best.get(step.modes, np.inf))
     counts = sorted(best)
     lowest = min(best.values(), default=0.0)
     ax.plot(counts, [best[c] - lowest for c in counts], "o-", color=COLOURS.get(name, _TRUTH), ms=4.0)

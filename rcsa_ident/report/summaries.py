@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.cutting.force import REFERENCE_RUNOUT, SLOPES
+from rcsa_ident.cutting.force import REFERENCE_RUNOUT, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
@@ -116,11 +116,12 @@ class CoefficientRow:
     unit: str
 
 
-def coefficient_rows(found: Mapping[str, tuple[float, float]]) -> list[CoefficientRow]:
+def coefficient_rows(found: Mapping[ForceCoefficient, tuple[float, float]]) -> list[CoefficientRow]:
     """Return a row for each coefficient of an identification, whose logarithms become factors."""
     rows = []
-    for name, (value, std) in found.items():
-        if name.startswith(SLOPES[-1]):
+    for coefficient, (value, std) in found.items():
+        name = str(coefficient)
+        if coefficient.term is ForceTerm.RUNOUT:
             unit = 1e6 * REFERENCE_RUNOUT
             rows.append(CoefficientRow(name, value * unit, std * unit, "µm"))
         else:

@@ -13,12 +13,13 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
+from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
 from rcsa_ident.signals.alignment import angle_to_air, trigger_delay
 from rcsa_ident.signals.frf import AxisLines, Estimator, LineEstimator, turned_air
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
-from rcsa_ident.signals.verdict import Verdict, chatter, implausible, raw_faults, silence, speed_faults, tooth_count_fault
+from rcsa_ident.signals.verdict import RecordCode, Verdict, chatter, implausible, raw_faults, silence, speed_faults, tooth_count_fault
 
 #: Highest line that is used [Hz].
 MAX_FREQUENCY = 4300.0
@@ -28,7 +29,7 @@ WEAKEST_FORCE = 1e-3
 _AIR_BEYOND = 1.02
 DEFAULT_ESTIMATOR = LineEstimator()
 #: Note on a cut without an air cut.
-NO_AIR = "no air cut: run-out and roundness of the flange remain in the lines at the tooth-passing harmonics"
+NO_AIR = Remark(RecordCode.NO_AIR_CUT, "no air cut: run-out and roundness of the flange remain in the lines at the tooth-passing harmonics")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,16 +129,16 @@ def measure_cut(
         raise InputError("sensors", "no displacement", "a displacement sensor for X or Y", cut_id)
     programmed, notes = conditions.spindle_speed, implausible(cut)
 
-    def left_out(reasons: tuple[str, ...], speed: float | None = None, harmonics: Mapping[Dof, int] | None = None) -> Reading:
+    def left_out(reasons: tuple[Remark, ...], speed: float | None = None, harmonics: Mapping[Dof, int] | None = None) -> Reading:
         return Reading(cut_id, tooling, programmed, Verdict(reasons, notes), None, speed, harmonics or {})
 
-    faults = raw_faults(cut) + tuple(f"air cut: {fault}" for fault in (raw_faults(air) if air is not None else ()))
+    faults = raw_faults(cut) + tuple(fault.of("air cut") for fault in (raw_faults(air) if air is not None else ()))
     if faults:
         return left_out(faults)
     try:
         steady = steady_record(cut, axes, programmed, max_frequency, cutter.teeth)
     except Unsteady as error:
-        return left_out((str(error.found),))
+        return left_out((_not_steady(error),))
     found = steady.spindle_speed, _harmonics(steady)
     faults = _speed_faults(steady, programmed)
     if faults:
@@ -146,12 +147,12 @@ def measure_cut(
         still = None if air is None else steady_record(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
         faults = () if still is None else _speed_faults(still, programmed)
     except Unsteady as error:
-        faults = (str(error.found),)
+        faults = (_not_steady(error),)
     if faults:
-        return left_out((f"air cut: {faults[0]}",), *found)
+        return left_out((faults[0].of("air cut"),), *found)
     harmonic = np.arange(cutter.teeth, steady.highest_order + 1, cutter.teeth)
     if harmonic.size == 0:
-        return left_out((f"no tooth-passing line below {max_frequency:.0f} Hz",), *found)
+        return left_out((Remark(RecordCode.NO_LINE, f"no tooth-passing line below {max_frequency:.0f} Hz"),), *found)
     angle, alignment_std = 0.0, 0.0
     if still is not None:
         angle, alignment_std = angle_to_air(steady, still, cutter.teeth)
@@ -196,12 +197,16 @@ def judge_air(cut_id: str, tooling: str, air: Recording, conditions: CuttingCond
     try:
         still = steady_record(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
     except Unsteady as error:
-        return Reading(cut_id, tooling, programmed, Verdict((str(error.found),), notes))
+        return Reading(cut_id, tooling, programmed, Verdict((_not_steady(error),), notes))
     verdict = Verdict(_speed_faults(still, programmed), notes)
     return Reading(cut_id, tooling, programmed, verdict, None, still.spindle_speed, _harmonics(still))
 
 
-def _speed_faults(steady: SteadyRecord, programmed: float) -> tuple[str, ...]:
+def _not_steady(error: Unsteady) -> Remark:
+    return Remark(RecordCode.NOT_STEADY, str(error.found))
+
+
+def _speed_faults(steady: SteadyRecord, programmed: float) -> tuple[Remark, ...]:
     """The first reason against the speed of a steady part."""
     return speed_faults(steady.displacement, steady.lines, programmed)[:1]
 
@@ -217,7 +222,7 @@ def _harmonics(steady: SteadyRecord) -> dict[Dof, int]:
 
 def _cut_faults(
     cut: SteadyRecord, air: SteadyRecord | None, angle: float, harmonic: np.ndarray, cutter: Cutter, max_frequency: float
-) -> tuple[str, ...]:
+) -> tuple[Remark, ...]:
     """Reasons against a cut that only show beside its air cut."""
     difference, noise = cut.flange, cut.variance
     if air is not None:

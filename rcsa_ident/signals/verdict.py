@@ -1,12 +1,14 @@
-"""May a record be trusted? Every reason why not, in words with its numbers."""
+"""May a record be trusted? Every reason why not, with its numbers."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, follow_speed, line_spectrum, refine_speed
@@ -33,20 +35,40 @@ VISIBLE = 40.0
 DRIFT_PHASE = 0.5
 
 
+class RecordCode(StrEnum):
+    """What may be said of a record; the last two speak of one that may be used."""
+
+    UNREADABLE = "unreadable"
+    NOT_FINITE = "not-finite"
+    LOST_SAMPLES = "lost-samples"
+    FROZEN = "frozen"
+    NO_SIGNAL = "no-signal"
+    SATURATED = "saturated"
+    NOT_STEADY = "not-steady"
+    WRONG_SPEED = "wrong-speed"
+    SPEED_DRIFT = "speed-drift"
+    NO_LINE = "no-line"
+    NO_CUTTING = "no-cutting"
+    CHATTER = "chatter"
+    TOOTH_COUNT = "tooth-count"
+    IMPLAUSIBLE = "implausible"
+    NO_AIR_CUT = "no-air-cut"
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Verdict(Shown):
     """What was found in a record.
 
     Parameters
     ----------
-    reasons : tuple of str
+    reasons : tuple of Remark
         Why the record is left out; empty where it is used.
-    notes : tuple of str
+    notes : tuple of Remark
         What the user should know though it is used.
     """
 
-    reasons: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    reasons: tuple[Remark, ...] = ()
+    notes: tuple[Remark, ...] = ()
 
     @property
     def usable(self) -> bool:
@@ -57,9 +79,13 @@ class Verdict(Shown):
         return "usable" if self.usable else f"left out: {'; '.join(self.reasons)}"
 
 
-def raw_faults(recording: Recording) -> tuple[str, ...]:
+def raw_faults(recording: Recording) -> tuple[Remark, ...]:
     """Return what is wrong with the samples themselves: lost, frozen, saturated, silent."""
-    found: list[str] = []
+    found: list[Remark] = []
+
+    def fault(code: RecordCode, sentence: str) -> None:
+        found.append(Remark(code, sentence))
+
     for i, sensor in enumerate(recording.sensors):
         if sensor.quantity in (Quantity.TRIGGER, Quantity.FORCE):
             continue
@@ -67,23 +93,25 @@ def raw_faults(recording: Recording) -> tuple[str, ...]:
         lost = ~np.isfinite(x)
         if lost.any():
             first = float(np.argmax(lost)) / recording.rate
-            found.append(f"drop-outs: {lost.sum()} samples of {sensor.name} are missing, the first at {first:.4g} s")
+            fault(RecordCode.LOST_SAMPLES, f"drop-outs: {lost.sum()} samples of {sensor.name} are missing, the first at {first:.4g} s")
             continue
         if np.ptp(x) == 0.0:
-            found.append(f"no signal: {sensor.name} has the constant value {x[0]:.4g}")
+            fault(RecordCode.NO_SIGNAL, f"no signal: {sensor.name} has the constant value {x[0]:.4g}")
             continue
         start, length = _runs(x)
         clipped = _clipped(x, x[start], length)
         if clipped:
-            found.append(f"saturation: {clipped} samples of {sensor.name} are at its limits, {x.min():.4g} and {x.max():.4g}")
+            words = f"saturation: {clipped} samples of {sensor.name} are at its limits, {x.min():.4g} and {x.max():.4g}"
+            fault(RecordCode.SATURATED, words)
             continue
         k = _frozen(x[start], length)
         if k is not None:
-            found.append(f"drop-outs: {sensor.name} is frozen for {length[k]} samples at {start[k] / recording.rate:.4g} s")
+            words = f"drop-outs: {sensor.name} is frozen for {length[k]} samples at {start[k] / recording.rate:.4g} s"
+            fault(RecordCode.FROZEN, words)
     return tuple(found)
 
 
-def implausible(recording: Recording) -> tuple[str, ...]:
+def implausible(recording: Recording) -> tuple[Remark, ...]:
     """Return what speaks for a wrong unit or sensitivity: motion that no spindle makes, or that no sensor resolves."""
     found = []
     for i, sensor in enumerate(recording.sensors):
@@ -92,7 +120,8 @@ def implausible(recording: Recording) -> tuple[str, ...]:
         x = x[np.isfinite(x)]
         swing = float(np.ptp(x)) if x.size else 0.0
         if swing > most or 0.0 < swing < least:
-            found.append(f"{sensor.name} has a peak-to-peak amplitude of {swing:.3g} {unit}: check its unit and sensitivity")
+            words = f"{sensor.name} has a peak-to-peak amplitude of {swing:.3g} {unit}: check its unit and sensitivity"
+            found.append(Remark(RecordCode.IMPLAUSIBLE, words))
     return tuple(found)
 
 
@@ -131,7 +160,7 @@ def _clipped(x: FloatArray, value: FloatArray, length: np.ndarray) -> int:
     return sum(int(run.sum()) for run, full in zip(runs, piled, strict=True) if full and run.size >= 2)
 
 
-def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) -> tuple[str, ...]:
+def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) -> tuple[Remark, ...]:
     """Return what is wrong with the speed: far from the programmed one, or drifting within the record.
 
     Parameters
@@ -156,7 +185,8 @@ def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) ->
         # an air cut of a round flange tells no speed
         return ()
     if abs(speed / programmed - 1.0) > 0.0095:
-        return (f"speed: the record repeats at {to_rpm(speed):.1f} rev/min, the programmed speed is {to_rpm(programmed):.0f} rev/min",)
+        words = f"speed: the record repeats at {to_rpm(speed):.1f} rev/min, the programmed speed is {to_rpm(programmed):.0f} rev/min"
+        return (Remark(RecordCode.WRONG_SPEED, words),)
     duration = samples.shape[0] / rate
     half = samples.shape[0] // 2
     if half < 4.0 * rate * 2.0 * np.pi / speed:
@@ -168,10 +198,11 @@ def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) ->
     # halves have an eighth of the record's information on the speed each
     std = 4.0 / np.sqrt(np.sum(order**2 * information) * duration**2 / 12.0)
     if phase > DRIFT_PHASE and abs(second - first) > 5.0 * std:
-        return (
+        words = (
             f"speed drifts from {to_rpm(first):.1f} to {to_rpm(second):.1f} rev/min: "
-            f"the phase of the highest line deviates by {phase:.2g} rad (limit {DRIFT_PHASE} rad)",
+            f"the phase of the highest line deviates by {phase:.2g} rad (limit {DRIFT_PHASE} rad)"
         )
+        return (Remark(RecordCode.SPEED_DRIFT, words),)
     return ()
 
 
@@ -181,8 +212,8 @@ def _explained(lines: LineSpectrum, channels: int) -> float:
     return float(power / (power + np.sum(np.mean(lines.rest[:, :channels] ** 2, axis=0))))
 
 
-def silence(power: FloatArray, variance: FloatArray) -> str | None:
-    """Return a sentence if no cutting force shows in the tooth-passing lines, else None.
+def silence(power: FloatArray, variance: FloatArray) -> Remark | None:
+    """Return a remark if no cutting force shows in the tooth-passing lines, else None.
 
     Parameters
     ----------
@@ -193,11 +224,12 @@ def silence(power: FloatArray, variance: FloatArray) -> str | None:
     # pure noise has a mean of 1, and its largest of n is rarely above log(n) + 7
     if np.max(ratio) > np.log(ratio.size) + 7.0:
         return None
-    return f"no cutting: the largest tooth-passing line is {np.sqrt(power.max()) * 1e9:.3g} nm, which is at the noise level"
+    words = f"no cutting: the largest tooth-passing line is {np.sqrt(power.max()) * 1e9:.3g} nm, which is at the noise level"
+    return Remark(RecordCode.NO_CUTTING, words)
 
 
-def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: tuple[float, float]) -> str | None:
-    """Return a sentence if a vibration off the spindle's orders stands out, else None.
+def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: tuple[float, float]) -> Remark | None:
+    """Return a remark if a vibration off the spindle's orders stands out, else None.
 
     Parameters
     ----------
@@ -224,10 +256,11 @@ def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: 
         peak = int(np.argmax(candidates))
         floor = float(np.median(amplitude[inside, c]))
         if candidates[peak] > CHATTER_SHARE * forced[c] and candidates[peak] > 10.0 * floor:
-            return (
+            words = (
                 f"chatter: {candidates[peak] * 1e6:.3g} µm at {frequency[peak]:.0f} Hz, which is not a multiple of the spindle frequency, "
                 f"{lines.spindle_speed / (2 * np.pi):.1f} Hz (largest tooth-passing line {forced[c] * 1e6:.3g} µm)"
             )
+            return Remark(RecordCode.CHATTER, words)
     return None
 
 
@@ -241,8 +274,8 @@ def _stands_out(own: FloatArray, rest: FloatArray, claimed: FloatArray) -> bool:
     return bool(np.sort(own)[-2] > 4.0 * max(rest.max(), claimed.max()))
 
 
-def tooth_count_fault(power: FloatArray, teeth: int) -> str | None:
-    """Return a sentence if the cut's own lines do not stand where `teeth` teeth would put them, else None.
+def tooth_count_fault(power: FloatArray, teeth: int) -> Remark | None:
+    """Return a remark if the cut's own lines do not stand where `teeth` teeth would put them, else None.
 
     Parameters
     ----------
@@ -260,18 +293,24 @@ def tooth_count_fault(power: FloatArray, teeth: int) -> str | None:
         own, rest = others & (order % count == 0), others & (order % count != 0)
         claimed = first & (order % count != 0)
         if teeth > 1 and claimed.any() and _stands_out(power[own], power[rest], power[claimed]):
-            return f"wrong tooth count (or chatter): the lines of the cut are at multiples of {count}, not of {teeth}"
+            return _wrong_count(f"wrong tooth count (or chatter): the lines of the cut are at multiples of {count}, not of {teeth}")
         if teeth > 1 and own.any() and power[own].max() > ALONE * power[rest].max(initial=0.0):
             missed = power[first & (order % count != 0)].max(initial=0.0)
             if power[own].max() > (0.03 * power[first].max() if teeth % count == 0 else missed):
                 strongest = int(order[own][np.argmax(power[own])])
-                return f"wrong tooth count (or chatter): order {strongest} of the cut fits {count} teeth, not {teeth}"
+                return _wrong_count(f"wrong tooth count (or chatter): order {strongest} of the cut fits {count} teeth, not {teeth}")
     if teeth > 1 and power[others].max() > ALONE * power[first].max():
         strongest = int(order[others][np.argmax(power[others])])
-        return f"wrong tooth count (or chatter): the strongest line of the cut is order {strongest}, not a multiple of {teeth} teeth"
+        return _wrong_count(
+            f"wrong tooth count (or chatter): the strongest line of the cut is order {strongest}, not a multiple of {teeth} teeth"
+        )
     odd = shared & (order % (2 * teeth) != 0) & (order <= 4 * teeth)
     even = (order % (2 * teeth) == 0) & (order > 0) & (order <= 4 * teeth)
     background = power[others].mean() if others.any() else 0.0
     if odd.any() and even.any() and power[odd].max() < 1e-2 * power[even].max() and power[odd].max() < 4.0 * background:
-        return f"wrong tooth count: only every second multiple of {teeth} is present, as with {2 * teeth} teeth"
+        return _wrong_count(f"wrong tooth count: only every second multiple of {teeth} is present, as with {2 * teeth} teeth")
     return None
+
+
+def _wrong_count(words: str) -> Remark:
+    return Remark(RecordCode.TOOTH_COUNT, words)

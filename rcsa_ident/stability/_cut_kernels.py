@@ -8,42 +8,82 @@ so that at the rotation theta a point at the height z of the edge is at phi = th
 copies of a window follow each other by `spacing`. F = sum K_d(theta) (y(theta) - y(theta - delay_d)) + C(theta) y'. The angles at which
 a window opens or closes split the period into elements, elements into steps of at most a given length, steps into Gauss-Lobatto nodes.
 
-`plan` holds the scalars: PERIOD, SPACING (angles), SPEED, DEPTH, LAG (angle per height), KT, KR, CT, CR (stiffness and damping per
-depth, the latter times the cutting speed), RADIUS, SWING, SWINGS (amplitude and ratio of a varying speed), STEP, FROZEN, then the
-delays (angles). `table` holds the nodes, their weights, and row by row the
-Lagrange polynomials' coefficients of s^k.
+`table` holds the nodes, their weights, and row by row the Lagrange polynomials' coefficients of s^k.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
 
-PERIOD, SPACING, SPEED, DEPTH, LAG, KT, KR, CT, CR, RADIUS, SWING, SWINGS, STEP, FROZEN, DELAYS = range(15)
 _NARROW = 1e-7
+
+
+class CutPlan(NamedTuple):
+    """A cut at a speed and a depth: what all its teeth share."""
+
+    #: Angles [rad].
+    period: float
+    spacing: float
+    speed: float
+    depth: float
+    #: Angle by which the edge lags, per height.
+    lag: float
+    #: Stiffness per depth; damping per depth, times the cutting speed.
+    k_tangential: float
+    k_radial: float
+    c_tangential: float
+    c_radial: float
+    radius: float
+    #: Amplitude and ratio of a varying speed.
+    swing: float
+    swings: float
+    #: Longest step [s].
+    step: float
+    #: Whether coefficients stand still within a step.
+    frozen: bool
+    #: Angles, shape (d,).
+    delays: np.ndarray
+
+
+class CutLayout(NamedTuple):
+    """A cut over its period: e elements, n points, d delays, q + 1 nodes. Kernels of `_monodromy_kernels` take it, too: clear their
+    cache where the order changes."""
+
+    #: Shape (e, 5), as `elements`.
+    places: np.ndarray
+    #: At the points, by delay, shapes (n, d, r, r), (n, r, r).
+    stiffness: np.ndarray
+    damping: np.ndarray
+    #: As `lookups`, shapes (n, d), (n, d, q + 1).
+    where: np.ndarray
+    weight: np.ndarray
+    #: Shape (n,).
+    time: np.ndarray
 
 
 @numba.njit(cache=True)
 def angle_at(time, plan):
     """Rotation after a time, from rest of the swing at 0."""
-    mean = plan[SPEED]
-    if plan[SWING] == 0.0:
+    mean = plan.speed
+    if plan.swing == 0.0:
         return mean * time
-    swing = plan[SWINGS] * mean
-    return mean * (time + plan[SWING] / swing * (1.0 - math.cos(swing * time)))
+    swing = plan.swings * mean
+    return mean * (time + plan.swing / swing * (1.0 - math.cos(swing * time)))
 
 
 @numba.njit(cache=True)
 def time_at(angle, plan):
     """The time of a rotation: Newton's method on a monotone function."""
-    time = angle / plan[SPEED]
-    if plan[SWING] == 0.0:
+    time = angle / plan.speed
+    if plan.swing == 0.0:
         return time
-    swing = plan[SWINGS] * plan[SPEED]
+    swing = plan.swings * plan.speed
     for _ in range(100):
-        change = (angle_at(time, plan) - angle) / (plan[SPEED] * (1.0 + plan[SWING] * math.sin(swing * time)))
+        change = (angle_at(time, plan) - angle) / (plan.speed * (1.0 + plan.swing * math.sin(swing * time)))
         # no further than half a swing: far from the root the slope says little
         change = min(max(change, -math.pi / swing), math.pi / swing)
         time -= change
@@ -59,8 +99,8 @@ def add_window(theta, middle, row, plan, weights, out):
     weights : (stiffness tangential, radial, damping tangential, radial); out : shape (2, 2, 2).
     """
     offset, start, end, upper, lower = row[0], row[1], row[2], row[3], row[4]
-    near, far = plan[LAG] * plan[DEPTH] * upper, plan[LAG] * plan[DEPTH] * lower
-    share, spacing = lower - upper, plan[SPACING]
+    near, far = plan.lag * plan.depth * upper, plan.lag * plan.depth * lower
+    share, spacing = lower - upper, plan.spacing
     # copies whose edge stands between start and end somewhere along its height
     first = math.ceil((middle + offset - far - end) / spacing - 1e-12)
     last = math.floor((middle + offset - near - start) / spacing + 1e-12)
@@ -91,9 +131,9 @@ def add_window(theta, middle, row, plan, weights, out):
 def _cuts(middle, rows, plan):
     """Whether any tooth is in the cut at this rotation."""
     for row in rows:
-        near, far = plan[LAG] * plan[DEPTH] * row[3], plan[LAG] * plan[DEPTH] * row[4]
-        first = math.ceil((middle + row[0] - far - row[2]) / plan[SPACING] - 1e-12)
-        if first * plan[SPACING] <= middle + row[0] - near - row[1]:
+        near, far = plan.lag * plan.depth * row[3], plan.lag * plan.depth * row[4]
+        first = math.ceil((middle + row[0] - far - row[2]) / plan.spacing - 1e-12)
+        if first * plan.spacing <= middle + row[0] - near - row[1]:
             return True
     return False
 
@@ -101,19 +141,19 @@ def _cuts(middle, rows, plan):
 @numba.njit(cache=True)
 def elements(rows, plan, degree):
     """Return start time, length of a step, steps, first point (-1 where nothing cuts) and start angle of each element."""
-    period = plan[PERIOD]
-    edges = np.empty(4 * rows.shape[0] * (int(period / plan[SPACING]) + 3) + 2)
+    period = plan.period
+    edges = np.empty(4 * rows.shape[0] * (int(period / plan.spacing) + 3) + 2)
     edges[0], edges[1], count = 0.0, period, 2
     for row in rows:
-        near, far = plan[LAG] * plan[DEPTH] * row[3], plan[LAG] * plan[DEPTH] * row[4]
+        near, far = plan.lag * plan.depth * row[3], plan.lag * plan.depth * row[4]
         for phi in (row[1], row[2]):
             for lag in (near, far):
-                place = (phi + lag - row[0]) % plan[SPACING]
+                place = (phi + lag - row[0]) % plan.spacing
                 while place < period - 1e-11:
                     if place > 1e-11:
                         edges[count] = place
                         count += 1
-                    place += plan[SPACING]
+                    place += plan.spacing
                 if far - near < _NARROW:
                     break
     for k in range(1, count):
@@ -135,7 +175,7 @@ def elements(rows, plan, degree):
         begin, end = time_at(kept[k], plan), time_at(kept[k + 1], plan)
         table[k, 0], table[k, 4] = begin, kept[k]
         if _cuts(0.5 * (kept[k] + kept[k + 1]), rows, plan):
-            steps = max(1, math.ceil((end - begin) / plan[STEP] - 1e-9))
+            steps = max(1, math.ceil((end - begin) / plan.step - 1e-9))
             table[k, 1], table[k, 2], table[k, 3] = (end - begin) / steps, steps, point
             point += steps * degree + 1
         else:
@@ -146,7 +186,7 @@ def elements(rows, plan, degree):
 @numba.njit(cache=True)
 def coefficients(rows, shapes, plan, places, points, table):
     """Stiffness by delay (n, d, r, r), its sum's damping (n, r, r), and rotation and time of each point."""
-    q, r, count = table.shape[1] - 1, shapes.shape[2], plan.size - DELAYS
+    q, r, count = table.shape[1] - 1, shapes.shape[2], plan.delays.size
     stiffness, damping = np.zeros((points, count, r, r)), np.zeros((points, r, r))
     angle, time = np.empty(points), np.empty(points)
     weights, pair = np.empty(4), np.empty((2, 2, 2))
@@ -154,17 +194,17 @@ def coefficients(rows, shapes, plan, places, points, table):
         if places[e, 3] < 0:
             continue
         h, steps, first = places[e, 1], int(places[e, 2]), int(places[e, 3])
-        end = plan[PERIOD] if e + 1 == places.shape[0] else places[e + 1, 4]
+        end = plan.period if e + 1 == places.shape[0] else places[e + 1, 4]
         middle = 0.5 * (places[e, 4] + end)
         for i in range(steps * q + 1):
             point = first + i
             time[point] = places[e, 0] + h * (i // q + table[0, i % q])
             theta = places[e, 4] if i == 0 else end if i == steps * q else angle_at(time[point], plan)
             angle[point] = theta
-            swing = plan[SWINGS] * plan[SPEED]
-            speed = plan[SPEED] * (1.0 + plan[SWING] * math.sin(swing * time[point])) * plan[RADIUS]
-            weights[0], weights[1] = plan[DEPTH] * plan[KT], plan[DEPTH] * plan[KR]
-            weights[2], weights[3] = plan[DEPTH] * plan[CT] / speed, plan[DEPTH] * plan[CR] / speed
+            swing = plan.swings * plan.speed
+            speed = plan.speed * (1.0 + plan.swing * math.sin(swing * time[point])) * plan.radius
+            weights[0], weights[1] = plan.depth * plan.k_tangential, plan.depth * plan.k_radial
+            weights[2], weights[3] = plan.depth * plan.c_tangential / speed, plan.depth * plan.c_radial / speed
             for w in range(rows.shape[0]):
                 for i1 in range(2):
                     for i2 in range(2):
@@ -178,7 +218,7 @@ def coefficients(rows, shapes, plan, places, points, table):
                                 both = shapes[w, i1, a] * shapes[w, i2, b]
                                 stiffness[point, d, a, b] += both * pair[0, i1, i2]
                                 damping[point, a, b] += both * pair[1, i1, i2]
-    if plan[FROZEN] > 0.0:
+    if plan.frozen:
         # each step with its means: a step's nodes are its own, so the shared ones are kept by the step that starts there
         for e in range(places.shape[0]):
             if places[e, 3] < 0:
@@ -207,17 +247,17 @@ def lookups(plan, places, points, angle, time, table):
 
     Where the first weight is 1 the point itself.
     """
-    q, count = table.shape[1] - 1, plan.size - DELAYS
+    q, count = table.shape[1] - 1, plan.delays.size
     where = np.zeros((points, count), dtype=np.int64)
     weight = np.zeros((points, count, q + 1))
     for p in range(points):
         starts = _starts(places, p)
         for d in range(count):
-            back = angle[p] - plan[DELAYS + d]
+            back = angle[p] - plan.delays[d]
             # the period's first instant belongs to the points that start there, to all others the last one's end
             now = back > (-1e-9 if starts else 1e-9)
             if not now:
-                back += plan[PERIOD]
+                back += plan.period
             then = time_at(back, plan)
             # the element in the cut that holds it, or comes nearest to it
             best, distance = -1, 1e300
@@ -271,18 +311,13 @@ def lay_out(rows, shapes, plan, table):
         Windows.
     shapes : array (w, 2, r)
         How the displacements that are kept move the edge there, in feed and normal direction.
+    plan : CutPlan
 
     Returns
     -------
-    places : array (e, 5)
-        As `elements`.
-    stiffness, damping : arrays (n, d, r, r), (n, r, r)
-        At the points, by delay.
-    where, weight : arrays (n, d), (n, d, q + 1)
-        As `lookups`.
-    time : array (n,)
+    CutLayout
     """
     places, points = elements(rows, plan, table.shape[1] - 1)
     stiffness, damping, angle, time = coefficients(rows, shapes, plan, places, points, table)
     where, weight = lookups(plan, places, points, angle, time, table)
-    return places, stiffness, damping, where, weight, time
+    return CutLayout(places, stiffness, damping, where, weight, time)

@@ -42,7 +42,7 @@ def _exponential_moments(z, moments):
 
 
 @numba.njit(cache=True)
-def responses(h, pole, outputs, inputs, table, decay, drive, seen, echo):
+def responses(h, modes, table, decay, drive, seen, echo):
     """Write what a step of length h makes of a state and of forces at its nodes.
 
     Parameters
@@ -51,6 +51,7 @@ def responses(h, pole, outputs, inputs, table, decay, drive, seen, echo):
     seen (2, q, r, m) : y and y' at nodes 1..q, real part of it times p
     echo (2, q, q + 1, r, r), zero before : y and y' at nodes 1..q of F at each node, without the constant
     """
+    pole, outputs, inputs, _ = modes
     q, m, r = table.shape[1] - 1, pole.size, outputs.shape[0]
     moments = np.empty(q + 1, dtype=np.complex128)
     for k in range(m):
@@ -116,7 +117,7 @@ def _identity(matrix):
 
 
 @numba.njit(cache=True)
-def prepare(pole, outputs, inputs, constant, stiffness, damping, places, frozen, table):
+def prepare(modes, layout, table, frozen):
     """Each element's responses, and each step's solution for the forces at its nodes.
 
     Returns
@@ -127,6 +128,8 @@ def prepare(pole, outputs, inputs, constant, stiffness, damping, places, frozen,
     later (n, q r, q r) : the same for nodes 1..q of the step that starts at a point
     total (n, r, r), kinds : stiffness of all delays; 2 where velocities matter, which they do to process damping only, else 1
     """
+    pole, outputs, inputs, constant = modes
+    places, stiffness, damping = layout.places, layout.stiffness, layout.damping
     q, m, r = table.shape[1] - 1, pole.size, outputs.shape[0]
     count, points = places.shape[0], damping.shape[0]
     decay = np.empty((count, q + 1, m), dtype=np.complex128)
@@ -158,7 +161,7 @@ def prepare(pole, outputs, inputs, constant, stiffness, damping, places, frozen,
                 same[e] = same[other]
         own = same[e]
         if own == e:
-            responses(places[e, 1], pole, outputs, inputs, table, decay[e], drive[e], seen[e], echo[e])
+            responses(places[e, 1], modes, table, decay[e], drive[e], seen[e], echo[e])
             for j in range(q):
                 for a in range(r):
                     for b in range(r):
@@ -202,8 +205,10 @@ def _earlier(motion, where, weight, point, delay, row):
 
 
 @numba.njit(cache=True)
-def march(state, motion, force, pole, outputs, constant, stiffness, damping, places, frozen, table, where, weight, prepared):
+def march(state, motion, force, modes, layout, table, frozen, prepared):
     """Move by one period. `motion` (2 n, r) holds y at all points, the last period's first; `force` (n, r) and the rest is written."""
+    pole, outputs, constant = modes.pole, modes.outputs, modes.constant
+    places, stiffness, damping, where, weight, _ = layout
     decay, drive, seen, echo, same, first, later, total, kinds = prepared
     q, m, r = table.shape[1] - 1, state.size, constant.shape[0]
     points, delays = damping.shape[0], stiffness.shape[1]
@@ -414,21 +419,16 @@ def _unpack(vector, state, motion, kept):
 
 
 @numba.njit(cache=True)
-def multiplier(pole, outputs, inputs, constant, cut, table, frozen, tolerance, waves, start):
+def multiplier(modes, layout, table, frozen, tolerance, waves, start):
     """The period map's eigenvalue of largest magnitude by Arnoldi's method [arnoldi1951] without restarts.
 
     Parameters
     ----------
-    cut : tuple of arrays
-        As `lay_out` gives it.
-    frozen : bool
-        Constant coefficients within a step.
-    tolerance : float
-        Residual of the eigenvalue, as a share of it, at which the search ends.
-    waves : bool
-        Whether the vector's forces are wanted.
-    start : array
-        First Krylov vector, of any length: what it lacks is made up.
+    modes, layout : `ModeArrays`, `CutLayout`
+    frozen : constant coefficients within a step
+    tolerance : residual of the eigenvalue, as a share of it, at which the search ends
+    waves : whether the vector's forces are wanted
+    start : first Krylov vector, of any length: what it lacks is made up
 
     Returns
     -------
@@ -436,9 +436,9 @@ def multiplier(pole, outputs, inputs, constant, cut, table, frozen, tolerance, w
     vector (complex) : state and motion that it belongs to
     force (complex) : at the points, of that vector
     """
-    places, stiffness, damping, where, weight, _ = cut
-    m, r, points = pole.size, outputs.shape[0], damping.shape[0]
-    prepared = prepare(pole, outputs, inputs, constant, stiffness, damping, places, frozen, table)
+    pole, places, where = modes.pole, layout.places, layout.where
+    m, r, points = pole.size, modes.outputs.shape[0], layout.damping.shape[0]
+    prepared = prepare(modes, layout, table, frozen)
     kept = min(points, where.min())
     size = 2 * m + (points - kept) * r
     most = min(_MOST, size)
@@ -463,7 +463,7 @@ def multiplier(pole, outputs, inputs, constant, cut, table, frozen, tolerance, w
             look += 2
     for n in range(most):
         _unpack(basis[n], state, motion, kept)
-        march(state, motion, force, pole, outputs, constant, stiffness, damping, places, frozen, table, where, weight, prepared)
+        march(state, motion, force, modes, layout, table, frozen, prepared)
         after = basis[n + 1]
         for k in range(m):
             after[k], after[m + k] = state[k].real, state[k].imag
@@ -492,7 +492,7 @@ def multiplier(pole, outputs, inputs, constant, cut, table, frozen, tolerance, w
         for i in range(size):
             along[i] = vector[i].real if part == 0 else vector[i].imag
         _unpack(along, state, motion, kept)
-        march(state, motion, force, pole, outputs, constant, stiffness, damping, places, frozen, table, where, weight, prepared)
+        march(state, motion, force, modes, layout, table, frozen, prepared)
         for point in range(points):
             for a in range(r):
                 forces[point, a] += (1.0 if part == 0 else 1j) * force[point, a]

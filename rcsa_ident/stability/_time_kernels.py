@@ -3,24 +3,54 @@
 Steps are equal in rotation. The structure moves exactly under a force that is linear over each step; the force at a step's end is
 found with the motion there by two corrections. The chip of a tooth is the smallest distance to what the teeth before it left, over
 one revolution of them, so that a tooth that misses leaves the surface as it was.
-
-`plan` holds STEP (angle), SPEED, KT, KR, TE, RE (forces per area and per width), ENTRY, EXIT, RUB (indentation force per width, times
-cutting speed over velocity into the material), FRICTION, RADIUS, WIDTH (of a slice), SWING, SWINGS (amplitude and ratio of a varying
-speed), LEAVES (whether teeth may leave the cut and the flank rubs one way only), REGENERATE.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
 
-STEP, SPEED, KT, KR, TE, RE, ENTRY, EXIT, RUB, FRICTION, RADIUS, WIDTH, SWING, SWINGS, LEAVES, REGENERATE, COUNT = range(17)
+
+class TimePlan(NamedTuple):
+    """A cut at a speed and a depth: what all its teeth share."""
+
+    #: Angle [rad].
+    step: float
+    speed: float
+    #: Forces per area, and per width.
+    k_tangential: float
+    k_radial: float
+    edge_tangential: float
+    edge_radial: float
+    #: Indentation force per width, times cutting speed over velocity into the material.
+    rub: float
+    friction: float
+    radius: float
+    #: Amplitude and ratio of a varying speed.
+    swing: float
+    swings: float
+    #: Whether teeth may leave the cut and the flank rubs one way only.
+    leaves: bool
+    #: Whether a tooth cuts what others have left, or a surface that knows no vibration.
+    regenerate: bool
+
+
+class Memory(NamedTuple):
+    """What the next step begins with; a march changes it in place."""
+
+    #: Complex, shape (m,).
+    state: np.ndarray
+    #: Feed and normal, shape (2,).
+    force: np.ndarray
+    #: Ring of tips, feed and normal, at the steps before, shape (n, 2).
+    past: np.ndarray
 
 
 @numba.njit(cache=True)
-def force_at(step, here, velocity, past, teeth, lag, plan, speed, out):
+def force_at(step, here, velocity, past, teeth, slices, plan, speed, out):
     """Force on the tool (feed, normal) at a step.
 
     Parameters
@@ -31,19 +61,21 @@ def force_at(step, here, velocity, past, teeth, lag, plan, speed, out):
         Ring of tips, feed and normal, at the steps before this one, which has the number `step`.
     teeth : array (z, 2 + 3 z)
         Angle ahead of tooth 1, runout, then for each tooth ahead: steps ago, feed since then, its runout.
-    lag : array (s,)
-        Angle by which each slice lags the tip.
+    slices : array (s, 4)
+        Of the edge: angle by which it lags the tip, angles between which it cuts, width.
+    speed : float
+        Of the spindle, now.
     out : array (2,)
     """
     out[0], out[1] = 0.0, 0.0
-    size, count, theta = past.shape[0], teeth.shape[0], plan[STEP] * step
-    rub = plan[RUB] / (speed * plan[RADIUS])
+    size, count, theta = past.shape[0], teeth.shape[0], plan.step * step
+    rub = plan.rub / (speed * plan.radius)
     for j in range(count):
-        for lagging in lag:
-            phi = (theta + teeth[j, 0] - lagging + 0.5 * plan[STEP]) % (2.0 * math.pi) - 0.5 * plan[STEP]
+        for i in range(slices.shape[0]):
+            phi = (theta + teeth[j, 0] - slices[i, 0] + 0.5 * plan.step) % (2.0 * math.pi) - 0.5 * plan.step
             # the share of the step about this place in which the tooth is inside: without it the entry would jump by a step
-            low, high = max(phi - 0.5 * plan[STEP], plan[ENTRY]), min(phi + 0.5 * plan[STEP], plan[EXIT])
-            inside = (high - low) / plan[STEP]
+            low, high = max(phi - 0.5 * plan.step, slices[i, 1]), min(phi + 0.5 * plan.step, slices[i, 2])
+            inside = (high - low) / plan.step
             if inside <= 0.0:
                 continue
             phi = 0.5 * (low + high)
@@ -52,7 +84,7 @@ def force_at(step, here, velocity, past, teeth, lag, plan, speed, out):
             for k in range(count):
                 ago, feed, other = teeth[j, 2 + 3 * k], teeth[j, 3 + 3 * k], teeth[j, 4 + 3 * k]
                 still, moved = feed * s + teeth[j, 1] - other, 0.0
-                if plan[REGENERATE] > 0.0:
+                if plan.regenerate:
                     whole = int(ago)
                     part = ago - whole
                     a = (step - whole) % size
@@ -61,34 +93,36 @@ def force_at(step, here, velocity, past, teeth, lag, plan, speed, out):
                     y = here[1] - (1.0 - part) * past[a, 1] - part * past[b, 1]
                     moved = s * x + c * y
                 # without loss of contact the surface that decides is that of a tool which does not vibrate
-                distance = still + moved if plan[LEAVES] > 0.0 else still
+                distance = still + moved if plan.leaves else still
                 if distance < nearest:
                     nearest, chip = distance, still + moved
             if nearest <= 0.0:
                 continue
-            tangential = plan[KT] * chip + plan[TE]
-            radial = plan[KR] * chip + plan[RE]
+            tangential = plan.k_tangential * chip + plan.edge_tangential
+            radial = plan.k_radial * chip + plan.edge_radial
             into = s * velocity[0] + c * velocity[1]
-            if plan[LEAVES] == 0.0 or into > 0.0:
+            if not plan.leaves or into > 0.0:
                 radial += rub * into
-                tangential += plan[FRICTION] * rub * into
-            out[0] -= inside * plan[WIDTH] * (tangential * c + radial * s)
-            out[1] += inside * plan[WIDTH] * (tangential * s - radial * c)
+                tangential += plan.friction * rub * into
+            out[0] -= inside * slices[i, 3] * (tangential * c + radial * s)
+            out[1] += inside * slices[i, 3] * (tangential * s - radial * c)
 
 
 @numba.njit(cache=True)
-def simulate(pole, outputs, inputs, constant, teeth, lag, plan, state, force, past, start, samples):
+def simulate(modes, teeth, slices, plan, memory, start, samples):
     """March `samples.shape[0]` steps on, from step number `start`.
 
     Parameters
     ----------
-    outputs, inputs, constant : shapes (2, m), (m, 2), (2, 2)
+    modes, plan, memory : ModeArrays, TimePlan, Memory
         In feed and normal direction.
-    state : complex array (m,), force : array (2,), past : array (n, 2)
-        Changed in place: what the next call begins with.
+    teeth, slices
+        As in `force_at`.
     samples : array (count, 6)
         Written: tip, its velocity and the force, feed and normal, at each step.
     """
+    pole, outputs, inputs, constant = modes
+    state, force, past = memory
     m, size = pole.size, past.shape[0]
     decay = np.empty(m, dtype=np.complex128)
     before, now = np.empty((m, 2), dtype=np.complex128), np.empty((m, 2), dtype=np.complex128)
@@ -102,17 +136,17 @@ def simulate(pole, outputs, inputs, constant, teeth, lag, plan, state, force, pa
     time = 0.0
     for n in range(samples.shape[0]):
         step = start + n
-        h = plan[STEP] / plan[SPEED]
-        if plan[SWING] > 0.0:
+        h = plan.step / plan.speed
+        if plan.swing > 0.0:
             # Newton's method for the time of this rotation, from that of the last one
-            swing = plan[SWINGS] * plan[SPEED]
-            then = _time(plan[STEP] * (step - 1), plan[STEP] * (step - 1) / plan[SPEED] if n == 0 else time, plan)
-            time = _time(plan[STEP] * step, then + h, plan)
+            swing = plan.swings * plan.speed
+            then = _time(plan.step * (step - 1), plan.step * (step - 1) / plan.speed if n == 0 else time, plan)
+            time = _time(plan.step * step, then + h, plan)
             h = time - then
-            speed = plan[SPEED] * (1.0 + plan[SWING] * math.sin(swing * time))
+            speed = plan.speed * (1.0 + plan.swing * math.sin(swing * time))
         else:
-            speed = plan[SPEED]
-        if plan[SWING] > 0.0 or not prepared:
+            speed = plan.speed
+        if plan.swing > 0.0 or not prepared:
             for k in range(m):
                 x = pole[k] * h
                 decay[k] = np.exp(x)
@@ -138,7 +172,7 @@ def simulate(pole, outputs, inputs, constant, teeth, lag, plan, state, force, pa
                     y = 2.0 * outputs[a, k] * p
                     here[a] += y.real
                     velocity[a] += (pole[k] * y).real
-            force_at(step, here, velocity, past, teeth, lag, plan, speed, new)
+            force_at(step, here, velocity, past, teeth, slices, plan, speed, new)
         for k in range(m):
             state[k] = free[k] + now[k, 0] * new[0] + now[k, 1] * new[1]
         force[0], force[1] = new[0], new[1]
@@ -155,11 +189,11 @@ def simulate(pole, outputs, inputs, constant, teeth, lag, plan, state, force, pa
 
 @numba.njit(cache=True)
 def _time(angle, guess, plan):
-    swing = plan[SWINGS] * plan[SPEED]
+    swing = plan.swings * plan.speed
     time = guess
     for _ in range(50):
-        angle_there = plan[SPEED] * (time + plan[SWING] / swing * (1.0 - math.cos(swing * time)))
-        change = (angle_there - angle) / (plan[SPEED] * (1.0 + plan[SWING] * math.sin(swing * time)))
+        angle_there = plan.speed * (time + plan.swing / swing * (1.0 - math.cos(swing * time)))
+        change = (angle_there - angle) / (plan.speed * (1.0 + plan.swing * math.sin(swing * time)))
         time -= min(max(change, -1.0 / swing), 1.0 / swing)
         if abs(change) * swing < 1e-14:
             break

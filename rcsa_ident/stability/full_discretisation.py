@@ -13,7 +13,7 @@ from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import check_resolution, marched_lobes
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tip_modes import TipModes, modes_of
+from rcsa_ident.stability.tip_modes import TipModes, require_modes
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class FullDiscretisation:
 
     def monodromy(self, tip: Receptance | TipModes, process: MillingProcess) -> MonodromyOperator:
         """Return the cut's monodromy operator."""
-        return MonodromyOperator(modes_of(tip, self.name), process, self.degree)
+        return MonodromyOperator(require_modes(tip, self.name), process, self.degree)
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""

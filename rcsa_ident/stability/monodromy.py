@@ -13,7 +13,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability import _cut_kernels as kernels
 from rcsa_ident.stability import _monodromy_kernels
-from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.stability.tip_modes import ModeArrays, TipModes
 
 #: Residual of the multiplier, as a share of it.
 RESIDUAL = 1e-6
@@ -99,23 +99,21 @@ class MonodromyOperator:
         self.rotation = process.machine_from_feed.T
         if modes.shape is None:
             moving = np.any(modes.outputs != 0.0, axis=1) | np.any(modes.constant != 0.0, axis=1)
-            self.outputs, self.inputs = modes.outputs[moving], modes.inputs[:, moving]
-            self.constant = modes.constant[np.ix_(moving, moving)]
+            outputs, inputs = modes.outputs[moving], modes.inputs[:, moving]
+            constant = modes.constant[np.ix_(moving, moving)]
             self.directions = np.eye(2)[:, moving]
         else:
-            self.outputs, self.inputs, self.directions = _planar(modes)
-            self.constant = np.zeros((modes.pole.size, modes.pole.size))
+            outputs, inputs, self.directions = _planar(modes)
+            constant = np.zeros((modes.pole.size, modes.pole.size))
         # modes scaled so that each moves the tip alike
-        size = np.maximum(np.linalg.norm(self.outputs, axis=0), 1e-30 * np.linalg.norm(self.outputs))
-        self.outputs = np.ascontiguousarray(self.outputs / size)
-        self.inputs = np.ascontiguousarray(self.inputs * size[:, None])
-        self.constant = np.array(self.constant)
-        # writable copies: a kernel is compiled anew for read-only arrays
-        self.pole = modes.pole.copy()
+        size = np.maximum(np.linalg.norm(outputs, axis=0), 1e-30 * np.linalg.norm(outputs))
+        self.arrays = ModeArrays(
+            modes.pole.copy(), np.ascontiguousarray(outputs / size), np.ascontiguousarray(inputs * size[:, None]), np.array(constant)
+        )
         self._straight: tuple[FloatArray, FloatArray] | None = None
         #: Whether all forces are proportional to the depth.
         self.proportional = cutter.helix == 0.0 and process.engagement_profile is None and modes.shape is None
-        self._unit: dict[tuple[float, float], tuple[FloatArray, ...]] = {}
+        self._unit: dict[tuple[float, float], kernels.CutLayout] = {}
 
     def duration(self, speed: float) -> float:
         """Seconds of a period."""
@@ -145,18 +143,16 @@ class MonodromyOperator:
         residual : float
             Of the eigenvalue, as a share of it, at which the search for it ends.
         """
-        cut = self._laid_out(speed, depth, step)
+        layout = self._laid_out(speed, depth, step)
         first = np.zeros(0) if start is None else np.ascontiguousarray(start.real)
-        value, left, _, vector, force = _monodromy_kernels.multiplier(
-            self.pole, self.outputs, self.inputs, self.constant, cut, self.table, self.frozen, residual, waves, first
-        )
+        value, left, _, vector, force = _monodromy_kernels.multiplier(self.arrays, layout, self.table, self.frozen, residual, waves, first)
         value = complex(value)
         if value.imag < 0.0:
             value, vector, force = value.conjugate(), vector.conj(), force.conj()
-        omega, motion = self._waves(value, speed, force, cut[0], cut[-1]) if waves else (np.zeros(0), np.zeros(0))
+        omega, motion = self._waves(value, speed, force, layout) if waves else (np.zeros(0), np.zeros(0))
         return Multiplier(value, self.duration(speed), vector, omega, motion, float(left))
 
-    def _laid_out(self, speed: float, depth: float, step: float) -> tuple[FloatArray, ...]:
+    def _laid_out(self, speed: float, depth: float, step: float) -> kernels.CutLayout:
         """The cut over its period; without a helix it is laid out once for all depths, since every force grows with the depth."""
         if not self.proportional:
             return self._lay_out(speed, depth, step)
@@ -164,32 +160,34 @@ class MonodromyOperator:
             if len(self._unit) >= _KEPT:
                 self._unit.clear()
             self._unit[speed, step] = self._lay_out(speed, 1.0, step)
-        places, stiffness, damping, where, weight, time = self._unit[speed, step]
-        return places, depth * stiffness, depth * damping, where, weight, time
+        unit = self._unit[speed, step]
+        return unit._replace(stiffness=depth * unit.stiffness, damping=depth * unit.damping)
 
-    def _lay_out(self, speed: float, depth: float, step: float) -> tuple[FloatArray, ...]:
-        process = self.process
+    def _lay_out(self, speed: float, depth: float, step: float) -> kernels.CutLayout:
         rows, shapes = self._rows(speed, depth)
+        found: kernels.CutLayout = kernels.lay_out(rows, shapes, self._plan(speed, depth, step), self.table)
+        return found
+
+    def _plan(self, speed: float, depth: float, step: float) -> kernels.CutPlan:
+        process = self.process
         c, d, v = process.coefficients, process.damping, process.speed_variation
-        plan = np.zeros(kernels.DELAYS + self.delays.size)
-        plan[: kernels.DELAYS] = (
-            self.period,
-            self.spacing,
-            speed,
-            depth,
-            2.0 * np.tan(process.cutter.helix) / process.cutter.diameter,
-            c.tangential,
-            c.tangential * c.radial_ratio,
-            0.0 if d is None else d.friction * d.strength,
-            0.0 if d is None else d.strength,
-            0.5 * process.cutter.diameter,
-            0.0 if v is None else v.amplitude,
-            0.0 if v is None else v.ratio,
-            step,
-            float(self.frozen),
+        return kernels.CutPlan(
+            period=self.period,
+            spacing=self.spacing,
+            speed=float(speed),
+            depth=float(depth),
+            lag=float(2.0 * np.tan(process.cutter.helix) / process.cutter.diameter),
+            k_tangential=float(c.tangential),
+            k_radial=float(c.tangential * c.radial_ratio),
+            c_tangential=0.0 if d is None else float(d.friction * d.strength),
+            c_radial=0.0 if d is None else float(d.strength),
+            radius=float(0.5 * process.cutter.diameter),
+            swing=0.0 if v is None else float(v.amplitude),
+            swings=0.0 if v is None else float(v.ratio),
+            step=float(step),
+            frozen=self.frozen,
+            delays=self.delays,
         )
-        plan[kernels.DELAYS :] = self.delays
-        return kernels.lay_out(rows, shapes, plan, self.table)
 
     def _rows(self, speed: float, depth: float) -> tuple[FloatArray, FloatArray]:
         """Windows and the directions that they push in, as the kernels want them."""
@@ -219,13 +217,12 @@ class MonodromyOperator:
         share = np.array([np.interp(height, self.modes.heights, each) for each in self.modes.shape.T])
         return self.directions * share
 
-    def _waves(
-        self, value: complex, speed: float, force: ComplexArray, places: FloatArray, time: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    def _waves(self, value: complex, speed: float, force: ComplexArray, layout: kernels.CutLayout) -> tuple[FloatArray, FloatArray]:
         """Frequencies of the vibration, and the tip's amplitude at each, from the force's lines and the modes."""
+        (pole, outputs, inputs, constant), places, time = self.arrays, layout.places, layout.time
         period, nodes = self.duration(speed), self.table.shape[1] - 1
         base = float(np.angle(value)) / period
-        highest = 2.0 * float(np.max(np.abs(self.pole)))
+        highest = 2.0 * float(np.max(np.abs(pole)))
         k = np.arange(-int((highest + base) * period / (2.0 * np.pi)), int((highest - base) * period / (2.0 * np.pi)) + 1)
         omega = base + 2.0 * np.pi * k / period
         lines = np.zeros((omega.size, force.shape[1]), dtype=complex)
@@ -235,9 +232,9 @@ class MonodromyOperator:
                 p = int(first) + step * nodes + np.arange(nodes + 1)
                 weight = h / period * self.table[1] * np.exp(-growth * time[p])
                 lines += np.exp(-1j * omega[:, None] * time[p]) @ (weight[:, None] * force[p])
-        decay = 1.0 / (1j * omega[:, None] - self.pole), 1.0 / (1j * omega[:, None] - self.pole.conj())
-        pairs = (decay[0], self.inputs, self.outputs), (decay[1], self.inputs.conj(), self.outputs.conj())
-        motion = lines @ self.constant.T + sum((d * (lines @ i.T)) @ o.T for d, i, o in pairs)
+        decay = 1.0 / (1j * omega[:, None] - pole), 1.0 / (1j * omega[:, None] - pole.conj())
+        pairs = (decay[0], inputs, outputs), (decay[1], inputs.conj(), outputs.conj())
+        motion = lines @ constant.T + sum((d * (lines @ i.T)) @ o.T for d, i, o in pairs)
         return np.abs(omega), np.linalg.norm(motion @ self.directions.T, axis=1)
 
 

@@ -51,7 +51,7 @@ class Growth:
 def longest_step(cut: MonodromyOperator) -> float:
     """Length of a step that is good to some thousandths of the limit [s]."""
     strength = cut.modes.strength
-    wave = 2.0 * np.pi / float(np.max(np.abs(cut.pole)[strength >= _WEAK * strength.max()]))
+    wave = 2.0 * np.pi / float(np.max(np.abs(cut.arrays.pole)[strength >= _WEAK * strength.max()]))
     degree = cut.table.shape[1] - 1
     return wave / _STEPS if cut.frozen else degree * wave / (_NODES * (1.0 + _LOW_DEGREE / degree**2))
 

@@ -11,6 +11,8 @@ from rcsa_ident.errors import InputError
 
 #: Two peaks are one pocket unless the level between them falls below this share of the higher one.
 POCKET = 0.85
+#: A speed beyond those that were asked for may lie this much below what a tolerance needs, as a share.
+COARSE = 0.9
 
 
 def peaks(speed: FloatArray, level: FloatArray, count: int = 3) -> list[tuple[float, float]]:
@@ -80,6 +82,8 @@ def pad_speeds(speeds: FloatArray, tolerance: float, also: Sequence[float] = ())
     low, high = inner.min() * (1.0 - tolerance), inner.max() * (1.0 + tolerance)
     below = np.arange(speeds[0] - step, low - step, -step) if low < speeds[0] else np.zeros(0)
     above = np.arange(speeds[-1] + step, high + step, step) if high > speeds[-1] else np.zeros(0)
-    found = np.unique(np.concatenate([inner, below[below > 0.0], above]))
+    # a coarse step leads far out, down to a standstill: where it does, the tolerance's own end will do
+    below, above = np.where(below > COARSE * low, below, low), np.where(COARSE * above < high, above, high)
+    found = np.unique(np.concatenate([inner, below, above]))
     # the same speed twice, but for its last digit
     return found[np.concatenate([[True], np.diff(found) > 1e-9 * found[1:]])]

@@ -12,7 +12,7 @@ from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import check_resolution, marched_lobes
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tip_modes import TipModes, modes_of
+from rcsa_ident.stability.tip_modes import TipModes, require_modes
 
 #: Of the polynomials that stand for the exact answer within a step: at 24 steps a wave they leave 1e-7 of the multiplier.
 _DEGREE = 3
@@ -49,7 +49,7 @@ class SemiDiscretisation:
 
     def monodromy(self, tip: Receptance | TipModes, process: MillingProcess) -> MonodromyOperator:
         """Return the cut's monodromy operator."""
-        return MonodromyOperator(modes_of(tip, self.name), process, _DEGREE, frozen=True)
+        return MonodromyOperator(require_modes(tip, self.name), process, _DEGREE, frozen=True)
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
@@ -16,7 +17,7 @@ from rcsa_ident.stability.first_instability import first_loss
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.monodromy import common_period, stable_depth_bound
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tip_modes import TipModes, modes_of
+from rcsa_ident.stability.tip_modes import ModeArrays, TipModes, require_modes
 
 #: Steps per wave of the highest mode that counts, and per tooth period at least.
 _STEPS, _FEWEST = 40.0, 60
@@ -66,8 +67,8 @@ class TimeDomain:
 
     Two cuts run side by side, one of them a little pushed, and are looked at once per period (a tooth's, a revolution's where teeth
     differ, a swing's of a varying speed): what their states differ by grows or dies away. The limit is where it does neither. Teeth
-    leave the cut, with run-out for longer; a worn flank rubs only while it moves into the material, twice as much as the equivalent
-    viscous force of the other methods, half of the time.
+    leave the cut, with run-out for longer, and the engagement may change along the edge; a worn flank rubs only while it moves into
+    the material, twice as much as the equivalent viscous force of the other methods, half of the time.
 
     Parameters
     ----------
@@ -98,7 +99,7 @@ class TimeDomain:
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""
-        modes = modes_of(tip, self.name)
+        modes = require_modes(tip, self.name)
         limit = np.full(speeds.size, np.inf)
         chatter, lobe = np.full(speeds.size, np.nan), np.full(speeds.size, -1, dtype=np.intp)
         flip = np.zeros(speeds.size, dtype=bool)
@@ -132,7 +133,7 @@ def milling_history(
     """
     if process.feed_per_tooth is None:
         raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m] of the cut to simulate")
-    cut = _Cut(modes_of(tip, TimeDomain.name), process, positive("speed", speed, "rad/s"), leaves=True)
+    cut = _Cut(require_modes(tip, TimeDomain.name), process, positive("speed", speed, "rad/s"), leaves=True)
     run = cut.begin(positive("depth", depth, "m")).pushed(push)
     samples = run.march(int(np.ceil(positive("revolutions", revolutions) * cut.per_turn)))
     back = process.machine_from_feed.T
@@ -145,17 +146,16 @@ class _Run:
     """A simulation that goes on."""
 
     cut: _Cut
-    plan: FloatArray
-    lag: FloatArray
-    state: ComplexArray
-    force: FloatArray
-    past: FloatArray
+    plan: kernels.TimePlan
+    slices: FloatArray
+    memory: kernels.Memory
     number: int
 
     def pushed(self, push: float) -> _Run:
         """Return a copy whose modes are pushed aside by about `push` [m] at the tip, and the surface that it left as well."""
-        aside = push * np.exp(1j * np.arange(self.state.size))
-        return _Run(self.cut, self.plan, self.lag, self.state + aside, self.force.copy(), self.past + push, self.number)
+        state, force, past = self.memory
+        aside = push * np.exp(1j * np.arange(state.size))
+        return _Run(self.cut, self.plan, self.slices, kernels.Memory(state + aside, force.copy(), past + push), self.number)
 
     def settle(self, tolerance: float) -> bool:
         """Go to the state that a period repeats, stable or not: Anderson's acceleration of one period after the other.
@@ -169,7 +169,7 @@ class _Run:
             self.march(self.cut.per_period)
             after = self.vector
             change = after - x
-            if np.max(np.abs(change[-self.past.size :])) < tolerance:
+            if np.max(np.abs(change[-self.memory.past.size :])) < tolerance:
                 return True
             states.append(after)
             changes.append(change)
@@ -185,24 +185,26 @@ class _Run:
     @property
     def vector(self) -> FloatArray:
         """State, force and past as one vector, the past from the newest on; scaled to displacements."""
-        order = (self.number - 1 - np.arange(self.past.shape[0])) % self.past.shape[0]
-        return np.concatenate([self.state.real, self.state.imag, self.force * self.cut.softness, self.past[order].ravel()])
+        state, force, past = self.memory
+        return np.concatenate([state.real, state.imag, force * self.cut.softness, past[self._newest_first].ravel()])
 
     @vector.setter
     def vector(self, values: FloatArray) -> None:
-        m = self.state.size
-        order = (self.number - 1 - np.arange(self.past.shape[0])) % self.past.shape[0]
-        self.state[:] = values[:m] + 1j * values[m : 2 * m]
-        self.force[:] = values[2 * m : 2 * m + 2] / self.cut.softness
-        self.past[order] = values[2 * m + 2 :].reshape(-1, 2)
+        state, force, past = self.memory
+        m = state.size
+        state[:] = values[:m] + 1j * values[m : 2 * m]
+        force[:] = values[2 * m : 2 * m + 2] / self.cut.softness
+        past[self._newest_first] = values[2 * m + 2 :].reshape(-1, 2)
+
+    @property
+    def _newest_first(self) -> NDArray[np.intp]:
+        count = self.memory.past.shape[0]
+        return (self.number - 1 - np.arange(count)) % count
 
     def march(self, count: int) -> FloatArray:
         """Return tip, velocity and force of the next steps, feed and normal, shape (count, 6)."""
         samples = np.empty((count, 6))
-        c = self.cut
-        kernels.simulate(
-            c.pole, c.outputs, c.inputs, c.constant, c.teeth, self.lag, self.plan, self.state, self.force, self.past, self.number, samples
-        )
+        kernels.simulate(self.cut.arrays, self.cut.teeth, self.slices, self.plan, self.memory, self.number, samples)
         self.number += count
         return samples
 
@@ -215,19 +217,17 @@ class _Cut:
         self.feed = process.feed_per_tooth or _FEED
         if process.feed_per_tooth is None and np.ptp(process.cutter.runout) > 0.0:
             raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: with run-out it decides which teeth cut")
-        if process.engagement_profile is not None:
-            allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
-            raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
         turn = process.machine_from_feed
-        self.pole = modes.pole.copy()
-        self.outputs = np.ascontiguousarray(turn.T @ modes.outputs)
-        self.inputs = np.ascontiguousarray(modes.inputs @ turn)
-        self.constant = turn.T @ modes.constant @ turn
+        outputs, inputs = turn.T @ modes.outputs, modes.inputs @ turn
         cutter, teeth = process.cutter, process.cutter.teeth
         # modes scaled so that each moves the tip alike
-        size = np.linalg.norm(self.outputs, axis=0)
+        size = np.linalg.norm(outputs, axis=0)
         size[size == 0.0] = 1.0
-        self.outputs, self.inputs, self.softness = self.outputs / size, self.inputs * size[:, None], modes.largest
+        constant = turn.T @ modes.constant @ turn
+        self.arrays = ModeArrays(
+            modes.pole.copy(), np.ascontiguousarray(outputs / size), np.ascontiguousarray(inputs * size[:, None]), constant
+        )
+        self.softness = modes.largest
         strength = modes.strength
         self.highest = float(np.max(np.abs(modes.pole)[strength >= _WEAK * strength.max()]))
         slowest = speed * (1.0 - (process.speed_variation.amplitude if process.speed_variation else 0.0))
@@ -266,40 +266,51 @@ class _Cut:
         """Return a cut in the steady state of equal teeth, where nothing regenerates."""
         process = self.process
         c, d, v = process.coefficients, process.damping, process.speed_variation
-        whole = 2.0 * depth * np.tan(process.cutter.helix) / process.cutter.diameter
-        slices = max(1, int(np.ceil(_SLICES * whole)))
-        plan = np.zeros(kernels.COUNT)
-        plan[:] = (
-            self.step,
-            self.speed,
-            c.tangential,
-            c.tangential * c.radial_ratio,
-            c.tangential_edge,
-            c.radial_edge,
-            process.engagement.entry,
-            process.engagement.exit,
-            0.0 if d is None else (2.0 if self.leaves else 1.0) * d.strength,
-            0.0 if d is None else d.friction,
-            0.5 * process.cutter.diameter,
-            depth / slices,
-            0.0 if v is None else v.amplitude,
-            0.0 if v is None else v.ratio,
-            float(self.leaves),
-            0.0,
+        plan = kernels.TimePlan(
+            step=float(self.step),
+            speed=float(self.speed),
+            k_tangential=float(c.tangential),
+            k_radial=float(c.tangential * c.radial_ratio),
+            edge_tangential=float(c.tangential_edge),
+            edge_radial=float(c.radial_edge),
+            rub=0.0 if d is None else (2.0 if self.leaves else 1.0) * float(d.strength),
+            friction=0.0 if d is None else float(d.friction),
+            radius=float(0.5 * process.cutter.diameter),
+            swing=0.0 if v is None else float(v.amplitude),
+            swings=0.0 if v is None else float(v.ratio),
+            leaves=self.leaves,
+            regenerate=False,
         )
-        lag = whole * (np.arange(slices) + 0.5) / slices
-        run = _Run(self, plan, lag, np.zeros_like(self.pole), np.zeros(2), np.zeros((self.per_turn + 2, 2)), 0)
+        memory = kernels.Memory(np.zeros_like(self.arrays.pole), np.zeros(2), np.zeros((self.per_turn + 2, 2)))
+        run = _Run(self, plan, self._slices(depth), memory, 0)
         # from rest through one period of a force that knows no vibration: what is left decides on the state that repeats itself;
         # a period before that one, for a tooth may be in the cut where it begins
-        turns = int(np.ceil(run.past.shape[0] / self.per_period))
+        turns = int(np.ceil(memory.past.shape[0] / self.per_period))
         run.march(self.per_period)
-        run.state[:] = 0.0
+        memory.state[:] = 0.0
         run.march(self.per_period)
         duration = float(np.diff(self.time(self.step * np.array([0.0, self.per_period])))[0])
-        run.state /= 1.0 - np.exp(self.pole * duration)
+        memory.state[:] /= 1.0 - np.exp(self.arrays.pole * duration)
         run.march(turns * self.per_period)
-        plan[kernels.REGENERATE] = 1.0
+        run.plan = plan._replace(regenerate=True)
         return run
+
+    def _slices(self, depth: float) -> FloatArray:
+        """Slices of the edge as the kernel wants them, shape (s, 4)."""
+        process = self.process
+        whole = 2.0 * depth * np.tan(process.cutter.helix) / process.cutter.diameter
+        count = max(1, int(np.ceil(_SLICES * whole)))
+        if process.engagement_profile is None:
+            rows = np.array([[0.0, 1.0, process.engagement.entry, process.engagement.exit]])
+        else:
+            rows = process.engagement_profile(self.speed, depth)
+        each = int(np.ceil(count / len(rows)))
+        parts = [
+            [whole * upper + whole * (lower - upper) * (k + 0.5) / each, start, end, depth * (lower - upper) / each]
+            for upper, lower, start, end in rows
+            for k in range(each)
+        ]
+        return np.array(parts)
 
     def growth(self, depth: float, periods: int) -> float:
         """Return the logarithm of the growth of a disturbance per tooth period."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.poles import PoleResidue, frequencies
@@ -122,14 +123,29 @@ class TipModes(PoleResidue):
         return f"tip: {frequencies('modes', np.abs(self.pole))}"
 
 
+class ModeArrays(NamedTuple):
+    """What kernels take of modes, p' = pole p + inputs F, y = 2 Re(outputs p) + constant F, with m modes and r displacements.
+
+    The order is that in which the kernels unpack it. They are compiled anew for read-only arrays: these are not.
+    """
+
+    #: Complex, shape (m,).
+    pole: ComplexArray
+    #: Complex, shapes (r, m), (m, r).
+    outputs: ComplexArray
+    inputs: ComplexArray
+    #: Shape (r, r).
+    constant: FloatArray
+
+
 def fitted_modes(tip: Receptance) -> tuple[TipModes, float]:
     """Return modes that stand for the tip's receptance, and how far they are beside it: the norm of what is left, as a share."""
     found, error = fitted_poles(tip.omega, tip.values, FIT_TOLERANCE, DAMPED_OUTSIDE)
     return TipModes.joined([found]), error
 
 
-def modes_of(tip: Receptance | TipModes, method: str) -> TipModes:
-    """Return the modes that a method marches with."""
+def require_modes(tip: Receptance | TipModes, method: str) -> TipModes:
+    """Return the modes that a method marches with, or say what it needs."""
     if isinstance(tip, TipModes):
         return tip
     raise InputError(

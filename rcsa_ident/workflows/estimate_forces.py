@@ -131,9 +131,10 @@ def observe(
     top = min(identified[1], HIGHEST * 2.0 * np.pi * cut.rate)
     steady = steady_record(cut, axes, programmed, top / (2.0 * np.pi), teeth)
     speed = steady.spindle_speed
-    notes = list(speed_faults(steady.displacement, steady.lines, programmed))
+    notes: list[str] = [*speed_faults(steady.displacement, steady.lines, programmed)]
     _periodic(steady, programmed, notes)
-    band = _band(identified, top, speed, teeth, notes)
+    answers = identified if machine.ends else (0.0, np.inf)
+    band = _band(identified, max(BELOW * identified[0], answers[0]), top, speed, teeth, notes)
     run_out = _run_out(steady, air, axes, programmed, top, teeth, notes)
     known = machine.speed_range
     if known is not None and not known[0] * (1.0 - 1e-9) <= speed <= known[1] * (1.0 + 1e-9):
@@ -142,6 +143,7 @@ def observe(
             f"the machine was identified from {low:.0f} to {high:.0f} rev/min, the recording was made at {to_rpm(speed):.0f} rev/min"
         )
     omega = 2.0 * np.pi * np.arange(max(0.25 * band[0] / (2.0 * np.pi), STEP_HZ), 1.3 * band[1] / (2.0 * np.pi), STEP_HZ)
+    omega = omega[(omega >= answers[0]) & (omega <= answers[1])]
     here = machine.at(speed)
     coupled = here.coupled(assembly, omega, axes)
     tuning = {axis: Tuning(_noise(steady, i), bandwidth or band[1], _response_time(method, speed)) for i, axis in enumerate(axes)}
@@ -199,10 +201,9 @@ def _periodic(steady: SteadyRecord, programmed: float, notes: list[str]) -> None
         notes.append(f"{100.0 * (1.0 - share):.0f} % of the vibration is not at orders of the spindle: chatter, or an unsteady cut")
 
 
-def _band(identified: tuple[float, float], top: float, speed: float, teeth: int, notes: list[str]) -> tuple[float, float]:
+def _band(identified: tuple[float, float], low: float, top: float, speed: float, teeth: int, notes: list[str]) -> tuple[float, float]:
     """Where forces are estimated, and what that leaves out."""
     hz = 2.0 * np.pi
-    low = BELOW * identified[0]
     if low >= 0.9 * top:
         raise InputError("band", f"{low / hz:.0f} to {top / hz:.0f} Hz", "one that the sampling rate can hold")
     fundamental = speed * teeth

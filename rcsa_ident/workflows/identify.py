@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,27 +13,22 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.data import IdentificationData, prepare
+from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.identification.progress import Progress
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.remarks import Remark
+from rcsa_ident.scaleout import Map
 from rcsa_ident.signals.measurement import Reading, measure_cut
 from rcsa_ident.signals.recording import Recording
-from rcsa_ident.signals.verdict import Verdict
+from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 
-Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 #: Change of an unknown (all are logarithms or of order one) from which a slope is taken.
 _STEP = 1e-5
 #: Reads the recordings of a cut: the cut itself, and its air cut where there is one.
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
-
-
-class Method(Protocol):
-    """An identification method: an object that carries its settings."""
-
-    def run(self, data: IdentificationData, seed: int, map: Map) -> Identification:
-        """Return modes and joint."""
-        ...
 
 
 def judge(campaign: Campaign, read: ReadCut, map: Map = map, progress: Callable[[int, int], None] | None = None) -> list[Reading]:
@@ -64,7 +58,7 @@ def judge_cut(campaign: Campaign, read: ReadCut, cut: Cut) -> Reading:
         cutter = campaign.toolings[cut.tooling].cutter
         return measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, campaign.workpiece.coefficients)
     except InputError as error:
-        return Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((f"unreadable: {error}",)))
+        return Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((Remark(RecordCode.UNREADABLE, f"unreadable: {error}"),)))
 
 
 def left_out(readings: Iterable[Reading]) -> list[tuple[str, str]]:
@@ -72,15 +66,34 @@ def left_out(readings: Iterable[Reading]) -> list[tuple[str, str]]:
     return [(each.cut_id, "; ".join(each.verdict.reasons)) for each in readings if not each.verdict.usable]
 
 
-def identify(campaign: Campaign, readings: Sequence[Reading], method: Method, seed: int, map: Map = map) -> Identification:
+def identify(
+    campaign: Campaign, readings: Sequence[Reading], method: Method, seed: int, map: Map = map, progress: Progress | None = None
+) -> Identification:
     """Return modes and joint from the usable cuts.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    readings : sequence of Reading
+        As `judge` returns them.
+    method : Method
+    seed : int
+        Same seed, same answer, whatever `map` is.
+    map : callable
+        The builtin, or a pool's: the method's long work goes through it.
+    progress : callable, optional
+        Told of every step of the search; with a pool's map it has to be picklable.
 
     Raises
     ------
     InputError
         If no cut is usable.
     """
-    found = method.run(data_of(campaign, readings), seed, map)
+    return of_campaign(method.run(data_of(campaign, readings), seed, map, progress), campaign)
+
+
+def of_campaign(found: Identification, campaign: Campaign) -> Identification:
+    """Return the identification with what its machine has to know of the campaign: name, workpiece and sensors."""
     return replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors)
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.machining_setup import Tooling, Workpiece
+from rcsa_ident.scaleout import Map
 from rcsa_ident.virtual.campaign import SimulatedCut, SimulatedRecord, TrueFlange, TrueReceptances
 from rcsa_ident.virtual.machine import CutPlan, VirtualSpindle
 from rcsa_ident.virtual.milling import CutHistory, mill_cut, synchronous_lines
@@ -53,9 +54,7 @@ class _Job:
     rng: np.random.Generator
 
 
-def simulate(
-    setup: VirtualSetup, toolings: Sequence[Tooling], seed: int, map: Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]] = map
-) -> Iterator[SimulatedCut]:
+def simulate(setup: VirtualSetup, toolings: Sequence[Tooling], seed: int, map: Map = map) -> Iterator[SimulatedCut]:
     """Yield every tooling's cut at every speed of the plan, in order.
 
     Parameters

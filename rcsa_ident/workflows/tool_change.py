@@ -187,7 +187,7 @@ def advise(
         Cuts that were tried: how many do the limits tell right?
     """
     process = change.process
-    wide = change.limits(pad_speeds(change.speeds, tolerance, [speed for speed, _ in planned]))
+    wide = _limits_beside(change, pad_speeds(change.speeds, tolerance, [speed for speed, _ in planned]))
     low, high = float(np.min(change.speeds)), float(np.max(change.speeds))
     usable = usable_depths(wide, process, drive, tolerance, probability, reserve).between(low, high)
     lobes = wide.between(low, high)
@@ -202,6 +202,17 @@ def advise(
         None if tested is None else classify_tested_cuts(change, tested),
         change.remarks(lobes),
     )
+
+
+def _limits_beside(change: ToolChange, speeds: FloatArray) -> StabilityLobes:
+    """Limits at the speeds that were asked for, among further ones beside them."""
+    if change.machine.speed_range is None:
+        return change.limits(speeds)
+    # close speeds share the machine at their middle, which those that nobody has asked for shall not move
+    known = np.unique(change.speeds)
+    asked = np.searchsorted(known, speeds * (1.0 - 1e-9)) < np.searchsorted(known, speeds * (1.0 + 1e-9))
+    places = [np.flatnonzero(part) for part in (asked, ~asked) if part.any()]
+    return StabilityLobes.joined([change.limits(speeds[own]) for own in places], places)
 
 
 def classify_tested_cuts(change: ToolChange, cuts: TestedCuts) -> Tally:

@@ -65,7 +65,7 @@ class Near:
 
 SQLITE, POSTGRESQL = "sqlite", "postgresql"
 #: For tests of what both databases promise.
-BOTH = pytest.mark.parametrize("store", [SQLITE, POSTGRESQL], indirect=True)
+BOTH = pytest.mark.parametrize("store", [SQLITE, pytest.param(POSTGRESQL, marks=pytest.mark.slow)], indirect=True)
 
 
 def database(request: pytest.FixtureRequest, kind: str, folder: Path) -> str:

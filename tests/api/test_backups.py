@@ -71,6 +71,7 @@ def answers(folder: Path, scratch: Path) -> list[object]:
     return told
 
 
+@pytest.mark.slow
 def test_a_restored_service_answers_as_the_other_did(data, tmp_path):
     expected = answers(data, tmp_path / "scratch")
     account = backup(data, tmp_path / "b.tar")
@@ -91,6 +92,7 @@ def test_a_restored_service_answers_as_the_other_did(data, tmp_path):
         assert tar.getnames()[-1] == "manifest.json"
 
 
+@pytest.mark.slow
 def test_while_somebody_writes(tmp_path):
     """A backup is the store at one moment: of toolings written one after the other a first part, and every file that a row refers to."""
     folder = tmp_path / "data"
@@ -166,6 +168,7 @@ def test_what_is_missing_or_damaged_is_told(data, tmp_path):
     assert len(restore(tmp_path / "b.tar", tmp_path / "new").missing) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("member", [1, 2, 4, 7])
 def test_killed_at_any_member_nothing_has_the_name_of_a_backup(data, tmp_path, member):
     code = f"""

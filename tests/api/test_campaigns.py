@@ -110,6 +110,7 @@ def _file(client, name):
     return path
 
 
+@pytest.mark.slow
 def test_what_happens_to_the_library_later_does_not_matter(client, machine):
     client.write_tooling("T1", TOOLING)
     made = client.make_campaign(machine, declared(toolings={"T1": "T1"}))
@@ -188,6 +189,7 @@ def test_what_is_wrong_is_named(client, machine, changed, field):
     assert list(client.campaigns(machine)) == []
 
 
+@pytest.mark.slow
 def test_forms_that_are_none(client, machine):
     for data in ({}, {"cuts": []}, declared() | {"cuts": "x"}, declared(further=1), declared(toolings={"T1": 7})):
         refused(422, client.make_campaign, machine, data)

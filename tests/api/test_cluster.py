@@ -20,12 +20,14 @@ def cluster():
         yield found.scheduler_address
 
 
+@pytest.mark.slow
 def test_work_is_done_elsewhere_in_order(cluster):
     found = list(over_cluster(cluster)(tasks.late, [1.0, 0.0, 4.0]))
     assert [task for task, _ in found] == [1.0, 0.0, 4.0]
     assert os.getpid() not in {process for _, process in found}
 
 
+@pytest.mark.slow
 def test_an_error_of_the_work_is_none_of_the_cluster(cluster):
     answers = over_cluster(cluster)(tasks.picky, [1, 2, 3])
     assert next(answers) == 1
@@ -46,6 +48,7 @@ def away(address, timeout):
     return cluster_map(address, timeout)
 
 
+@pytest.mark.slow
 def test_a_cluster_that_goes_away_in_the_middle(caplog):
     """The answers it gave are kept, the others are computed here, each once."""
     from distributed import LocalCluster
@@ -61,6 +64,7 @@ def test_a_cluster_that_goes_away_in_the_middle(caplog):
     assert "the cluster has lost work: the rest is done here" in [record.getMessage() for record in caplog.records]
 
 
+@pytest.mark.slow
 def test_setting():
     assert from_environment({"RCSA_IDENT_DASK": "tcp://scheduler:8786"}).dask == "tcp://scheduler:8786"
     assert from_environment({}).dask == ""

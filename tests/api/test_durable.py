@@ -14,6 +14,8 @@ from sqlalchemy import create_engine, text
 from tests.api.in_process import POSTGRESQL, SQLITE, database
 from tests.fixtures.waiting import PATIENCE
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 #: Carries jobs out until all are over, or dies in a step; each line of its output is a step that it computed.
 SCRIPT = """

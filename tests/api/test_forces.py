@@ -79,6 +79,7 @@ def campaign(shop):
     return id
 
 
+@pytest.mark.slow
 def test_forces_of_an_upload_are_true(shop):
     http, machine = shop
     answer = post(http, machine, air=file(*AIR))
@@ -105,6 +106,7 @@ def test_forces_of_an_upload_are_true(shop):
         assert lines[4]["amplitude_n"] == pytest.approx(amplitude[4, i], rel=0.04)
 
 
+@pytest.mark.slow
 def test_every_sample_as_a_file(shop, tmp_path):
     http, machine = shop
     answer = post(http, machine, air=file(*AIR), accept="text/csv")
@@ -120,12 +122,14 @@ def test_every_sample_as_a_file(shop, tmp_path):
     assert not [path for path in http.app.state.components.files.folder.rglob("*") if path.is_file() and "parts" in str(path)]
 
 
+@pytest.mark.slow
 def test_without_an_air_cut_it_is_told(shop):
     http, machine = shop
     found = post(http, machine).json()
     assert any("no air cut" in note for note in found["notes"])
 
 
+@pytest.mark.slow
 def test_mean_wear_smoothing_and_the_papers_method(shop):
     http, machine = shop
     cut = {"axial_depth_mm": 1.0, "feed_per_tooth_mm": 0.15, "immersion": 0.5, "strategy": "down"}
@@ -140,6 +144,7 @@ def test_mean_wear_smoothing_and_the_papers_method(shop):
     assert paper["axes"]["X"]["rms_n"] != found["axes"]["X"]["rms_n"]
 
 
+@pytest.mark.slow
 def test_a_recording_of_a_campaign_with_its_air_cut(shop, campaign):
     http, machine = shop
     body = {"machine": machine, "campaign": campaign, "recording": "c0_cut.h5"}
@@ -164,6 +169,7 @@ def fields(answer):
     return [error["field"] for error in answer.json().get("errors", [])]
 
 
+@pytest.mark.slow
 def test_bad_queries_are_named(shop):
     http, machine = shop
     for change, status, field in (
@@ -186,6 +192,7 @@ def test_bad_queries_are_named(shop):
         assert field is None or field in fields(answer), (change, answer.text)
 
 
+@pytest.mark.slow
 def test_bad_files_are_named(shop):
     http, machine = shop
     lost = signals(*CUT)
@@ -206,6 +213,7 @@ def test_bad_files_are_named(shop):
         assert "/" not in answer.json()["detail"].replace("rev/min", "").replace("and/or", ""), answer.text
 
 
+@pytest.mark.slow
 def test_bad_forms(shop):
     http, machine = shop
     kind = {"Content-Type": "multipart/form-data; boundary=b"}
@@ -228,6 +236,7 @@ def test_bad_forms(shop):
     assert http.post("/v1/forces", files=files).status_code == 422
 
 
+@pytest.mark.slow
 def test_an_identification_without_sensors(tmp_path):
     with streaming(tmp_path) as (http, _):
         machine = http.post("/v1/machines", json={"name": "other"}).json()["id"]
@@ -240,6 +249,7 @@ def test_an_identification_without_sensors(tmp_path):
         assert post(http, machine, sensors=SENSORS).status_code == 200
 
 
+@pytest.mark.slow
 def test_a_replay_gives_the_forces_of_the_recording(shop, campaign, tmp_path):
     """To the last digit, through the same path as a live stream, at a hundred times its pace."""
     http, machine = shop
@@ -260,6 +270,7 @@ def test_a_replay_gives_the_forces_of_the_recording(shop, campaign, tmp_path):
     np.testing.assert_allclose(joined(frames), expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_a_replay_keeps_its_pace_and_takes_no_samples(shop, campaign):
     http, machine = shop
     with http.websocket_connect(STREAM) as socket:
@@ -276,6 +287,7 @@ def test_a_replay_keeps_its_pace_and_takes_no_samples(shop, campaign):
     assert (code, problem["status"]) == (1003, 415)
 
 
+@pytest.mark.slow
 def test_an_uploaded_air_cut_serves_a_live_stream(shop, campaign):
     http, machine = shop
     first = {
@@ -292,6 +304,7 @@ def test_an_uploaded_air_cut_serves_a_live_stream(shop, campaign):
     assert np.all(relative_error(joined(frames), true, RATE) < 0.05)
 
 
+@pytest.mark.slow
 def test_the_client_asks_for_forces(shop, campaign, tmp_path):
     http, machine = shop
     client = Client(http=http)

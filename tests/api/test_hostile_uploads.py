@@ -204,6 +204,7 @@ def test_rates_that_no_machine_has(campaign, tmp_path, rate):
     assert answer.status_code == 422 or not answer.json()["verdict"]["usable"]
 
 
+@pytest.mark.slow
 def test_as_many_samples_as_are_allowed_cost_words_or_a_verdict(campaign, tmp_path):
     """Half a minute of four channels is more than 512 MiB can judge or not: either way an answer, and the process goes on."""
     path = tmp_path / "x.h5"
@@ -271,6 +272,7 @@ def test_a_form_that_breaks_off_is_told(campaign):
     assert campaign.http.post(path, content=head + b"\r\n--x--", headers=kind).status_code == 200
 
 
+@pytest.mark.slow
 def test_a_form_of_very_many_parts(campaign):
     path = campaign.paths["x", ".h5"].rsplit("/", 1)[0]
     part = b"--x\r\nContent-Disposition: form-data; name=f; filename=a\r\n\r\n\r\n"
@@ -278,6 +280,7 @@ def test_a_form_of_very_many_parts(campaign):
     assert answer.status_code == 413
 
 
+@pytest.mark.slow
 def test_declared_sizes_of_every_format_are_looked_at_first(campaign):
     """A RIFF file of 4 GB in a hundred bytes, a TDMS of 2^60 values."""
     form = struct.pack("<HHIIHH", 1, 1, 51200, 102400, 2, 16)

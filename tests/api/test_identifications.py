@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import threading
 import time
 import zipfile
@@ -18,12 +19,13 @@ from typer.testing import CliRunner
 from api.client import Client
 from api.jobs import identification as work
 from api.jobs.event_feed import Crowded, EventFeeds
-from api.jobs.job_context import JobContext
+from api.jobs.job_context import STARTS_OVER, JobContext
 from api.security import new_id, now
 from api.stores.entities import Machine
 from api.stores.jobs import Event, Job, Outcome
 from rcsa_ident.cli import app
 from rcsa_ident.errors import InputError
+from rcsa_ident.identification.method import Phase
 from rcsa_ident.io.recordings import read_cut
 from rcsa_ident.io.setups import read_campaign
 from tests.api import identifying
@@ -50,6 +52,7 @@ def done(tmp_path_factory):
     store.close()
 
 
+@pytest.mark.slow
 def test_an_identification_from_end_to_end(done):
     client, machine, campaign, id, *_ = done
     job = client.job(id)
@@ -79,6 +82,7 @@ def test_an_identification_from_end_to_end(done):
     assert client.send("GET", f"/machines/{machine}/identification").text == client.result(id)
 
 
+@pytest.mark.slow
 def test_it_is_what_the_commands_find(done, tmp_path):
     """Same recordings and seed, same file, byte for byte."""
     client, _, _, id, *_ = done
@@ -94,6 +98,7 @@ def test_it_is_what_the_commands_find(done, tmp_path):
     assert (tmp_path / "RESULT.json").read_text(encoding="utf-8") == client.result(id)
 
 
+@pytest.mark.slow
 def test_what_is_told_on_the_way(done):
     client, _, _, id, *_ = done
     events = list(client.events(id))
@@ -110,6 +115,7 @@ def test_what_is_told_on_the_way(done):
     assert all(value > 0.0 for value in fit["model_abs"])
 
 
+@pytest.mark.slow
 def test_a_lost_connection_goes_on_where_it_was_lost(done):
     client, _, _, id, *_ = done
     text = client.http.get(f"/v1/identifications/{id}/events").text
@@ -123,12 +129,14 @@ def test_a_lost_connection_goes_on_where_it_was_lost(done):
         assert rest.text.rstrip().splitlines()[-2] == "event: end"
 
 
+@pytest.mark.slow
 def test_the_same_key_is_the_same_job(done):
     client, _, campaign, id, *_ = done
     assert client.identify_campaign(campaign, seed=3, repeat="k").id == id
     refused(409, client.identify_campaign, campaign, seed=4, repeat="k")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("killed_after", [1, 4])
 def test_a_killed_job_goes_on_and_finds_the_same(done, killed_after):
     """The process is gone after so many steps: what was remembered is not done again, and the answer is the same to the last bit."""
@@ -145,6 +153,51 @@ def test_a_killed_job_goes_on_and_finds_the_same(done, killed_after):
     assert all(steps.texts[second, name] == engine.texts[id, name] for name in names)
 
 
+@pytest.mark.slow
+def test_a_job_that_an_earlier_version_began_starts_over(done):
+    """Its steps are in a form that nobody reads any more: the same bytes come out as if it had never begun, and it says so."""
+    client, _, campaign, id, engine, store, folder = done
+    second = client.identify_campaign(campaign, seed=3, apply=False).id
+    store.jobs.begin(second, "earlier", now())
+    store.jobs.tell(second, "earlier", [], json.dumps({"stage": "search", "done": 0, "total": 1}))
+    steps = Steps()
+    old = {"plan": [[cut.id, "x.h5", ""] for cut in client.campaign(campaign).cuts], "1_search_axis.0": {"~AxisSearch": {"solutions": []}}}
+    steps.texts = {(second, name): json.dumps({"~table": [["value", value]]}) for name, value in old.items()}
+    carried(store, folder, steps)
+    # the engine has seen it end, and forgets it
+    assert client.job(second).state == "running"
+    assert steps.computed == []
+    fresh = carried(store, folder)
+    assert client.job(second).state == "done"
+    assert client.result(second) == client.result(id)
+    assert [name for _, name in fresh.computed] == [name for job, name in engine.computed if job == id]
+    notes = [data["text"] for kind, data in client.events(second) if kind == "note"]
+    assert notes == [STARTS_OVER]
+    assert "starts over from its recordings" in notes[0]
+
+
+@pytest.mark.slow
+def test_what_a_job_keeps_is_documented(done):
+    """Nouns that methods promise to answer with, and none of the equations behind them."""
+    *_, id, engine, _, _ = done
+    kept = {noun for (job, _), text in engine.texts.items() if job == id for noun in re.findall(r'"~([A-Z]\w+)"', text)}
+    assert kept <= {
+        "Reading",
+        "Verdict",
+        "Remark",
+        "CutMeasurement",
+        "AxisLines",
+        "AxisSearch",
+        "Candidate",
+        "Layout",
+        "AxisLayout",
+        "Step",
+    }
+    names = [name for job, name in engine.computed if job == id]
+    assert {name.split(".")[1] for name in names if name[0].isdigit()} == {phase.name.lower() for phase in (Phase.SEARCH, Phase.BOTH_AXES)}
+
+
+@pytest.mark.slow
 def test_going_on_from_an_earlier_answer(done):
     client, machine, campaign, _, _, store, folder = done
     before = client.send("GET", f"/machines/{machine}/identification").text
@@ -159,6 +212,7 @@ def test_going_on_from_an_earlier_answer(done):
     assert len(engine.computed) >= 4
 
 
+@pytest.mark.slow
 def test_lists(done):
     client, machine, campaign, id, *_ = done
     found = list(client.jobs(limit=1, machine=machine, campaign=campaign))
@@ -185,7 +239,7 @@ def test_what_can_not_be_identified(client, store, tmp_path, result):
     for axis in bare["axes"].values():
         del axis["covariance"]
     client.identify(machine, json.dumps(bare))
-    assert "without a covariance" in refused(422, client.identify_campaign, empty, start=True).detail
+    assert "no covariance" in refused(422, client.identify_campaign, empty, start=True).detail
     assert list(client.jobs()) == []
 
 
@@ -248,6 +302,7 @@ def test_cancelled_while_it_waits(client, store, tmp_path):
     refused(409, client.found_modes, id)
 
 
+@pytest.mark.slow
 def test_cancelled_while_it_runs(client, store, tmp_path):
     """It stops within moments, has no result, and the machine stays as it was."""
     machine = client.make_machine("M").id
@@ -267,7 +322,7 @@ def test_cancelled_while_it_runs(client, store, tmp_path):
     assert client.job(id).state == "cancelled"
     refused(409, client.result, id)
     assert client.machine(machine).identification is None
-    assert not any(name.startswith("3") for _, name in engine.computed)
+    assert not any(Phase.BOTH_AXES.name.lower() in name for _, name in engine.computed)
 
 
 def test_a_query_that_waits_for_the_end(client, store):

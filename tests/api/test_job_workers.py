@@ -16,11 +16,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from api.jobs import job_context as desks
-from api.jobs.backend import Carried
+from api.jobs.backend import VERSION, Carried
+from api.jobs.codec import encode
 from api.jobs.job_context import JobContext
 from api.jobs.worker import LEASE, JobWorker, carry, gone, place, process
 from api.security import now
-from api.stores.jobs import Worker
+from api.stores.jobs import Outcome, Worker
 from rcsa_ident.errors import InputError
 from tests.api.identifying import Steps, job, left, running
 from tests.fixtures.waiting import until
@@ -103,6 +104,95 @@ def test_wherever_it_is_interrupted_each_task_is_done_once(calls, killed_after):
     assert done == [x for tasks in calls for x in tasks]
 
 
+def written_before(value):
+    """A step's text as the first version wrote it, which did not say so."""
+    return json.dumps({"~table": [["value", value]]})
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        written_before([["c0", "c0.h5", ""]]),
+        written_before({"~Solution": {"theta": 1}}),
+        encode({"version": "1", "value": 1}),
+        encode({"version": VERSION, "value": 1}).replace('"value"', '"~Unheard": 1, "value"'),
+        "no text at all",
+    ],
+)
+def test_a_step_of_another_version_is_not_read(quiet, text):
+    quiet.steps.texts[quiet.id, "a"] = text
+    with quiet.desk() as desk, pytest.raises(desks.Outdated):
+        desk.remember("a", lambda: pytest.fail("computed beside what is remembered"))
+    assert quiet.codes == []
+
+
+def test_a_job_of_another_version_starts_over_and_says_so(store, machine):
+    """The engine sees it end and forgets it, since the job's row is open still; then it is carried out from its first step on."""
+    id = store.jobs.add(job(machine), {}, 10).id
+    steps, done = Steps(), []
+
+    def carrier(_job, desk):
+        for name in ("plan", "search"):
+            done.append(desk.remember(name, lambda name=name: name))
+            desk.progress(name, 1, 1)
+        return Outcome("done", "")
+
+    def carried():
+        carry(store.jobs, {"identification": carrier}, "w", 3, id, partial(steps.remember, id), left)
+        notes = [json.loads(event.data)["text"] for event in store.jobs.events(id, 0, 100) if event.kind == "note"]
+        return store.jobs.find(id).state, notes
+
+    # an earlier version had come to its second step
+    store.jobs.begin(id, "old", now())
+    store.jobs.tell(id, "old", [], json.dumps({"stage": "plan", "done": 1, "total": 1}))
+    steps.texts = {(id, name): written_before(name) for name in ("plan", "search")}
+    assert carried() == ("running", [])
+    assert steps.computed == []
+    worker = worker_of(store, Carried(id, "over"))
+    worker.submitted = {id}
+    worker.round()
+    worker.look()
+    assert worker.backend.calls == [("forget", id), ("submit", id, 10)]
+    steps.texts.clear()
+    state, notes = carried()
+    assert state == "done"
+    assert notes == [desks.STARTS_OVER]
+    assert done == ["plan", "search"]
+
+
+def test_a_job_that_goes_on_says_nothing_of_starting_over(store, machine):
+    id = store.jobs.add(job(machine), {}, 10).id
+    steps = Steps()
+
+    class Killed(BaseException):
+        pass
+
+    def carrier(found, desk):
+        desk.remember("plan", lambda: 1)
+        desk.progress("plan", 1, 1)
+        if found.progress is None:
+            desk._deliver()
+            raise Killed
+        desk.remember("search", lambda: 2)
+        return Outcome("done", "")
+
+    def carried():
+        carry(store.jobs, {"identification": carrier}, "w", 3, id, partial(steps.remember, id), left)
+
+    with pytest.raises(Killed):
+        carried()
+    carried()
+    assert store.jobs.find(id).state == "done"
+    assert "note" not in [event.kind for event in store.jobs.events(id, 0, 100)]
+
+
+def test_a_step_that_cannot_be_read_back_at_once_is_a_fault(quiet, monkeypatch):
+    """Not an old text: the job would start over for ever."""
+    monkeypatch.setattr(desks, "_read", lambda text: None)
+    with quiet.desk() as desk, pytest.raises(desks.Faulty):
+        desk.remember("a", lambda: 1)
+
+
 def test_refusals_are_remembered_as_such(quiet):
     def refuse():
         raise InputError("cuts", 3, "more", "here")
@@ -146,7 +236,7 @@ def test_a_job_that_is_cancelled_stops_where_it_looks_up(quiet):
         quiet.store.jobs.cancel("A", quiet.id, now())
 
         with pytest.raises(desks.Stopped):
-            until(lambda: desk.word("trace", {"cost": 1.0}))
+            until(lambda: desk.event("trace", {"cost": 1.0}))
     assert quiet.codes == []
     assert quiet.store.jobs.find(quiet.id).state == "cancelled"
 
@@ -182,7 +272,7 @@ def test_words_in_quick_succession_are_few_and_curves_fewer(quiet):
     with quiet.desk() as desk:
         end = time.monotonic() + 0.5
         while time.monotonic() < end:
-            desk.word("trace", {"cost": 1.0})
+            desk.event("trace", {"cost": 1.0})
             desk.curve("fit x", lambda: drawn.append(1) or {"axis": "X"})
     told = [e.kind for e in quiet.store.jobs.events(quiet.id, 0, 1000)]
     assert 1 <= told.count("trace") <= 6
@@ -251,7 +341,8 @@ def test_what_the_engine_has_lost_is_handed_over_again(store, machine):
         ("running", "me", True, None),
         ("waiting", None, True, None),
         ("waiting", None, False, "forget"),
-        ("running", "me", False, None),
+        # an earlier version has had this one's name
+        ("running", "me", False, "forget"),
         ("over", "me", True, "forget"),
     ],
 )
@@ -270,10 +361,11 @@ def test_a_round_of_what_has_ended(store, machine):
     assert worker.backend.calls == [("forget", "gone", id)] or worker.backend.calls == [("forget", *sorted([id, "gone"]))]
 
 
-def test_a_job_of_one_that_lives_elsewhere_is_left_to_it(store, machine, monkeypatch):
+@pytest.mark.parametrize("current", [True, False], ids=["of this version", "of another version"])
+def test_a_job_of_one_that_lives_elsewhere_is_left_to_it(store, machine, monkeypatch, current):
     id = running(store, machine)
     store.jobs.claim(Worker("other", "elsewhere", "1:1", "w"), None)
-    worker = worker_of(store, Carried(id, "running", "other"))
+    worker = worker_of(store, Carried(id, "running", "other", current))
     moment = [time.monotonic()]
     monkeypatch.setattr("api.jobs.worker.time.monotonic", lambda: moment[0])
     worker.round()
@@ -286,7 +378,8 @@ def test_a_job_of_one_that_lives_elsewhere_is_left_to_it(store, machine, monkeyp
     # not a sign of it for too long
     moment[0] += 0.2 * LEASE
     worker.round()
-    assert worker.backend.calls == [("resume", id)]
+    # what another version has remembered helps nobody: the engine forgets it, and the job starts over
+    assert worker.backend.calls == [("resume", id)] + ([] if current else [("forget", id)])
 
 
 def test_a_job_that_another_has_just_taken_over_is_left_to_it(store, machine):

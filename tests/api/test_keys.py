@@ -151,6 +151,7 @@ def test_a_bucket_of_tokens():
     assert rates.wait("b") == 0.0
 
 
+@pytest.mark.slow
 def test_too_many_with_one_key_leave_another_alone(store, tmp_path):
     from api.security import make_key
 

@@ -12,9 +12,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
+from sqlalchemy import create_engine, text
 
 from api.client import Client
 from api.jobs import lobes
+from api.jobs.job_context import STARTS_OVER
 from api.jobs.worker import gone, process
 from api.security import new_id, now
 from api.stores.entities import Machine, Store, digest_of
@@ -68,7 +70,9 @@ def after(client: Client, id: str, count: int) -> None:
 
 @contextmanager
 def started(folder: Path, url: str) -> Iterator[tuple[Client, subprocess.Popen]]:
-    settings = {"RCSA_IDENT_JOB_NICE": "0"} | ({} if url.startswith("sqlite") else {"RCSA_IDENT_DATABASE": url})
+    settings = {"RCSA_IDENT_JOB_WORKERS": "1", "RCSA_IDENT_JOB_NICE": "0"} | (
+        {} if url.startswith("sqlite") else {"RCSA_IDENT_DATABASE": url}
+    )
     with serving(folder, **settings) as served, Client(served.url) as client:
         yield client, served.process
         kill([*descendants(served.process.pid), served.process.pid])
@@ -106,6 +110,40 @@ def test_an_identification_survives_everything(request, tmp_path, kind):
         assert client.result(job) == expected
         assert [kind for kind, _ in client.events(job)].count("end") == 1
         assert client.send("GET", f"/machines/{machine}/identification").text == expected
+    store.close()
+
+
+@pytest.mark.parametrize(
+    "left",
+    [
+        # steps of another version, which have other names and come in another order
+        "UPDATE workflow_status SET application_version = '1' WHERE workflow_uuid = :job",
+        # the same steps, in words of another version
+        """UPDATE operation_outputs SET output = '"{\\"~table\\":[[\\"value\\",{\\"~Linearisation\\":{}}]]}"' WHERE workflow_uuid = :job""",
+    ],
+    ids=["other steps", "other texts"],
+)
+def test_an_identification_survives_an_upgrade(tmp_path, left):
+    """What the version before has left of a job that was running is of no use to this one: it starts over, and says so."""
+    folder = tmp_path / "data"
+    url = f"sqlite:///{folder / 'service.db'}"
+    with started(folder, url) as (client, service):
+        campaign = uploaded(client, client.make_machine("M").id)
+        job = client.identify_campaign(campaign, seed=7).id
+        store = open_store(url)
+        until(lambda: (store.jobs.find(job).progress or "").startswith('{"stage": "search"'))
+        kill([*workers(store), service.pid])
+    tables = create_engine(f"sqlite:///{folder / 'jobs.db'}")
+    with tables.begin() as connection:
+        assert connection.execute(text(left), {"job": job}).rowcount > 0
+    tables.dispose()
+    with started(folder, url) as (client, _):
+        found = client.wait(job, 120.0)
+        assert (found.state, found.problem) == ("done", None)
+        assert [data["text"] for kind, data in client.events(job) if kind == "note"] == [STARTS_OVER]
+        fresh = client.identify_campaign(campaign, seed=7, apply=False).id
+        assert client.wait(fresh, 120.0).state == "done"
+        assert client.result(job) == client.result(fresh)
     store.close()
 
 

@@ -24,6 +24,7 @@ def later(client, id, *toolings, **further):
     return client.lobes_later(id, *toolings, speeds=SPEEDS, **further).id
 
 
+@pytest.mark.slow
 def test_as_a_job_they_are_the_same(shop, store, tmp_path):
     client, id = shop
     tested = [{"spindle_speed_rpm": 7777.0, "axial_depth_mm": 0.1, "verdict": "stable"}]
@@ -42,6 +43,7 @@ def test_as_a_job_they_are_the_same(shop, store, tmp_path):
     assert [kind for kind, _ in client.events(job, "lobes")][-1] == "end"
 
 
+@pytest.mark.slow
 def test_where_it_went_on_after_a_kill_they_are_the_same(shop, store, tmp_path):
     client, id = shop
     first, second = (later(client, id, "T1", example()) for _ in range(2))
@@ -86,6 +88,7 @@ def test_there_is_an_end_to_that_too(shop, store, tmp_path):
         assert found.job.problem.errors[0].field == "speeds"
 
 
+@pytest.mark.slow
 def test_the_client_waits_for_them(shop, store, tmp_path):
     """With a limit of work at which nothing is quick any more."""
     client, id = shop

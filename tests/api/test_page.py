@@ -92,6 +92,7 @@ def test_nothing_else_is_a_file(http, name):
     assert answer.headers["content-type"] == "application/problem+json"
 
 
+@pytest.mark.slow
 def test_a_page_takes_no_other_method(http):
     answer = http.post("/")
     assert answer.status_code == 405

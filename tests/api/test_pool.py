@@ -33,6 +33,7 @@ def pool():
     found.stop()
 
 
+@pytest.mark.slow
 def test_answers_and_refusals_come_back(pool):
     assert asyncio.run(pool.run(pow, 3, 4)) == 81
     assert asyncio.run(pool.run(os.getpid)) != os.getpid()
@@ -42,6 +43,7 @@ def test_answers_and_refusals_come_back(pool):
     assert pool.ready
 
 
+@pytest.mark.slow
 def test_too_many_are_refused_at_once(pool):
     async def three():
         return await asyncio.gather(*(pool.run(time.sleep, 0.3) for _ in range(3)), return_exceptions=True)
@@ -51,6 +53,7 @@ def test_too_many_are_refused_at_once(pool):
     assert [type(each) for each in found] == [type(None), type(None), Busy]
 
 
+@pytest.mark.slow
 def test_a_killed_worker_is_replaced(pool):
     with pytest.raises(Busy):
         asyncio.run(pool.run(die))
@@ -70,6 +73,7 @@ def bug():
     raise ValueError("a bug")
 
 
+@pytest.mark.slow
 def test_numbers_without_an_answer_are_bad_input_and_a_bug_stays_a_bug():
     with pytest.raises(InputError, match="no finite answer"):
         guarded(divide)
@@ -89,6 +93,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_workers_end_with_the_service_however_it_ends(tmp_path):
     script = tmp_path / "service.py"
     script.write_text(CODE, encoding="utf-8")

@@ -107,6 +107,7 @@ def test_answers_and_refusals_come_back(reader):
     assert reader.waiting == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("call", "arguments"),
     [(much, (600,)), (much_by_numpy, (600,)), (long, ()), (end, (signal.SIGSEGV,)), (end, (signal.SIGABRT,))],
@@ -118,6 +119,7 @@ def test_what_costs_too_much_is_refused_and_the_next_is_read(reader, call, argum
     assert ask(reader, much, 100) == 100 << 20
 
 
+@pytest.mark.slow
 def test_what_sleeps_is_ended_by_the_clock():
     found = Reader(Limits(wall_seconds=3.0), 1, nothing)
     found.start()
@@ -155,6 +157,7 @@ def test_no_file_grows_without_end(reader, tmp_path):
     assert not (tmp_path / "x").exists() or (tmp_path / "x").stat().st_size == 0
 
 
+@pytest.mark.slow
 def test_who_is_killed_is_asked_again(reader, tmp_path):
     """Somebody else's doing says nothing about the upload."""
     assert ask(reader, end_once, str(tmp_path / "marker")) == "answered"
@@ -185,6 +188,7 @@ def _stamped():
     return [start, time.monotonic()]
 
 
+@pytest.mark.slow
 def test_after_so_many_calls_comes_a_new_process():
     found = Reader(Limits(calls=2), 0, nothing)
     with pytest.raises(Busy):
@@ -197,6 +201,7 @@ def test_after_so_many_calls_comes_a_new_process():
         ask(found, os.getpid)
 
 
+@pytest.mark.slow
 def test_the_end_waits_for_nobody():
     found = Reader(LIMITS, 3, nothing)
     found.start()
@@ -226,6 +231,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_the_process_ends_with_the_service_however_it_ends(tmp_path):
     script = tmp_path / "service.py"
     script.write_text(CODE, encoding="utf-8")
@@ -300,6 +306,7 @@ def test_an_outline_holds_every_extreme(tmp_path, count, points):
         assert found["time_s"][k] == pytest.approx(k * width / 1000.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2, 3, 1000, 51200])
 def test_a_tone_stands_at_its_place_with_its_amplitude(tmp_path, count):
     path = tmp_path / "x.h5"

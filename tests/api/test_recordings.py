@@ -12,7 +12,8 @@ import pytest
 
 from api.files import NORMALISED, UPLOADS
 from api.reading.samples import read_normalised
-from rcsa_ident.io.recordings import read_recording, write_hdf5
+from rcsa_ident.io.hdf5 import write_hdf5
+from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.api.in_process import refused, service
 from tests.api.recordings import RATE, RPM, channels, content, declared, pair
@@ -79,6 +80,7 @@ def test_the_same_again_changes_nothing_and_another_content_needs_a_word(client,
     assert client.http.put(f"{url}?replace=true", content=other, headers=BINARY).status_code == 200
 
 
+@pytest.mark.slow
 def test_air_cuts_come_and_go_and_verdicts_with_them(client, campaign, tmp_path):
     def verdict():
         return client.campaign(campaign).cuts[0].verdict
@@ -138,7 +140,7 @@ def test_a_wrong_unit_leaves_a_note(client, campaign, tmp_path):
     assert any("flange_x has a peak-to-peak amplitude of" in note for note in found.verdict.notes)
     tiny = {name: values * 1e-5 for name, values in channels(1).items()}
     found = client.upload(campaign, made(tmp_path, "c1_cut.h5", 1, **tiny))
-    assert sum("are its unit and sensitivity right?" in note for note in found.verdict.notes) >= 2
+    assert sum("check its unit and sensitivity" in note for note in found.verdict.notes) >= 2
 
 
 @pytest.mark.parametrize("kind", FORMATS)
@@ -239,6 +241,7 @@ def test_a_file_comes_back_as_a_download_only(client, campaign, tmp_path):
     assert client.http.get(url, headers={"If-None-Match": answer.headers["etag"]}).status_code == 304
 
 
+@pytest.mark.slow
 def test_several_in_one_body_each_on_its_own(client, campaign, tmp_path):
     (tmp_path / "stranger.h5").write_bytes(b"x")
     (tmp_path / "c1_cut.h5").write_bytes(b"no recording")
@@ -268,6 +271,7 @@ def test_of_a_path_in_a_form_the_last_part_counts(client, campaign, tmp_path):
     assert [item["status"] for item in answer.json()["items"]] == [404, 200]
 
 
+@pytest.mark.slow
 def test_parts_follow_each_other(client, campaign, tmp_path):
     url, raw = f"/v1/campaigns/{campaign}/recordings/c0_cut.h5", content(tmp_path)
 

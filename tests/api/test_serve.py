@@ -54,6 +54,7 @@ def test_loopback_needs_none(host):
     assert Settings(host=host, keys=True).asks_for_keys
 
 
+@pytest.mark.slow
 def test_importing_does_nothing_and_the_service_stays_light():
     """What is slow to import, or draws, stays out of the process that answers."""
     heavy = ("control", "scipy.signal", "matplotlib", "pymoo", "filterpy", "h5py", "typer")
@@ -66,6 +67,7 @@ def test_importing_does_nothing_and_the_service_stays_light():
     assert found.stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_a_service_with_keys_killed_and_started_again(tmp_path, result):
     words, environment = command(tmp_path / "data", "create-key", "--group", "hall 3", "--label", "first")
     made = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
@@ -94,13 +96,8 @@ def test_a_service_with_keys_killed_and_started_again(tmp_path, result):
     assert key.split("_", 2)[2].encode() not in (tmp_path / "data" / "service.db").read_bytes()
 
 
-def test_a_service_without_keys_says_so(tmp_path):
-    with serving(tmp_path / "data") as served, Client(served.url) as client:
-        assert list(client.machines()) == []
-    assert any("no keys are asked for" in json.loads(line)["event"] for line in served.log.read_text().splitlines())
-
-
-def test_a_body_without_an_end_is_cut_off(tmp_path):
+@pytest.mark.slow
+def test_a_service_without_keys_says_so_and_cuts_off_a_body_without_an_end(tmp_path):
     """In chunks, whose sum nobody tells before; the connection ends when the limit is passed."""
     with serving(tmp_path / "data", RCSA_IDENT_MAX_BODY_BYTES="100000") as served:
         with socket.create_connection(("127.0.0.1", served.port), timeout=PATIENCE) as link:
@@ -117,8 +114,10 @@ def test_a_body_without_an_end_is_cut_off(tmp_path):
         # it goes on for others
         with Client(served.url) as client:
             assert list(client.machines()) == []
+    assert any("no keys are asked for" in json.loads(line)["event"] for line in served.log.read_text().splitlines())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -36,6 +36,7 @@ def machine(group="A", name="M"):
     return Machine(new_id(), group, name, "", now())
 
 
+@pytest.mark.slow
 def test_documents_are_kept_replaced_and_told_in_order(store):
     kept = store.toolings
     assert kept.put(document(name="b"))
@@ -53,6 +54,7 @@ def test_documents_are_kept_replaced_and_told_in_order(store):
     assert not kept.delete("A", "a")
 
 
+@pytest.mark.slow
 def test_a_writer_may_say_what_it_has_seen(store):
     kept = store.toolings
     kept.put(document(), ABSENT)

@@ -19,13 +19,14 @@ from tests.fixtures.waiting import PATIENCE, until
 @pytest.fixture(scope="module")
 def served(tmp_path_factory):
     """A service with the machine and its tooling: its process, port and the machine's id."""
-    with serving(tmp_path_factory.mktemp("served"), RCSA_IDENT_JOB_WORKERS="0") as found, Client(found.url) as client:
+    with serving(tmp_path_factory.mktemp("served")) as found, Client(found.url) as client:
         id = client.make_machine("m").id
         client.identify(id, result())
         client.write_tooling("T1", tooling())
         yield found.process, found.port, id
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["float32", "json"])
 def test_a_logger_gets_the_forces_of_all_its_samples(served, form):
     _, port, id = served
@@ -74,6 +75,7 @@ def test_what_is_refused_is_told(served):
     assert (caught.value.code, caught.value.problem["title"]) == (401, "Unauthorized")
 
 
+@pytest.mark.slow
 def test_a_viewer_who_does_not_read_costs_no_memory(served):
     """More than the system holds for it: what it does not read makes way, and is counted; the logger notices nothing."""
     _, port, id = served
@@ -102,6 +104,7 @@ def test_a_viewer_who_does_not_read_costs_no_memory(served):
     assert read + end["unread"] <= 24 * len(raw)
 
 
+@pytest.mark.slow
 def test_the_service_ends_with_its_streams(served):
     process, port, id = served
     with ForceStream(f"ws://127.0.0.1:{port}", hello(id)) as stream:

@@ -48,6 +48,7 @@ def test_no_bytes_are_more_than_refused(raw, channels):
     assert 0 <= first <= MOST_INDEX
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(
     st.recursive(
@@ -88,6 +89,7 @@ def naive_envelope(pieces, size):
     }
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 30), st.integers(0, 70)), min_size=1, max_size=8), st.integers(1, 25), st.integers(0, 100))
 def test_envelopes_do_not_depend_on_blocks(pieces, size, begin):
@@ -109,6 +111,7 @@ def test_envelopes_do_not_depend_on_blocks(pieces, size, begin):
         np.testing.assert_array_equal(high, expected[key][1])
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(st.lists(st.tuples(st.integers(0, 300), st.integers(1, 60)), max_size=20), st.integers(0, 3))
 def test_every_index_is_counted_once(frames, every):
@@ -193,6 +196,7 @@ def test_the_window_is_the_first_one_without_a_gap():
     asyncio.run(run())
 
 
+@pytest.mark.slow
 def test_who_does_not_read_loses_forces_and_never_memory():
     async def run():
         for text in (False, True):

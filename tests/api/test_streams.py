@@ -50,6 +50,7 @@ def joined(frames) -> np.ndarray:
     return np.concatenate([unpacked(f)[1] if isinstance(f, bytes) else np.array(f["samples"]) for f in frames])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [True, False])
 def test_live_forces_are_those_of_the_batch(shop, text):
     http, id = shop
@@ -78,6 +79,7 @@ def test_live_forces_are_those_of_the_batch(shop, text):
     np.testing.assert_allclose(joined(frames), expected, rtol=0, atol=(1e-9 if text else 1e-6) * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_forces_are_true(shop):
     """A stream that begins in air; the tool enters after a second and a half, and the spindle slows down under it. 300 to 4300 Hz."""
     http, id = shop
@@ -96,6 +98,7 @@ def test_forces_are_true(shop):
     assert end["angle_known"]
 
 
+@pytest.mark.slow
 def test_a_drift_beyond_what_the_observer_is_made_for_is_told(shop):
     http, id = shop
     raw = signals(0.0, 3.0, sag=4e-3)
@@ -110,6 +113,7 @@ def test_a_drift_beyond_what_the_observer_is_made_for_is_told(shop):
     assert any("-0.40 %" in note and "new stream" in note for note in end["notes"])
 
 
+@pytest.mark.slow
 def test_counters_are_true(shop):
     """Known losses, repeats, overlaps and latecomers."""
     http, id = shop
@@ -165,6 +169,7 @@ def test_a_service_that_is_behind_drops_the_oldest_and_says_so(tmp_path):
         assert f"rcsa_ident_stream_dropped_samples_total {end['dropped']}.0" in http.get("/metrics").text
 
 
+@pytest.mark.slow
 def test_a_viewer_sees_the_same_in_buckets(shop):
     http, id = shop
     raw = signals(2.0, 2.8)
@@ -250,6 +255,7 @@ def test_too_many_small_frames_end_a_stream(shop, monkeypatch):
     assert (code, problem["status"]) == (1008, 429)
 
 
+@pytest.mark.slow
 def test_the_observer_waits_for_a_steady_part(shop):
     """The spindle stands at first: noise, of which no observer can be made. It is told, and the next second is tried."""
     http, id = shop
@@ -338,6 +344,7 @@ def test_forces_that_are_not_finite_end_the_stream(shop):
     assert problem["errors"][0]["found"] == "signals whose forces are not finite"
 
 
+@pytest.mark.slow
 def test_the_process_of_the_streams_is_replaced_when_it_dies(tmp_path):
     """Spawned, killed without a word: sessions go on, what was on its way is counted as dropped."""
     host = StreamProcess()
@@ -370,6 +377,7 @@ def test_a_slow_spindle_has_enough_revolutions(shop):
             assert until(socket, "opened")[0]["settle_samples"] == pytest.approx(settle * RATE, abs=1)
 
 
+@pytest.mark.slow
 def test_what_the_next_second_can_not_mend_ends_at_once(shop):
     """One axis is asked for where the channels and the machine have two."""
     http, id = shop
@@ -380,6 +388,7 @@ def test_what_the_next_second_can_not_mend_ends_at_once(shop):
     assert (code, problem["errors"][0]["field"]) == (1008, "axes")
 
 
+@pytest.mark.slow
 def test_the_service_is_ready_when_the_streams_are(tmp_path):
     near = Near()
     with streaming(tmp_path, near) as (http, _):

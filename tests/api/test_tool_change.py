@@ -8,7 +8,6 @@ import math
 import numpy as np
 import pytest
 
-from api.client import Client
 from api.work import tasks
 from api.work.machine_cache import MachineCache
 from rcsa_ident.cutting.materials import materials
@@ -16,8 +15,9 @@ from rcsa_ident.identification import machine as identified
 from rcsa_ident.io.curves import read_frf_csv
 from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.machining_setup import CutSpec
-from rcsa_ident.workflows.tool_change import ToolChange, advise, tooltip
-from tests.api.in_process import refused, service
+from rcsa_ident.workflows import tool_change
+from rcsa_ident.workflows.tool_change import ToolChange, tooltip
+from tests.api.in_process import refused
 from tests.fixtures import by_hand
 from tests.fixtures.service import example
 
@@ -26,7 +26,7 @@ RPM = math.pi / 30.0
 
 
 def by_workflow(result, tooling, speeds):
-    return advise(ToolChange(machine_from_json(json.loads(result), ""), tooling, CutSpec(), speeds, 0.01)).lobes
+    return ToolChange(machine_from_json(json.loads(result), ""), tooling, CutSpec(), speeds, 0.01).limits()
 
 
 @pytest.fixture
@@ -34,6 +34,7 @@ def tooling(tmp_path):
     return by_hand.campaign(tmp_path).toolings["T1"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("softening", [False, True])
 def test_lobes_are_those_of_the_command(client, tmp_path, tooling, softening):
     """With bands, for a machine that stays the same at all speeds and for one that changes."""
@@ -64,6 +65,7 @@ def test_several_toolings_are_compared(shop):
     assert found[0].limit_depth_low_mm is None
 
 
+@pytest.mark.slow
 def test_stable_speeds_are_null(shop):
     client, id = shop
     (found,) = client.lobes(id, "T1", speeds=SPEEDS, max_depth_mm=1e-3).toolings
@@ -88,6 +90,7 @@ def test_the_cut_counts(shop):
     assert not np.allclose(limits(strategy="up"), plain, rtol=1e-2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["zero-order", "full-discretisation"])
 def test_tested_cuts_are_counted(shop, method):
     """Each at its own speed and to its own depth, whatever speeds and depth the lobes are asked for; in any order."""
@@ -144,6 +147,7 @@ def test_advice_has_its_limit_of_work(shop):
     assert "of work" in problem.detail
 
 
+@pytest.mark.slow
 def test_tooltip_is_that_of_the_command(shop, result, tooling, tmp_path):
     client, id = shop
     machine = machine_from_json(json.loads(result), "")
@@ -238,7 +242,8 @@ def test_numbers_that_lead_nowhere_are_told_not_thrown(shop):
     refused(422, client.tooltip, id, example(contact=contact))
 
 
-def test_a_posterior_that_is_too_large_to_keep_is_weighed(shop, store, tmp_path, monkeypatch):
+@pytest.mark.slow
+def test_a_posterior_that_is_too_large_to_keep_is_weighed(shop, monkeypatch):
     """The plain road gives the same limits; where it would take too long it is refused, and so are too many frequencies."""
     client, id = shop
     quick = client.lobes(id, "T1", speeds=SPEEDS).toolings[0]
@@ -247,9 +252,8 @@ def test_a_posterior_that_is_too_large_to_keep_is_weighed(shop, store, tmp_path,
     slow = client.lobes(id, "T1", speeds=SPEEDS).toolings[0]
     np.testing.assert_allclose(slow.limit_depth_low_mm, quick.limit_depth_low_mm, rtol=1e-4)
     np.testing.assert_allclose(slow.limit_depth_mm, quick.limit_depth_mm, rtol=1e-9)
-    with service(store, tmp_path, work_seconds=0.2, job_work_seconds=1.0) as http:
-        hurried = Client(http=http)
-        assert refused(422, hurried.lobes, id, "T1", "T1", "T1", speeds=SPEEDS).errors[0].field == "speeds"
-        assert refused(422, hurried.tooltip, id, "T1").errors[0].field == "step_hz"
-        assert refused(422, hurried.frf, id).errors[0].field == "step_hz"
-        assert hurried.tooltip(id, "T1", bands=False).axes["X"].re_std is None
+    monkeypatch.setattr(tool_change, "_SPREAD_SECONDS", 1.0)
+    assert refused(422, client.lobes, id, "T1", speeds=SPEEDS).errors[0].field == "speeds"
+    assert refused(422, client.tooltip, id, "T1").errors[0].field == "step_hz"
+    assert refused(422, client.frf, id).errors[0].field == "step_hz"
+    assert client.tooltip(id, "T1", bands=False).axes["X"].re_std is None

@@ -113,11 +113,13 @@ values = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(st.dictionaries(text, values, max_size=5))
 def test_what_is_written_reads_back(data):
     assert tomllib.loads(toml_of(data)) == data
 
 
+@pytest.mark.slow
 def test_a_tooling_that_would_cost_too_much_is_refused_before_it_does():
     """5 m of needle, and many tapers; what passes has not more elements than allowed."""
     needle = {"length_mm": 5000.0, "outer_diameter_mm": 0.5, "material": "carbide"}

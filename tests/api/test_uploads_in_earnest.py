@@ -99,6 +99,7 @@ def test_a_body_without_an_end_is_cut_off(place, tmp_path):
         assert files_in(tmp_path) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["PUT", "PATCH"])
 def test_a_client_that_goes_half_way(place, tmp_path, method):
     raw = content(tmp_path)
@@ -124,6 +125,7 @@ def _written(folder: Path, raw: bytes) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_length_that_is_a_lie(place, tmp_path):
     """Less than was told of is waited for, so long; of more than was told of the rest is no part of the body."""
     raw = content(tmp_path)
@@ -144,6 +146,7 @@ def test_a_length_that_is_a_lie(place, tmp_path):
         assert client.upload(id, _written(tmp_path, raw)).verdict.usable
 
 
+@pytest.mark.slow
 def test_a_client_that_crawls_is_given_up(place, tmp_path):
     limits = {"upload_idle_seconds": 0.5, "upload_bytes_per_second": 100_000}
     with place(**limits) as (_, port, id), socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
@@ -168,6 +171,7 @@ def test_a_client_that_crawls_is_given_up(place, tmp_path):
     assert files_in(tmp_path) == []
 
 
+@pytest.mark.slow
 def test_too_many_at_once_are_told_to_wait(place, tmp_path):
     raw = content(tmp_path)
     with place(uploads=2) as (client, port, id):
@@ -187,6 +191,7 @@ def test_too_many_at_once_are_told_to_wait(place, tmp_path):
         assert client.upload(id, _written(tmp_path, raw)).verdict.usable
 
 
+@pytest.mark.slow
 def test_uploads_of_one_name_at_once(place, tmp_path):
     """The same content is one recording; of two contents one is kept, the other refused."""
     raws = [content(tmp_path, seed) for seed in range(2)]
@@ -208,6 +213,7 @@ def test_uploads_of_one_name_at_once(place, tmp_path):
         assert len(files_in(tmp_path)) == 2 * len({each.sha256 for each in client.recordings(id)})
 
 
+@pytest.mark.slow
 def test_two_who_write_the_same_parts(place, tmp_path):
     raw = content(tmp_path)
     with place() as (client, port, id):
@@ -223,6 +229,7 @@ def test_two_who_write_the_same_parts(place, tmp_path):
             assert link.recv(65536).split(b" ", 2)[1] == b"201"
 
 
+@pytest.mark.slow
 def test_air_and_cut_at_once_end_with_the_right_verdict(place, tmp_path):
     with place() as (client, port, id):
         url = f"http://127.0.0.1:{port}/v1/campaigns/{id}/recordings/"
@@ -322,6 +329,7 @@ def whole(folder: Path, group: str = "local") -> dict[str, str]:
         return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("replacing", [False, True], ids=["new", "replacing"])
 def test_a_kill_at_every_step_loses_nothing_and_leaves_nothing(tmp_path, replacing):
     """What was there is there, or what has come in its place, whole; the rest is swept, and the same upload again is taken."""

@@ -78,6 +78,7 @@ def test_toolings_are_what_they_are_said_to_be(drawn, seed):
     assert len({kinds[0], kinds[1], kinds[3]}) == 3
 
 
+@pytest.mark.slow
 def test_the_depth_is_lowered_until_every_cut_is_stable_and_nothing_else_changes(drawn, tmp_path, monkeypatch):
     limits = []
 

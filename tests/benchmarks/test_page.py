@@ -34,6 +34,7 @@ def test_rows_survive_a_line_that_was_cut_short(tmp_path):
     assert read_rows(path) == [{"a": 1}, {"c": 3}]
 
 
+@pytest.mark.slow
 def test_pictures_stay_small(tmp_path):
     errors = {"similar": {"errors": [0.003, 0.2]}, "different": {"errors": [0.01, 0.02]}}
     study = [

@@ -24,13 +24,11 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
-from rcsa_ident.identification.posterior import MachineAxis
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.io.curves import write_frf_csv
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.machine.spindle import Spindle
-from rcsa_ident.workflows.tip import tooltip
+from rcsa_ident.machine.flange_machine import FlangeMachine
 
 TOOLINGS = study.MACHINES / "toolings"
 
@@ -70,13 +68,12 @@ def test_coverage_of_an_honest_band_is_what_its_name_says():
 
 @pytest.fixture
 def machine():
-    axes = {}
+    flanges = []
     for axis, shift in ((Dof.X, 1.0), (Dof.Y, 0.9)):
         omega_n = 2.0 * np.pi * shift * np.array([900.0, 2000.0])
         phi = np.array([[0.2, 0.1], [0.3, -0.6]]) * (1.0 - 1.0j) / (2.0 * np.sqrt(omega_n))[:, None]
-        modes = ModalModel(omega_n, np.array([0.05, 0.04]), phi, np.zeros((2, 2)), plane("flange", axis))
-        axes[axis] = MachineAxis(Spindle(modes), LumpedJoint(3e9, 6e6, 2e3, 10.0))
-    return axes
+        flanges.append(ModalModel(omega_n, np.array([0.05, 0.04]), phi, np.zeros((2, 2)), plane("flange", axis)))
+    return FlangeMachine(tuple(flanges), (2.0 * np.pi * 600.0, 2.0 * np.pi * 4000.0), LumpedJoint(3e9, 6e6, 2e3, 10.0))
 
 
 def test_tooltips_are_compared_with_the_truth_of_their_own_tooling_and_axis(machine, tmp_path):
@@ -86,8 +83,8 @@ def test_tooltips_are_compared_with_the_truth_of_their_own_tooling_and_axis(mach
     # true curves that are a known factor away: the error is |1 - 1 / factor|
     factors = {"S1-ER32": (1.0, 1.25), "S2-PG25": (0.8, 1.0), "S3-PG25-long": (2.0, 1.0), "S4-shrink": (1.0, 0.5)}
     for name, path in paths.items():
-        response = tooltip(machine, read_tooling(path).assembly, 2.0 * np.pi * frequency)
-        values = {axis.upper(): f * response.tip(axis) for axis, f in zip((Dof.X, Dof.Y), factors[name], strict=True)}
+        tip = machine.tip(read_tooling(path), 2.0 * np.pi * frequency)
+        values = {row.dof.upper(): f * tip.between(str(row), str(row)) for row, f in zip(tip.rows, factors[name], strict=True)}
         write_frf_csv(tmp_path / "tip" / f"{name}.csv", frequency, values)
     files = tuple(paths.values())
     found = compared(machine, SimpleNamespace(toolings=files[:2], truth_toolings=files[2:]), tmp_path)
@@ -190,6 +187,7 @@ def coarse(monkeypatch):
         monkeypatch.setattr(module, "warm", lambda: None)
 
 
+@pytest.mark.slow
 def test_a_run_goes_through_files_and_comes_back_as_a_row(scratch, coarse, monkeypatch):
     # the published algorithm, stopped early: fast, far off, and without bands
     monkeypatch.setattr(study, "METHODS", {"quick, bad": PaperGeneticAlgorithm(population=4, generations=2)})
@@ -205,6 +203,7 @@ def test_a_run_goes_through_files_and_comes_back_as_a_row(scratch, coarse, monke
     assert (written["seed"], written["method"]) == (3, "paper")
 
 
+@pytest.mark.slow
 def test_a_search_is_followed_and_measured(scratch, coarse):
     row = search_trace.perform(scratch, "hpm", "differential evolution", 1, 0.3)
     points = np.array(row["points"])
@@ -214,6 +213,7 @@ def test_a_search_is_followed_and_measured(scratch, coarse):
     assert np.all(points[:, 2:] > 0.0)
 
 
+@pytest.mark.slow
 def test_the_default_is_followed_to_its_end(scratch, coarse, monkeypatch):
     quick = EvidenceSelection(search=SearchSettings(modes=3, population=4, generations=1, steps=1), candidates=1)
     monkeypatch.setattr(search_trace, "EvidenceSelection", lambda: quick)

@@ -45,6 +45,7 @@ def force_campaign(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["mean", "signal"])
 def test_coefficients_and_figure(force_campaign, tmp_path, method):
     out, plot = tmp_path / "W.toml", tmp_path / "means.png"
@@ -67,6 +68,7 @@ def test_coefficients_and_figure(force_campaign, tmp_path, method):
     assert read_campaign(folder).workpiece.coefficients == c
 
 
+@pytest.mark.slow
 def test_json(force_campaign, tmp_path):
     answer = json.loads(run("calibrate", force_campaign, "--out", tmp_path / "W.toml", "--method", "signal", "--json").output)
     k = answer["coefficients"]["K_tc"]
@@ -76,6 +78,7 @@ def test_json(force_campaign, tmp_path):
     assert answer["signal"]["sensor_axes"] == [[1.0, 0.0], [0.0, 1.0]]
 
 
+@pytest.mark.slow
 def test_a_wrong_sign_is_refused_with_the_reason(force_campaign, tmp_path):
     folder = tmp_path / "turned"
     shutil.copytree(force_campaign, folder)

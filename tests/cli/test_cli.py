@@ -13,12 +13,12 @@ import pytest
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
-from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.io.curves import read_frf_csv, read_lobes_csv, write_frf_csv
 from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.workflows.tip import tooltip
+from rcsa_ident.workflows.tool_change import tooltip
 from tests.fixtures import by_hand
 from tests.oracles import literature
 
@@ -29,12 +29,14 @@ def run(*arguments, code=0):
     return result
 
 
+@pytest.mark.slow
 def test_help_names_every_command():
     text = run("--help").output
     for name in ("demo", "check", "identify", "tooltip", "lobes", "simulate", "warm"):
         assert name in text
 
 
+@pytest.mark.slow
 def test_help_imports_nothing_heavy():
     code = (
         "import sys; from rcsa_ident.cli import app\n"
@@ -55,7 +57,7 @@ def test_help_imports_nothing_heavy():
         (["tooltip", "{}/none.json", "{}/T1.toml", "--out", "{}/F.csv"], "none.json: result: found no such file"),
         (["tooltip", "{}/RESULT.json", "{}/T1.toml", "--out", "{}/F.csv", "--from", "0"], "--from"),
         (["tooltip", "{}/RESULT.json", "{}/T1.toml", "--out", "{}/F.csv", "--to", "50"], "--to"),
-        (["lobes", "{}/T1.toml", "--out", "{}/L.csv"], "RESULT.json TOOLING.toml"),
+        (["lobes", "{}/T1.toml", "--out", "{}/L.csv"], "RESULT.json or FLANGE.csv, then TOOLING.toml"),
         (["lobes", "{}/RESULT.json", "{}/T1.toml", "--out", "{}/L.csv", "--immersion", "2"], "immersion"),
         (["lobes", "{}/RESULT.json", "{}/T1.toml", "--out", "{}/L.csv", "--entry-deg", "90"], "--exit-deg"),
         (["lobes", "{}/RESULT.json", "{}/T1.toml", "--out", "{}/L.csv", "--feed-direction", "north"], "--feed-direction"),
@@ -93,10 +95,10 @@ def test_the_result_holds_what_later_commands_need(result_file):
     assert data["axes"]["X"]["model_error"] == 0.004
     machine = machine_from_json(data, str(result_file))
     for axis, part in by_hand.identification().axes.items():
-        np.testing.assert_array_equal(machine[axis].posterior.theta, part.posterior.theta)
-        np.testing.assert_array_equal(machine[axis].posterior.covariance, part.posterior.covariance)
-        np.testing.assert_array_equal(machine[axis].spindle.modes.phi, part.modes.phi)
-        assert machine[axis].joint == part.joint
+        np.testing.assert_array_equal(machine.identified[axis].posterior.theta, part.posterior.theta)
+        np.testing.assert_array_equal(machine.identified[axis].posterior.covariance, part.posterior.covariance)
+        np.testing.assert_array_equal(machine.identified[axis].spindle.modes.phi, part.modes.phi)
+        assert machine.identified[axis].joint == part.joint
 
 
 def test_unknowns_that_do_not_fit_the_covariance_are_refused(tmp_path, result_file, tooling_file):
@@ -114,10 +116,11 @@ def test_tooltip_writes_the_coupled_receptance_with_bands(tmp_path, result_file,
     curves = read_frf_csv(out)
     np.testing.assert_allclose(curves.frequency, np.arange(500.0, 2501.0, 20.0))
     machine = machine_from_json(read_result(result_file), "")
-    response = tooltip(machine, read_tooling(tooling_file).assembly, 2.0 * np.pi * curves.frequency)
+    response = tooltip(machine, read_tooling(tooling_file), 2.0 * np.pi * curves.frequency).tip
     for axis in (Dof.X, Dof.Y):
-        np.testing.assert_allclose(curves.values[axis.upper()], response.tip(axis), rtol=1e-12)
-        real, imaginary = response.deviation[axis]
+        tip = Coordinate("tip", axis)
+        np.testing.assert_allclose(curves.values[axis.upper()], response.between(str(tip), str(tip)), rtol=1e-12)
+        real, imaginary = response.deviation()[tip, tip]
         assert np.all(real > 0.0)
         np.testing.assert_allclose(curves.bands[f"{axis.upper()}_re_std"], real, rtol=1e-12)
         np.testing.assert_allclose(curves.bands[f"{axis.upper()}_im_std"], imaginary, rtol=1e-12)
@@ -130,6 +133,7 @@ def test_tooltip_for_machines(tmp_path, result_file, tooling_file):
     assert list(read_frf_csv(tmp_path / "F.csv").bands) == []
 
 
+@pytest.mark.slow
 def test_lobes_from_a_result_and_from_its_own_tip_agree(tmp_path, certain_file, tooling_file):
     speeds = ("--speed-from", 6000, "--speed-to", 12000, "--speed-step", 200)
     run("lobes", certain_file, tooling_file, "--out", tmp_path / "a.csv", *speeds)
@@ -147,6 +151,7 @@ def test_lobes_from_a_result_and_from_its_own_tip_agree(tmp_path, certain_file, 
     assert np.mean((low <= a.limit) & (a.limit <= high)) > 0.9
 
 
+@pytest.mark.slow
 def test_lobes_from_modes_reproduce_the_published_table(tmp_path, tooling_file):
     case = literature.INSPERGER_STEPAN
     mode = "natural_frequency_hz = {}\ndamping_ratio = {}\nmodal_mass_kg = {}\n".format(
@@ -164,13 +169,16 @@ def test_lobes_from_modes_reproduce_the_published_table(tmp_path, tooling_file):
         assert read_lobes_csv(tmp_path / "L.csv").limit[0] == pytest.approx(limit, rel=3e-3)
 
 
+@pytest.mark.slow
 def test_lobes_leave_cells_empty_where_the_cut_is_stable(tmp_path, result_file, tooling_file):
     out = tmp_path / "L.csv"
     answer = run("lobes", result_file, tooling_file, "--out", out, "--max-depth-mm", 0.01, "--speed-step", 4000, "--json").stdout
     rows = list(csv.DictReader(out.read_text(encoding="utf-8").splitlines()))
     assert [row["spindle_speed_rpm"] for row in rows] == ["4000.0", "8000.0", "12000.0", "16000.0", "20000.0"]
     assert {row[key] for row in rows for key in ("limit_depth_mm", "chatter_frequency_hz", "lobe")} == {""}
-    assert json.loads(answer.splitlines()[-1])["best_speeds"] == [{"spindle_speed_rpm": pytest.approx(12000.0), "limit_depth_mm": None}]
+    (best,) = json.loads(answer.splitlines()[-1])["best_speeds"]
+    # 10 % are kept in reserve
+    assert best == {"spindle_speed_rpm": pytest.approx(12000.0), "limit_depth_mm": None, "recommended_depth_mm": pytest.approx(0.009)}
 
 
 def test_one_axis_alone_is_rigid_in_the_other(tmp_path, tooling_file):

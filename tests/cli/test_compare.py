@@ -12,8 +12,9 @@ from rcsa_ident.io.curves import write_frf_csv
 from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.workflows.tip import tooltip
 from tests.cli.measurements import run
+
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
@@ -23,9 +24,9 @@ def hammer(result_file, tmp_path):
     machine = machine_from_json(data, str(result_file))
     frequency = np.arange(*data["band_hz"], 2.0)
     omega = 2.0 * np.pi * frequency
-    response = tooltip(machine, read_tooling(tmp_path / "T1.toml").assembly, omega / 0.97, bands=False)
-    write_frf_csv(tmp_path / "tip.csv", frequency, {axis.upper(): 1.1 * response.tip(axis) for axis in (Dof.X, Dof.Y)})
-    flange = machine[Dof.X].spindle.receptance(omega).values[:, 0, 0]
+    tip = machine.tip(read_tooling(tmp_path / "T1.toml"), omega / 0.97, spread=False)
+    write_frf_csv(tmp_path / "tip.csv", frequency, {axis.upper(): 1.1 * tip.between(f"tip.{axis}", f"tip.{axis}") for axis in machine.axes})
+    flange = machine.identified[Dof.X].spindle.receptance(omega).values[:, 0, 0]
     write_frf_csv(tmp_path / "flange.csv", frequency, {"X": flange})
     return tmp_path
 

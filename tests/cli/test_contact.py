@@ -21,6 +21,8 @@ from tests.cli.measurements import run
 from tests.fixtures import by_hand
 from tests.oracles import analytic
 
+pytestmark = pytest.mark.slow
+
 TRUE = Contact(1.2e10, 1.5e6, 6e4, 25.0)
 
 

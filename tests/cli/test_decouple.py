@@ -76,6 +76,7 @@ def options(folder, places=("tip", "cross", "spindle")):
     return texts
 
 
+@pytest.mark.slow
 def test_the_flange_carries_another_tooling(taps):
     """The joint stays in the flange; with it the tip of a tooling that was never measured comes within a few percent of the machine's."""
     out, plot = taps / "FLANGE.csv", taps / "flange.png"
@@ -94,6 +95,7 @@ def test_the_flange_carries_another_tooling(taps):
     assert answer["axes"]["Y"]["frequencies"] == FREQUENCY.size
 
 
+@pytest.mark.slow
 def test_tips_alone_are_called_doubtful(taps):
     """Three tips leave two flanges at many frequencies: written, and the exit code says that it is not settled."""
     result = run("decouple", *options(taps, ("tip",)), "--out", taps / "TIPS.csv", code=3)
@@ -101,6 +103,7 @@ def test_tips_alone_are_called_doubtful(taps):
     assert (taps / "TIPS.csv").exists()
 
 
+@pytest.mark.slow
 def test_what_is_refused(taps):
     out = taps / "NONE.csv"
     one = options(taps)[:2]

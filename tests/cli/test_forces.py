@@ -13,7 +13,7 @@ from rcsa_ident.cli.forces import forces
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.forces import read_forces_csv, sensors_of_result, write_forces_csv
-from rcsa_ident.io.recordings import write_hdf5
+from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.io.results import read_result, write_result
 from tests.fixtures.flange_machine import BAND, flange_keys, paper_cut
 from tests.fixtures.paths import TOOLINGS
@@ -55,6 +55,7 @@ def arguments(folder, *more):
     return (folder / "RESULT.json", folder / "T.toml", folder / "cut.h5", "--out", folder / "F.csv", "--speed-rpm", 12000, *more)
 
 
+@pytest.mark.slow
 def test_forces_of_a_recording(folder):
     result = run(*arguments(folder, "--air", folder / "air.h5"))
     time, force, deviation = read_forces_csv(folder / "F.csv")
@@ -67,6 +68,7 @@ def test_forces_of_a_recording(folder):
     assert "written" in result.stdout
 
 
+@pytest.mark.slow
 def test_json_pictures_wear_and_smoothing(folder):
     result = run(
         *arguments(folder, "--air", folder / "air.h5", "--smooth", "--json", "--plot", folder / "F.png", "--wear", folder / "W.csv"),
@@ -90,11 +92,13 @@ def test_json_pictures_wear_and_smoothing(folder):
     assert len(rows) > 50
 
 
+@pytest.mark.slow
 def test_the_papers_walk_lags(folder):
     data = json.loads(run(*arguments(folder, "--air", folder / "air.h5", "--observer", "random-walk", "--json")).stdout)
     assert data["axes"]["X"]["delay_s"] * 25600.0 == pytest.approx(5.3, abs=1.0)
 
 
+@pytest.mark.slow
 def test_the_mean_where_the_cut_is_interrupted(folder):
     data = json.loads(run(*arguments(folder, "--air", folder / "air.h5", "--idle-percent", 40, "--json")).stdout)
     _, force, _ = read_forces_csv(folder / "F.csv")
@@ -104,6 +108,7 @@ def test_the_mean_where_the_cut_is_interrupted(folder):
         assert np.mean(force[axis][2000:]) == pytest.approx(true.mean(), abs=0.1 * np.std(true) + 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("more", "text"),
     [
@@ -125,6 +130,7 @@ def test_bad_input_is_told_in_a_sentence(folder, more, text, monkeypatch):
     assert result.stderr.count("found") == 1
 
 
+@pytest.mark.slow
 def test_without_speed_and_trigger_the_speed_is_asked_for(folder):
     result = run(folder / "RESULT.json", folder / "T.toml", folder / "cut.h5", "--out", folder / "F.csv", code=2)
     assert "--speed-rpm: found none, and no trigger" in result.stderr
@@ -147,6 +153,7 @@ def test_forces_file_reads_back_exactly(tmp_path):
         read_forces_csv(tmp_path / "H.csv")
 
 
+@pytest.mark.slow
 def test_sensors_of_a_result(folder):
     sensors = sensors_of_result(read_result(folder / "RESULT.json"), "r")
     assert [(s.name, s.axis) for s in sensors][:2] == [("flange_x", Dof.X), ("flange_y", Dof.Y)]

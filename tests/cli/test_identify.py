@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,10 +11,11 @@ from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.result import IdentificationCode, Status
 from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_campaign
-from rcsa_ident.workflows.tip import tooltip
+from rcsa_ident.remarks import Remark
 from tests.fixtures import by_hand
 
 
@@ -48,8 +50,8 @@ def published(data):
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
-        (without_covariance, ["axes.X", "no covariance (method default)"]),
-        (published, ["axes.X", "no covariance (method paper)", "a result of the default method"]),
+        (without_covariance, ["axes.X", "found no covariance", "a result of the default method"]),
+        (published, ["axes.X", "found no covariance", "a result of the default method"]),
         (failed, ["axes", "the identification has failed"]),
         (lambda data: {"seed": 1}, ["schema_version", "found nothing"]),
         (lambda data: [], ["content", "an empty list"]),
@@ -91,21 +93,24 @@ def warm(tmp_path_factory, small_campaign, first):
     return path, run("identify", small_campaign, "--out", path, "--start", first, "--processes", 1).stdout
 
 
+@pytest.mark.slow
 def test_two_processes_write_the_same_bytes(tmp_path, small_campaign, first, warm):
     run("identify", small_campaign, "--out", tmp_path / "two.json", "--start", first, "--processes", 2)
     assert (tmp_path / "two.json").read_bytes() == warm[0].read_bytes()
 
 
+@pytest.mark.slow
 def test_a_warm_start_says_the_same_of_a_tip(small_campaign, first, warm):
     assembly = read_campaign(small_campaign).toolings["S1-ER32"].assembly
     omega = 2.0 * np.pi * np.linspace(600.0, 4000.0, 100)
-    again, cold = (tooltip(machine_from_json(read_result(path), ""), assembly, omega, False) for path in (warm[0], first))
-    for axis in (Dof.X, Dof.Y):
-        assert np.linalg.norm(again.tip(axis) - cold.tip(axis)) < 0.01 * np.linalg.norm(cold.tip(axis))
+    again, cold = (machine_from_json(read_result(path), "").tip(assembly, omega, spread=False) for path in (warm[0], first))
+    for tip in ("tip.x", "tip.y"):
+        assert np.linalg.norm(again.between(tip, tip) - cold.between(tip, tip)) < 0.01 * np.linalg.norm(cold.between(tip, tip))
     assert read_result(warm[0])["started_from"] == "RESULT.json"
     assert "started_from" not in read_result(first)
 
 
+@pytest.mark.slow
 def test_notes_and_coefficients_are_printed_and_written(warm):
     data, printed = read_result(warm[0]), warm[1]
     assert "tangential coefficient: " in printed
@@ -118,6 +123,7 @@ def test_notes_and_coefficients_are_printed_and_written(warm):
     assert data["coefficients"]["tangential coefficient"]["std"] > 0.0
 
 
+@pytest.mark.slow
 def test_a_method_sees_the_cuts_of_its_band_alone(tmp_path, small_campaign, monkeypatch):
     """The whole way through the command with a method that only counts, since the search itself has its own tests."""
 
@@ -147,3 +153,29 @@ def test_a_method_sees_the_cuts_of_its_band_alone(tmp_path, small_campaign, monk
     data = read_result(out)
     low, high = ([edge * np.pi / 30.0 for edge in band["speed_range_rpm"]] for band in data["speed_bands"])
     assert low[1] == pytest.approx(high[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [
+        ({"reasons": (Remark(IdentificationCode.NOT_CONVERGED, "it was still gaining"),)}, 3),
+        ({"reasons": (Remark(IdentificationCode.FEW_CUTS, "not converged, says a tooling of that name"),)}, 0),
+        ({"status": Status.FAILED, "axes": {}}, 3),
+    ],
+)
+def test_the_exit_code_follows_the_code_and_not_the_words(tmp_path, small_campaign, monkeypatch, change, code):
+    from rcsa_ident.identification import evidence
+
+    class Found:
+        def __init__(self, start=None):
+            pass
+
+        def run(self, data, seed, map, progress=None):
+            return replace(by_hand.identification(), **change)
+
+    monkeypatch.setattr(evidence, "EvidenceSelection", Found)
+    monkeypatch.setattr("rcsa_ident.io.identifications._delays", lambda *_: {})
+    out = tmp_path / "R.json"
+    run("identify", small_campaign, "--out", out, "--processes", 1, code=code)
+    # it is written, whatever it is worth
+    assert read_result(out)["status"] == ("failed" if change.get("status") else "suspect")

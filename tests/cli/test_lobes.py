@@ -15,6 +15,8 @@ from rcsa_ident.cli import advice, cases, export, lobes
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.curves import read_lobes_csv, write_frf_csv
 from rcsa_ident.io.frf_files import Source, read_tap_tests
+from rcsa_ident.io.identifications import machine_from_json
+from rcsa_ident.io.results import read_result
 from tests.fixtures import by_hand
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
@@ -55,6 +57,7 @@ def shop(tmp_path):
 SPEEDS = ("--speed-from", 6000, "--speed-to", 16000, "--speed-step", 1000)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["zero-order", "multi-frequency", "semi-discretisation", "full-discretisation", "time-domain"])
 def test_every_method_from_modes_and_from_tap_tests(shop, method):
     """Modes that a method fits to the receptance give the lobes of the modes that were given."""
@@ -64,10 +67,11 @@ def test_every_method_from_modes_and_from_tap_tests(shop, method):
     assert one["method"] == two["method"] == method
     a, b = read_lobes_csv(shop / "a.csv"), read_lobes_csv(shop / "b.csv")
     np.testing.assert_allclose(a.limit, b.limit, rtol=1e-3 if method == "zero-order" else 1e-2)
-    assert any("fitted with" in w for w in two["warnings"]) == (method not in ("zero-order", "multi-frequency"))
-    assert (shop / "a.csv").read_text(encoding="utf-8").splitlines()[0].endswith(",lobe,flip")
+    assert any("replaced by a fit with" in w for w in two["warnings"]) == (method not in ("zero-order", "multi-frequency"))
+    assert (shop / "a.csv").read_text(encoding="utf-8").splitlines()[0].endswith(",lobe,recommended_depth_mm,flip")
 
 
+@pytest.mark.slow
 def test_a_map_knows_islands_that_the_first_limit_does_not(tmp_path):
     """The helical mill at low immersion: closed islands of period doubling under and above the lobes."""
     (tmp_path / "M.toml").write_text(
@@ -92,6 +96,7 @@ def test_a_map_knows_islands_that_the_first_limit_does_not(tmp_path):
     assert (tmp_path / "L.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_tested_cuts_are_counted_at_their_own_speeds(shop):
     speed = 10013.0
     run("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, "--speed-from", speed, "--speed-to", speed, "--out", shop / "one.csv")
@@ -197,6 +202,7 @@ def test_units_and_records_of_tap_tests(shop):
     assert "record 4" in run(*base, "--frf", f"X={shop}/F.csv#4", code=2).stderr
 
 
+@pytest.mark.slow
 def test_advice_from_modes(shop):
     tip = ("--modes", shop / "M.toml", shop / "T.toml")
     common = ("advise", *tip, *KNOWN, *FEED, "--speed-from", 6000, "--speed-to", 24000, "--max-depth-mm", 15)
@@ -227,6 +233,7 @@ def test_advice_from_modes(shop):
     assert "highest removal rate" in run(*common, "--depth-mm", 40, "--max-depth-mm", 50).stdout
 
 
+@pytest.mark.slow
 def test_advice_compares_stickouts_and_toolings(result_file, tmp_path):
     tool = result_file.parent / "T1.toml"
     base = (*FEED, "--speed-from", 8000, "--speed-to", 16000, "--speed-step", 100)
@@ -247,6 +254,7 @@ def test_advice_compares_stickouts_and_toolings(result_file, tmp_path):
     assert "comparison" in run("advise", result_file, tool, other, *base).stdout
 
 
+@pytest.mark.slow
 def test_probability_counts_the_machines_of_the_posterior(result_file):
     tool = result_file.parent / "T1.toml"
     base = (*FEED, "--speed-from", 11000, "--speed-to", 12000, "--speed-step", 100, "--tolerance", 0, "--reserve", 0)
@@ -305,7 +313,7 @@ def test_export_of_flange_and_modes(result_file, tmp_path):
     assert {"X", "X_tM", "X_rF", "X_rM", "Y"} <= set(data["receptances"])
     run("export", result_file, "--to", "csv", "--what", "modes", "--out", tmp_path / "m.csv")
     rows = list(csv.DictReader((tmp_path / "m.csv").read_text(encoding="utf-8").splitlines()))
-    machine, _ = lobes.read_machine(result_file)
+    machine = machine_from_json(read_result(result_file), "").identified
     assert float(rows[0]["natural_frequency_hz"]) == pytest.approx(machine[Dof.X].spindle.modes.omega_n[0] / (2.0 * np.pi))
     for more, words in (
         (("--to", "uff", "--what", "modes"), "csv or json for modes"),
@@ -328,6 +336,7 @@ def test_the_face_mill_of_the_shared_files(tmp_path):
     assert answer["absolute_frequency_hz"] == pytest.approx(1441.0, abs=1.0)
 
 
+@pytest.mark.slow
 def test_cases_in_process_and_at_standstill(result_file, tmp_path):
     """Cuts at 0.9 and 1.1 of the machine's own limit are classified correctly by it, and not by tap tests of a machine twice as soft."""
     folder, speeds = result_file.parent, ("--speed-from", 9000, "--speed-to", 15000, "--speed-step", 500)

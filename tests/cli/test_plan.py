@@ -88,6 +88,7 @@ def test_the_plan_is_a_piece_of_a_campaign_file(tmp_path):
         assert np.degrees([conditions.engagement.entry, conditions.engagement.exit]) == pytest.approx([90.0, 150.0])
 
 
+@pytest.mark.slow
 def test_figures_for_machines(tmp_path):
     arguments = [result_in(tmp_path), *options(tmp_path, "--cuts", 4, "--json")]
     first = json.loads(run(*arguments).stdout)
@@ -106,6 +107,7 @@ def test_a_band_out_of_reach_is_a_warning(tmp_path):
     assert shown.stdout.count("S1-ER32") + shown.stdout.count("S2-PG25") == 2
 
 
+@pytest.mark.slow
 def test_better_known_forces_narrow_the_band(tmp_path):
     found = []
     for std in (0.05, 1e-4):
@@ -115,6 +117,7 @@ def test_better_known_forces_narrow_the_band(tmp_path):
     assert found[1] < found[0]
 
 
+@pytest.mark.slow
 def test_noise_of_a_campaign(tmp_path):
     summary = json.loads(run(result_in(tmp_path), *options(tmp_path, "--cuts", 1, "--campaign", DATA / "sample_runs", "--json")).stdout)
     # 2 nm rms over 7168 samples in the gap's cut and air cut: 2 nm sqrt(2 / 7168) sqrt(2), and the fixture's share

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -12,7 +13,8 @@ import time
 
 import pytest
 
-from rcsa_ident.cli.processes import tell, workers
+from rcsa_ident.cli.processes import workers
+from rcsa_ident.identification.progress import Stage, Step
 from tests.fixtures.waiting import PATIENCE, until
 
 
@@ -31,9 +33,10 @@ def refuse_seven(x):
     return x
 
 
-def say_something(x):
+def say_something(task):
+    x, progress = task
     time.sleep(0.15)
-    tell("x", f"stage {x}", float(x))
+    progress(Step("x", Stage.MODES, float(x), x))
     return x
 
 
@@ -67,15 +70,29 @@ def test_an_error_comes_out_where_its_task_stands(two):
 
 def test_words_of_workers_and_of_this_process_arrive(two):
     heard = []
-    with two.listening(lambda *word: heard.append((*word, threading.current_thread() is threading.main_thread()))):
-        assert list(two.map(say_something, range(8))) == list(range(8))
+    with two.listening(lambda *word: heard.append((*word, threading.current_thread() is threading.main_thread()))) as progress:
+        assert list(two.map(say_something, [(x, progress) for x in range(8)])) == list(range(8))
         until(lambda: len(heard) == 8)
     assert {main for *_, main in heard} == {True, False}
-    assert all(axis == "x" and stage == f"stage {cost:.0f}" for axis, stage, cost, _ in heard)
-    tell("x", "nobody listens", 0.0)
-    assert all(stage != "nobody listens" for _, stage, _, _ in heard)
+    assert all(axis == "x" and stage == f"{cost:.0f} modes" for axis, stage, cost, _ in heard)
+    count = len(heard)
+    # a worker that still tells when nobody listens any more goes on with its work
+    assert list(two.map(say_something, [(x, progress) for x in range(8)])) == list(range(8))
+    assert all(main for *_, main in heard[count:])
 
 
+def test_a_progress_that_goes_to_a_cluster_tells_nobody(two):
+    heard = []
+    with two.listening(lambda *word: heard.append(word)) as progress:
+        again = pickle.loads(pickle.dumps(progress))
+        again(Step("x", Stage.SEARCH, 1.0, 3))
+    assert heard == []
+    with workers(1) as alone, alone.listening(lambda *word: heard.append(word)) as progress:
+        progress(Step("x", Stage.SEARCH, 1.0, 3))
+    assert heard == [("x", "search", 1.0)]
+
+
+@pytest.mark.slow
 def test_after_an_error_no_worker_is_left():
     children = []
 
@@ -93,16 +110,21 @@ def test_after_an_error_no_worker_is_left():
         assert not child.is_alive()
 
 
-CTRL_C = """
-import os, pathlib, signal, sys, time
-sys.path.insert(0, {root!r})
-from rcsa_ident.cli.processes import workers
+#: A module of its own: the helpers do not run the script that starts them.
+WORK = """
+import pathlib, time
 def work(task):
     pathlib.Path({place!r}, str(task)).touch()
     # a signal between a check of the interpreter and one long sleep would wait for the sleep's end
     end = time.monotonic() + 600.0
     while time.monotonic() < end:
         time.sleep(0.01)
+"""
+CTRL_C = """
+import signal, sys
+sys.path.insert(0, {root!r})
+from long_work import work
+from rcsa_ident.cli.processes import workers
 def main():
     try:
         with workers(3, early=()) as pool:
@@ -127,7 +149,8 @@ def test_ctrl_c_ends_all_of_them_without_a_word(tmp_path, at_work):
     place.mkdir()
     script = tmp_path / "script.py"
     root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-    script.write_text(CTRL_C.format(root=root, place=str(place)), encoding="utf-8")
+    (tmp_path / "long_work.py").write_text(WORK.format(place=str(place)), encoding="utf-8")
+    script.write_text(CTRL_C.format(root=root), encoding="utf-8")
     with subprocess.Popen(
         [sys.executable, str(script)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as running:

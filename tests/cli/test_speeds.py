@@ -13,7 +13,7 @@ from rcsa_ident.cli import app, lobes
 from rcsa_ident.io.curves import read_frf_csv, read_lobes_csv
 from rcsa_ident.io.identifications import machine_from_json, speed_band_to_json
 from rcsa_ident.io.results import read_result
-from rcsa_ident.workflows.tip import STIFFNESS_SPREAD, tooltip
+from rcsa_ident.machine.machine import STIFFNESS_SPREAD
 from tests.fixtures import by_hand
 
 RPM = 30.0 / np.pi
@@ -31,23 +31,26 @@ def tip(path, folder, *more):
     return read_frf_csv(folder / "F.csv")
 
 
+@pytest.mark.slow
 def test_a_speed_gives_the_machine_at_that_speed(tmp_path, softening_file):
     curves = tip(softening_file, tmp_path, "--speed", 6500)
     machine = machine_from_json(read_result(softening_file), "")
-    assembly = by_hand.campaign(tmp_path).toolings["T1"].assembly
-    response = tooltip(machine, assembly, 2.0 * np.pi * curves.frequency, speed=6500.0 / RPM)
-    for axis in machine:
-        np.testing.assert_allclose(curves.values[axis.upper()], response.tip(axis), rtol=1e-10)
-        np.testing.assert_allclose(curves.bands[f"{axis.upper()}_re_std"], response.deviation[axis][0], rtol=1e-8)
+    response = machine.at(6500.0 / RPM).tip(by_hand.campaign(tmp_path).toolings["T1"], 2.0 * np.pi * curves.frequency)
+    for row in response.rows:
+        axis = row.dof.upper()
+        np.testing.assert_allclose(curves.values[axis], response.between(str(row), str(row)), rtol=1e-10)
+        np.testing.assert_allclose(curves.bands[f"{axis}_re_std"], response.deviation()[row, row][0], rtol=1e-8)
     middle = tip(softening_file, tmp_path)
     assert np.linalg.norm(curves.values["X"] - middle.values["X"]) > 0.01 * np.linalg.norm(middle.values["X"])
 
 
+@pytest.mark.slow
 def test_a_machine_that_stays_says_the_same_at_every_speed(tmp_path, result_file):
     one, two = tip(result_file, tmp_path), tip(result_file, tmp_path, "--speed", 50000)
     np.testing.assert_array_equal(one.values["X"], two.values["X"])
 
 
+@pytest.mark.slow
 def test_speeds_beyond_the_campaigns_are_warned_of(tmp_path, softening_file):
     known = f"from {600 * RPM:.0f} to {1400 * RPM:.0f} rev/min"
     for arguments in (("tooltip", "--speed", 20000, "--step", 100), ("lobes", *SPEEDS, "--speed-to", 20000)):
@@ -58,6 +61,7 @@ def test_speeds_beyond_the_campaigns_are_warned_of(tmp_path, softening_file):
     assert "outside it stays" not in result.stderr
 
 
+@pytest.mark.slow
 def test_lobes_follow_the_machine_over_its_speeds(tmp_path, softening_file):
     out = tmp_path / "L.csv"
     run("lobes", softening_file, tmp_path / "T1.toml", "--out", out, *SPEEDS)
@@ -71,6 +75,7 @@ def test_lobes_follow_the_machine_over_its_speeds(tmp_path, softening_file):
     assert np.all(curves.extra["limit_depth_low_mm"] < curves.extra["limit_depth_high_mm"])
 
 
+@pytest.mark.slow
 def test_a_speed_band_answers_with_its_own_model(tmp_path, result_file):
     data = json.loads(result_file.read_text(encoding="utf-8"))
     other = by_hand.identification(softening=True)
@@ -82,6 +87,7 @@ def test_a_speed_band_answers_with_its_own_model(tmp_path, result_file):
     assert np.linalg.norm(tip(path, tmp_path, "--speed", 13000).values["X"] - whole) > 0.01 * np.linalg.norm(whole)
 
 
+@pytest.mark.slow
 def test_a_stiffness_known_less_well_widens_the_bands(tmp_path, result_file):
     exact, usual, ten = (tip(result_file, tmp_path, "--stiffness-spread", percent).bands["X_re_std"] for percent in (0.0, 0.05, 0.5))
     own = [np.sqrt(wide**2 - exact**2) for wide in (usual, ten)]

@@ -68,6 +68,7 @@ def observations(name, noise, rng, spindle_end=True, which=(0, 1, 2, 3)):
     return made
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 10**6), count=st.sampled_from([3, 4]))
 def test_exact_tips_give_the_flange(seed, count):
@@ -87,6 +88,7 @@ def test_exact_tips_give_the_flange(seed, count):
     assert np.all(found.chi2 < 1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["hpm", "stiff", "table2"])
 def test_noise_of_two_percent_with_the_spindles_end(name):
     """Four toolings, tip, flange and across: entries to about the measurements' own noise, intervals that hold, well conditioned."""
@@ -104,6 +106,7 @@ def test_noise_of_two_percent_with_the_spindles_end(name):
     assert 0.7 * 18 < np.median(found.chi2) < 1.4 * 18
 
 
+@pytest.mark.slow
 def test_smoothness_helps_and_says_so():
     """Tips alone are ill-conditioned: neighbours halve the error, their use is marked, and the notes say what to measure."""
     flange, joint, _ = truth("hpm")
@@ -121,6 +124,7 @@ def test_smoothness_helps_and_says_so():
     assert np.all(smooth.std[smooth.regularised] < np.inf)
 
 
+@pytest.mark.slow
 def test_three_tips_leave_two_flanges():
     found = least_squares_flange(observations("hpm", 1e-6, np.random.default_rng(3), spindle_end=False, which=(0, 2, 3)), truth("hpm")[1])
     assert found.ambiguous.mean() > 0.05
@@ -128,6 +132,7 @@ def test_three_tips_leave_two_flanges():
     assert found.freedom == 0
 
 
+@pytest.mark.slow
 def test_a_wrong_holder_shows():
     """A holder modelled 20 % too heavy does not explain four toolings; the misfit says so, and passivity suffers."""
     heavy = replace(STEEL, density=1.2 * STEEL.density)
@@ -140,6 +145,7 @@ def test_a_wrong_holder_shows():
     assert any("differ from their models" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_the_result_is_judged_for_passivity():
     found = least_squares_flange(observations("table2", 0.02, np.random.default_rng(5)), truth("table2")[1])
     np.testing.assert_allclose(found.dissipation, dissipation(OMEGA, found.receptance.values))

@@ -53,6 +53,7 @@ def test_lines_are_linear_in_the_coefficients(lines):
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(
     entry=st.floats(0.0, 2.5),

@@ -46,6 +46,7 @@ CUTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", list(CUTS))
 @pytest.mark.parametrize("name", list(CUTTERS))
 def test_lines_of_a_sampled_revolution(name, cut):
@@ -55,6 +56,7 @@ def test_lines_of_a_sampled_revolution(name, cut):
     np.testing.assert_allclose(found, expected, atol=1e-3 * np.abs(found).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", list(CUTS))
 @pytest.mark.parametrize("name", list(RUNOUT))
 def test_lines_with_runout(name, cut):
@@ -85,6 +87,7 @@ def test_no_runout_is_equal_runout_is_force_lines(teeth, helix, feed, angle, ent
         np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_the_series_is_the_force():
     """Summed up to a high order, away from the jumps."""
     orders = np.arange(0, 4000)

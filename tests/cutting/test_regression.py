@@ -45,6 +45,7 @@ def test_single_observations_give_hc2():
     np.testing.assert_allclose(covariance, expected, rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_exact_in_the_mean_for_equal_errors():
     rng = np.random.default_rng(4)
     design = np.stack([np.ones(20), np.linspace(0.0, 1.0, 20)], axis=1)
@@ -53,6 +54,7 @@ def test_exact_in_the_mean_for_equal_errors():
     np.testing.assert_allclose(mean, np.linalg.inv(design.T @ design), rtol=0.08)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("uneven", [0.0, 1.0])
 def test_intervals_hold(uneven):
     """Five clusters of two, errors of a cluster alike, large where the regressor is: 95 % intervals hold 93 % or more."""

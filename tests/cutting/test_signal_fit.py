@@ -58,6 +58,7 @@ def records(seed=1, feeds=(4e-5, 6e-5, 8e-5, 1e-4, 1.2e-4), **options):
     return [m[0] for m in made], np.array([m[1] for m in made])
 
 
+@pytest.mark.slow
 def test_everything_comes_back():
     """Coefficients within their intervals, run-out to a twentieth of a micrometre, each record's tooth angle."""
     found = calibrate_signal(*(records()[:1]))
@@ -75,6 +76,7 @@ def test_everything_comes_back():
     np.testing.assert_allclose(found.runout["a"], shifted, atol=5e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axes", [((-1, 0), (0, -1)), ((0, 1), (-1, 0)), ((1, 0), (0, -1)), ((0, -1), (-1, 0))])
 def test_sensor_axes_are_found(axes):
     """A dynamometer under the workpiece shows the force with the other sign; one that was mounted turned shows other axes."""
@@ -84,6 +86,7 @@ def test_sensor_axes_are_found(axes):
     assert any("sensor axes" in note for note in found.forces.notes)
 
 
+@pytest.mark.slow
 def test_a_resonance_of_the_dynamometer():
     """Two different resonances are found and undone; unknown to the fit they show as a misfit that is named."""
     true = Dynamometer(2, 1900.0, 0.04)
@@ -97,6 +100,7 @@ def test_a_resonance_of_the_dynamometer():
     assert any("remains unexplained" in reason for reason in blind.forces.reasons)
 
 
+@pytest.mark.slow
 def test_a_bandwidth():
     true = Dynamometer(1, 1500.0)
     made, _ = records(response=lambda omega: true.response(omega, np.array([0.0, 0.1])))
@@ -105,6 +109,7 @@ def test_a_bandwidth():
     np.testing.assert_allclose(found.forces.value, TRUE, rtol=0.01)
 
 
+@pytest.mark.slow
 def test_the_helix():
     told = replace(CUTTER, helix=np.radians(30.0))
     made = [replace(r, cutter=replace(told, helix=np.radians(38.0))) for r in records(depth=3e-3)[0]]
@@ -114,6 +119,7 @@ def test_the_helix():
     assert calibrate_signal(made).helix is None
 
 
+@pytest.mark.slow
 def test_unequal_pitch_and_two_clampings():
     cutter = Cutter(3, 0.012, np.radians(30.0), np.radians([112.0, 120.0, 128.0]))
     one, _ = records(cutter=cutter, feeds=(5e-5, 8e-5))
@@ -123,6 +129,7 @@ def test_unequal_pitch_and_two_clampings():
     np.testing.assert_allclose(found.forces.value, TRUE, rtol=0.01)
 
 
+@pytest.mark.slow
 def test_slopes_by_differences():
     """The whole Jacobian, priors included, against differences of the residual."""
     problem = signal_fit._Problem(records()[0][:3], Dynamometer(2, 2500.0), True, runout=True)
@@ -139,6 +146,7 @@ def test_slopes_by_differences():
         np.testing.assert_allclose(slope[:, k], numeric, rtol=1e-3, atol=share * np.abs(numeric).max())
 
 
+@pytest.mark.slow
 def test_intervals_see_what_differs_between_cuts():
     """A cut's depth that is off by 2 % shows in no record's own noise."""
     rng = np.random.default_rng(7)
@@ -152,6 +160,7 @@ def test_intervals_see_what_differs_between_cuts():
     assert any("too few to estimate their scatter" in note for note in few.forces.notes)
 
 
+@pytest.mark.slow
 def test_noise_width_is_the_estimates_scatter():
     """Over seeds, with all cuts alike, estimates scatter as the records' own noise says."""
     found = [calibrate_signal(records(seed, noise=0.05, feeds=(5e-5, 8e-5, 1.1e-4))[0]) for seed in range(14)]

@@ -16,7 +16,7 @@ from rcsa_ident.dynamics.rational import FitStatus, fitted_poles, rational_fit
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.machine.machine import FlangeMachine
+from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 
 MACHINES = Path(__file__).parents[2] / "data" / "machines"
@@ -48,6 +48,7 @@ def test_the_order_comes_out_of_the_data():
     np.testing.assert_array_equal(fit.constant, 0.0)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.integers(1, 5), st.integers(0, 2**31), st.integers(0, 2))
 def test_any_stable_function_is_recovered(pairs, seed, real):
@@ -93,6 +94,7 @@ def test_mirrored_poles_fit_what_a_stable_function_can():
     assert fit.pole[0].imag == pytest.approx(8000.0, rel=0.1)
 
 
+@pytest.mark.slow
 def test_noise_leaves_the_order_and_widens_the_poles():
     """The misfit is that of the noise, and the poles lie where the Cramer-Rao bound puts them."""
     model = modal()
@@ -135,6 +137,7 @@ def test_what_no_order_reaches_is_said():
     assert fit.error == pytest.approx(0.05 * np.sqrt(2.0), rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tooling", ["S1-ER32", "S2-PG25", "S3-PG25-long", "S4-shrink"])
 def test_tip_and_cross_receptance_of_a_finite_element_machine(tooling):
     """100 to 4300 Hz, full equations with hysteretic damping: not rational, but nearly so."""

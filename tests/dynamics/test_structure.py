@@ -37,6 +37,7 @@ def chain(springs, dampers, masses, losses=0.0):
 W = np.linspace(20.0, 3000.0, 61)
 
 
+@pytest.mark.slow
 def test_one_mass_on_a_spring():
     m, c, k = 2.0, 30.0, 4e5
     one = structure(m, c, k)
@@ -46,6 +47,7 @@ def test_one_mass_on_a_spring():
     assert natural_frequencies(one)[0] == pytest.approx(np.sqrt(k / m))
 
 
+@pytest.mark.slow
 def test_hysteretic_damping_takes_energy_at_positive_frequencies():
     one = structure(2.0, 0.0, 4e5, np.array([[4e3]]))
     expected = 1.0 / (4e5 * (1 + 0.01j) - W**2 * 2.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tests.gallery.test_gallery import example
 
@@ -14,6 +15,7 @@ def test_cutting_coefficients():
     assert ex.FOUND.half_width[0] < 0.1 * true[0]
 
 
+@pytest.mark.slow
 def test_decoupled_flange():
     ex = example("decoupled_flange")
     true = ex.MACHINE.receptance(ex.OMEGA).values

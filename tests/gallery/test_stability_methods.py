@@ -8,6 +8,7 @@ import pytest
 from tests.gallery.test_gallery import example
 
 
+@pytest.mark.slow
 def test_all_methods():
     ex = example("all_methods")
     exact = ex.LIMITS["FullDiscretisation"]

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
@@ -58,6 +59,7 @@ def campaigns(draw):
     ]
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(campaigns())
 def test_every_line_is_there_once_with_its_own_holder(cuts):
@@ -119,11 +121,11 @@ def test_an_axis_where_one_cut_lacks_the_fixture_falls_back_to_the_sum():
 def test_what_is_uncertain_about_the_forces():
     rng = np.random.default_rng(2)
     cuts = [measurement("1", "a", rng), measurement("2", "b", rng), measurement("3", "a", rng)]
-    assert prepared(cuts).coefficient_names == ()
+    assert prepared(cuts).coefficients == ()
     assert all(a.force_slope.shape[1] == 0 for a in prepared(cuts).axes)
     # the edge forces are known: they have no column
     data = prepared(cuts, (0.05, 0.1, 0.0, 0.0))
-    assert data.coefficient_names == ("tangential coefficient", "radial ratio", "run-out of a", "run-out of b")
+    assert tuple(map(str, data.coefficients)) == ("tangential coefficient", "radial ratio", "run-out of a", "run-out of b")
     assert data.coefficient_spread == (0.05, 0.1, RUNOUT_SPREAD, RUNOUT_SPREAD)
     for axis in data.axes:
         for k, cut in enumerate(cuts):
@@ -132,7 +134,9 @@ def test_what_is_uncertain_about_the_forces():
             own, other = (2, 3) if cut.tooling == "a" else (3, 2)
             np.testing.assert_array_equal(mine[:, own], lines.force_slope[:, 4])
             np.testing.assert_array_equal(mine[:, other], 0.0)
-    assert prepared(cuts, (0.0, 0.0, 0.2, 0.2)).coefficient_names[:2] == ("tangential edge force", "radial edge force")
+    assert [c.tooling for c in data.coefficients] == ["", "", "a", "b"]
+    edges = prepared(cuts, (0.0, 0.0, 0.2, 0.2)).coefficients[:2]
+    assert edges == (ForceCoefficient(ForceTerm.TANGENTIAL_EDGE), ForceCoefficient(ForceTerm.RADIAL_EDGE))
 
 
 def test_smooth_errors_belong_to_one_axis_and_one_tooling():
@@ -144,7 +148,7 @@ def test_smooth_errors_belong_to_one_axis_and_one_tooling():
     known = len(data.coefficient_spread)
     # axis, tooling, real and imaginary, polynomial
     assert wide.coefficient_spread == (*data.coefficient_spread, *(share,) * (2 * 2 * 2 * terms))
-    assert wide.coefficient_names == data.coefficient_names
+    assert wide.coefficients == data.coefficients
     highest = max(a.omega.max() for a in data.axes)
     seen = np.zeros(2 * 2 * 2 * terms, dtype=int)
     for axis, before in zip(wide.axes, data.axes, strict=True):

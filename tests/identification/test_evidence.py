@@ -1,17 +1,26 @@
 """The whole method on lines of the virtual machine, whose spindle is not of the form that is fitted."""
 
+import pickle
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
+from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification.evidence import EvidenceSelection
+from rcsa_ident.identification.method import Phase
 from rcsa_ident.identification.parameters import AxisLayout, parameter_names
+from rcsa_ident.identification.preview import Preview
+from rcsa_ident.identification.progress import BOTH, Stage
+from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.status import Status
+from rcsa_ident.remarks import says
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, open_shop
+
+pytestmark = pytest.mark.slow
 
 SMALL = EvidenceSelection(search=SearchSettings(modes=8, population=4, generations=2, steps=6), candidates=2)
 #: For what must not crash, whatever comes out.
@@ -57,7 +66,7 @@ def told():
 
 @pytest.fixture(scope="module")
 def found(campaign, told):
-    return SMALL.run(campaign[0], 102, progress=lambda *step: told.append(step))
+    return SMALL.run(campaign[0], 102, progress=told.append)
 
 
 def test_tooltip_of_a_tooling_that_never_cut(shop, found):
@@ -89,7 +98,8 @@ def test_the_result_tells_its_story(campaign, found):
     data = campaign[0]
     assert found.method == "default"
     assert (found.seed, found.reasons, found.cut_ids) == (102, (), data.cut_ids)
-    assert {stage for _, stage, _ in found.trace} >= {"search", "refine", "learn noise", "exchange", "grow", "polish"}
+    stages = {Stage.SEARCH, Stage.REFINE, Stage.NOISE, Stage.MODES, Stage.EXCHANGE, Stage.GROW, Stage.POLISH}
+    assert {step.stage for step in found.trace} >= stages
     assert found.coefficients == {}
     for axis, result in found.axes.items():
         assert 0.3 < result.chi2_per_point < 1.2
@@ -116,22 +126,48 @@ def test_the_result_tells_its_story(campaign, found):
 
 
 def test_progress_is_told_of_every_step_of_the_trace(found, told):
-    assert [(axis, stage, cost) for axis, stage, cost, _, _ in told if axis == "both"] == [t for t in found.trace if t[0] == "both"]
-    for axis in ("x", "y"):
-        assert sorted(step[:3] for step in told if step[0] == axis) == sorted(t for t in found.trace if t[0] == axis)
-    for axis, _, cost, theta, layout in told:
-        assert np.isfinite(cost)
-        assert theta.size == layout.size
-        assert len(layout.axes) == (2 if axis == "both" else 1)
+    for axis in ("x", "y", BOTH):
+        assert [step for step in told if step.axis == axis] == [step for step in found.trace if step.axis == axis]
+    assert all(step.candidate is None for step in found.trace)
+    for step in told:
+        candidate = step.candidate
+        assert np.isfinite(step.cost)
+        assert candidate.theta.size == candidate.layout.size == candidate.information.shape[0]
+        assert len(candidate.layout.axes) == (2 if step.axis == BOTH else 1)
+        assert sum(a.modes for a in candidate.layout.axes) == step.modes
+        assert step.label == (f"{step.modes} modes" if step.stage is Stage.MODES else step.stage.value)
+
+
+def test_a_preview_shows_what_a_step_has_come_to(campaign, found, told):
+    preview = Preview(campaign[0])
+    last = told[-1]
+    assert preview.axes(last) == AXES
+    for axis in AXES:
+        result, lines = found.axes[axis], preview.lines(last, axis)
+        order = np.argsort(result.measured["omega"], kind="stable")
+        np.testing.assert_array_equal(lines.omega, result.measured["omega"][order])
+        np.testing.assert_allclose(np.abs(lines.measured), np.abs(result.measured["value"])[order], rtol=1e-9)
+        np.testing.assert_allclose(lines.model, result.measured["model"][order], rtol=1e-9)
+    first = next(step for step in told if step.axis == "x")
+    assert preview.axes(first) == (Dof.X,)
+    assert preview.axes(replace(first, candidate=None)) == ()
 
 
 def test_same_seed_same_answer_in_any_order(shop, campaign):
     data = shop.prepare(campaign[2][::8], spread=(0.05, 0.05, 0.0, 0.0))
 
-    def backwards(function, jobs):
-        return [function(job) for job in reversed(list(jobs))][::-1]
+    phases = []
 
-    one, again, other = TINY.run(data, 5), TINY.run(data, 5, backwards), TINY.run(data, 6)
+    def elsewhere(function, tasks):
+        """Last task first, each as if in a process of its own."""
+        tasks = list(tasks)
+        phases.append({task.phase for task in tasks})
+        return [pickle.loads(pickle.dumps(function(pickle.loads(pickle.dumps(task))))) for task in reversed(tasks)][::-1]
+
+    one, again, other = TINY.run(data, 5), TINY.run(data, 5, elsewhere), TINY.run(data, 6)
+    # tasks of one call are of one phase, which they say
+    assert phases[:2] == [{Phase.SEARCH}, {Phase.OTHER_AXIS}]
+    assert phases[-1] == {Phase.BOTH_AXES}
     np.testing.assert_array_equal(again.delay, one.delay)
     np.testing.assert_array_equal(again.delay_std, one.delay_std)
     assert (again.trace, again.reasons, again.notes) == (one.trace, one.reasons, one.notes)
@@ -144,10 +180,10 @@ def test_same_seed_same_answer_in_any_order(shop, campaign):
 def test_warm_start_comes_to_the_same_machine_sooner(shop, campaign, found, told):
     warm = replace(SMALL, start={axis: result.posterior for axis, result in found.axes.items()})
     steps = []
-    again = warm.run(campaign[0], 7, progress=lambda *step: steps.append(step))
+    again = warm.run(campaign[0], 7, progress=steps.append)
     assert again.status is Status.CONVERGED
     assert len(steps) < 0.75 * len(told)
-    assert "search" not in {stage for _, stage, *_ in steps}
+    assert Stage.SEARCH not in {step.stage for step in steps}
     assert max(tip_errors(shop, again).values()) < 0.03
     one, two = (each.machine.tip(shop.held_out, TIP_OMEGA) for each in (found, again))
     for axis in AXES:
@@ -177,22 +213,22 @@ def clamped(clamped_cuts):
 
 def test_a_wrong_cutting_coefficient_is_found(shop, clamped_cuts, clamped):
     assert clamped.status is Status.CONVERGED, clamped.reasons
-    scale, std = clamped.coefficients["tangential coefficient"]
+    scale, std = clamped.coefficients[ForceCoefficient(ForceTerm.TANGENTIAL)]
     assert scale == pytest.approx(-np.log(1.1), abs=3.0 * std)
     assert std < 0.02
-    ratio, std = clamped.coefficients["radial ratio"]
+    ratio, std = clamped.coefficients[ForceCoefficient(ForceTerm.RATIO)]
     assert ratio == pytest.approx(0.0, abs=3.0 * std)
     assert std < 0.01
     # the smooth errors behind them have no name
-    assert tuple(clamped.coefficients) == clamped_cuts[0].coefficient_names
+    assert tuple(clamped.coefficients) == clamped_cuts[0].coefficients
     assert max(tip_errors(shop, clamped).values()) < 0.03
 
 
 def test_what_a_wrong_coefficient_costs_where_nobody_asks(shop, clamped_cuts, clamped):
     """The same lines with forces taken for exact."""
-    named = len(clamped_cuts[0].coefficient_names)
+    named = len(clamped_cuts[0].coefficients)
     axes = tuple(replace(a, force_slope=a.force_slope[:, named:]) for a in clamped_cuts[0].axes)
-    data = replace(clamped_cuts[0], axes=axes, coefficient_names=(), coefficient_spread=())
+    data = replace(clamped_cuts[0], axes=axes, coefficients=(), coefficient_spread=())
     warm = replace(SMALL, start={axis: result.posterior for axis, result in clamped.axes.items()})
     deaf = warm.run(data.only(Dof.Y), 1)
     assert tip_errors(shop, deaf)[Dof.Y] > 2.0 * tip_errors(shop, clamped)[Dof.Y]
@@ -248,7 +284,7 @@ def test_a_cut_that_contradicts_the_others_is_named_and_counts_less(shop, campai
     without = SMALL.run(shop.prepare([*bad[:7], *bad[8:]]), 102)
     spoilt = SMALL.run(shop.prepare(bad), 102)
     assert spoilt.status is Status.CONVERGED, spoilt.reasons
-    named = [note for note in spoilt.notes if "contradict" in note]
+    named = [note for note in spoilt.notes if note.code is IdentificationCode.CUTS_WEIGHTED_DOWN]
     assert len(named) == 1
     assert [c.cut_id for c in bad if f" {c.cut_id} (" in named[0]] == [bad[7].cut_id]
     # the others are believed as if it were not there
@@ -260,7 +296,7 @@ def test_one_tooling_is_not_enough(shop):
     cuts, _ = shop.measurements(np.random.default_rng(0), names=list(shop.truth)[:1], axes=(Dof.X,))
     found = TINY.run(shop.prepare(cuts), 1)
     assert found.status is Status.SUSPECT
-    assert any("one tooling" in reason for reason in found.reasons)
+    assert says(found.reasons, IdentificationCode.ONE_TOOLING)
     assert list(found.axes) == [Dof.X]
 
 
@@ -276,7 +312,7 @@ def test_a_sensor_of_the_wrong_sign(shop):
     found = TINY.run(shop.prepare(cuts[::4]), 1)
     assert found.status is Status.SUSPECT
     assert found.axes[Dof.X].model_error > 0.05
-    assert any(reason.startswith("X:") and "unexplained" in reason for reason in found.reasons)
+    assert any(reason.code is IdentificationCode.UNEXPLAINED and reason.startswith("X:") for reason in found.reasons)
 
 
 def test_forces_that_are_not_those_of_the_cut(shop):
@@ -288,14 +324,14 @@ def test_forces_that_are_not_those_of_the_cut(shop):
 
     found = TINY.run(shop.prepare(shop.measurements(np.random.default_rng(0), axes=(Dof.X,), change=wrong)[0][::2]), 1)
     assert found.status is Status.SUSPECT
-    assert any("unexplained" in reason for reason in found.reasons)
+    assert says(found.reasons, IdentificationCode.UNEXPLAINED)
 
 
 def test_noise_alone_is_not_a_machine(shop):
     cuts, _ = shop.measurements(np.random.default_rng(0), change=lambda values, force, axis: 0.0 * values)
     found = TINY.run(shop.prepare(cuts[::2]), 1)
     assert found.status is Status.SUSPECT
-    assert any("noise" in reason for reason in found.reasons)
+    assert says(found.reasons, IdentificationCode.WEAK_SIGNAL)
 
 
 ODD = {

@@ -90,6 +90,7 @@ def test_no_cut_widens_a_band_and_the_greedy_one_beats_any_other_first(seed):
     assert variance(prospects, order[:1]) == pytest.approx(min(variance(prospects, [k]) for k in range(12)), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_exchange_is_never_worse_and_mends_what_greed_has_spoilt():
     mended = 0
     for seed in range(60):

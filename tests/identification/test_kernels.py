@@ -160,6 +160,7 @@ def test_cross_frf_gradient_against_differences(outputs, soft):
             assert np.abs(gradient[:, o, k] - difference[:, o]).max() < 1e-5 * size, (k, o)
 
 
+@pytest.mark.slow
 def test_modal_cross_frf_is_that_of_coupled_modes():
     rng = np.random.default_rng(6)
     omega = 2.0 * np.pi * rng.uniform(200.0, 4500.0, 17)

@@ -19,6 +19,7 @@ from rcsa_ident.identification.model_order import (
 )
 from rcsa_ident.identification.parameters import AxisLayout, Layout, pack, plain, unpack, with_mode, without_mode
 from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.progress import Stage
 from tests.identification.models import machine_vector, own, remade, vector_of
 from tests.identification.test_parameters import receptance
 
@@ -61,11 +62,11 @@ def test_evidence_prefers_the_true_number_of_modes(few, theta):
     seen = []
     best = drop_modes(full, misfit, lambda stage, value, solution: seen.append((stage, value, solution.layout)))
     assert best.layout == TRUE
-    assert [stage for stage, _, _ in seen] == ["4 modes", "3 modes", "2 modes"]
+    assert {stage for stage, _, _ in seen} == {Stage.MODES}
     assert [layout.axes[0].modes for _, _, layout in seen] == [4, 3, 2]
-    values = {stage: value for stage, value, _ in seen}
-    assert values["3 modes"] == pytest.approx(evidence(best, misfit))
-    assert values["3 modes"] < min(values["4 modes"], values["2 modes"], evidence(full, misfit))
+    values = {layout.axes[0].modes: value for _, value, layout in seen}
+    assert values[3] == pytest.approx(evidence(best, misfit))
+    assert values[3] < min(values[4], values[2], evidence(full, misfit))
     np.testing.assert_allclose(frequencies(best), [600.0, 1400.0, 2600.0], rtol=0.02)
 
 

@@ -77,6 +77,7 @@ def test_vector_and_physics_belong_together(drawn):
     np.testing.assert_array_equal(axis.softening, axis.softening.T)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(vectors(), st.floats(-1.0, 1.0))
 def test_every_vector_is_a_passive_reciprocal_machine(drawn, x):

@@ -62,6 +62,7 @@ def deviation(rows):
     return np.sqrt(np.sum(np.abs(rows) ** 2, axis=0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [None, 2000.0])
 def test_spread_against_draws(soft, tip, speed):
     # where the response is straight over the posterior, its spread is that of the draws

@@ -18,7 +18,8 @@ from typer.testing import CliRunner
 from rcsa_ident.cli import app
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.recordings import READERS, read_recording, write_hdf5
+from rcsa_ident.io.hdf5 import write_hdf5
+from rcsa_ident.io.recordings import READERS, read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.fixtures.recording_formats import FORMATS
 
@@ -49,6 +50,7 @@ def real_size(tmp_path_factory):
     return channels, read_recording(path, SENSORS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
 def test_a_recording_of_real_size_is_that_of_hdf5(tmp_path, real_size, name):
     channels, native = real_size

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.recordings import read_recording, write_hdf5
+from rcsa_ident.io.hdf5 import write_hdf5
+from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 from tests.fixtures.hostile_hdf5 import (
     DATA,

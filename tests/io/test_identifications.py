@@ -16,8 +16,6 @@ from rcsa_ident.io.identifications import (
     identification_to_json,
     machine_from_json,
     speed_band_to_json,
-    speed_bands_from_json,
-    workpiece_from_json,
 )
 from rcsa_ident.io.results import read_result, write_result
 from tests.fixtures import by_hand
@@ -40,7 +38,7 @@ def path(tmp_path, found):
 
 
 def test_the_posterior_comes_back_bit_by_bit(path, found, softening):
-    machine = machine_from_json(read_result(path), str(path))
+    machine = machine_from_json(read_result(path), str(path)).identified
     omega = 2.0 * np.pi * np.linspace(300.0, 3000.0, 50)
     for axis, part in found.axes.items():
         read, wrote = machine[axis].posterior, part.posterior
@@ -82,7 +80,7 @@ def test_coefficients_are_factors_and_micrometres(path):
 
 def test_the_workpiece_comes_back_with_its_spreads(path, tmp_path):
     campaign = by_hand.campaign(tmp_path)
-    assert workpiece_from_json(read_result(path), "") == campaign.workpiece
+    assert machine_from_json(read_result(path), "").workpiece == campaign.workpiece
 
 
 def test_standard_deviations_stand_beside_the_modes(tmp_path, found):
@@ -105,7 +103,7 @@ def test_a_file_from_before_the_layout_holds_a_machine_that_stays(tmp_path):
     for key in [key for key in data["workpiece"] if "spread" in key]:
         del data["workpiece"][key]
     write_result(tmp_path / "old.json", data)
-    read = machine_from_json(read_result(tmp_path / "old.json"), "")[Dof.X].posterior
+    read = machine_from_json(read_result(tmp_path / "old.json"), "").identified[Dof.X].posterior
     wrote = found.axes[Dof.X].posterior
     assert read.layout == wrote.layout
     assert read.speed_range == (0.0, 0.0)
@@ -118,7 +116,7 @@ def test_without_a_posterior_the_modes_remain(tmp_path):
     found = replace(found, axes={a: replace(p, posterior=None, parameters=()) for a, p in found.axes.items()})
     data = identification_to_json(found, by_hand.campaign(tmp_path), [])
     assert "unknowns" not in data["axes"]["X"]
-    part = machine_from_json(data, "")[Dof.X]
+    part = machine_from_json(data, "").identified[Dof.X]
     assert part.posterior is None
     assert part.at(Dof.X, 900.0)[0] is part.spindle.modes
 
@@ -157,11 +155,11 @@ def test_a_posterior_that_does_not_fit_is_named(path, where, value, words):
 
 def test_speed_bands_come_back_with_their_edges(tmp_path, path, found):
     data = json.loads(path.read_text(encoding="utf-8"))
-    assert speed_bands_from_json(data, "") == []
+    assert machine_from_json(data, "").speed_models == ()
     edges = [(600.0, 1000.0), (1000.0, 1400.0)]
     data["speed_bands"] = [speed_band_to_json(speeds, found) for speeds in edges]
     write_result(path, data)
-    read = speed_bands_from_json(read_result(path), str(path))
+    read = machine_from_json(read_result(path), str(path)).speed_models
     for (speeds, machine), wanted in zip(read, edges, strict=True):
         assert speeds == pytest.approx(wanted, rel=1e-14)
         np.testing.assert_array_equal(machine[Dof.Y].posterior.theta, found.axes[Dof.Y].posterior.theta)

@@ -10,7 +10,8 @@ from hypothesis.extra.numpy import arrays
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.recordings import READERS, read_recording, write_hdf5
+from rcsa_ident.io.hdf5 import write_hdf5
+from rcsa_ident.io.recordings import READERS, read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
 
 GAP = Sensor("flange_x", Quantity.DISPLACEMENT, Dof.X, 1.0e4)

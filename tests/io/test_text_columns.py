@@ -103,6 +103,7 @@ def test_a_bad_file_is_answered_with_one_sentence(tmp_path, text, words):
         assert word in message
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(
     rate=st.sampled_from([10.0, 1000.0, 25600.0, 48000.0, 51200.0, 102400.0]),

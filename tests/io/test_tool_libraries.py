@@ -259,6 +259,7 @@ def test_a_hostile_library_costs_one_sentence(name):
     costs_one_sentence(*HOSTILE[name])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "words"),
     [
@@ -294,6 +295,7 @@ JSON = st.recursive(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(st.data())
 def test_any_value_anywhere_gives_a_tooling_or_a_reason(data):

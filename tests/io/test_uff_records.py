@@ -51,6 +51,7 @@ def test_the_campaigns_rate_counts_where_the_header_allows_it(tmp_path_factory, 
     assert read_recording(path, (sensor("x"),), 1.1 * rate).rate == pytest.approx(rate, rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("binary", [False, True])
 def test_times_point_by_point(tmp_path, binary):
     """Six digits of a late time are coarser than half a step; their straight line is not."""

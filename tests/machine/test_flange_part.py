@@ -10,7 +10,7 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.machine.flange_part import Candidate, Doubt, FlangePart, Step, independent_parts
+from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation, independent_parts
 from tests.machine.planes import FLANGES, JOINT, oblique
 
 OMEGA = 2.0 * np.pi * np.array([500.0, 1000.0, 2000.0])
@@ -46,19 +46,19 @@ def test_half_a_plane_or_another_point_is_refused(rows):
 
 
 def test_w_is_the_flange_and_the_joints_compliance():
-    here = Candidate(oblique(), JOINT).interface(OMEGA)
+    here = JointedFlange(oblique(), JOINT).interface(OMEGA)
     translation = 1.0 / (2e9 + 2000j * OMEGA)
     slope = 1.0 / (5e6 + 10j * OMEGA)
     expected = oblique().receptance(OMEGA).values.copy()
     for i, each in enumerate((translation, slope, translation, slope)):
         expected[:, i, i] += each
     np.testing.assert_allclose(here, expected, rtol=1e-12)
-    np.testing.assert_array_equal(Candidate(oblique(), None).interface(OMEGA), oblique().receptance(OMEGA).values)
+    np.testing.assert_array_equal(JointedFlange(oblique(), None).interface(OMEGA), oblique().receptance(OMEGA).values)
 
 
 def candidate(hertz):
     modes = normal_modes([2.0 * np.pi * hertz], [0.05], [[0.2, 1.0]], plane("flange"))
-    return Candidate(modes, LumpedJoint(2e9, 5e6))
+    return JointedFlange(modes, LumpedJoint(2e9, 5e6))
 
 
 def frequency(each):
@@ -66,7 +66,9 @@ def frequency(each):
 
 
 def test_a_parts_changes_are_those_of_its_steps_and_rivals():
-    doubt = Doubt((Step(candidate(905.0), candidate(895.0), 0.7), Step(candidate(901.0), candidate(899.0), 2.0)), (candidate(950.0),))
+    doubt = Doubt(
+        (Perturbation(candidate(905.0), candidate(895.0), 0.7), Perturbation(candidate(901.0), candidate(899.0), 2.0)), (candidate(950.0),)
+    )
     here, change = FlangePart(plane("flange"), candidate(900.0), lambda: doubt).response(frequency)
     np.testing.assert_allclose(here, [900.0])
     np.testing.assert_allclose(change, [[7.0], [4.0], [50.0]])

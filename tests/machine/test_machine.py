@@ -14,7 +14,8 @@ from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.structure import Structure
 from rcsa_ident.errors import InputError
-from rcsa_ident.machine.machine import LOWEST, FlangeMachine
+from rcsa_ident.machine.flange_machine import FlangeMachine
+from rcsa_ident.machine.machine import LOWEST
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.tool_holder.model import tool_holder_receptance, tool_holder_structure
 from tests.coupling.test_rcsa import TOOL, spindle_structure
@@ -206,6 +207,24 @@ def test_a_flange_is_one_or_more_in_a_band():
     for flanges, band in (((), BAND), ((one_plane(Dof.X),), (5.0, 5.0)), ((one_plane(Dof.X),), (-1.0, 5.0))):
         with pytest.raises(InputError, match="one or more, in a band"):
             FlangeMachine(flanges, band)
+
+
+def test_a_measured_flange_gives_what_its_modes_give():
+    """Tip, and the spindle's motion over a force at the tip (C31), from which forces are told; off its own frequencies."""
+    modes = FlangeMachine((oblique(),), BAND, JOINT)
+    omega = OMEGA + 3.0
+    errors = []
+    for step in (4.0, 2.0):
+        measured = FlangeMachine((sampled(step),), BAND, JOINT)
+        one, other = (machine.coupled(TOOL, omega) for machine in (measured, modes))
+        errors.append(beside(one.block(TIP).values, other.block(TIP).values))
+        assert beside(measured.tip(TOOL, omega).values, one.block(TIP).values) < 1e-9
+        for row, col in (("spindle.x", "tip.x"), ("spindle.y", "tip.y"), ("spindle.x", "tip.y")):
+            c31 = [each.between(row, col) for each in (one, other)]
+            assert np.linalg.norm(c31[0] - c31[1]) < 1e-4 * np.linalg.norm(c31[1])
+    assert errors[1] < 1e-5
+    # a local cubic: an order of four
+    assert errors[1] < errors[0] / 8.0
 
 
 def test_lines_of_modes_go_beyond_their_band_and_those_of_a_measurement_do_not():

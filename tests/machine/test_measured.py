@@ -43,6 +43,7 @@ def relative(found, true):
     return np.max(np.abs(found - true) / size[:, :, None] / size[:, None, :], axis=(1, 2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["hpm", "stiff", "table2"])
 def test_the_error_estimate_is_honest(name):
     """At least 95 % of the true errors lie below their estimates, on grids from fine to far too coarse; and it is no empty phrase."""

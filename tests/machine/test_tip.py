@@ -13,7 +13,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.parameters import AxisLayout, joint_of, modes_of, pack, simple_axis
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
-from rcsa_ident.machine.flange_part import Candidate, Doubt, FlangePart, Step
+from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.tool_holder.geometry import stiffened
@@ -166,15 +166,15 @@ def candidate(vector):
     phi = modes.phi.copy()
     phi[1] = phi[1] * (1.0 + shape) + shape * phi[2]
     stiff = {name: np.exp(joint) * getattr(JOINT, name) for name in ("translational_stiffness", "rotational_stiffness")}
-    return Candidate(replace(modes, phi=phi), replace(JOINT, **stiff))
+    return JointedFlange(replace(modes, phi=phi), replace(JOINT, **stiff))
 
 
 def doubt():
     """The steps as written down, and two rivals."""
     steps = []
     for direction, deviation, step in zip(np.eye(3), DEVIATIONS, STEPS, strict=True):
-        steps.append(Step(candidate(step * direction), candidate(-step * direction), deviation / (2.0 * step)))
-    return Doubt(tuple(steps), tuple(Candidate(oblique(change), JOINT) for change in RIVALS))
+        steps.append(Perturbation(candidate(step * direction), candidate(-step * direction), deviation / (2.0 * step)))
+    return Doubt(tuple(steps), tuple(JointedFlange(oblique(change), JOINT) for change in RIVALS))
 
 
 class Doubted(Machine):

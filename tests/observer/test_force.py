@@ -46,6 +46,7 @@ def error(found, lag=0.0):
     return relative_error(found.estimate.force, paper_cut().force, RATE, lag)
 
 
+@pytest.mark.slow
 def test_oscillators_follow_a_steady_cut_without_lag(oscillating):
     """300 to 4300 Hz, mean removed, live."""
     assert np.all(error(oscillating) < 0.04)
@@ -53,16 +54,19 @@ def test_oscillators_follow_a_steady_cut_without_lag(oscillating):
     assert np.all(error(oscillating) < error(oscillating, -1.0))
 
 
+@pytest.mark.slow
 def test_the_papers_walk_lags_by_the_machines_delay(walking):
     assert np.all(error(walking) > 0.5)
     assert np.all(error(walking, 5.75) < 0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [Resonators(), PaperWalk()])
 def test_the_smoother_has_neither_lag_nor_loss(method):
     assert np.all(error(monitored(method, smooth=True)) < 0.03)
 
 
+@pytest.mark.slow
 def test_bands_hold_the_error(oscillating):
     """Within the band the error is not larger than told; there is no noise without an error, either."""
     made = paper_cut()
@@ -73,6 +77,7 @@ def test_bands_hold_the_error(oscillating):
     assert np.all(told < 0.02 * oscillating.estimate.standard_deviation[0])
 
 
+@pytest.mark.slow
 def test_compensated_with_the_true_machine_it_is_flat(oscillating, walking):
     """Times the true C31: oscillators are right at all orders of the spindle, the walk nearly everywhere."""
     for i in (0, 1):
@@ -89,17 +94,20 @@ def test_compensated_with_the_true_machine_it_is_flat(oscillating, walking):
         assert abs(smooth.delay(walking.band)) * RATE < 0.1
 
 
+@pytest.mark.slow
 def test_run_out_of_the_flange_is_taken_out(oscillating):
     """Four micrometres of it beside about one of vibration: without the air cut the forces are wrong."""
     assert np.all(error(monitored(Resonators(), air=False)) > 3.0 * error(oscillating))
 
 
+@pytest.mark.slow
 def test_the_fixtures_motion_is_added(oscillating):
     cut = paper_cut().cut
     alone = replace(cut, samples=cut.samples[:, :2], sensors=cut.sensors[:2])
     assert np.all(error(monitored(Resonators(), cut=alone)) > 1.5 * error(oscillating))
 
 
+@pytest.mark.slow
 def test_a_live_stream_in_blocks_is_the_record(oscillating, signals):
     observer, (gap, acceleration) = oscillating.observer, signals
     whole = observer.run(observer.init(), gap, acceleration)[1]
@@ -114,6 +122,7 @@ def test_a_live_stream_in_blocks_is_the_record(oscillating, signals):
     np.testing.assert_array_equal(observer.observe(gap, acceleration).force, whole.force)
 
 
+@pytest.mark.slow
 def test_a_constant_in_the_gap_changes_nothing(oscillating, signals):
     observer, (gap, acceleration) = oscillating.observer, signals
     one = observer.observe(gap[:3000], acceleration[:3000]).force
@@ -121,6 +130,7 @@ def test_a_constant_in_the_gap_changes_nothing(oscillating, signals):
     np.testing.assert_allclose(two, one, atol=1e-6 * np.abs(one).max())
 
 
+@pytest.mark.slow
 def test_estimates_are_linear_in_the_signals(oscillating, signals):
     bare = force_observer([replace(each, run_out=None) for each in oscillating.observer.axes])
     gap, acceleration = (part[:2000] for part in signals)
@@ -133,6 +143,7 @@ def test_estimates_are_linear_in_the_signals(oscillating, signals):
         np.testing.assert_allclose(both, 2.0 * one - two, atol=1e-8 * np.abs(both).max())
 
 
+@pytest.mark.slow
 def test_exported_to_python_control(oscillating, signals):
     """Filters, plant and force model as one sampled state space: it is the observer whose gain is steady from the first sample on."""
     axis = oscillating.observer.axes[1]
@@ -165,6 +176,7 @@ def test_harmonics_of_a_cut():
     assert harmonics(100.0, 4, (200.0, 500.0)).tolist() == [200.0, 300.0, 400.0, 500.0]
 
 
+@pytest.mark.slow
 def test_tuning_does_what_it_says(oscillating):
     """A smoothed walk keeps 0.1 dB at the worst place below the bandwidth, by the closed form of a stationary Wiener filter."""
     transfer, noise = oscillating.observer.axes[0].transfer, 2e-9
@@ -180,6 +192,7 @@ def test_tuning_does_what_it_says(oscillating):
         Tuning(noise, 2.0 * np.pi * 3000.0, 1e-3).resonators(transfer, np.array([10.0]))
 
 
+@pytest.mark.slow
 def test_oscillators_follow_a_change_within_the_response_time(oscillating, signals):
     """The vibration doubles at once: half a revolution later most of the new force is there."""
     observer = force_observer([replace(each, run_out=None) for each in oscillating.observer.axes])
@@ -197,6 +210,7 @@ def test_oscillators_follow_a_change_within_the_response_time(oscillating, signa
     assert ratio[2] == pytest.approx(2.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_the_mean_comes_from_the_time_between_the_teeth(oscillating):
     """Two teeth, half immersed: for a third of the time no edge cuts (the helix lags a little)."""
     made, first = paper_cut(), 2000
@@ -211,6 +225,7 @@ def test_the_mean_comes_from_the_time_between_the_teeth(oscillating):
         restore_mean_force(oscillating.estimate, 0.0)
 
 
+@pytest.mark.slow
 def test_signals_are_checked(oscillating, signals):
     observer, (gap, acceleration) = oscillating.observer, signals
     with pytest.raises(InputError, match="one column"):

@@ -29,12 +29,14 @@ def transfer(cross):
     return transfer_function(OMEGA, cross, STEP, BAND)
 
 
+@pytest.mark.slow
 def test_it_is_the_machines_response_in_the_band(transfer, cross):
     np.testing.assert_allclose(transfer.response(OMEGA[INSIDE]), cross[INSIDE], rtol=0.01)
     assert transfer.flatness < 0.1
     assert 8 <= transfer.order <= 24
 
 
+@pytest.mark.slow
 def test_it_is_stable_and_strictly_proper(transfer):
     system = transfer.fit.state_space()
     assert system.stable

@@ -37,6 +37,7 @@ def steady():
     return forces()
 
 
+@pytest.mark.slow
 def test_coefficients_and_angle_come_back(steady):
     found = wear_indicators(steady, STEP, CUTTER, CONDITIONS, BAND, first=200)
     assert found.names == ("K_tc", "K_rc", "K_te", "K_re")
@@ -47,6 +48,7 @@ def test_coefficients_and_angle_come_back(steady):
     assert found.time.size == int((6000 - 200) * STEP * CONDITIONS.spindle_speed / (2.0 * np.pi))
 
 
+@pytest.mark.slow
 def test_bands_tell_the_scatter_of_noise(steady):
     rng = np.random.default_rng(2)
     noisy = steady + 2.0 * rng.normal(size=steady.shape)
@@ -58,6 +60,7 @@ def test_bands_tell_the_scatter_of_noise(steady):
     assert np.all(np.abs(found.tracked.mean(axis=0) - found.coefficient.mean(axis=0)) < scatter)
 
 
+@pytest.mark.slow
 def test_a_dulling_edge_shows_in_the_edge_coefficients():
     """K_te and K_re grow steadily, K_tc stays: the trend says so, and by how much."""
     sharp = forces()
@@ -72,6 +75,7 @@ def test_a_dulling_edge_shows_in_the_edge_coefficients():
     assert slope[3] > 5.0 * std[3]
 
 
+@pytest.mark.slow
 def test_one_harmonic_does_not_tell_four_coefficients(steady):
     narrow = wear_indicators(steady, STEP, CUTTER, CONDITIONS, (2.0 * np.pi * 370.0, 2.0 * np.pi * 500.0), angle=ANGLE)
     assert narrow.condition > wear_indicators(steady, STEP, CUTTER, CONDITIONS, BAND).condition
@@ -87,6 +91,7 @@ def test_one_harmonic_does_not_tell_four_coefficients(steady):
     np.testing.assert_allclose(apart.coefficient.mean(axis=0), [900e6, 270e6], rtol=0.1)
 
 
+@pytest.mark.slow
 def test_linear_in_the_force(steady):
     one = wear_indicators(steady, STEP, CUTTER, CONDITIONS, BAND, angle=ANGLE)
     three = wear_indicators(3.0 * steady, STEP, CUTTER, CONDITIONS, BAND, angle=ANGLE)
@@ -97,6 +102,7 @@ def test_linear_in_the_force(steady):
     np.testing.assert_allclose(lifted.coefficient, one.coefficient, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_what_is_not_enough_is_refused(steady):
     with pytest.raises(InputError, match="revolutions"):
         wear_indicators(steady[:150], STEP, CUTTER, CONDITIONS, BAND)

@@ -12,23 +12,30 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.force import ForceCoefficient, ForceTerm
+from rcsa_ident.cutting.power import SpindleDrive
+from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.parameters import AxisLayout, parameter_names
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.progress import BOTH, Stage, Step
+from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machining_setup import Campaign, Cut, Tooling, Workpiece
+from rcsa_ident.remarks import Remark
 from rcsa_ident.report.figures import svg, tooltip_frf
 from rcsa_ident.report.html import ToolingPage, report_html
-from rcsa_ident.report.summaries import coefficient_rows, mode_rows, recording_rows, two_digits
+from rcsa_ident.report.summaries import coefficient_rows, lobes_curves, lobes_summary, mode_rows, recording_rows, two_digits
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement, Reading
-from rcsa_ident.signals.verdict import Verdict
+from rcsa_ident.signals.verdict import RecordCode, Verdict
+from rcsa_ident.stability.advice import Advice, highest_removal, usable_depths
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 
 STEEL = MATERIALS["steel"]
+PROCESS = MillingProcess(Cutter(4, 0.012), CuttingCoefficients(902e6, 0.26), Engagement(0.5 * np.pi, np.pi))
 # neither HTML nor a formula
 NAME = "<b>T1</b> & $co_"
 
@@ -51,8 +58,10 @@ def readings(campaign):
     slope = np.zeros((2, 5), dtype=complex)
     lines = AxisLines(np.array([4, 8]), np.array([4e3, 8e3]), value, 0.0 * value, variance, np.ones(2), force, slope)
     measurement = CutMeasurement("cut-0", NAME, 1001.0, {Dof.X: lines}, 0.0)
-    good = [Reading(cut.id, NAME, 1000.0, Verdict((), ("no air cut",)), measurement) for cut in campaign.cuts[:2]]
-    return [*good, Reading(campaign.cuts[2].id, NAME, 1000.0, Verdict(("chatter: 3 µm at 1500 Hz",)))]
+    good = [
+        Reading(cut.id, NAME, 1000.0, Verdict((), (Remark(RecordCode.NO_AIR_CUT, "no air cut"),)), measurement) for cut in campaign.cuts[:2]
+    ]
+    return [*good, Reading(campaign.cuts[2].id, NAME, 1000.0, Verdict((Remark(RecordCode.CHATTER, "chatter: 3 µm at 1500 Hz"),)))]
 
 
 @pytest.fixture
@@ -68,12 +77,14 @@ def found():
     covariance = np.diag([1.0] * layout.size + [1e-4, 1.0, 1e-4, 1e-4])
     posterior = Posterior(np.zeros(layout.size + 4), covariance, layout)
     part = AxisResult(modes, joint, 1.23, {NAME: 1.23}, 0.004, parameter_names(layout), posterior, measured)
-    trace = (("x", "search", 30.0), ("x", "search", 20.0), ("x", "3 modes", -5.0), ("x", "2 modes", -9.0), ("both", "polish", 4.0))
+    told = ((Stage.SEARCH, 30.0, 3), (Stage.SEARCH, 20.0, 3), (Stage.MODES, -5.0, 3), (Stage.MODES, -9.0, 2))
+    trace = (*(Step("x", *each) for each in told), Step(BOTH, Stage.POLISH, 4.0, 2))
     cuts = ("cut-0", "cut-1")
-    notes = ("run-out of <T1>: the cuts say little about it",)
-    scales = {"tangential coefficient": (np.log(1.1), 0.01), f"run-out of {NAME}": (-0.6, 0.02)}
+    reasons = (Remark(IdentificationCode.FEW_CUTS, "few cuts: 2"),)
+    notes = (Remark(IdentificationCode.COEFFICIENT_UNKNOWN, "run-out of <T1>: the cuts say little about it"),)
+    scales = {ForceCoefficient(ForceTerm.TANGENTIAL): (np.log(1.1), 0.01), ForceCoefficient(ForceTerm.RUNOUT, NAME): (-0.6, 0.02)}
     return Identification(
-        Status.SUSPECT, ("few cuts: 2",), 1, "default", {Dof.X: part}, cuts, np.zeros(2), np.ones(2), np.ones(2), trace, notes, scales
+        Status.SUSPECT, reasons, 1, "default", {Dof.X: part}, cuts, np.zeros(2), np.ones(2), np.ones(2), trace, notes, scales
     )
 
 
@@ -83,9 +94,12 @@ def page_of(name=NAME, **more):
     speed = np.linspace(400.0, 2000.0, 30)
     limit = np.where(speed > 1800.0, np.inf, 1e-3 * (1.2 + np.sin(speed / 100.0)))
     stable = np.isinf(limit)
-    lobes = StabilityLobes(speed, limit, np.where(stable, np.nan, 5e3), np.where(stable, -1, 2), 2e-4, 5e3, "zero-order")
+    lobes = StabilityLobes(speed, limit, np.where(stable, np.nan, 5e3), np.where(stable, -1, 2), 4e-3, "zero-order", 2e-4, 5e3)
+    usable = usable_depths(lobes, PROCESS, SpindleDrive.flat())
+    points = tuple(highest_removal(usable, PROCESS))
     deviation = {"X": (np.full(50, 1e-8), np.full(50, 1e-8))}
-    return ToolingPage(name, True, frequency, tip, deviation, lobes=lobes, best=[(1900.0, np.inf), (500.0, 2e-3)], **more)
+    advice = Advice(name, 0.06, lobes, usable, points, (), (), None, ())
+    return ToolingPage(name, True, frequency, tip, deviation, advice=advice, **more)
 
 
 class Tags(HTMLParser):
@@ -122,6 +136,7 @@ def parsed(text):
     return tags
 
 
+@pytest.mark.slow
 def test_the_page_is_whole_and_self_contained(found, campaign, readings):
     text = report_html(found, campaign, readings, [page_of(), page_of("T2")], {"recordings": 1.5})
     tags = parsed(text)
@@ -145,6 +160,7 @@ def test_the_page_is_whole_and_self_contained(found, campaign, readings):
         assert unit in words
 
 
+@pytest.mark.slow
 def test_what_the_records_do_not_tell_is_marked(found, campaign, readings):
     text = report_html(found, campaign, readings)
     rows = {
@@ -159,6 +175,7 @@ def test_what_the_records_do_not_tell_is_marked(found, campaign, readings):
     }
 
 
+@pytest.mark.slow
 def test_the_truth_appears_only_where_it_is_known(found, campaign, readings):
     without = report_html(found, campaign, readings, [page_of()])
     truth = page_of().tip
@@ -167,12 +184,31 @@ def test_the_truth_appears_only_where_it_is_known(found, campaign, readings):
     assert "1.2 %" in known
 
 
+@pytest.mark.slow
 def test_the_same_figure_gives_the_same_text():
     page = page_of()
     one, two = (svg(tooltip_frf(page.frequency, page.tip, page.deviation), "a") for _ in range(2))
     assert one == two
     assert one.startswith("<svg")
     assert "<metadata" not in one
+
+
+def test_a_recommendation_stands_beside_its_limit_and_an_infinite_one_is_none(found, campaign, readings):
+    advice = page_of().advice
+    summary, curves = lobes_summary(advice), lobes_curves(advice)
+    assert len(summary["recommended"]) == len(advice.recommended) > 1
+    best = summary["recommended"][0]
+    # stable up to the depth that was asked for: no limit is known there
+    assert advice.recommended[0].spindle_speed > 1800.0
+    assert best["limit_depth_mm"] is None
+    assert best["recommended_depth_mm"] == pytest.approx(0.9 * 4.0)
+    assert summary["best_speeds"][0]["limit_depth_mm"] is None
+    assert curves["limit_depth_mm"][-1] is None
+    assert curves["recommended_depth_mm"] == pytest.approx(1e3 * advice.usable.stable)
+    text = " ".join(parsed(report_html(found, campaign, readings, [page_of()])).text)
+    for point in advice.recommended:
+        assert f"{point.spindle_speed * 30.0 / np.pi:.0f}" in text
+        assert f"{1e3 * point.depth:.2f}" in text
 
 
 def test_rows_say_what_a_recording_is_worth(readings):
@@ -186,6 +222,7 @@ def test_rows_say_what_a_recording_is_worth(readings):
     assert rows[2].signal_to_noise_db == {}
 
 
+@pytest.mark.slow
 def test_the_page_says_what_was_found_beside_the_machine(found, campaign, readings):
     text = report_html(found, campaign, readings, deviations={Dof.X: (2.0 * np.pi * np.array([1.234, 56.78]), np.array([1e-4, 0.02]))})
     words = " ".join(" ".join(parsed(text).text).split())
@@ -198,6 +235,7 @@ def test_the_page_says_what_was_found_beside_the_machine(found, campaign, readin
     assert "1591.5 57 4.00 2.0 1.000 − 1.000 i" in words
 
 
+@pytest.mark.slow
 def test_without_deviations_there_are_no_columns_for_them(found, campaign, readings):
     words = " ".join(" ".join(parsed(report_html(found, campaign, readings)).text).split())
     assert "795.8 5.00 1.000 − 1.000 i" in words
@@ -205,7 +243,9 @@ def test_without_deviations_there_are_no_columns_for_them(found, campaign, readi
 
 
 def test_rows_of_coefficients_are_factors_and_micrometres():
-    scale, runout = coefficient_rows({"radial ratio": (np.log(0.8), 0.05), "run-out of T": (1.5, 0.5)})
+    scale, runout = coefficient_rows(
+        {ForceCoefficient(ForceTerm.RATIO): (np.log(0.8), 0.05), ForceCoefficient(ForceTerm.RUNOUT, "T"): (1.5, 0.5)}
+    )
     assert (scale.value, scale.std) == (pytest.approx(0.8), pytest.approx(0.04))
     assert (runout.value, runout.std, runout.unit) == (pytest.approx(3.0), pytest.approx(1.0), "µm")
 

@@ -92,6 +92,7 @@ def test_roundness_biases_spectra_but_not_lines():
     assert far(made.measure(estimator=AirCorrectedSpectra()), made) > 0.1
 
 
+@pytest.mark.slow
 def test_the_jackknife_is_calibrated():
     z = []
     for seed in range(30):

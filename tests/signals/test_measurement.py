@@ -27,6 +27,7 @@ def errors(made, **changes):
     return np.array(z)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rpm", [8000.0, 11500.0, 18300.0])
 @pytest.mark.parametrize("noise", [2e-9, 5e-8])
 def test_known_receptances_come_back_within_their_noise(rpm, noise):
@@ -36,6 +37,7 @@ def test_known_receptances_come_back_within_their_noise(rpm, noise):
     assert np.abs(z).max() < 5.0
 
 
+@pytest.mark.slow
 def test_the_angle_to_the_air_cut_explains_the_rest():
     # with run-out, lines that the roundness reaches are as good as that angle
     z = []
@@ -70,6 +72,7 @@ def test_coherence():
             assert np.median(noisy.axes[axis].coherence) < 0.9
 
 
+@pytest.mark.slow
 def test_a_force_that_scatters_widens_the_variance():
     z = np.concatenate([errors(pair(seed, 12000.0, scatter=0.03)) for seed in range(10)])
     steady = pair(0, 12000.0).measure().measurement.axes[Dof.X]
@@ -188,6 +191,7 @@ def test_entry_and_exit_do_not_matter():
         assert error.max() < 1e-2 * np.abs(lines.receptance * lines.force).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tooth_angle", [0.0, 1.9])
 def test_a_trigger_gives_the_delay(tooth_angle):
     for seed in range(5):
@@ -199,6 +203,7 @@ def test_a_trigger_gives_the_delay(tooth_angle):
         assert measured.delay_std * made.cut.rate < 0.3
 
 
+@pytest.mark.slow
 def test_a_trigger_of_unknown_tooth_angle_gives_its_edge():
     """The angle that turns edges into delays is the same in all cuts of a clamping."""
     angles = []
@@ -243,6 +248,7 @@ def recording(machine, record):
     return Recording(suite.rate, np.column_stack(columns), tuple(sensors))
 
 
+@pytest.mark.slow
 def test_the_virtual_machines_cross_frf(virtual):
     machine, tooling, cuts = virtual
     assert len(cuts) == 2

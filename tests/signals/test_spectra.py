@@ -21,6 +21,7 @@ def lines(rng, highest, teeth=4, only_teeth=False):
     return amplitude
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rpm", "noise", "only_teeth", "n"),
     [

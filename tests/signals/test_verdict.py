@@ -190,6 +190,7 @@ def test_one_tooth_is_never_wrong():
     assert tooth_count_fault(np.array([0.0, 1.0, 0.5, 0.2, 0.1]), 1) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [2e-9, 2e-8])
 def test_an_air_cut_of_noise_alone_is_used(noise):
     for seed in range(12):

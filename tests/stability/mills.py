@@ -10,8 +10,6 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel, normal_modes
-from rcsa_ident.stability import _cut_kernels as kernels
-from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.tip_modes import TipModes
 from tests.oracles.literature import FOUR_MODES, INSPERGER_STEPAN
 
@@ -50,20 +48,3 @@ def mill(teeth: int = 2, immersion: float = 0.5, strategy: str = "down", helix: 
     own = {name: np.asarray(more.pop(name)) for name in ("pitch", "runout") if name in more}
     coefficients = more.pop("coefficients", COEFFICIENTS)
     return MillingProcess(Cutter(teeth, 0.012, helix, **own), coefficients, Engagement.from_immersion(immersion, strategy), **more)
-
-
-def plan_of(cut: MonodromyOperator, speed: float, depth: float, step: float) -> np.ndarray:
-    """The scalars that the kernels take."""
-    process = cut.process
-    c, d, v = process.coefficients, process.damping, process.speed_variation
-    plan = np.zeros(kernels.DELAYS + cut.delays.size)
-    plan[kernels.PERIOD], plan[kernels.SPACING], plan[kernels.SPEED], plan[kernels.DEPTH] = cut.period, cut.spacing, speed, depth
-    plan[kernels.LAG] = 2.0 * np.tan(process.cutter.helix) / process.cutter.diameter
-    plan[kernels.KT], plan[kernels.KR] = c.tangential, c.tangential * c.radial_ratio
-    if d is not None:
-        plan[kernels.CT], plan[kernels.CR] = d.friction * d.strength, d.strength
-    if v is not None:
-        plan[kernels.SWING], plan[kernels.SWINGS] = v.amplitude, v.ratio
-    plan[kernels.RADIUS], plan[kernels.STEP], plan[kernels.FROZEN] = 0.5 * process.cutter.diameter, step, float(cut.frozen)
-    plan[kernels.DELAYS :] = cut.delays
-    return plan

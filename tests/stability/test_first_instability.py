@@ -57,6 +57,7 @@ def test_each_depth_is_looked_at_once():
     assert len(seen) < 40
 
 
+@pytest.mark.slow
 def test_lenses_of_random_mills():
     """Against a dense ladder: mills with helix and little immersion, where closed lenses of instability lie below the lobes."""
     rng = np.random.default_rng(3)

@@ -69,8 +69,9 @@ def test_bad_settings(arguments, field, words):
 
 
 def test_a_receptance_is_not_marched_with():
+    """The verb fits modes to it and says so; the method itself refuses it."""
     with pytest.raises(InputError, match="a rational fit") as error:
-        stability_lobes(tip(ONE).receptance(), mill(), [900.0], 1e-3, FullDiscretisation())
+        FullDiscretisation().lobes(tip(ONE).receptance(), mill(), np.array([900.0]), 1e-3)
     assert error.value.field == "tip"
     # but the other way round
     assert stability_lobes(tip(ONE), mill(), [900.0], 30e-3, MultiFrequency()).limit_depth[0] < 30e-3

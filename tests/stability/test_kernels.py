@@ -40,6 +40,7 @@ def test_eigenvalues(characteristic):
         assert np.min(np.abs(np.linalg.eigvals(ALPHA @ model(middle)) / found - 1.0)) < 1e-6
 
 
+@pytest.mark.slow
 def test_largest_real_part(characteristic):
     fine = np.linspace(OMEGA[0], OMEGA[-1], 20001)
     expected = max(np.linalg.eigvals(ALPHA @ model(w)).real.max() for w in fine)
@@ -48,6 +49,7 @@ def test_largest_real_part(characteristic):
     assert np.linalg.eigvals(ALPHA @ model(place)).real.max() == pytest.approx(expected, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_envelopes(characteristic):
     speeds = np.array([900.0, 1333.0, 2000.0])
     equal = np.full(3, 2.0 * np.pi / 3.0)
@@ -126,6 +128,7 @@ def test_no_limit_where_no_eigenvalue_has_a_positive_real_part():
     assert lobe[0] == -1
 
 
+@pytest.mark.slow
 def test_receptance_at_any_frequency():
     values = np.array([model(w).ravel() for w in OMEGA])
     inside = np.array([OMEGA[0], OMEGA[1] + 1.0, OMEGA[80] + 11.0, OMEGA[-2] + 3.0, OMEGA[-1]])

@@ -66,6 +66,7 @@ def probability(found, depths):
     return np.array([[found.probability(place, depth) for place, depth in enumerate(row)] for row in depths])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "draws"), [(ZeroOrder(), 400), (MultiFrequency(), 40)])
 def test_probability_of_stability_of_a_scale(method, draws):
     """With G (1 + 0.1 z) the limit is a / (1 + 0.1 z): a cut of depth d is stable where z < 10 (a / d - 1)."""
@@ -169,9 +170,7 @@ def test_draws_with_cross_terms_have_the_lobes_of_each_drawn_tip(pitch):
 def test_a_machine_that_is_turned_with_its_feed_has_the_same_limits_and_draws(angle):
     tip = oblique_tip()
     turn = rotation(angle)
-    turned = UncertainReceptance(
-        OMEGA, turn @ tip.values @ turn.T, TIP, TIP, Written((0, 1), turn @ tip.variation.change @ turn.T)
-    )
+    turned = UncertainReceptance(OMEGA, turn @ tip.values @ turn.T, TIP, TIP, Written((0, 1), turn @ tip.variation.change @ turn.T))
     here, there = asked(tip), asked(turned, process=replace(PROCESS, feed_angle=PROCESS.feed_angle + angle))
     np.testing.assert_allclose(there.limit_depth, here.limit_depth, rtol=1e-9)
     # told from other frequencies

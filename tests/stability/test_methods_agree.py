@@ -16,6 +16,8 @@ from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.tip_modes import TipModes
 from tests.stability.mills import FOUR, FOUR_COEFFICIENTS, ONE, RPM, SKEWED, TWO, mill, tip
 
+pytestmark = pytest.mark.slow
+
 FULL, SEMI, MULTI, TIME = FullDiscretisation(tolerance=1e-5), SemiDiscretisation(), MultiFrequency(), TimeDomain(contact_loss=False)
 #: A mode whose direction is skewed, beside the others: cross receptances.
 CROSS = TipModes(

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from rcsa_ident.cutting.process import ProcessDamping, SpeedVariation
-from rcsa_ident.stability import _cut_kernels
 from rcsa_ident.stability import _monodromy_kernels as kernels
+from rcsa_ident.stability._cut_kernels import CutLayout
 from rcsa_ident.stability.monodromy import MonodromyOperator, lobatto
+from rcsa_ident.stability.tip_modes import ModeArrays
 from tests.oracles import naive
-from tests.stability.mills import ONE, RPM, SKEWED, Table, mill, plan_of, tip
+from tests.stability.mills import ONE, RPM, SKEWED, Table, mill, tip
 
 NODE, SHARE = np.polynomial.legendre.leggauss(40)
 NODE, SHARE = 0.5 * (NODE + 1.0), 0.5 * SHARE
@@ -34,7 +35,7 @@ def test_responses(degree):
     q, m, r = table.shape[1] - 1, pole.size, outputs.shape[0]
     decay, drive, seen = (np.empty(shape, dtype=complex) for shape in ((q + 1, m), (q + 1, m, r), (2, q, r, m)))
     echo = np.zeros((2, q, q + 1, r, r))
-    kernels.responses(h, pole, outputs, inputs, table, decay, drive, seen, echo)
+    kernels.responses(h, ModeArrays(pole, outputs, inputs, np.zeros((2, 2))), table, decay, drive, seen, echo)
     start, force = rng.standard_normal(3) + 1j * rng.standard_normal(3), rng.standard_normal((degree + 1, 2))
     for j in range(1, degree + 1):
         x = table[0, j]
@@ -61,6 +62,7 @@ def test_solve():
         np.testing.assert_allclose(right, expected, rtol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_largest_of_hessenberg(seed):
     rng = np.random.default_rng(seed)
@@ -79,6 +81,7 @@ def test_largest_of_hessenberg(seed):
     assert np.linalg.norm(vector) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_largest_of_a_rotation():
     """Eigenvalues of one magnitude all round the circle."""
     matrix = np.zeros((6, 6))
@@ -92,14 +95,13 @@ def test_largest_of_a_rotation():
 def test_elements_of_nearly_equal_steps_share_what_was_computed():
     """Also where the first and the last of them differ by more than neighbours do."""
     cut = MonodromyOperator(tip(ONE), mill(2, 0.5), 2, False)
-    m, r, h, shape = cut.pole.size, cut.outputs.shape[0], 3e-4, (9, cut.outputs.shape[0], cut.outputs.shape[0])
+    m, r, h = cut.arrays.pole.size, cut.arrays.outputs.shape[0], 3e-4
     places = np.array([[0.0, h * (1.0 + 0.7e-12 * k), 1.0, 3.0 * k, 0.0] for k in range(3)])
-    system = cut.pole, cut.outputs, cut.inputs
-    decay, drive, seen, echo, same, *_ = kernels.prepare(
-        *system, cut.constant, np.zeros((9, 1, r, r)), np.zeros(shape), places, False, cut.table
-    )
+    nothing = np.zeros((9, 1), dtype=int), np.zeros((9, 1, 3)), np.zeros(9)
+    layout = CutLayout(places, np.zeros((9, 1, r, r)), np.zeros((9, r, r)), *nothing)
+    decay, drive, seen, echo, same, *_ = kernels.prepare(cut.arrays, layout, cut.table, False)
     wanted = np.empty((3, m), dtype=complex), np.empty((3, m, r), dtype=complex), np.empty((2, 2, r, m), dtype=complex)
-    kernels.responses(h, *system, cut.table, *wanted, np.zeros((2, 2, 3, r, r)))
+    kernels.responses(h, cut.arrays, cut.table, *wanted, np.zeros((2, 2, 3, r, r)))
     for e in same:
         for found, each in zip((decay, drive, seen), wanted, strict=True):
             np.testing.assert_allclose(found[e], each, rtol=1e-9)
@@ -108,17 +110,14 @@ def test_elements_of_nearly_equal_steps_share_what_was_computed():
 
 def dense(cut: MonodromyOperator, speed: float, depth: float, step: float) -> np.ndarray:
     """The map of a period written down, column by column."""
-    layout = _cut_kernels.lay_out(*cut._rows(speed, depth), plan_of(cut, speed, depth, step), cut.table)
-    places, stiffness, damping, where, weight, _ = layout
-    prepared = kernels.prepare(cut.pole, cut.outputs, cut.inputs, cut.constant, stiffness, damping, places, cut.frozen, cut.table)
-    m, (r, points) = cut.pole.size, (cut.outputs.shape[0], damping.shape[0])
-    system = cut.pole, cut.outputs, cut.constant
-    laid = stiffness, damping, places, cut.frozen, cut.table, where, weight, prepared
+    layout = cut._lay_out(speed, depth, step)
+    prepared = kernels.prepare(cut.arrays, layout, cut.table, cut.frozen)
+    m, (points, r, _) = cut.arrays.pole.size, layout.damping.shape
     columns = []
     for unit in np.eye(2 * m + points * r):
         state, motion, force = unit[:m] + 1j * unit[m : 2 * m], np.zeros((2 * points, r)), np.zeros((points, r))
         motion[:points] = unit[2 * m :].reshape(points, r)
-        kernels.march(state, motion, force, *system, *laid)
+        kernels.march(state, motion, force, cut.arrays, layout, cut.table, cut.frozen, prepared)
         columns.append(np.concatenate([state.real, state.imag, motion[points:].ravel()]))
     return np.array(columns).T
 

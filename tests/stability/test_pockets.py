@@ -74,6 +74,13 @@ def test_speeds_reach_beyond_the_range_by_the_tolerance():
     assert pad_speeds([500.0], 0.1)[-1] >= 550.0
 
 
+@pytest.mark.parametrize("first", [4000.0, 4100.0, 3999.0])
+def test_a_coarse_step_does_not_lead_far_beyond_the_speeds(first):
+    """4000 less a step of 4000 is a standstill, but for its last digit."""
+    speeds = (first + 4000.0 * np.arange(5)) * np.pi / 30.0
+    np.testing.assert_allclose(pad_speeds(speeds, 0.01), [0.99 * speeds[0], *speeds, 1.01 * speeds[-1]])
+
+
 def test_a_speed_that_differs_in_its_last_digit_is_the_same():
     found = pad_speeds(np.array([500.0, 600.0]), 0.0, also=[600.0 * (1.0 - 1e-15), 550.0])
     np.testing.assert_allclose(found, [500.0, 550.0, 600.0])

@@ -27,6 +27,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_followed_boundary_is_the_full_map(name):
     modes, process, depth = CASES[name]
@@ -49,6 +50,7 @@ def test_followed_boundary_is_the_full_map(name):
     assert max(full.error, followed.error) < 5e-3
 
 
+@pytest.mark.slow
 def test_islands_are_found():
     modes, process, depth = CASES["islands"]
     found = stability_map(tip(modes), process, SPEEDS, np.linspace(depth / 80.0, depth, 80))

@@ -50,6 +50,7 @@ def turned(modes, angle):
     return Receptance(OMEGA, rotation @ values @ rotation.T, TIP, TIP)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engagement", [DOWN, UP, Engagement(0.0, np.pi)])
 @pytest.mark.parametrize("wall", [None, Wall.ENTRY])
 def test_a_slow_cut_bends_the_tool_as_its_force_of_the_moment_does(engagement, wall):

@@ -21,13 +21,12 @@ CASES = {
 }
 
 
-def force_of(process, step, here, velocity, path, number, lag, plan, speed):
+def force_of(process, step, here, velocity, path, number, slices, plan, speed):
     """The force of all teeth, over the share of the step about each tooth's place in which it cuts."""
-    cutter, total, width = process.cutter, np.zeros(2), plan[kernels.WIDTH]
-    entry, leave = process.engagement.entry, process.engagement.exit
+    cutter, total = process.cutter, np.zeros(2)
     for j in range(cutter.teeth):
-        for each in lag:
-            middle = (step * number + cutter.tooth_angle[j] - each + 0.5 * step) % (2.0 * np.pi) - 0.5 * step
+        for lag, entry, leave, width in slices:
+            middle = (step * number + cutter.tooth_angle[j] - lag + 0.5 * step) % (2.0 * np.pi) - 0.5 * step
             low, high = max(middle - 0.5 * step, entry), min(middle + 0.5 * step, leave)
             if high <= low:
                 continue
@@ -41,15 +40,15 @@ def force_of(process, step, here, velocity, path, number, lag, plan, speed):
                 then = np.array([np.interp(number - back / step, *axis) for axis in path])
                 still.append(moved)
                 chips.append(moved + normal @ (here - then))
-            decides = np.argmin(chips if plan[kernels.LEAVES] > 0.0 else still)
-            if (chips if plan[kernels.LEAVES] > 0.0 else still)[decides] <= 0.0:
+            decides = np.argmin(chips if plan.leaves else still)
+            if (chips if plan.leaves else still)[decides] <= 0.0:
                 continue
-            tangential = plan[kernels.KT] * chips[decides] + plan[kernels.TE]
-            radial = plan[kernels.KR] * chips[decides] + plan[kernels.RE]
+            tangential = plan.k_tangential * chips[decides] + plan.edge_tangential
+            radial = plan.k_radial * chips[decides] + plan.edge_radial
             into = normal @ velocity
-            if into > 0.0 or plan[kernels.LEAVES] == 0.0:
-                rub = plan[kernels.RUB] / (speed * plan[kernels.RADIUS]) * into
-                tangential, radial = tangential + plan[kernels.FRICTION] * rub, radial + rub
+            if into > 0.0 or not plan.leaves:
+                rub = plan.rub / (speed * plan.radius) * into
+                tangential, radial = tangential + plan.friction * rub, radial + rub
             pair = np.array([-tangential * normal[1] - radial * normal[0], tangential * normal[0] - radial * normal[1]])
             total += (high - low) / step * width * pair
     return total
@@ -63,15 +62,15 @@ def test_march(name, leaves):
     cut = _Cut(tip(SKEWED), process, SPEED, leaves)
     run = cut.begin(DEPTH).pushed(2e-5)
     first, m = run.number, len(SKEWED)
-    order = np.arange(first - run.past.shape[0], first)
-    tips = run.past[order % run.past.shape[0]]
-    fast_from = run.state.copy(), run.force.copy()
+    order = np.arange(first - run.memory.past.shape[0], first)
+    tips = run.memory.past[order % run.memory.past.shape[0]]
+    fast_from = run.memory.state.copy(), run.memory.force.copy()
     count = 40
     samples = run.march(count)
     # real coordinates of each mode: p and its mirror
-    pole = cut.pole
+    pole, outputs, inputs, _ = cut.arrays
     free = np.diag(np.concatenate([pole, pole.conj()]))
-    out, into = np.hstack([cut.outputs, cut.outputs.conj()]), np.vstack([cut.inputs, cut.inputs.conj()])
+    out, into = np.hstack([outputs, outputs.conj()]), np.vstack([inputs, inputs.conj()])
     state, force = np.concatenate([fast_from[0], fast_from[0].conj()]), fast_from[1]
     times = cut.time(cut.step * np.arange(first - 1, first + count))
     for i in range(count):
@@ -87,44 +86,39 @@ def test_march(name, leaves):
             after = step[: 2 * m, : 2 * m] @ state + step[: 2 * m, 2 * m : 2 * m + 2] @ force
             after = after + step[: 2 * m, 2 * m + 2 :] @ (new - force)
             here, velocity = np.real(out @ after), np.real(out @ (free @ after + into @ new))
-            new = force_of(process, cut.step, here, velocity, path, number, run.lag, run.plan, speed)
+            new = force_of(process, cut.step, here, velocity, path, number, run.slices, run.plan, speed)
         state, force = after, new
         order, tips = np.append(order, number), np.vstack([tips, here])
         np.testing.assert_allclose(samples[i, :2], here, rtol=0, atol=1e-4 * np.abs(samples[:, :2]).max())
         np.testing.assert_allclose(samples[i, 4:], new, rtol=0, atol=4e-4 * np.abs(samples[:, 4:]).max())
-    np.testing.assert_allclose(run.state, state[:m], rtol=0, atol=1e-3 * np.abs(state).max())
+    np.testing.assert_allclose(run.memory.state, state[:m], rtol=0, atol=1e-3 * np.abs(state).max())
     np.testing.assert_allclose(
         samples[:, 2:4], np.gradient(samples[:, :2], times[1:], axis=0), rtol=0, atol=0.1 * np.abs(samples[:, 2:4]).max()
     )
 
 
 def test_a_tooth_in_the_air_pushes_nothing():
-    process = CASES["half"]
-    cut = _Cut(tip(SKEWED), process, SPEED, True)
-    run, out = cut.begin(DEPTH), np.empty(2)
-    number = int(0.25 * np.pi / cut.step)
-    kernels.force_at(number, np.zeros(2), np.zeros(2), 0.0 * run.past, cut.teeth, run.lag, run.plan, SPEED, out)
-    np.testing.assert_array_equal(out, 0.0)
+    cut = _Cut(tip(SKEWED), CASES["half"], SPEED, True)
+    run = cut.begin(DEPTH)
+
+    def force(number, here, plan):
+        out = np.empty(2)
+        kernels.force_at(number, here, np.zeros(2), 0.0 * run.memory.past, cut.teeth, run.slices, plan, SPEED, out)
+        return out
+
+    np.testing.assert_array_equal(force(int(0.25 * np.pi / cut.step), np.zeros(2), run.plan), 0.0)
     number = int(0.7 * np.pi / cut.step)
-    kernels.force_at(number, np.zeros(2), np.zeros(2), 0.0 * run.past, cut.teeth, run.lag, run.plan, SPEED, out)
-    assert np.all(np.abs(out) > 1.0)
+    assert np.all(np.abs(force(number, np.zeros(2), run.plan)) > 1.0)
     # pushed out of the cut by more than the feed
     phi = cut.step * number
-    kernels.force_at(
-        number, -2e-4 * np.array([np.sin(phi), np.cos(phi)]), np.zeros(2), 0.0 * run.past, cut.teeth, run.lag, run.plan, SPEED, out
-    )
-    np.testing.assert_array_equal(out, 0.0)
+    away = -2e-4 * np.array([np.sin(phi), np.cos(phi)])
+    np.testing.assert_array_equal(force(number, away, run.plan), 0.0)
     # the linear equations know no air
-    run.plan[kernels.LEAVES] = 0.0
-    kernels.force_at(
-        number, -2e-4 * np.array([np.sin(phi), np.cos(phi)]), np.zeros(2), 0.0 * run.past, cut.teeth, run.lag, run.plan, SPEED, out
-    )
-    assert np.any(out)
+    assert np.any(force(number, away, run.plan._replace(leaves=False)))
 
 
 def test_clock():
-    plan = np.zeros(kernels.COUNT)
-    plan[kernels.SPEED], plan[kernels.SWING], plan[kernels.SWINGS] = 900.0, 0.7, 0.3
+    plan = _Cut(tip(SKEWED), CASES["half"], 900.0, True).begin(DEPTH).plan._replace(swing=0.7, swings=0.3)
     for t in (1e-3, 0.02, 0.11):
         swing = 0.3 * 900.0
         angle = 900.0 * (t + 0.7 / swing * (1.0 - np.cos(swing * t)))

@@ -22,6 +22,7 @@ from tests.oracles import literature, naive
 
 RPM = 2.0 * np.pi / 60.0
 TIP = (Coordinate.parse("tip.x"), Coordinate.parse("tip.y"))
+FLANGE = (Coordinate.parse("flange.x"),)
 SLOT = Engagement(0.0, np.pi)
 COEFFICIENTS = CuttingCoefficients(6e8, 1.0 / 3.0)
 BAND = 2.0 * np.pi * np.arange(400.0, 2001.0, 1.0)
@@ -168,21 +169,23 @@ def test_speeds_in_any_order_and_beyond_the_depth():
 
 @pytest.mark.parametrize("pitch", [np.full(3, 2.0 * np.pi / 3.0), np.radians([110.0, 130.0, 120.0])])
 def test_many_tips_at_once_have_the_limits_of_each(pitch):
-    """Speeds in any order, frequencies from rest, limits up to a depth."""
+    """Speeds in any order, frequencies from rest, limits up to a depth; with cross receptances, too."""
     band = 2.0 * np.pi * np.arange(0.0, 1600.0, 4.0)
     speeds = np.array([15000.0, 5000.0, 12500.0, 25000.0]) * RPM
     process = MillingProcess(Cutter(3, 0.012, pitch=pitch), COEFFICIENTS, Engagement.from_immersion(0.5, "down"), 0.7)
-    x = np.array([resonance(band, f, 0.03, 0.04) for f in (780.0, 800.0, 830.0)])
-    y = np.array([resonance(band, f, 0.02, 0.05) for f in (930.0, 700.0, 900.0)])
-    found = ZeroOrder().depths(band, (x, y), process, speeds, 0.4e-3)
-    for i in range(3):
-        planes = (Receptance(band, each[i][:, None, None], (c,), (c,)) for each, c in zip((x, y), TIP, strict=True))
-        each = stability_lobes(uncoupled_planes(*planes), process, speeds, 0.4e-3).limit_depth
-        np.testing.assert_allclose(found[i], each, rtol=1e-9)
-    assert 0 < np.isfinite(found).sum() < found.size
-    y[1, 7] = np.inf
+    tips = np.zeros((3, band.size, 2, 2), dtype=complex)
+    tips[:, :, 0, 0] = [resonance(band, f, 0.03, 0.04) for f in (780.0, 800.0, 830.0)]
+    tips[:, :, 1, 1] = [resonance(band, f, 0.02, 0.05) for f in (930.0, 700.0, 900.0)]
+    turn = np.array([[np.cos(0.4), -np.sin(0.4)], [np.sin(0.4), np.cos(0.4)]])
+    for each in (tips, turn @ tips @ turn.T):
+        found = ZeroOrder().depths(band, each, process, speeds, 0.4e-3)
+        for limits, values in zip(found, each, strict=True):
+            alone = stability_lobes(Receptance(band, values, TIP, TIP), process, speeds, 0.4e-3).limit_depth
+            np.testing.assert_allclose(limits, alone, rtol=1e-9)
+        assert 0 < np.isfinite(found).sum() < found.size
+    tips[1, 7, 1, 1] = np.inf
     with np.errstate(all="ignore"), pytest.raises(InputError, match="finite"):
-        ZeroOrder().depths(band, (x, y), process, speeds, 0.4e-3)
+        ZeroOrder().depths(band, tips, process, speeds, 0.4e-3)
 
 
 def test_lobe_numbers_count_waves():
@@ -224,7 +227,7 @@ def test_doubts_are_told():
         ({"speeds": []}, "one or more"),
         ({"max_depth": 0.0}, "max_depth"),
         ({"process": MillingProcess(Cutter(2, 0.012), COEFFICIENTS, SLOT, speed_variation=SpeedVariation(0.1, 0.1))}, "constant speed"),
-        ({"tip": Receptance(BAND, symmetric(BAND)[:, :1, :1], TIP[:1], TIP[:1])}, "tip.y"),
+        ({"tip": Receptance(BAND, symmetric(BAND)[:, :1, :1], FLANGE, FLANGE)}, "tip.y"),
         ({"tip": Receptance(BAND[::-1], symmetric(BAND), TIP, TIP)}, "ascending"),
         ({"tip": Receptance(BAND, symmetric(BAND) * np.nan, TIP, TIP)}, "finite"),
     ],

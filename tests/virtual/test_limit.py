@@ -75,6 +75,7 @@ def test_published_multipliers_and_second_order(freedoms, name):
     np.testing.assert_allclose(errors[0] / errors[1], 4.0, rtol=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("freedoms", [1, 2])
 def test_published_limits(freedoms):
     for rpm, exact in zip(SLOT_RPM, SLOT_LIMIT_MM[freedoms], strict=True):
@@ -112,6 +113,7 @@ def test_helix_that_vanishes():
         np.testing.assert_allclose(bent, straight, atol=0.02 * helix / 1e-3 + 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("helix", [0.0, np.radians(30.0)])
 @pytest.mark.parametrize("share", [0.9, 0.97])
 def test_a_cut_comes_to_rest_as_fast_as_the_multiplier_says(helix, share):
@@ -150,6 +152,7 @@ def test_frequency_domain_agrees_on_the_full_machine(dynamics, tooling, rpm, eng
     assert min(ratio, 1.0 - ratio) == pytest.approx(turn, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_step_of_the_march_is_fine_enough_for_the_full_machine(dynamics, tooling):
     conditions = cut(9500.0, DOWN)
     coarse, fine = (true_limit(dynamics, tooling.cutter, conditions, ALUMINIUM, (2e-4, 4e-3), 1e-4, step).depth for step in (5e-6, 2.5e-6))

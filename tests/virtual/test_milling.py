@@ -90,6 +90,7 @@ def test_stable_cut_answers_with_the_cross_receptance(model, dynamics, tooling, 
     assert np.linalg.norm(acceleration - by_lines) < 5e-3 * np.linalg.norm(by_lines)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["hpm", "stiff", "table2"])
 def test_programmed_cuts_are_stable(machines_folder, name):
     machine = read_machine(machines_folder / f"{name}.toml")
@@ -114,6 +115,7 @@ def limit_depth(system, alpha, period):
     return 1.0 / loop.real[real + 1].max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rpm", [3000.0, 3140.0])
 def test_regeneration_has_the_stability_limit_of_the_delay_equation(rpm):
     # many straight teeth in a half-immersed cut: the directional coefficients hardly vary over the angle

@@ -22,6 +22,7 @@ def distance(a, b):
     return np.linalg.norm(a - b) / np.linalg.norm(b)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["S1-ER32", "S2-PG25", "S3-PG25-long", "S4-shrink"])
 def test_halving_the_mesh_changes_little(hpm, machines_folder, name):
     assembly = read_tooling(machines_folder / "toolings" / f"{name}.toml").assembly
@@ -30,11 +31,13 @@ def test_halving_the_mesh_changes_little(hpm, machines_folder, name):
         assert distance(coarse[:, row, col], fine[:, row, col]) < 2e-3
 
 
+@pytest.mark.slow
 def test_error_falls_with_the_mesh(hpm, tooling):
     values = [frequency_response(rotor(hpm.spindle, tooling.assembly, r), BAND[::8], outputs=("tip.x",)) for r in (1, 2, 4)]
     assert distance(values[0], values[2]) > 3.0 * distance(values[1], values[2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["S1-ER32", "S4-shrink"])
 def test_agrees_with_receptance_coupling(hpm, machines_folder, name):
     # the other road: free tool-holder, spindle's flange, joint, each in its own model
@@ -77,6 +80,7 @@ def tilt_response(frequency, speed, gyroscopic=True):
     return frequency_response(rotor(disc(gyroscopic), None), omega, speed, inputs=("flange.x'",), outputs=("flange.x'", "flange.y'"))
 
 
+@pytest.mark.slow
 def test_disc_whirls_as_the_closed_form_says():
     # I_d r'' -+ I_p Omega r' + k_t r = 0: omega = sqrt((g/2)^2 + k_t / I_d) +- g/2, g = I_p Omega / I_d
     mass = 7850.0 * np.pi / 4.0 * 0.24**2 * 0.03

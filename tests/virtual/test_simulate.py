@@ -6,13 +6,13 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from rcsa_ident.samples import simulate_campaign as simulate
 from rcsa_ident.cutting.force import force_lines
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.samples import simulate_campaign as simulate
 from rcsa_ident.signals.recording import Quantity
 
 
@@ -58,6 +58,7 @@ def lines(values, angle, orders):
     return found[: orders.size] + 1j * found[orders.size : 2 * orders.size]
 
 
+@pytest.mark.slow
 def test_recordings_hold_the_true_cross_receptance(written):
     # what a reader of the folder, told speed and tooth angle, finds: cut minus air, over the analytic force
     campaign, truth = read_campaign(written.folder), true_records(written)
@@ -84,6 +85,7 @@ def test_recordings_hold_the_true_cross_receptance(written):
             assert np.linalg.norm(found - expected) < 1e-2 * np.linalg.norm(expected)
 
 
+@pytest.mark.slow
 def test_true_forces_are_those_of_the_cut(written):
     campaign, truth = read_campaign(written.folder), true_records(written)
     cut = campaign.cuts[0]
@@ -96,6 +98,7 @@ def test_true_forces_are_those_of_the_cut(written):
     assert np.abs(found - expected)[teeth].max() < 5e-3 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_the_truth_lies_outside(written):
     assert written.cuts == 2
     assert written.truth.parent == written.folder.parent
@@ -106,6 +109,7 @@ def test_the_truth_lies_outside(written):
     assert (tip[0, 0], tip[-1, 0]) == (5.0, 4500.0)
 
 
+@pytest.mark.slow
 def test_speeds_differ_from_the_programmed_and_from_each_other(written):
     truth = true_records(written)
     programmed = {cut.id: cut.conditions.spindle_speed for cut in read_campaign(written.folder).cuts}
@@ -115,6 +119,7 @@ def test_speeds_differ_from_the_programmed_and_from_each_other(written):
     assert np.unique([angle for _, angle in truth.values()]).size == 4
 
 
+@pytest.mark.slow
 def test_same_seed_same_files_in_any_order(small, written, tmp_path):
     done = []
     with ThreadPoolExecutor(2) as pool:
@@ -124,18 +129,21 @@ def test_same_seed_same_files_in_any_order(small, written, tmp_path):
     assert done == [(1, 2), (2, 2)]
 
 
+@pytest.mark.slow
 def test_another_seed_other_records(small, written, tmp_path, quick_truth):
     other, one = digest(simulate(small, tmp_path / "b", seed=8).folder), digest(written.folder)
     assert other.keys() == one.keys()
     assert {name for name in one if one[name] != other[name]} == {name for name in one if name.startswith("recordings/")}
 
 
+@pytest.mark.slow
 def test_one_more_speed_leaves_the_other_records(small, written, tmp_path, quick_truth):
     plan = dataclasses.replace(small.plan, spindle_speeds=(*small.plan.spindle_speeds, 1900.0))
     more = simulate(dataclasses.replace(small, plan=plan), tmp_path / "more", seed=7)
     assert digest(written.folder / "recordings").items() <= digest(more.folder / "recordings").items()
 
 
+@pytest.mark.slow
 def test_a_folder_with_content_is_left_alone(small, tmp_path):
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "mine.txt").write_text("mine")
@@ -144,6 +152,7 @@ def test_a_folder_with_content_is_left_alone(small, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["full"]
 
 
+@pytest.mark.slow
 def test_machine_with_everything(machines_folder, tmp_path, quick_truth):
     # trigger, lagging sensors, gyroscopic moments, edge forces, feed along Y: the campaign says so and can be read
     machine = read_machine(machines_folder / "stiff.toml")

@@ -204,7 +204,7 @@ def test_what_is_wrong_stands_beside_its_field(opened, served: Served, shop: str
     assert fault_beside(page, "name")
     page.get_by_label("Name", exact=True).fill("Shop")
     page.get_by_role("button", name="Make it").click()
-    expect(page.locator('[data-field="name"] .fault')).to_contain_text("of its own")
+    expect(page.locator('[data-field="name"] .fault')).to_contain_text("another name")
 
 
 def page_requests(opened) -> list[str]:

@@ -10,14 +10,15 @@ import numpy as np
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.identification.posterior import MachineAxis
 from rcsa_ident.io.machines import read_machine
-from rcsa_ident.machine.spindle import Spindle
+from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.virtual.reduction import poles, reduced
 from rcsa_ident.virtual.rotor import rotor
 
 MACHINES = Path(__file__).resolve().parents[2] / "data" / "machines"
 RPM = np.pi / 30.0
+#: All that a test looks at [rad/s].
+BAND = (2.0 * np.pi * 10.0, 2.0 * np.pi * 10_000.0)
 
 
 def softening_spindle():
@@ -29,7 +30,7 @@ def modal_machine(spindle, speed):
     """Exact complex modes of the flange at a spindle speed [rad/s], both axes."""
     j = spindle.joint
     joint = LumpedJoint(j.translational_stiffness, j.rotational_stiffness, j.translational_damping, j.rotational_damping)
-    machine = {}
+    flanges = []
     both = ("flange.x", "flange.x'", "flange.y", "flange.y'")
     small = reduced(rotor(spindle, None), inputs=both)
     for axis in (Dof.X, Dof.Y):
@@ -44,6 +45,5 @@ def modal_machine(spindle, speed):
         phi_t = np.sqrt(residues[:, 0, 0])
         phi = np.stack([phi_t, residues[:, 1, 0] / phi_t], axis=1)
         size = np.abs(pole)
-        modes = ModalModel(size, np.clip(-pole.real / size, 1e-9, 1.0), phi, np.zeros((2, 2)), plane("flange", axis))
-        machine[axis] = MachineAxis(Spindle(modes), joint)
-    return machine
+        flanges.append(ModalModel(size, np.clip(-pole.real / size, 1e-9, 1.0), phi, np.zeros((2, 2)), plane("flange", axis)))
+    return FlangeMachine(tuple(flanges), BAND, joint)

@@ -48,6 +48,7 @@ def recorded(cuts, rng, scatter, sign=1.0, noise=1.0):
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("depth", "engagement", "resonance"), [(4e-4, DOWN, ()), (1.5e-4, SLOT, ()), (4e-4, DOWN, RESONANCE)], ids=["down", "slot", "resonance"]
 )
@@ -70,6 +71,7 @@ def test_intervals_hold_the_truth(depth, engagement, resonance):
     assert np.all(np.median(width, axis=0)[:2] < 0.05)
 
 
+@pytest.mark.slow
 def test_the_signal_tells_more_than_the_means():
     rng = np.random.default_rng(3)
     made = recorded(simulated(5, 4e-4, DOWN)[0], rng, 0.0, sign=-1.0)
@@ -91,6 +93,7 @@ def campaign(cuts):
     return Campaign("by hand", RATE, SENSORS, Workpiece("alloy", COEFFICIENTS), {"T": tooling}, made)
 
 
+@pytest.mark.slow
 def test_campaign_with_what_must_be_left_out():
     """A chattering cut, one without a force, one with lost samples, one that is too short; the others give the answer."""
     rng = np.random.default_rng(9)
@@ -151,6 +154,7 @@ class AxialSensor:
         return np.ones(omega.size, dtype=complex)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("signal", [False, True])
 def test_a_force_along_the_axis_gives_the_axial_coefficients(signal):
     """Kinematic forces of a slot with an axial part; both methods take it from the means."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -15,7 +16,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from rcsa_ident.workflows.compare import LocalMode, Place, compare, frac, local_modes, matched
-from tests.workflows.in_process import MACHINES, RPM, modal_machine, softening_spindle
+from tests.workflows.in_process import BAND, MACHINES, RPM, modal_machine, softening_spindle
 
 OMEGA = 2.0 * np.pi * np.arange(300.0, 3800.0, 4.0)
 SPEED = 15000.0 * RPM
@@ -35,6 +36,7 @@ def measured(place, axis, speed):
     return frequency_response(model, OMEGA, speed, inputs=(f"{col}.{axis}",), outputs=(f"{row}.{axis}",))[:, 0, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", [Dof.X, Dof.Y])
 def test_in_process_is_in_process(axis):
     """At the speed of the identification all four responses agree with the machine: the comparison itself adds nothing."""
@@ -48,6 +50,7 @@ def test_in_process_is_in_process(axis):
             assert identified.compliance == pytest.approx(hammer.compliance, rel=0.03)
 
 
+@pytest.mark.slow
 def test_softening_shows_as_it_is():
     """Idle (speed 0, with noise) against in process: each mode's change is the machine's own, from its full equations at both speeds."""
     rng = np.random.default_rng(1)
@@ -70,6 +73,7 @@ def test_softening_shows_as_it_is():
     assert np.min(found.band_frac[1]) < found.frac
 
 
+@pytest.mark.slow
 def test_the_flange_shows_it_more_than_the_tip():
     """The tool is the machine's most compliant part, and it does not soften."""
     machine = modal_machine(softening_spindle(), SPEED)
@@ -80,11 +84,8 @@ def test_the_flange_shows_it_more_than_the_tip():
 
 def test_bands_hold(identification):
     """With a posterior every response has one; a flange's is that of its modes."""
-    from rcsa_ident.identification.posterior import MachineAxis
-    from rcsa_ident.machine.spindle import Spindle
-
-    machine = {a: MachineAxis(Spindle(p.modes), p.joint, p.posterior) for a, p in identification.axes.items()}
-    h = machine[Dof.X].spindle.receptance(OMEGA).values[:, 0, 0]
+    machine = replace(identification.machine, identified_band=BAND)
+    h = machine.identified[Dof.X].spindle.receptance(OMEGA).values[:, 0, 0]
     (found,) = compare(machine, {(Place.FLANGE, Dof.X): (OMEGA, 1.1 * h)})
     assert found.deviation is not None
     assert np.all(found.deviation[0] >= 0.0)
@@ -94,6 +95,7 @@ def test_bands_hold(identification):
     assert bare.deviation is None
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(
     first=st.floats(500.0, 1200.0),
@@ -140,12 +142,14 @@ def test_frac_sees_shapes_only(scale, seed):
     assert frac(a, b) == pytest.approx(frac(scale * b, a))
 
 
+@pytest.mark.slow
 def test_what_is_refused():
-    machine = {Dof.X: modal_machine(softening_spindle(), SPEED)[Dof.X]}
+    whole = modal_machine(softening_spindle(), SPEED)
+    machine = replace(whole, flanges=whole.flanges[:1])
     h = measured(Place.TIP, Dof.X, 0.0)
     with pytest.raises(InputError, match="an identified axis"):
         compare(machine, {(Place.TIP, Dof.Y): (OMEGA, h)}, assembly())
     with pytest.raises(InputError, match="the tooling that was clamped"):
         compare(machine, {(Place.TIP, Dof.X): (OMEGA, h)})
     with pytest.raises(InputError, match="eight at least"):
-        compare(machine, {(Place.TIP, Dof.X): (OMEGA, h)}, assembly(), band=(0.0, OMEGA[4]))
+        compare(replace(machine, known=(0.0, OMEGA[4])), {(Place.TIP, Dof.X): (OMEGA, h)}, assembly())

@@ -9,6 +9,7 @@ import pytest
 from rcsa_ident.workflows.compile_kernels import STEPS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STEPS)
 def test_a_step_runs(name):
     STEPS[name]()

@@ -20,6 +20,8 @@ from rcsa_ident.virtual.rotor import frequency_response, rotor
 from rcsa_ident.workflows.contact import NAMES, Support, TapTest, calibrate_contact, tap_model
 from tests.oracles import analytic
 
+pytestmark = pytest.mark.slow
+
 MACHINES = Path(__file__).resolve().parents[2] / "data" / "machines"
 C, S = MATERIALS["carbide"], MATERIALS["steel"]
 TRUE = Contact(1.2e10, 1.5e6, 6e4, 25.0)

@@ -10,21 +10,26 @@ import pytest
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
-from rcsa_ident.identification.posterior import MachineAxis
+from rcsa_ident.machine.flange_machine import FlangeMachine
+from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.observer.tuning import PaperWalk, Resonators
 from rcsa_ident.report.forces import force_history, observer_frf
 from rcsa_ident.signals.measurement import NO_AIR
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.workflows.estimate_forces import observe, trigger_speed, wear_of
-from rcsa_ident.workflows.speeds import MachineOverSpeed
+from tests.fixtures import by_hand
 from tests.fixtures.flange_machine import BAND, flange_machine, paper_cut
 from tests.fixtures.virtual_cut import relative_error, virtual_cut
 
 RPM = np.pi / 30.0
 
 
-def watch(cut, air=None, teeth=2, machine=None, band=BAND, speed=12000.0 * RPM, **options):
-    return observe(machine or flange_machine(), paper_cut().tooling.assembly, teeth, cut, air, band, speed, **options)
+def watch(cut, air=None, teeth=2, machine=None, speed=12000.0 * RPM, **options):
+    return observe(machine or flange_machine(), paper_cut().tooling.assembly, teeth, cut, air, speed, **options)
+
+
+def known_in(band):
+    return replace(flange_machine(), known=band)
 
 
 @pytest.fixture(scope="module")
@@ -39,27 +44,31 @@ def with_trigger(cut, speed, pulses=1):
     return Recording(cut.rate, np.column_stack([cut.samples, signal]), (*cut.sensors, sensor))
 
 
+@pytest.mark.slow
 def test_speed_and_noise_come_from_the_record(found):
     assert found.spindle_speed == pytest.approx(paper_cut().spindle_speed, rel=1e-6)
     for noise in found.noise.values():
         assert noise == pytest.approx(2e-9, rel=0.2)
 
 
+@pytest.mark.slow
 def test_the_fundamental_below_the_identified_band_is_said(found):
     assert found.band[0] < 2.0 * np.pi * 400.0 < BAND[0]
     assert any("400 Hz, lies below the identified band" in note for note in found.notes)
-    higher = watch(paper_cut().cut, paper_cut().air, band=(2.0 * np.pi * 700.0, BAND[1]))
+    higher = watch(paper_cut().cut, paper_cut().air, machine=known_in((2.0 * np.pi * 700.0, BAND[1])))
     assert any("harmonics below 490 Hz are left out" in note for note in higher.notes)
     assert higher.band[0] > 2.0 * np.pi * 400.0
 
 
+@pytest.mark.slow
 def test_a_missing_air_cut_is_said():
     assert NO_AIR in watch(paper_cut().cut).notes
 
 
+@pytest.mark.slow
 def test_one_axis_alone_is_watched(found):
     whole = flange_machine()
-    only = watch(paper_cut().cut, paper_cut().air, machine=MachineOverSpeed({Dof.Y: whole.whole[Dof.Y]}))
+    only = watch(paper_cut().cut, paper_cut().air, machine=replace(whole, flanges=whole.flanges[1:]))
     assert only.estimate.axes == (Dof.Y,)
     # speed and angle to the air cut come from fewer channels
     np.testing.assert_allclose(
@@ -67,6 +76,32 @@ def test_one_axis_alone_is_watched(found):
     )
 
 
+def measured(low_hz, high_hz, step_hz=5.0):
+    """The same machine, its flange as a tap test in this range would give it."""
+    grid = 2.0 * np.pi * np.arange(low_hz, high_hz, step_hz)
+    flanges = tuple(MeasuredFlange(flange.receptance(grid)) for flange in flange_machine().flanges)
+    return FlangeMachine(flanges, flanges[0].band, flange_machine().joint, ends=True)
+
+
+@pytest.mark.slow
+def test_a_measured_flange_gives_the_forces_of_its_modes(found):
+    """From where the identified machine's band begins; beyond what was measured nothing is asked for, and nothing told."""
+    alone = watch(paper_cut().cut, paper_cut().air, machine=measured(373.0, 4400.0))
+    assert 2.0 * np.pi * 373.0 <= alone.band[0] < alone.band[1] <= 2.0 * np.pi * 4400.0
+    for response in alone.response.values():
+        assert response.omega[0] >= 2.0 * np.pi * 373.0
+        assert response.omega[-1] <= 2.0 * np.pi * 4400.0
+    settled = slice(4000, None)
+    difference = np.std(alone.estimate.force[settled] - found.estimate.force[settled], axis=0)
+    assert np.all(difference < 0.01 * np.std(found.estimate.force[settled], axis=0))
+    assert np.all(relative_error(alone.estimate.force, paper_cut().force, paper_cut().cut.rate) < 0.03)
+    # a range that begins above the tooth-passing frequency
+    high = watch(paper_cut().cut, paper_cut().air, machine=measured(450.0, 4400.0))
+    assert high.band[0] == 2.0 * np.pi * 450.0
+    assert any("harmonics below 450 Hz are left out" in note for note in high.notes)
+
+
+@pytest.mark.slow
 def test_sensors_that_lag_and_lose_are_undone():
     """The same cut seen through slower sensors: the forces stay, without their delay."""
     slow = virtual_cut(gap_delay=60e-6, gap_bandwidth=7000.0, acceleration_delay=20e-6)
@@ -77,6 +112,7 @@ def test_sensors_that_lag_and_lose_are_undone():
     assert np.all(relative_error(worse.force, slow.force, slow.cut.rate) > 0.3)
 
 
+@pytest.mark.slow
 def test_a_narrow_bandwidth_keeps_few_harmonics():
     narrow = watch(paper_cut().cut, paper_cut().air, bandwidth=2.0 * np.pi * 1000.0)
     spectrum = np.abs(np.fft.rfft(narrow.estimate.force[4096:8192] * np.hanning(4096)[:, None], axis=0))
@@ -84,6 +120,7 @@ def test_a_narrow_bandwidth_keeps_few_harmonics():
     assert spectrum[frequency > 2500.0].max() < 0.05 * spectrum[frequency < 1100.0].max()
 
 
+@pytest.mark.slow
 def test_a_trigger_tells_the_speed(found):
     speed = paper_cut().spindle_speed
     for pulses in (1, 3):
@@ -97,18 +134,16 @@ def test_a_trigger_tells_the_speed(found):
         watch(still, speed=None)
 
 
+@pytest.mark.slow
 def test_the_posterior_widens_the_bands(found):
     """Of a machine whose C31 is uncertain by a known share: the force is, too."""
-    from tests.workflows.test_tip import posterior_of
-
-    machine = {}
-    for axis, shift in ((Dof.X, 1.0), (Dof.Y, 0.95)):
-        posterior = posterior_of(shift, softening=False)
-        machine[axis] = MachineAxis(None, None, posterior)  # type: ignore[arg-type]
+    machine = replace(by_hand.machine(rivals=0), identified_band=BAND)
     certain = {
-        axis: MachineAxis(None, None, replace(part.posterior, covariance=0.0 * part.posterior.covariance)) for axis, part in machine.items()
+        axis: replace(part, posterior=replace(part.posterior, covariance=0.0 * part.posterior.covariance))
+        for axis, part in machine.identified.items()
     }
-    one, two = (watch(paper_cut().cut, paper_cut().air, machine=MachineOverSpeed(m), method=PaperWalk()) for m in (machine, certain))
+    machines = (machine, replace(machine, identified=certain))
+    one, two = (watch(paper_cut().cut, paper_cut().air, machine=each, method=PaperWalk()) for each in machines)
     for i, axis in enumerate(one.estimate.axes):
         assert one.model_error[axis] > 0.0
         assert two.model_error[axis] == 0.0
@@ -116,6 +151,7 @@ def test_the_posterior_widens_the_bands(found):
         np.testing.assert_allclose(own**2, bare**2 + one.model_error[axis] ** 2, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_wear_of_the_paper_case(found):
     """Through machine, sensors and observer: K_tc and K_rc of the virtual workpiece (902 MPa, 0.26), no edges."""
     made = paper_cut()
@@ -142,9 +178,10 @@ def test_bad_records_are_refused_in_a_sentence():
     # no later part of the signal has a sensor more
     assert not isinstance(missing.value, Unsteady)
     with pytest.raises(InputError, match="band"):
-        watch(cut, band=(2.0 * np.pi * 20000.0, 2.0 * np.pi * 30000.0))
+        watch(cut, machine=known_in((2.0 * np.pi * 20000.0, 2.0 * np.pi * 30000.0)))
 
 
+@pytest.mark.slow
 def test_figures_have_units_and_bands(found):
     history = force_history(found.estimate, found.spindle_speed)
     assert [ax.get_ylabel() for ax in history.axes] == ["force X [N]", "force Y [N]"]

@@ -19,6 +19,7 @@ def identification_of(posterior):
     return replace(found, axes={Dof.X: replace(found.axes[Dof.X], posterior=posterior)})
 
 
+@pytest.mark.slow
 def test_an_uncoupled_mode_in_closed_form():
     natural, zeta = np.array([5000.0, 12000.0]), np.array([0.03, 0.06])
     axis = simple_axis(natural, np.ones((2, 2)), np.diag(np.sqrt(2.0 * zeta * natural)), np.eye(2) * 1e-5)
@@ -37,6 +38,7 @@ def test_an_uncoupled_mode_in_closed_form():
     np.testing.assert_allclose(zeta_std, relative * zeta, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_coupled_modes_scatter_as_drawn_machines_do():
     known = by_hand.posterior(softening=True)
     known = replace(known, covariance=known.covariance * 0.01)

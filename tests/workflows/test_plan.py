@@ -9,16 +9,16 @@ import pytest
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import MillingProcess
-from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.experiment_design import Volume
+from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.parameters import AxisLayout, AxisParameters, pack
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machine.spindle import Spindle
-from rcsa_ident.workflows.lobes import LobeConditions, tooling_lobes
+from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.workflows.plan import CutConstraints, line_noise, plan_cuts
-from rcsa_ident.workflows.tip import tooltip
 from tests.fixtures.virtual_shop import open_shop
 
 TOOLINGS = Path(__file__).parents[2] / "data" / "machines" / "toolings"
@@ -42,7 +42,12 @@ def machine_of(deviation=0.05, seed=1):
         posterior = Posterior(theta, np.diag(own**2), AxisLayout(4))
         modes, joint = posterior.machine(axis)
         machine[axis] = MachineAxis(Spindle(modes), joint, posterior)
-    return machine
+    return IdentifiedMachine(machine, (2.0 * np.pi * BAND[0], 2.0 * np.pi * BAND[1]))
+
+
+def with_axes(machine, **axes):
+    """The same machine with some of its axes alone, or changed."""
+    return replace(machine, identified={Dof(name): part for name, part in axes.items()})
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +70,7 @@ def planned(toolings, targets):
     return plan(toolings, targets, 8)
 
 
+@pytest.mark.slow
 def test_every_cut_is_stable_by_the_lobes_and_some_that_are_not_were_there(planned, toolings):
     assert planned.unstable > 0
     omega = 2.0 * np.pi * np.arange(100.0, 4300.0, 1.0)
@@ -73,14 +79,13 @@ def test_every_cut_is_stable_by_the_lobes_and_some_that_are_not_were_there(plann
         assert own
         speeds = np.array([c.conditions.spindle_speed for c in own])
         depths = np.array([c.conditions.axial_depth for c in own])
-        response = tooltip(machine_of(), tooling.assembly, omega, bands=False)
+        tip, process = machine_of().tip(tooling, omega, spread=False), MillingProcess(tooling.cutter, COEFFICIENTS, ALLOWED.engagement)
         for factor in (0.99, 1.0, 1.01):
-            lobes = tooling_lobes(
-                response, LobeConditions(MillingProcess(tooling.cutter, COEFFICIENTS, ALLOWED.engagement), factor * speeds, 0.01)
-            )
+            lobes = stability_lobes(tip, process, factor * speeds, 0.01)
             assert np.all(lobes.limit_depth >= 1.499 * depths)
 
 
+@pytest.mark.slow
 def test_speeds_are_allowed_whole_and_a_percent_apart(planned, toolings):
     for cuts in (planned.cuts, planned.even_cuts):
         assert len(cuts) == 8
@@ -91,33 +96,39 @@ def test_speeds_are_allowed_whole_and_a_percent_apart(planned, toolings):
             assert np.all((rpm > 7999.0) & (rpm < 20001.0))
 
 
+@pytest.mark.slow
 def test_bands_fall_with_every_cut(planned, targets):
     assert planned.targets == tuple(t.name for t in targets)
     assert planned.band.shape == (9, 2)
     assert np.all(np.diff(planned.band, axis=0) < 0.0)
 
 
+@pytest.mark.slow
 def test_the_band_before_any_cut_is_that_of_the_tooltip(toolings, targets):
     machine = machine_of(1e-3)
     before = plan(toolings, targets, 1, machine=machine).band[0]
     omega = 2.0 * np.pi * np.linspace(*BAND, 400)
     for tooling, known in zip(targets, before, strict=True):
         # by finite differences of the coupled machine, on other frequencies
-        response = tooltip(machine, tooling.assembly, omega)
-        parts = [np.sum(np.square(response.deviation[a])) / np.sum(np.abs(response.tip(a)) ** 2) for a in (Dof.X, Dof.Y)]
+        tip = machine.tip(tooling, omega)
+        entries = [(Coordinate("tip", axis),) * 2 for axis in (Dof.X, Dof.Y)]
+        parts = [np.sum(np.square(tip.deviation()[e])) / np.sum(np.abs(tip.between(*(str(c) for c in e))) ** 2) for e in entries]
         assert known == pytest.approx(np.sqrt(np.mean(parts)), rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_plan_beats_even_speeds(planned):
     assert np.mean(planned.band[-1] ** 2) < np.mean(planned.even**2)
 
 
+@pytest.mark.slow
 def test_the_same_call_gives_the_same_plan(planned, toolings, targets):
     again = plan(toolings, targets, 8)
     assert again.cuts == planned.cuts
     np.testing.assert_array_equal(again.band, planned.band)
 
 
+@pytest.mark.slow
 def test_fewest_says_how_many_and_whether(planned):
     widest = planned.band.max(axis=1)
     assert planned.fewest(widest[3]).cuts == 3
@@ -128,6 +139,7 @@ def test_fewest_says_how_many_and_whether(planned):
         planned.fewest(0.0)
 
 
+@pytest.mark.slow
 def test_a_wanted_band_takes_no_more_cuts_than_it_must(planned, toolings, targets):
     wanted = float(planned.band[4].max())
     found = plan(toolings, targets, 8, wanted=wanted)
@@ -151,9 +163,10 @@ def test_fewer_cuts_than_asked_for_are_said(toolings, targets):
 
 
 def test_without_a_posterior_or_a_stable_cut_there_is_no_plan(toolings, targets):
-    machine = machine_of()
+    x, y = machine_of().identified.values()
+    half = with_axes(machine_of(), x=replace(x, posterior=None), y=y)
     with pytest.raises(InputError, match="posterior"):
-        plan(toolings, targets, machine={Dof.X: replace(machine[Dof.X], posterior=None), Dof.Y: machine[Dof.Y]})
+        plan(toolings, targets, machine=half)
     with pytest.raises(InputError, match=r"none of .* stable with a margin of 1\.5 .*the deepest stable one would be"):
         plan(toolings, targets, allowed=replace(ALLOWED, depths=(0.05,)))
     with pytest.raises(InputError, match="at least one tooling"):
@@ -171,6 +184,7 @@ def test_what_may_not_be_allowed(change, words):
         replace(ALLOWED, **change)
 
 
+@pytest.mark.slow
 def test_most_information_is_another_plan(planned, toolings, targets):
     other = plan(toolings, targets, 8, goal=Volume())
     assert {(c.tooling, c.conditions.spindle_speed) for c in other.cuts} != {(c.tooling, c.conditions.spindle_speed) for c in planned.cuts}
@@ -178,7 +192,7 @@ def test_most_information_is_another_plan(planned, toolings, targets):
 
 
 def test_a_machine_with_one_axis_has_a_plan(toolings, targets):
-    found = plan(toolings, targets, 2, machine={Dof.Y: machine_of()[Dof.Y]})
+    found = plan(toolings, targets, 2, machine=with_axes(machine_of(), y=machine_of().identified[Dof.Y]))
     assert len(found.cuts) == 2
     assert found.band[-1].max() < found.band[0].max()
 

@@ -9,9 +9,10 @@ import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
+from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement, Reading
-from rcsa_ident.signals.verdict import Verdict
+from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.workflows.speed_bands import divided, speed_bands
 from tests.fixtures import by_hand
 
@@ -19,7 +20,7 @@ from tests.fixtures import by_hand
 def reading(number, speed, tooling="T1", usable=True):
     id = f"{tooling}-{number}"
     if not usable:
-        return Reading(id, tooling, speed, Verdict(("chatter",)))
+        return Reading(id, tooling, speed, Verdict((Remark(RecordCode.CHATTER, "chatter"),)))
     order = np.array([4, 8])
     value = np.full((2, 1), 1e-8 + 1e-9j)
     lines = AxisLines(
@@ -52,7 +53,7 @@ def test_a_band_with_too_few_cuts_of_a_tooling_is_refused_with_the_number():
     readings += [reading(k, speed, "T2") for k, speed in enumerate(np.linspace(800.0, 1500.0, 20))]
     with pytest.raises(InputError) as error:
         divided(readings, 2)
-    for word in ("--speed-bands", "3 cuts with T2", "13369 to 19099 rev/min", "at least 8 cuts", "2 bands"):
+    for word in ("speed_bands", "3 cuts with T2", "13369 to 19099 rev/min", "at least 8 cuts", "2 bands"):
         assert word in str(error.value)
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rcsa_ident.errors import InputError
 from rcsa_ident.workflows.estimate_forces import MonitoredCut, observe
 from rcsa_ident.workflows.stream_forces import LONGEST_BRIDGE, LiveObserver, live_observer
-from tests.fixtures.flange_machine import BAND, flange_machine
+from tests.fixtures.flange_machine import flange_machine
 from tests.fixtures.force_stream import RATE, SECOND, streamed, turning
 from tests.fixtures.virtual_cut import CASE, relative_error
 
@@ -23,7 +23,7 @@ def designed(air: bool = True) -> MonitoredCut:
     samples = streamed()[0][:SECOND] if air else streamed()[0][2 * SECOND : 2 * SECOND + SECOND // 2]
     record = turning().recording(samples)
     assembly = turning().made.tooling.assembly
-    return observe(flange_machine(), assembly, 2, record, record if air else None, BAND, CASE.spindle_speed)
+    return observe(flange_machine(), assembly, 2, record, record if air else None, CASE.spindle_speed)
 
 
 @cache
@@ -44,6 +44,7 @@ def errors(force, true, begin, end):
     return relative_error(force[part], true[part], RATE)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.lists(st.integers(0, 6000), max_size=12), st.booleans())
 def test_blocks_of_any_size_give_what_the_observer_gives_of_the_whole(cuts, air):
@@ -54,6 +55,7 @@ def test_blocks_of_any_size_give_what_the_observer_gives_of_the_whole(cuts, air)
     np.testing.assert_allclose(run(live, samples, cuts)[1], batch, atol=1e-9 * np.abs(batch).max(), rtol=0)
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(st.lists(st.integers(0, 12000), max_size=8))
 def test_blocks_of_any_size_follow_the_spindle_alike(cuts):
@@ -65,6 +67,7 @@ def test_blocks_of_any_size_follow_the_spindle_alike(cuts):
     assert whole.angle.first > 0
 
 
+@pytest.mark.slow
 def test_the_force_of_a_cut_that_follows_air():
     """Run-out from the first second, two thirds of a second before the tool enters."""
     samples, true = streamed()
@@ -82,6 +85,7 @@ def test_run_out_turns_with_a_spindle_that_does_not_keep_its_speed(wander, sag):
     assert np.all(errors(fixed, true, 2.0, 3.0) > 0.3)
 
 
+@pytest.mark.slow
 def test_the_speed_is_told():
     state = run(observer(), streamed(0.0, 1e-3)[0])[0]
     assert observer().drift(state) == pytest.approx(-1e-3, rel=0.01)
@@ -159,6 +163,7 @@ def test_nothing_in_nothing_out():
     assert state.count == 0
 
 
+@pytest.mark.slow
 def test_run_out_of_one_axis_alone_is_refused():
     found = designed()
     half = replace(found.observer.axes[0], run_out=None)

@@ -13,6 +13,7 @@ export async function view({ id }, _query, place) {
   let job = await get(`identifications/${id}`);
   const leaving = new AbortController();
   const fault = h("div");
+  const story = h("div");
   const state = h("section", { class: "card", "aria-live": "polite", "aria-label": "State" });
   const cancel = h("button", { type: "button", class: "danger" }, "Cancel");
   const reports = h("span", { class: "row-of-buttons" });
@@ -39,6 +40,7 @@ export async function view({ id }, _query, place) {
     head("Identification", null, reports, cancel),
     fault,
     state,
+    story,
     h("div", { class: "split live" }, costCard, card("Measured points and model", null, axesKey(), fit)),
     result,
   );
@@ -110,6 +112,8 @@ export async function view({ id }, _query, place) {
       } else if (event === "fit") {
         fits.set(data.axis, data);
         redraw("fit");
+      } else if (event === "note") {
+        add(story, note("", data.text));
       } else if (event === "progress" || event === "end") {
         job = data;
         draw();

@@ -1,0 +1,59 @@
+"""What every identification method offers: one verb, whose long work goes as tasks through the map that it is given."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Any, Protocol
+
+from rcsa_ident.identification.data import IdentificationData
+from rcsa_ident.identification.progress import Progress
+from rcsa_ident.identification.result import Identification
+from rcsa_ident.scaleout import Map
+
+
+class Phase(StrEnum):
+    """Parts of an identification whose tasks are independent of each other: each is one call of the map."""
+
+    SEARCH = "search"
+    OTHER_AXIS = "from the other axis"
+    BOTH_AXES = "both axes"
+
+
+class Task(Protocol):
+    """What a method gives to its map, through `perform`: the same task, the same answer, to the last bit.
+
+    It answers with arrays, numbers, `Candidate` or `AxisSearch`, which a service may keep in place of doing the task again.
+    """
+
+    @property
+    def phase(self) -> Phase:
+        """The part that it belongs to, the same for all tasks of a call."""
+        ...
+
+    def run(self) -> Any:
+        """Return the answer."""
+        ...
+
+
+def perform(task: Task) -> Any:
+    """Return a task's answer: the one function that methods map."""
+    return task.run()
+
+
+class Method(Protocol):
+    """An identification method: an object that carries its settings."""
+
+    def run(self, data: IdentificationData, seed: int, map: Map = map, progress: Progress | None = None) -> Identification:
+        """Return modes and joint.
+
+        Parameters
+        ----------
+        data : IdentificationData
+        seed : int
+            Same seed, same answer, whatever `map` is.
+        map : callable
+            The builtin, or a pool's: it is called with `perform` and the tasks of one phase.
+        progress : callable, optional
+            Told of every step; with a pool's map it has to be picklable.
+        """
+        ...

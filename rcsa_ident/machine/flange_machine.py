@@ -1,0 +1,93 @@
+"""A machine that is known by its flange's receptance: modes, a measurement, or another structure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.receptance import Receptance, Substructure
+from rcsa_ident.errors import InputError
+from rcsa_ident.machine.flange_part import FlangePart, JointedFlange, independent_parts
+from rcsa_ident.machine.machine import STEP, Machine
+from rcsa_ident.units import to_hz
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FlangeMachine(Machine):
+    """A machine that is known by its flange's receptance: modes, a measurement, or another structure, taken for exact.
+
+    Parameters
+    ----------
+    flanges : tuple of Substructure
+        Coordinates at ``flange``, those of one substructure feel nothing of another's.
+    known : (float, float) [rad/s]
+        Lowest and highest frequency at which the flange is known.
+    joint : LumpedJoint or None
+        None where the flange holds the joint's compliance, as one that was decoupled from clamped tool-holders does.
+    name : str
+    ends : bool
+        Whether nothing at all is known beyond `known`, as of a measurement.
+
+    Examples
+    --------
+    >>> from rcsa_ident.dynamics.modal import normal_modes
+    >>> from rcsa_ident.dynamics.coordinates import plane
+    >>> modes = normal_modes([6000.0], [0.05], [[0.2, 0.1]], plane("flange"))
+    >>> machine = FlangeMachine((modes,), (600.0, 30_000.0), LumpedJoint(3e9, 6e6))
+    >>> machine.receptance([1000.0]).values.shape
+    (1, 2, 2)
+    """
+
+    flanges: tuple[Substructure, ...]
+    known: tuple[float, float]
+    joint: LumpedJoint | None = None
+    name: str = "flange"
+    ends: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.flanges or not 0.0 <= self.known[0] < self.known[1]:
+            raise InputError("flange", f"{len(self.flanges)} from {self.known[0]:g} to {self.known[1]:g} rad/s", "one or more, in a band")
+
+    @cached_property
+    def parts(self) -> tuple[FlangePart, ...]:
+        """Bending planes, or both together where they feel each other."""
+        found = []
+        for flange in self.flanges:
+            look = flange.receptance(frozen(np.linspace(*self.known, 5)))
+            for group in independent_parts(look):
+                own = flange if group == look.rows else _Group(flange, group)
+                found.append(FlangePart(group, JointedFlange(own, self.joint)))
+        return tuple(found)
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Lowest and highest frequency at which the flange is known [rad/s]."""
+        return self.known
+
+    def lines(self, beyond: float = 1.0) -> FloatArray:
+        """Return frequencies [rad/s] 1 Hz apart; of a measurement between its first and last one, whatever is asked for beyond."""
+        if not self.ends:
+            return super().lines(beyond)
+        low, high = (w / (2.0 * np.pi) for w in self.known)
+        inner = np.arange(np.ceil(low / STEP + 1e-9), np.floor(high / STEP - 1e-9) + 0.5) * STEP
+        return 2.0 * np.pi * np.concatenate([[low], inner[(inner > low) & (inner < high)], [high]])
+
+    def __str__(self) -> str:
+        low, high = (to_hz(w) for w in self.known)
+        return f"{self.name}: {', '.join(axis.upper() for axis in self.axes)}, {low:.0f} to {high:.0f} Hz"
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Some of a flange's directions, which feel nothing of the others."""
+
+    flange: Substructure
+    coordinates: tuple[Coordinate, ...]
+
+    def receptance(self, omega: FloatArray) -> Receptance:
+        return self.flange.receptance(omega).block(self.coordinates)
