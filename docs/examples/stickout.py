@@ -9,7 +9,7 @@ import numpy as np
 import rcsa_ident as ri
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import plane
-from rcsa_ident.machine.machine import FlangeMachine
+from rcsa_ident.machine.flange_machine import FlangeMachine
 
 SPINDLE = ri.normal_modes(
     omega_n=ri.hz(1.0) * np.array([180.0, 1000.0, 1820.0, 2330.0, 3970.0]),

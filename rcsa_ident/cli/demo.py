@@ -10,8 +10,9 @@ import typer
 
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn
 from rcsa_ident.cli.identify import Method, leave, read_and_judge, result_of, search, warn_left_out
-from rcsa_ident.cli.processes import Processes, Workers, workers
+from rcsa_ident.cli.processes import Processes
 from rcsa_ident.errors import InputError
+from rcsa_ident.processes import Workers, workers
 from rcsa_ident.units import from_rpm, to_hz, to_rpm
 
 if TYPE_CHECKING:

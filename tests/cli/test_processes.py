@@ -13,8 +13,8 @@ import time
 
 import pytest
 
-from rcsa_ident.cli.processes import workers
 from rcsa_ident.identification.progress import Stage, Step
+from rcsa_ident.processes import workers
 from tests.fixtures.waiting import PATIENCE, until
 
 
@@ -124,7 +124,7 @@ CTRL_C = """
 import signal, sys
 sys.path.insert(0, {root!r})
 from long_work import work
-from rcsa_ident.cli.processes import workers
+from rcsa_ident.processes import workers
 def main():
     try:
         with workers(3, early=()) as pool:

@@ -12,7 +12,7 @@ import rcsa_ident as ri
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.identified import Result
 from rcsa_ident.io.simulations import SimulatedCampaign
-from rcsa_ident.machine.machine import FlangeMachine
+from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.observer.force import ForceEstimate
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.verdict import Verdict

@@ -92,7 +92,7 @@ def test_processes_do_not_run_the_script_again(tmp_path):
     """A script without a guard: spawned processes import its module, unless they are told of none."""
     (tmp_path / "script.py").write_text(
         "import os\n"
-        "from rcsa_ident.cli.processes import workers\n"
+        "from rcsa_ident.processes import workers\n"
         "print('once', flush=True)\n"
         "with workers(2, ()) as pool:\n"
         "    print(len(set(pool.map(os.path.basename, ['a/b', 'c/d', 'e/f']))))\n"
