@@ -13,6 +13,7 @@ WORKDIR /opt/rcsa-ident
 COPY pyproject.toml README.md LICENSE ./
 COPY rcsa_ident ./rcsa_ident
 COPY api ./api
+COPY data/machines ./data/machines
 RUN pip install --no-cache-dir .
 
 USER ident

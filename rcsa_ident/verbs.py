@@ -50,8 +50,8 @@ def sample_campaign(folder: str | Path = "sample_runs", processes: int | None = 
     processes, progress
         As of `identify`.
     """
-    from rcsa_ident.cli.processes import workers
     from rcsa_ident.io.setups import read_campaign
+    from rcsa_ident.processes import workers
     from rcsa_ident.samples import make_sample_campaign
 
     with _one_thread(), workers(processes, ("rcsa_ident.workflows.simulate",)) as pool, _line(progress) as line:
@@ -89,10 +89,10 @@ def identify(
     """
     from functools import partial
 
-    from rcsa_ident.cli.processes import workers
     from rcsa_ident.identified import Result
     from rcsa_ident.io.recordings import read_cut
     from rcsa_ident.io.setups import read_campaign
+    from rcsa_ident.processes import workers
     from rcsa_ident.workflows import identify as workflow
 
     chosen = _method(method, start)

@@ -4,8 +4,10 @@ import os
 from collections.abc import Callable
 from typing import Any
 
-# one thread per process: the linear algebra here is small, its sums stay the same on any number of cores
-for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
+from rcsa_ident.processes import THREADS
+
+# before anything asks for numpy
+for _name in THREADS:
     os.environ.setdefault(_name, "1")
 
 import typer  # noqa: E402

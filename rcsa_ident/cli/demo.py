@@ -10,8 +10,9 @@ import typer
 
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn
 from rcsa_ident.cli.identify import Method, exit_by_status, read_and_judge, result_of, search, warn_left_out
-from rcsa_ident.cli.processes import Processes, workers
+from rcsa_ident.cli.processes import Processes
 from rcsa_ident.errors import InputError
+from rcsa_ident.processes import Workers, workers
 from rcsa_ident.units import from_rpm, to_hz, to_rpm
 
 if TYPE_CHECKING:
@@ -28,11 +29,19 @@ if TYPE_CHECKING:
 COMPARED = (600.0, 4000.0, 5.0)
 SPEEDS = (4000.0, 20000.0, 50.0)
 MAX_DEPTH = 0.01
+#: Of a checkout.
+SAMPLES = Path("data/sample_runs")
 
 
 @answers
 def demo(
-    data: Annotated[Path, typer.Option(help="Campaign folder.")] = Path("data/sample_runs"),
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            help="Campaign folder; default: data/sample_runs, or where that is missing OUT/sample_runs, recorded on the virtual machine.",
+            show_default=False,
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for the results; created if it is missing.")] = Path("report"),
     tooling: Annotated[
         list[Path] | None, typer.Option(help="Further TOOLING.toml; default: those in DATA/../machines/toolings.", show_default=False)
@@ -54,8 +63,9 @@ def demo(
     stages = Stages(quiet=json_)
     _folder(out)
     with workers(processes) as pool:
+        data, others = _data(data, out, pool, stages)
         campaign, readings = read_and_judge(data, pool, stages)
-        extra = _further_toolings(campaign, data, tooling)
+        extra = _further_toolings(campaign, tooling or others)
         found = search(campaign, readings, Method.default, seed, pool, stages)
         deviations = mode_deviations(found)
         result = result_of(found, campaign, readings, deviations)
@@ -92,11 +102,24 @@ def _folder(out: Path) -> None:
         raise InputError("--out", error.strerror or "an error", "a folder that can be created", str(out)) from None
 
 
-def _further_toolings(campaign: Campaign, data: Path, given: list[Path] | None) -> dict[str, Tooling]:
+def _data(given: Path | None, out: Path, pool: Workers, stages: Stages) -> tuple[Path, list[Path]]:
+    """The campaign's folder, and the files of toolings that belong to its machine."""
+    if given is not None or SAMPLES.is_dir():
+        folder = SAMPLES if given is None else given
+        return folder, sorted((folder.resolve().parent / "machines" / "toolings").glob("*.toml"))
+    from rcsa_ident.samples import make_sample_campaign, sample_toolings
+
+    with stages.stage("sample campaign") as progress:
+        folder = make_sample_campaign(out / "sample_runs", progress=progress, mapper=pool.map)
+    if not stages.quiet:
+        say(f"sample campaign of the virtual machine: {folder}")
+    return folder, list(sample_toolings().values())
+
+
+def _further_toolings(campaign: Campaign, paths: list[Path]) -> dict[str, Tooling]:
     """Toolings that the campaign has not cut with."""
     from rcsa_ident.io.setups import read_tooling
 
-    paths = given if given else sorted((data.resolve().parent / "machines" / "toolings").glob("*.toml"))
     read = [read_tooling(path) for path in paths]
     return {each.name: each for each in read if each.name not in campaign.toolings}
 

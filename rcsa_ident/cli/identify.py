@@ -22,8 +22,9 @@ from rcsa_ident.cli.common import (
     warn,
     writable,
 )
-from rcsa_ident.cli.processes import Dask, Processes, Workers, workers_or_cluster
+from rcsa_ident.cli.processes import Dask, Processes, workers_or_cluster
 from rcsa_ident.errors import InputError
+from rcsa_ident.processes import Workers
 from rcsa_ident.units import to_rpm
 
 if TYPE_CHECKING:

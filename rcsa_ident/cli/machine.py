@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say
-from rcsa_ident.cli.processes import Processes, workers
+from rcsa_ident.cli.processes import Processes
+from rcsa_ident.processes import workers
 
 
 @answers

@@ -11,11 +11,10 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics._kernels import pole_sum
 from rcsa_ident.dynamics.coordinates import Coordinate
-from rcsa_ident.dynamics.poles import PoleResidue, pair_sum
+from rcsa_ident.dynamics.poles import PoleResidue, frequencies, pair_sum
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.shown import Shown
-from rcsa_ident.units import to_hz
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,8 +127,7 @@ class ModalModel(Shown):
         return self.pole_residue().to_control(names, names)
 
     def __str__(self) -> str:
-        low, high = (float(to_hz(w)) for w in (self.omega_n.min(initial=np.inf), self.omega_n.max(initial=-np.inf)))
-        return f"{self.omega_n.size} modes, {low:.0f} to {high:.0f} Hz, at {', '.join(str(c) for c in self.coordinates)}"
+        return f"{', '.join(str(c) for c in self.coordinates)}: {frequencies('modes', self.omega_n)}"
 
 
 def normal_modes(

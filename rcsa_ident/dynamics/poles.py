@@ -12,13 +12,15 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics._kernels import pole_sum
 from rcsa_ident.dynamics.state_space import StateSpace
 from rcsa_ident.errors import InputError
+from rcsa_ident.shown import Shown
+from rcsa_ident.units import to_hz
 
 #: Condition number of the eigenvectors beyond which poles are taken to coincide.
 _COINCIDING = 1e12
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PoleResidue:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class PoleResidue(Shown):
     """A linear system with real coefficients as a sum over its poles, each with a residue of rank one.
 
     H(s) = sum_k outputs_k inputs_k / (s - pole_k) + conj(outputs_k inputs_k) / (s - conj(pole_k)) + constant
@@ -49,6 +51,9 @@ class PoleResidue:
                 raise InputError(name, getattr(self, name).shape, f"shape {shape}")
             if not np.all(np.isfinite(getattr(self, name))):
                 raise InputError(name, "values that are not finite", "finite values")
+
+    def __str__(self) -> str:
+        return frequencies("poles", np.abs(self.pole))
 
     @classmethod
     def joined(cls, parts: Sequence[PoleResidue]) -> Self:
@@ -130,3 +135,10 @@ def pair_sum(omega: FloatArray, pole: ComplexArray, residue: ComplexArray) -> Co
     values = pole_sum(frozen(omega), np.concatenate([pole, pole.conj()]), np.concatenate([flat, flat.conj()]))
     found: ComplexArray = values.reshape(-1, r, c)
     return found
+
+
+def frequencies(what: str, omega: FloatArray, most: int = 8) -> str:
+    """Return a line about natural frequencies [rad/s], rising; of many the first ones and the last."""
+    named = [f"{frequency:.0f}" for frequency in np.sort(to_hz(omega))]
+    shown = named if len(named) <= most else [*named[: most - 1], "...", named[-1]]
+    return f"{len(named)} {what if len(named) != 1 else what.removesuffix('s')} at {', '.join(shown)} Hz"

@@ -183,6 +183,6 @@ def in_words(status: str, cuts: int, modes: Mapping[str, int], reasons: Sequence
     reasons : sequence of str
         Why it is not simply converged.
     """
-    line = ", ".join([status, f"{cuts} cuts", *(f"{axis.upper()} {count} modes" for axis, count in modes.items())])
+    line = ", ".join([status, f"{cuts} cuts", *(f"{axis.upper()} {count} mode{'s'[: count != 1]}" for axis, count in modes.items())])
     further = f" (and {len(reasons) - 1} more)" if len(reasons) > 1 else ""
     return f"{line}\n{reasons[0]}{further}" if reasons else line

@@ -11,12 +11,10 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel
-from rcsa_ident.dynamics.poles import PoleResidue
+from rcsa_ident.dynamics.poles import PoleResidue, frequencies
 from rcsa_ident.dynamics.rational import fitted_poles
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.shown import Shown
-from rcsa_ident.units import to_hz
 
 #: Lines per half-power bandwidth of the least damped mode, and the most there may be.
 LINES_PER_BANDWIDTH = 10.0
@@ -31,7 +29,7 @@ DAMPED_OUTSIDE = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class TipModes(PoleResidue, Shown):
+class TipModes(PoleResidue):
     """The tip's 2 x 2 receptance in machine axes X and Y as damped modes; along the edge they may have a shape.
 
     Parameters
@@ -122,8 +120,7 @@ class TipModes(PoleResidue, Shown):
         return float(np.max(np.linalg.norm(self.response(np.maximum(places, 0.0)), 2, axis=(1, 2))))
 
     def __str__(self) -> str:
-        frequency = np.sort(to_hz(np.abs(self.pole)))
-        return f"{self.pole.size} modes of the tip, {frequency[0]:.0f} to {frequency[-1]:.0f} Hz"
+        return f"tip: {frequencies('modes', np.abs(self.pole))}"
 
 
 class ModeArrays(NamedTuple):

@@ -199,6 +199,7 @@ save.backup(Path(sys.argv[1]), Path(sys.argv[2]))
     restore(target, tmp_path / "new")
 
 
+@pytest.mark.slow
 def test_an_error_on_the_way_leaves_nothing(data, tmp_path, monkeypatch):
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
@@ -295,6 +296,7 @@ def matching(members):
     return [*members[:-1], (members[-1][0], json.dumps(manifest).encode())]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -381,6 +383,7 @@ def test_what_is_refused(data, tmp_path, small):
         backup(data, tmp_path / "nowhere" / "b.tar")
 
 
+@pytest.mark.slow
 def test_commands(data, tmp_path, small):
     run = CliRunner().invoke
     made = run(app, ["--data", str(data), "backup", str(tmp_path / "b.tar")])

@@ -19,6 +19,7 @@ from api.work.toolings import toml_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import READERS, read_cut
 from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.io.toolings import tooling_keys
 from rcsa_ident.workflows.identify import judge_cut
 from tests.api.in_process import refused
 from tests.api.recordings import TOOLING, content, declared
@@ -297,7 +298,9 @@ def test_what_an_identification_reads(uploaded, tmp_path, store):
     found, read = load_campaign(store, client.http.app.state.components.files, "local", id)
     assert [cut.id for cut in found.cuts] == [cut.id for cut in folder.cuts]
     assert (found.name, found.sensors, found.workpiece) == (folder.name, folder.sensors, folder.workpiece)
-    assert repr(found.toolings) == repr(folder.toolings)
+    assert {name: tooling_keys(tooling) for name, tooling in found.toolings.items()} == {
+        name: tooling_keys(tooling) for name, tooling in folder.toolings.items()
+    }
     for mine, theirs in zip(found.cuts, folder.cuts, strict=True):
         assert mine.conditions == theirs.conditions
         for one, other in zip(read(mine), read_cut(folder.sensors, folder.sampling_rate, theirs), strict=True):

@@ -120,6 +120,7 @@ def test_hdf5_does_not_read_this_machine(campaign, tmp_path):
     assert "external file" in campaign.put((tmp_path / "x.h5").read_bytes()).json()["detail"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", hostile_matlab.HOSTILE)
 def test_matlab_bombs(campaign, name):
     before = peak(campaign.reader) if campaign.reader.child.ready else None
@@ -129,6 +130,7 @@ def test_matlab_bombs(campaign, name):
     assert before is None or peak(campaign.reader) < before + (64 << 20)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".h5", ".csv", ".tdms", ".uff", ".wav", ".mat", ".parquet"])
 @pytest.mark.parametrize(
     "raw",
@@ -263,6 +265,7 @@ def test_forms_that_are_none(campaign, raw, kind):
     assert [p for p in (campaign.folder / "files").rglob("*") if p.is_file()] == []
 
 
+@pytest.mark.slow
 def test_a_form_that_breaks_off_is_told(campaign):
     """Without the boundary at its end the last file may be a part of one: it is not kept, and not left out in silence."""
     path, kind = campaign.paths["x", ".h5"].rsplit("/", 1)[0], {"Content-Type": "multipart/form-data; boundary=x"}

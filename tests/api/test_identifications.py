@@ -325,6 +325,7 @@ def test_cancelled_while_it_runs(client, store, tmp_path):
     assert not any(Phase.BOTH_AXES.name.lower() in name for _, name in engine.computed)
 
 
+@pytest.mark.slow
 def test_a_query_that_waits_for_the_end(client, store):
     machine = store.machines.add(Machine(new_id(), "local", "M", "", now())).id
     id = store.jobs.add(Job(new_id(), "local", "identification", machine, "c", "{}", "queued", now()), {}, 9).id

@@ -267,6 +267,7 @@ def test_an_engine_that_refuses_ends_the_process_and_not_the_job(store, machine)
     assert store.jobs.find(id).state == "running"
 
 
+@pytest.mark.slow
 def test_words_in_quick_succession_are_few_and_curves_fewer(quiet):
     drawn = []
     with quiet.desk() as desk:

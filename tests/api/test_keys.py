@@ -66,6 +66,7 @@ CALLS = [
 ]
 
 
+@pytest.mark.slow
 def test_every_call_is_in_the_list(http):
     operations = [
         (method.upper(), path.removeprefix("/v1"))

@@ -290,6 +290,7 @@ def test_damaged_samples_are_noticed(tmp_path):
         read_normalised(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "points"), [(1, 10), (9, 10), (10, 10), (11, 10), (2_500_000, 1000)])
 def test_an_outline_holds_every_extreme(tmp_path, count, points):
     path = tmp_path / "x.h5"

@@ -143,6 +143,7 @@ def test_a_wrong_unit_leaves_a_note(client, campaign, tmp_path):
     assert sum("check its unit and sensitivity" in note for note in found.verdict.notes) >= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FORMATS)
 def test_every_format_tells_the_same(client, tmp_path, kind):
     suffix, write, *_ = FORMATS[kind]
@@ -331,6 +332,7 @@ def test_a_wrong_whole_is_given_up(client, campaign, tmp_path):
     assert files_in(tmp_path) == []
 
 
+@pytest.mark.slow
 def test_parts_of_another_content_wait_for_a_word(client, campaign, tmp_path):
     url, raw = f"/v1/campaigns/{campaign}/recordings/c0_cut.h5", content(tmp_path, 1)
     client.upload(campaign, made(tmp_path, "c0_cut.h5"))

@@ -140,6 +140,7 @@ def test_counters_are_true(shop):
     assert "rcsa_ident_stream_delay_seconds_count" in text
 
 
+@pytest.mark.slow
 def test_a_service_that_is_behind_drops_the_oldest_and_says_so(tmp_path):
     near = Near()
     with streaming(tmp_path, near, stream_buffer_seconds=6.0) as (http, id), http.websocket_connect(STREAM) as socket:
@@ -306,6 +307,7 @@ def test_a_client_that_vanishes_leaves_nothing_behind(shop):
     assert not hub.host.engine.sessions
 
 
+@pytest.mark.slow
 def test_the_end_of_the_service_is_told(tmp_path):
     with streaming(tmp_path) as (http, id), http.websocket_connect(STREAM) as socket:
         socket.send_json(hello(id))

@@ -79,6 +79,7 @@ def answer_of(link: socket.socket) -> tuple[int, bytes]:
     return int(raw.split(b" ", 2)[1]), raw
 
 
+@pytest.mark.slow
 def test_a_body_without_an_end_is_cut_off(place, tmp_path):
     with place(max_upload_bytes=3_000_000) as (client, port, id), socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
         link.sendall(head("PUT", f"/v1/campaigns/{id}/recordings/c0_cut.h5", "Transfer-Encoding: chunked"))

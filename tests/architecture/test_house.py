@@ -135,6 +135,7 @@ def test_one_place_turns_speeds_into_rad_per_s():
     assert offenders == {"rcsa_ident/units.py"}
 
 
+@pytest.mark.slow
 def test_errors_are_in_the_words_of_the_library():
     """No option of the command line stands in a text outside cli/: the commands turn the library's fields into their options."""
     option = re.compile(r"(^| )--[a-z][a-z-]+( |$|[,;.)])")

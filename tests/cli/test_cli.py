@@ -109,6 +109,7 @@ def test_unknowns_that_do_not_fit_the_covariance_are_refused(tmp_path, result_fi
     assert "axes.Y.unknowns" in run("tooltip", bad, tooling_file, "--out", tmp_path / "F.csv", code=2).stderr
 
 
+@pytest.mark.slow
 def test_tooltip_writes_the_coupled_receptance_with_bands(tmp_path, result_file, tooling_file):
     out = tmp_path / "FRF.csv"
     result = run("tooltip", result_file, tooling_file, "--out", out, "--from", 500, "--to", 2500, "--step", 20)

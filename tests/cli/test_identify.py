@@ -156,6 +156,7 @@ def test_a_method_sees_the_cuts_of_its_band_alone(tmp_path, small_campaign, monk
     assert low[1] == pytest.approx(high[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "code"),
     [

@@ -132,6 +132,7 @@ def test_surface_error_stands_beside_the_lobes(shop):
     np.testing.assert_allclose(twice["surface_error_mean_um"], 2.0 * once["surface_error_mean_um"], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_process_options_reach_the_method(shop):
     """A worn flank raises limits at low speed, run-out and a swinging speed change them."""
     common = ("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, "--method", "full-discretisation", "--max-depth-mm", 50)

@@ -13,8 +13,8 @@ import time
 
 import pytest
 
-from rcsa_ident.cli.processes import workers
 from rcsa_ident.identification.progress import Stage, Step
+from rcsa_ident.processes import THREADS, workers
 from tests.fixtures.waiting import PATIENCE, until
 
 
@@ -94,12 +94,12 @@ def test_a_progress_that_goes_to_a_cluster_tells_nobody(two):
 
 @pytest.mark.slow
 def test_after_an_error_no_worker_is_left():
-    children = []
+    children, others = [], multiprocessing.active_children()
 
     def fail():
         with workers(3, early=()) as pool:
             assert list(pool.map(square, range(5))) == [0, 1, 4, 9, 16]
-            children.extend(multiprocessing.active_children())
+            children.extend(child for child in multiprocessing.active_children() if child not in others)
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
@@ -124,7 +124,7 @@ CTRL_C = """
 import signal, sys
 sys.path.insert(0, {root!r})
 from long_work import work
-from rcsa_ident.cli.processes import workers
+from rcsa_ident.processes import workers
 def main():
     try:
         with workers(3, early=()) as pool:
@@ -141,6 +141,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="no process groups")
 @pytest.mark.parametrize("at_work", [0, 3], ids=["while they start", "while they work"])
 def test_ctrl_c_ends_all_of_them_without_a_word(tmp_path, at_work):
@@ -165,3 +166,38 @@ def test_ctrl_c_ends_all_of_them_without_a_word(tmp_path, at_work):
     for pid in map(int, lines):
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
+
+
+def test_other_processes_of_a_script_are_left_alone():
+    """What goes wrong here ends the helpers, and nobody else's processes."""
+    other = multiprocessing.get_context("spawn").Process(target=time.sleep, args=(600.0,))
+    other.start()
+    before = set(multiprocessing.active_children())
+    try:
+        with pytest.raises(ValueError, match="seven"), workers(2, early=()) as pool:
+            list(pool.map(refuse_seven, range(20)))
+        assert set(multiprocessing.active_children()) == before
+        assert other in before
+    finally:
+        other.kill()
+        other.join()
+
+
+def test_helpers_compute_on_one_thread():
+    before = dict(os.environ)
+    with workers(2, early=()) as pool:
+        assert {name for name in THREADS if name not in os.environ} == {name for name in THREADS if name not in before}
+        assert set(pool.map(threads, range(40))) <= {("1", "1", "1"), tuple(before.get(name) for name in THREADS)}
+        assert ("1", "1", "1") in set(pool.map(threads, range(40)))
+
+
+def threads(_):
+    time.sleep(0.02)
+    return tuple(os.environ.get(name) for name in THREADS)
+
+
+def test_a_daemonic_process_works_alone(monkeypatch):
+    monkeypatch.setattr(multiprocessing.current_process(), "_config", {**multiprocessing.current_process()._config, "daemon": True})
+    with workers(4) as pool:
+        assert pool.pool is None
+        assert list(pool.map(square, range(3))) == [0, 1, 4]

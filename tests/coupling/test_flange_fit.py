@@ -153,6 +153,7 @@ def test_the_result_is_judged_for_passivity():
     np.testing.assert_allclose(found.receptance.values, np.swapaxes(found.receptance.values, 1, 2))
 
 
+@pytest.mark.slow
 def test_what_is_refused():
     rng = np.random.default_rng(6)
     made = observations("stiff", 0.01, rng)

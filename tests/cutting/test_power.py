@@ -36,6 +36,7 @@ def test_power_is_what_the_edges_work(teeth, entry, width, feed, depth, speed):
     assert found.torque == pytest.approx(power / speed, rel=1e-9)
 
 
+@pytest.mark.slow
 @given(st.floats(0.02, 1.0), st.sampled_from(["up", "down"]))
 def test_without_edges_a_cubic_metre_costs_the_tangential_coefficient(immersion, strategy):
     engagement = Engagement.from_immersion(immersion, strategy)

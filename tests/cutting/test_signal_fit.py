@@ -169,6 +169,7 @@ def test_noise_width_is_the_estimates_scatter():
     np.testing.assert_allclose(scatter, width, rtol=0.5)
 
 
+@pytest.mark.slow
 def test_no_records():
     with pytest.raises(InputError, match="at least one record"):
         calibrate_signal([])

@@ -87,6 +87,7 @@ def test_a_loop_that_is_closed_in_python_control():
     np.testing.assert_allclose(closed.response(OMEGA), expected, rtol=1e-8, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_a_measured_receptance_goes_to_python_control():
     omega = 2.0 * np.pi * np.arange(100.0, 3000.0, 4.0)
     model = normal_modes(

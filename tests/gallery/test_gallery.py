@@ -1,4 +1,4 @@
-"""Each example states, solves and is checked here."""
+"""The worked examples of docs/examples: each states, solves and is checked here."""
 
 from __future__ import annotations
 
@@ -6,10 +6,15 @@ import importlib.util
 from pathlib import Path
 
 import numpy as np
+import pytest
+
+from tests.fixtures.paths import ROOT
+
+EXAMPLES = ROOT / "docs" / "examples"
 
 
 def example(name: str):  # type: ignore[no-untyped-def]
-    path = Path(__file__).with_name(f"ex_{name}.py")
+    path = EXAMPLES / f"{name}.py"
     assert len(path.read_text().splitlines()) <= 60
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None
@@ -17,6 +22,11 @@ def example(name: str):  # type: ignore[no-untyped-def]
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def test_every_example_is_checked():
+    checked = "".join(path.read_text() for path in sorted(Path(__file__).parent.glob("test_*.py")))
+    assert [path.stem for path in EXAMPLES.glob("*.py") if f'example("{path.stem}")' not in checked] == []
 
 
 def test_stickout():
@@ -36,3 +46,20 @@ def test_lobes_from_modes():
     np.testing.assert_allclose(lobes.absolute_limit, 0.04793e-3, rtol=1e-3)
     np.testing.assert_allclose(lobes.absolute_frequency / (2.0 * np.pi), 923.59, rtol=1e-4)
     assert not lobes.warnings
+
+
+@pytest.mark.slow
+def test_recordings_to_speed(tmp_path, monkeypatch, capsys):
+    """A tool that never cut: the recommended cut is stable on the true machine, and not far from its limit."""
+    monkeypatch.chdir(tmp_path)
+    ex = example("recordings_to_speed")
+    assert ex.found.status == "converged"
+    best = ex.advice.recommended[0]
+    assert best.spindle_speed == pytest.approx(ex.ri.rpm(14_550), rel=0.01)
+    tip = ex.ri.read_tip(tmp_path / "sample_runs.truth" / "tip" / f"{ex.tool.name}.csv")
+    process = ex.ri.CutSpec().process(ex.tool.cutter, ex.campaign.workpiece)
+    true = ex.ri.stability_lobes(tip, process, best.spindle_speed, max_depth=10e-3).limit_depth[0]
+    assert 0.7 * true < best.depth < true
+    assert ex.ri.read_result("RESULT.json").status == "converged"
+    assert ex.ri.read_forces("FORCES.csv").force.shape == ex.forces.estimate.force.shape
+    assert "14550 rev/min" in capsys.readouterr().out

@@ -68,6 +68,7 @@ def kept():
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TOOLINGS)
 def test_tooltip_and_its_spread_to_rounding(kept, name):
     assembly = TOOLINGS[name].assembly
@@ -89,6 +90,7 @@ def test_without_a_posterior_there_is_no_spread():
     assert stability_lobes(tip, process(tooling), SPEEDS, 0.01, draws=60).band is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TOOLINGS)
 def test_limits_to_rounding_and_those_of_drawn_machines_closely(kept, name):
     """Drawn machines are asked at a part of the frequencies: less than a ten-thousandth of a limit, far below the band itself."""

@@ -35,6 +35,7 @@ def start(theta):
     return theta + 0.03 * np.random.default_rng(5).standard_normal(theta.size)
 
 
+@pytest.mark.slow
 def test_finds_the_minimum_to_rounding(misfit, planted, theta, start):
     data, delay = planted
     found = refine(misfit, start, LAYOUT, np.zeros((len(data.cut_ids), 2)), 300, grid=32, tolerance=1e-6)

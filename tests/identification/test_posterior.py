@@ -75,6 +75,7 @@ def test_spread_against_draws(soft, tip, speed):
     np.testing.assert_allclose(deviation(rows), sampled, rtol=0.15)
 
 
+@pytest.mark.slow
 def test_bands_shrink_with_the_noise(few, theta, tip):
     loud, quiet = (deviation(spread(posterior_at(few, theta, noise), tip)) for noise in (1e-2, 1e-3))
     ratio = loud / quiet

@@ -102,6 +102,7 @@ def native_verdicts(tmp_path_factory, few_cuts):
     return rows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in FORMATS if name != "hdf5"])
 def test_a_verdict_does_not_depend_on_the_format(tmp_path, few_cuts, native_verdicts, name):
     # no scale of its own in WAV: the campaign's sensitivity carries it
@@ -189,6 +190,7 @@ def read_or_refused(path: Path) -> None:
     assert "\n" not in sentence
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORMATS)
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())

@@ -81,6 +81,7 @@ def test_the_tip_is_that_of_one_assembled_structure():
     assert beside(machine.coupled(TOOL, OMEGA).block(expected.rows).values, expected.values) < 1e-6
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.floats(-4.0, 4.0))
 def test_a_machine_that_is_turned_turns_its_tip(angle):

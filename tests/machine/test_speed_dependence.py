@@ -21,6 +21,7 @@ def tips(machine, speeds, spread=False):
     return list(tips_over_speed(machine, by_hand.tooling(), OMEGA, np.asarray(speeds, dtype=float), spread))
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.floats(100.0, 4000.0), min_size=1, max_size=40))
 def test_each_speed_is_in_one_narrow_block_that_feels_its_middle(speeds):
@@ -62,6 +63,7 @@ def test_single_models_take_their_speeds():
         np.testing.assert_array_equal(tip.values, model.at(speed).tip(by_hand.tooling(), OMEGA, spread=False).values)
 
 
+@pytest.mark.slow
 def test_spreads_at_the_anchors_are_the_machines_own_and_straight_lines_between_them():
     machine = by_hand.machine(softening=True)
     speeds = np.linspace(LOW, HIGH, 60)

@@ -78,6 +78,7 @@ def test_the_riccati_equation_bounds_the_peak(force):
     assert found.sensitivity_peak <= np.sqrt(kalman.variance[-1]) / kalman.model.noise * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "peak"), [(Resonators(), 3.63), (PaperWalk(), 8.89)])
 def test_of_a_whole_observer(method, peak):
     """65 states, half of them oscillators without damping, at 25 600 samples a second; and the published walk, whose peak is the bound."""

@@ -44,6 +44,7 @@ def test_it_is_stable_and_strictly_proper(transfer):
     assert np.all(np.abs(transfer.behind_high_pass(CORNER).decay) < 1.0)
 
 
+@pytest.mark.slow
 def test_the_sampled_filter_has_the_response_of_machine_and_high_pass(transfer, cross):
     """At every frequency of the band, at 25.6 kHz: no hold's droop (9 % at 4.3 kHz) and no delay of half a sample."""
     passed = (1j * warped(OMEGA, STEP)) ** 2

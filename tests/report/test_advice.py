@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from dataclasses import replace
 
 import numpy as np
@@ -34,6 +36,7 @@ def labels(figure):
     return {line.get_label() for line in figure.axes[0].get_lines()}
 
 
+@pytest.mark.slow
 def test_what_ends_the_depth_is_drawn():
     figure = usable_figure(depths(), [Mark(1000.0, 1e-3, 2e-6, "best")], [Mark(1500.0, 3e-3, 1e-6, "wish")], 0.8 * LIMIT)
     text = svg(figure, "u")
@@ -59,6 +62,7 @@ def test_a_comparison_names_its_curves():
         assert words in text
 
 
+@pytest.mark.slow
 def test_one_advice_is_drawn_with_what_ends_it_and_several_beside_each_other():
     alone = svg(advice_figure([advice()]), "a")
     assert "limited by power" in alone

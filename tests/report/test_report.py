@@ -193,6 +193,7 @@ def test_the_same_figure_gives_the_same_text():
     assert "<metadata" not in one
 
 
+@pytest.mark.slow
 def test_a_recommendation_stands_beside_its_limit_and_an_infinite_one_is_none(found, campaign, readings):
     advice = page_of().advice
     summary, curves = lobes_summary(advice), lobes_curves(advice)

@@ -46,6 +46,7 @@ def limits(tip_modes, rpm):
     return np.array(columns).T * 1e3
 
 
+@pytest.mark.slow
 def test_published_limits():
     """Without anything, deformation, damping, both; deformation and damping lift the limit by a quarter at 8200 rev/min."""
     found = limits(modes(shapes=False), list(DEFORMED_LIMIT_MM))
@@ -54,6 +55,7 @@ def test_published_limits():
     assert gain[3] / gain[0] - 1.0 == pytest.approx(0.25, abs=0.03)
 
 
+@pytest.mark.slow
 def test_published_limits_with_measured_shapes():
     found = limits(modes(shapes=True), list(DEFORMED_LIMIT_WITH_SHAPES_MM))
     np.testing.assert_allclose(found, list(DEFORMED_LIMIT_WITH_SHAPES_MM.values()), rtol=1e-2)
@@ -71,6 +73,7 @@ def test_no_deflection_is_the_plain_cut():
     np.testing.assert_allclose(sliced, plain, rtol=3e-5)
 
 
+@pytest.mark.slow
 def test_other_methods_that_march_agree():
     """At 8200 rev/min, where deflection and damping lift the limit by a quarter; the time domain knows nothing of windows."""
     cut, speeds = deflected_process(WORN, TOOL), np.array([8200.0]) * RPM
@@ -80,6 +83,7 @@ def test_other_methods_that_march_agree():
     np.testing.assert_allclose(time, full, rtol=1.2e-2)
 
 
+@pytest.mark.slow
 def test_a_profile_may_be_anything():
     """The lower half of the edge in the cut and the upper not: a cut of half the depth."""
     half = mill(2, 0.5, helix=0.4)
@@ -95,6 +99,7 @@ def test_a_profile_may_be_anything():
         np.testing.assert_allclose(found, 2.0 * whole, rtol=tolerance)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "call",
     [

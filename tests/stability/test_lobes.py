@@ -202,6 +202,7 @@ def test_directions_that_are_missing_are_rigid_and_further_ones_left_aside():
         both_directions(Receptance(OMEGA, values[:, 1:2, 1:2], rows[1:2], rows[1:2]))
 
 
+@pytest.mark.slow
 def test_lobes_of_the_fit_are_those_of_the_receptance():
     """The march on fitted modes against the frequency domain on the receptance itself."""
     process = MillingProcess(Cutter(2, 12e-3), CuttingCoefficients(700e6, 0.3), Engagement.from_immersion(0.5, "down"))

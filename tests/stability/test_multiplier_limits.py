@@ -29,6 +29,7 @@ PROCESSES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROCESSES)
 def test_limits_are_within_their_tolerance(name):
     exact = stability_lobes(tip(SKEWED), PROCESSES[name], SPEEDS, 20e-3, FullDiscretisation(tolerance=1e-6))

@@ -72,6 +72,7 @@ def test_a_slow_cut_bends_the_tool_as_its_force_of_the_moment_does(engagement, w
     np.testing.assert_allclose(found.error[0, 1:-1], static[1:-1], atol=0.012 * np.max(np.abs(static)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rpm", "depth"), [(9000.0, 0.4e-3), (13000.0, 0.4e-3), (20500.0, 0.8e-3)])
 @pytest.mark.parametrize(("engagement", "feed_angle"), [(DOWN, 0.0), (UP, 0.0), (DOWN, 0.5 * np.pi)])
 def test_a_march_of_the_virtual_machine_leaves_the_same_wall(rpm, depth, engagement, feed_angle):

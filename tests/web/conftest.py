@@ -47,7 +47,7 @@ def client(served: Served) -> Iterator[Client]:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    """One for each file and no longer: while it runs, its event loop runs in this thread, where other rooms' tests run loops of their own."""
+    """One for each file and no longer: its event loop runs in this thread, where other rooms' tests run loops of their own."""
     with sync_playwright() as playwright:
         found = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=list(_QUIET))
         yield found

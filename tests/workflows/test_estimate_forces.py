@@ -165,6 +165,7 @@ def test_wear_of_the_paper_case(found):
     assert np.mod(worn.angle - made.angle + 0.1, np.pi) == pytest.approx(0.1, abs=0.02)
 
 
+@pytest.mark.slow
 def test_bad_records_are_refused_in_a_sentence():
     cut = paper_cut().cut
     lost = np.array(cut.samples)

@@ -77,6 +77,7 @@ def test_the_force_of_a_cut_that_follows_air():
     assert np.all(np.std(force[SECOND : round(1.45 * RATE)], axis=0) < 0.05 * np.std(true[2 * SECOND :], axis=0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("wander", "sag"), [(3e-4, 0.0), (0.0, 1e-3), (3e-4, 1e-3)])
 def test_run_out_turns_with_a_spindle_that_does_not_keep_its_speed(wander, sag):
     samples, true = streamed(wander, sag)

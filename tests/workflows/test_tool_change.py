@@ -112,6 +112,7 @@ def test_outside_its_speeds_the_machine_of_the_nearest_answers():
     assert not any("outside this range" in remark for remark in inside.remarks(found))
 
 
+@pytest.mark.slow
 def test_bands_between_the_anchors_are_those_of_a_posterior_there():
     machine, speeds = one_axis(softening=True), np.linspace(LOW, HIGH, 9)
     asked = change(machine, speeds)
@@ -147,6 +148,7 @@ def shop():
     return ToolChange(by_hand.machine(softening=True), by_hand.tooling(), spec, np.linspace(650.0, 1350.0, 15), 0.02)
 
 
+@pytest.mark.slow
 def test_limits_of_a_machine_are_those_of_its_tips(shop):
     found = shop.limits()
     tips = list(tips_over_speed(shop.machine, shop.tooling, shop.omega, shop.speeds))
@@ -163,6 +165,7 @@ def test_limits_of_a_machine_are_those_of_its_tips(shop):
     assert replace(shop, draws=0).limits().drawn is None
 
 
+@pytest.mark.slow
 def test_another_method_keeps_the_proportion_of_its_draws(shop):
     asked = replace(shop, speeds=shop.speeds[::5], draws=20)
     fine = replace(asked, method=FullDiscretisation())
@@ -212,6 +215,7 @@ def test_the_wall_of_a_machine_that_changes_with_speed(shop):
     assert any("begins at 100 Hz" in warning for warning in both.warnings)
 
 
+@pytest.mark.slow
 def test_the_map_of_a_machine_that_changes_is_that_of_its_tips(shop):
     asked = replace(shop, speeds=np.array([900.0, 1300.0]), max_depth=4e-3)
     chart = map_of(asked, depths=12)
@@ -368,6 +372,7 @@ def flange(modes):
     return MeasuredFlange(modes.receptance(2.0 * np.pi * GRID_HZ))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planes", ["apart", "oblique"])
 def test_a_measured_flange_has_the_lobes_and_the_advice_of_its_modes(planes):
     apart = tuple(part.spindle.modes for part in by_hand.machine().identified.values())
