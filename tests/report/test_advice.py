@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import pytest
-
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from rcsa_ident.report.advice import Mark, advice_figure, comparison_figure, usable_figure
 from rcsa_ident.report.figures import svg
