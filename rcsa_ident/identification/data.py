@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -19,6 +19,11 @@ from rcsa_ident.signals.measurement import CutMeasurement
 LEVER = 0.1
 #: Standard deviation of a clamping's run-out, in units of the cutting model's reference.
 RUNOUT_SPREAD = 3.0
+
+
+#: Frequencies [rad/s] and the spindle's speed over each, shape (n,) both, to the free receptances of a turning tool-holder for x + i y
+#: and x - i y, shape (n, 4, 4) each: translation and slope of the tip, then of the flange.
+Turning = Callable[[FloatArray, FloatArray], tuple[ComplexArray, ComplexArray]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +47,12 @@ class AxisData:
         A21 for a force at the tip: t, r.
     force_slope : complex array, shape (n, c) [-]
         Change of the force's logarithm with each uncertain coefficient.
+    force, across : complex arrays, shape (n,) [N]
+        Force along this axis, and along the other one in the same lines; empty where the latter is not told.
+    across_slope : complex array, shape (n, c) or (0, c) [-]
+        `force_slope` of the other axis' force, without smooth errors.
+    beside : array, shape (n, o) or (0, o) [m^2/N^2]
+        What is added to the lines' own power where their model error is a share of it.
     """
 
     axis: Dof
@@ -53,11 +64,15 @@ class AxisData:
     flange: ComplexArray
     tip: ComplexArray
     force_slope: ComplexArray
+    force: ComplexArray = field(default_factory=lambda: np.zeros(0, dtype=complex))
+    across: ComplexArray = field(default_factory=lambda: np.zeros(0, dtype=complex))
+    across_slope: ComplexArray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    beside: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
-        for name in ("omega", "order", "variance"):
+        for name in ("omega", "order", "variance", "beside"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
-        for name in ("lines", "flange", "tip", "force_slope"):
+        for name in ("lines", "flange", "tip", "force_slope", "force", "across", "across_slope"):
             object.__setattr__(self, name, frozen(getattr(self, name), np.complex128))
 
     @property
@@ -75,16 +90,23 @@ class AxisData:
         """Variance of the flange's motion, of the real and the imaginary part each, shape (n,) [m^2/N^2]."""
         return np.sum(self.variance, axis=1)
 
+    @property
+    def power(self) -> FloatArray:
+        """Power of each line, of which a model error is a share, shape (n, o) [m^2/N^2]."""
+        size = np.abs(self.lines[:, :, 0] - self.lines[:, :, 1]) ** 2
+        return size + self.beside if self.beside.size else size
+
     def summed(self) -> AxisData:
         """Return the same points with the flange's motion as the only output."""
         if self.outputs == 1:
             return self
-        return replace(self, variance=self.noise[:, None], lines=np.sum(self.lines, axis=1, keepdims=True))
+        lines, beside = np.sum(self.lines, axis=1, keepdims=True), np.sum(self.beside, axis=1, keepdims=True)
+        return replace(self, variance=self.noise[:, None], lines=lines, beside=beside if self.beside.size else self.beside)
 
     def of(self, keep: np.ndarray) -> AxisData:
         """Return some of the points: a mask or indices, shape (n,)."""
-        names = ("omega", "order", "variance", "lines", "cut", "flange", "tip", "force_slope")
-        return replace(self, **{name: getattr(self, name)[keep] for name in names})
+        whole = (each.name for each in fields(self) if each.name != "axis")
+        return replace(self, **{name: getattr(self, name)[keep] for name in whole if len(getattr(self, name))})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -143,6 +165,8 @@ class IdentificationData:
         What is uncertain about the forces.
     coefficient_spread : tuple of float, length c or more
         Their standard deviations; behind them those of smooth errors, which have no name.
+    turning : mapping of tooling to Turning
+        Its receptances while it turns; empty where nobody asks for them.
     """
 
     cut_ids: tuple[str, ...]
@@ -155,6 +179,7 @@ class IdentificationData:
     edge: FloatArray
     coefficients: tuple[ForceCoefficient, ...] = ()
     coefficient_spread: tuple[float, ...] = ()
+    turning: Mapping[str, Turning] = field(default_factory=dict)
 
     @property
     def clampings(self) -> int:
@@ -201,7 +226,7 @@ class IdentificationData:
 
     def only(self, axis: Dof) -> IdentificationData:
         """Return the same data with one axis."""
-        return replace(self, axes=tuple(a for a in self.axes if a.axis is axis))
+        return replace(self, axes=tuple(a for a in self.axes if a.axis is axis), turning={})
 
     def summed(self) -> IdentificationData:
         """Return the same data with the flange's motion as the only output, and without the triggers of unknown tooth angle."""
@@ -213,6 +238,7 @@ def prepare(
     receptances: Mapping[str, Callable[[FloatArray], Receptance]],
     teeth: Mapping[str, int],
     coefficient_spread: Sequence[float] = (),
+    turning: Mapping[str, Turning] | None = None,
 ) -> IdentificationData:
     """Return the data of all measurements; each tool-holder is asked once for the frequencies of all its cuts.
 
@@ -225,6 +251,8 @@ def prepare(
     coefficient_spread : sequence of float, length c
         Standard deviations of K_tc's, k_rc's, K_te's and K_re's logarithms; 0 where known exactly. Without them the forces are
         taken as they are, and cutters to run true.
+    turning : mapping of tooling to Turning, optional
+        Asked only where both planes are fitted together.
 
     Raises
     ------
@@ -269,8 +297,9 @@ def prepare(
                 flange=np.concatenate([table[m.tooling][0][r] for (_, m, _), r in zip(present, rows, strict=True)]),
                 tip=np.concatenate([table[m.tooling][1][r] for (_, m, _), r in zip(present, rows, strict=True)]),
                 force_slope=np.concatenate(
-                    [_slopes(each, uncertain, toolings.index(m.tooling), len(coefficients)) for _, m, each in present]
+                    [_slopes(each.force_slope, uncertain, toolings.index(m.tooling), len(coefficients)) for _, m, each in present]
                 ),
+                **_both_forces([(each, toolings.index(m.tooling)) for _, m, each in present], uncertain, len(coefficients)),
             )
         )
     speed = np.array([m.spindle_speed for m in measurements])
@@ -287,16 +316,29 @@ def prepare(
         edge=frozen(edge),
         coefficients=tuple(coefficients),
         coefficient_spread=tuple(spread),
+        turning={} if turning is None else turning,
     )
 
 
-def _slopes(lines: AxisLines, uncertain: Sequence[int], tooling: int, count: int) -> ComplexArray:
+def _slopes(slope: ComplexArray, uncertain: Sequence[int], tooling: int, count: int) -> ComplexArray:
     """Columns of a cut's force slopes: the coefficients that all cuts share, then its own tooling's run-out, shape (n, count)."""
-    columns = np.zeros((lines.omega.size, count), dtype=complex)
-    columns[:, : len(uncertain)] = lines.force_slope[:, uncertain]
+    columns = np.zeros((slope.shape[0], count), dtype=complex)
+    columns[:, : len(uncertain)] = slope[:, uncertain]
     if count > len(uncertain):
-        columns[:, len(uncertain) + tooling] = lines.force_slope[:, -1]
+        columns[:, len(uncertain) + tooling] = slope[:, -1]
     return columns
+
+
+def _both_forces(lines: Sequence[tuple[AxisLines, int]], uncertain: Sequence[int], count: int) -> dict[str, ComplexArray]:
+    """Forces along both axes in the lines of one, where all cuts tell them."""
+    found = [(each.force, each.across, each.across_slope, tooling) for each, tooling in lines]
+    if any(across is None for _, across, _, _ in found):
+        return {}
+    return {
+        "force": np.concatenate([force for force, _, _, _ in found]),
+        "across": np.concatenate([across for _, across, _, _ in found]),
+        "across_slope": np.concatenate([_slopes(slope, uncertain, tooling, count) for _, _, slope, tooling in found]),
+    }
 
 
 def _cut_priors(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification._kernels import cross_frf, fit_cuts, mix_cuts, whiten
 from rcsa_ident.identification.data import AxisData, CutPrior, IdentificationData
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, AxisParameters, Layout, chain, residual_turn, scaled_joint, unpack
-from rcsa_ident.identification.priors import Priors, prior_rows
+from rcsa_ident.identification.priors import PriorRows, Priors, prior_rows
 
 #: Unit of a delay in the normal equations [s].
 DELAY_UNIT = 1e-6
@@ -240,7 +242,7 @@ class Misfit:
         self.priors = priors
         self.model_error = model_error
         self.cut_weight = np.ones(len(data.cut_ids)) if cut_weight is None else cut_weight
-        self._axes = tuple(_WeightedLines(a, data.relative_speed, f, self.cut_weight) for a, f in zip(data.axes, model_error, strict=True))
+        self._axes = tuple(WeightedLines(a, data.relative_speed, f, self.cut_weight) for a, f in zip(data.axes, model_error, strict=True))
         # lines of all axes, cut by cut: a cut's delay and angle are the same for both
         cut = np.concatenate([a.cut for a in self._axes])
         self._order = np.argsort(cut, kind="stable")
@@ -269,18 +271,19 @@ class Misfit:
         normal : bool
             Whether gradient and Gauss-Newton matrix are made, too.
         """
-        models, gradients, axes = self._models(theta, layout, normal)
+        answers = self._answers(theta, layout, normal)
+        models = [answer.model for answer in answers]
         nuisance = nuisance.copy()
         prior = self._cut_prior(theta, layout)
         at_lines = np.concatenate([m.ravel() for m in models])[self._order]
         fit_cuts(self._lines, self._weights, at_lines, self._start, prior.rows, nuisance, grid)
         residual = self._residual(theta, layout, models, nuisance, prior)
-        linear = self._linearise(theta, layout, axes, models, gradients, residual, nuisance, prior) if normal else None
+        linear = self._linearise(layout, answers, residual, nuisance, prior) if normal else None
         return Evaluation(residual.cost, nuisance, tuple(models), residual, linear)
 
     def models(self, theta: FloatArray, layout: Layout) -> tuple[ComplexArray, ...]:
         """Return the model's cross FRFs on the lines of each axis, shapes (n, o) [m/N]; no delay and no noise is in them."""
-        return tuple(self._models(theta, layout, False)[0])
+        return tuple(answer.model for answer in self._answers(theta, layout, False))
 
     def residual_at(self, theta: FloatArray, layout: Layout, nuisance: FloatArray) -> Residual:
         """Return the residual with the cuts' delays and angles as they are given.
@@ -292,8 +295,11 @@ class Misfit:
         nuisance : array, shape (k, 2)
             Delay [s] and angle [rad] of each cut.
         """
-        models = self._models(theta, layout, False)[0]
-        return self._residual(theta, layout, models, nuisance, self._cut_prior(theta, layout))
+        return self._residual(theta, layout, self.models(theta, layout), nuisance, self._cut_prior(theta, layout))
+
+    def prior(self, layout: Layout) -> PriorRows:
+        """Return the priors of a layout's unknowns."""
+        return prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients])
 
     def without_delay(self, i: int, nuisance: FloatArray) -> ComplexArray:
         """Return the measured flange motion of an axis with tooth 1 at immersion 0 at the start, shape (n,) [m/N]."""
@@ -304,12 +310,11 @@ class Misfit:
         """Return the weights of an axis' lines, shape (n, o) [N^2/m^2]."""
         return self._axes[i].weight.reshape(-1, self._axes[i].outputs)
 
-    def _models(
-        self, theta: FloatArray, layout: Layout, normal: bool
-    ) -> tuple[list[ComplexArray], list[ComplexArray], list[AxisParameters]]:
-        """Cross FRFs on each axis' lines, their gradients in kernel units, and the axes' physics."""
-        joint = scaled_joint(theta[layout.joint])
-        models, gradients, axes = [], [], []
+    def _answers(self, theta: FloatArray, layout: Layout, normal: bool) -> Sequence[Answer]:
+        """What the model says of each axis' lines, with `normal` ready to be linearised."""
+        logs = theta[layout.joint]
+        joint = scaled_joint(logs)
+        answers = []
         for i, (lines, part) in enumerate(zip(self._axes, layout.axes, strict=True)):
             axis = unpack(theta[layout.axis(i)], part)
             n, o = lines.points.shape[0], lines.outputs
@@ -322,10 +327,8 @@ class Misfit:
                 scale = np.exp(lines.force_slope @ theta[layout.force])[:, None]
                 values *= scale
                 gradient *= scale[:, :, None] if normal else 1.0
-            axes.append(axis)
-            models.append(values)
-            gradients.append(gradient)
-        return models, gradients, axes
+            answers.append(_AxisAnswer(values, gradient, axis, part, logs))
+        return answers
 
     def _cut_prior(self, theta: FloatArray, layout: Layout) -> CutPrior:
         """What is known of each cut, with the triggers of unknown tooth angle where that is an unknown of the layout."""
@@ -339,39 +342,29 @@ class Misfit:
         weight[known] = self.data.edge[known, 1]
         return replace(prior, delay=delay, delay_weight=weight)
 
-    def _residual(self, theta: FloatArray, layout: Layout, models: list[ComplexArray], nuisance: FloatArray, prior: CutPrior) -> Residual:
+    def _residual(self, theta: FloatArray, layout: Layout, models: Sequence[ComplexArray], nuisance: FloatArray, prior: CutPrior) -> Residual:
         lines = tuple(axis.rest(model, nuisance) for axis, model in zip(self._axes, models, strict=True))
-        own = prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients]).residual(theta)
+        own = self.prior(layout).residual(theta)
         cuts = np.sqrt(prior.weights) * nuisance
         cuts[:, 0] -= np.sqrt(prior.delay_weight) * prior.delay
         return Residual(lines, own, cuts)
 
     def _linearise(
-        self,
-        theta: FloatArray,
-        layout: Layout,
-        axes: list[AxisParameters],
-        models: list[ComplexArray],
-        gradients: list[ComplexArray],
-        residual: Residual,
-        nuisance: FloatArray,
-        prior: CutPrior,
+        self, layout: Layout, answers: Sequence[Answer], residual: Residual, nuisance: FloatArray, prior: CutPrior
     ) -> Linearisation:
         """Gauss-Newton matrices of the parameters after eliminating two unknowns per cut (Schur complement)."""
         size, cuts = layout.size, len(self.data.cut_ids)
-        own = prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients]).jacobian
+        own = self.prior(layout).jacobian
         hessian = own.T @ own
         cut_prior = np.sqrt(prior.weights) * np.array([DELAY_UNIT, 1.0])
         mixed = np.zeros((cuts, 2, size))
         inner = np.zeros((cuts, 2, 2))
         inner[:, 0, 0], inner[:, 1, 1] = cut_prior[:, 0] ** 2, cut_prior[:, 1] ** 2
-        joint = np.exp(theta[layout.joint])
         jacobians, all_columns, compliance = [], [], []
-        for i, (lines, axis) in enumerate(zip(self._axes, axes, strict=True)):
-            block, core = layout.axis(i), layout.axes[i].core
-            compliance.append(gradients[i][:, :, core - 3 : core].copy())
-            gradients[i][:, :, core - 3 : core] = compliance[i] @ residual_turn(axis.residual)
-            jacobian = lines.jacobian(gradients[i], models[i], _whole_chain(axis, layout.axes[i], joint), layout)
+        for i, (lines, answer) in enumerate(zip(self._axes, answers, strict=True)):
+            block = layout.axis(i)
+            jacobian, change = answer.jacobian(lines, layout)
+            compliance.append(change)
             part = block.stop - block.start
             place = np.r_[block, slice(layout.tail, layout.force.stop)]
             hessian[np.ix_(place, place)] += jacobian.T @ jacobian
@@ -418,7 +411,7 @@ class Misfit:
         return place, np.where(known, -np.sqrt(prior.delay_weight) / self.data.spindle_speed, 0.0)
 
 
-class _WeightedLines:
+class WeightedLines:
     """Lines of one axis as rows, output after output at each point, with what never changes about them."""
 
     def __init__(self, axis: AxisData, relative_speed: FloatArray, model_error: float, cut_weight: FloatArray) -> None:
@@ -458,9 +451,36 @@ class _WeightedLines:
         return out
 
 
-def _whole_chain(axis: AxisParameters, layout: AxisLayout, joint: FloatArray) -> FloatArray:
-    """d physics / d vector of an axis and the joint, whose kernel units are those of `scaled_joint`."""
-    return np.concatenate([chain(axis, layout), scaled_joint(np.log(joint))])
+class Answer(Protocol):
+    """What a model says of one axis' lines: `model`, shape (n, o) [m/N]."""
+
+    @property
+    def model(self) -> ComplexArray:
+        """Cross FRFs without delay and noise, shape (n, o) [m/N]."""
+        ...
+
+    def jacobian(self, lines: WeightedLines, layout: Layout) -> tuple[FloatArray, ComplexArray]:
+        """Return the residual's change with the axis' own parameters, the joint and the coefficients, shape (2 n o, q + c), and the
+        model's change with the flange's receptance."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _AxisAnswer:
+    """One bending plane's lines, their gradient in kernel units, and the physics behind them."""
+
+    model: ComplexArray
+    gradient: ComplexArray
+    axis: AxisParameters
+    layout: AxisLayout
+    joint: FloatArray
+
+    def jacobian(self, lines: WeightedLines, layout: Layout) -> tuple[FloatArray, ComplexArray]:
+        core = self.layout.core
+        compliance = self.gradient[:, :, core - 3 : core].copy()
+        self.gradient[:, :, core - 3 : core] = compliance @ residual_turn(self.axis.residual)
+        scale = np.concatenate([chain(self.axis, self.layout), scaled_joint(self.joint)])
+        return lines.jacobian(self.gradient, self.model, scale, layout), compliance
 
 
 def _solve_pairs(inner: FloatArray, right: FloatArray) -> FloatArray:
@@ -477,7 +497,7 @@ def _without_information(inner: FloatArray, period: FloatArray) -> None:
 
 
 def _weight(axis: AxisData, model_error: float) -> FloatArray:
-    size = np.abs(axis.lines[:, :, 0] - axis.lines[:, :, 1]) ** 2
+    size = axis.power
     # a line of nothing in a record without noise is not infinitely sure
     floor = 1e-12 * float(np.mean(size)) if np.any(size) else 1e-30
     return 1.0 / np.maximum(axis.variance + 0.5 * model_error**2 * size, floor)

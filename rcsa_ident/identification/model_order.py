@@ -13,7 +13,6 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import AxisParameters, Layout, pack, unpack, with_mode, without_mode
-from rcsa_ident.identification.priors import log_volume, prior_rows
 from rcsa_ident.identification.progress import Stage
 
 #: Walks down end where the evidence lies this far behind the best seen: nothing below comes back from there. The second one is
@@ -43,8 +42,8 @@ def evidence(solution: Solution, misfit: Misfit) -> float:
     """
     sign, volume = np.linalg.slogdet(solution.evaluation.hessian)
     # modes may stand in any order and each shape may have either sign: as many equal minima
-    alike = 2.0 * sum(math.lgamma(a.modes + 1) + a.modes * math.log(2.0) for a in solution.layout.axes)
-    known = log_volume(solution.layout, misfit.priors, misfit.data.coefficient_spread[: solution.layout.coefficients])
+    alike = 2.0 * sum(math.lgamma(modes + 1) + modes * math.log(2.0) for modes in solution.layout.modes_of_axes)
+    known = misfit.prior(solution.layout).log_volume
     noise = -2.0 * sum(float(np.sum(np.log(misfit.weight(i)))) for i in range(len(misfit.data.axes)))
     value = float(solution.cost + noise + volume - known - alike)
     return value if sign > 0.0 and np.isfinite(value) else np.inf
@@ -256,7 +255,7 @@ def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> t
         Floor: no simulated force is better than that.
     """
     layout, data = solution.layout, misfit.data
-    jacobian = prior_rows(layout, misfit.priors, data.coefficient_spread[: layout.coefficients]).jacobian
+    jacobian = misfit.prior(layout).jacobian
     # parameters that the data have moved away from their priors
     used = solution.theta.size - float(np.trace(np.linalg.solve(solution.evaluation.hessian, jacobian.T @ jacobian)))
     used += 2.0 * len(data.cut_ids)
@@ -267,7 +266,7 @@ def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> t
         # a cut that contradicts the others does not count against them here, either
         counted = np.repeat(misfit.cut_weight[axis.cut], axis.outputs)
         squares = counted * (rest[: weight.size] ** 2 + rest[weight.size :] ** 2) / weight
-        size = np.abs(axis.lines[:, :, 0] - axis.lines[:, :, 1]).ravel() ** 2
+        size = axis.power.ravel()
         shares.append(_share(squares, axis.variance.ravel(), size, 2.0 * weight.size * free, smallest))
     return tuple(shares)
 

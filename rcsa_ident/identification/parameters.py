@@ -95,6 +95,11 @@ class Layout:
         """Length of the vector."""
         return self.tail + JOINT + self.coefficients + self.clampings
 
+    @property
+    def modes_of_axes(self) -> tuple[int, ...]:
+        """Modes of each axis: those of one may be exchanged with each other without changing anything."""
+        return tuple(a.modes for a in self.axes)
+
     def axis(self, i: int) -> slice:
         """Return the part of an axis."""
         first = sum(a.size for a in self.axes[:i])
@@ -163,7 +168,7 @@ class AxisParameters:
         squares, turn = np.linalg.eigh(stiffness)
         # far outside the measured speeds the straight line may cross zero: a machine does not
         omega_n = np.sqrt(np.maximum(squares, 1e-6 * np.min(self.omega_n) ** 2))
-        factor = _lower(turn.T @ self.factor)
+        factor = lower_factor(turn.T @ self.factor)
         return AxisParameters(
             omega_n, turn.T @ self.psi, factor, self.residual, turn.T @ self.fixture, self.fixture_residual, np.zeros((0, 0))
         )
@@ -256,7 +261,7 @@ def residual_turn(factor: FloatArray) -> FloatArray:
     return np.array([[2.0 * a, 0.0, 0.0], [b, a, 0.0], [0.0, 2.0 * b, 2.0 * c]])
 
 
-def _lower(rows: FloatArray) -> FloatArray:
+def lower_factor(rows: FloatArray) -> FloatArray:
     """Return the lower triangular L with L L^T = rows rows^T and a diagonal above zero.
 
     From rows^T = Q R: unlike a Cholesky factor of the product it exists for any damping, however light.
@@ -275,7 +280,7 @@ def selected(axis: AxisParameters, modes: np.ndarray) -> AxisParameters:
     return AxisParameters(
         axis.omega_n[modes],
         axis.psi[modes],
-        _lower(axis.factor[modes]),
+        lower_factor(axis.factor[modes]),
         axis.residual,
         axis.fixture[modes],
         axis.fixture_residual,

@@ -32,6 +32,8 @@ class AxisLines:
     force : complex array, shape (n,) [N]
     force_slope : complex array, shape (n, 5) [-]
         Change of the force's logarithm with `cutting.force.SLOPES`.
+    across, across_slope : complex arrays of the same shapes, or None
+        The force along the other machine axis in the same lines, with tooth 1 at immersion 0, too; None where it is not told.
     """
 
     order: np.ndarray
@@ -42,6 +44,8 @@ class AxisLines:
     coherence: FloatArray
     force: ComplexArray
     force_slope: ComplexArray
+    across: ComplexArray | None = None
+    across_slope: ComplexArray | None = None
 
     @property
     def outputs(self) -> int:
@@ -60,7 +64,8 @@ class AxisLines:
 
     def of(self, keep: np.ndarray) -> AxisLines:
         """Return some of the lines: a mask or indices, shape (n,)."""
-        return AxisLines(*(getattr(self, each.name)[keep] for each in fields(self)))
+        every = (getattr(self, each.name) for each in fields(self))
+        return AxisLines(*(None if each is None else each[keep] for each in every))
 
 
 class Estimator(Protocol):

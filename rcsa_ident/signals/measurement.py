@@ -163,10 +163,12 @@ def measure_cut(
     force, slope = force_and_slope(cutter, replace(conditions, spindle_speed=speed), coefficients, harmonic)
     weakest = WEAKEST_FORCE * np.abs(force).max()
     measured = [0 if axis is Dof.X else 1 for axis in axes]
-    force, slope = force[:, measured], slope[:, measured]
-    strong = np.abs(force) > weakest
-    lines = estimator.lines(steady, still, angle, harmonic, np.where(strong, force, max(weakest, 1e-300)), slope)
-    kept = {axis: lines[axis].of(k) for axis, k in zip(axes, strong.T, strict=True) if k.any()}
+    other = [1 - m for m in measured]
+    strong = np.abs(force[:, measured]) > weakest
+    own = np.where(strong, force[:, measured], max(weakest, 1e-300))
+    lines = estimator.lines(steady, still, angle, harmonic, own, slope[:, measured])
+    both = {a: replace(lines[a], across=force[:, o], across_slope=slope[:, o]) for a, o in zip(axes, other, strict=True)}
+    kept = {axis: both[axis].of(k) for axis, k in zip(axes, strong.T, strict=True) if k.any()}
     measurement = CutMeasurement(cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth))
     verdict = Verdict((), notes if air is not None else (*notes, NO_AIR))
     return Reading(cut_id, tooling, programmed, verdict, measurement, *found)

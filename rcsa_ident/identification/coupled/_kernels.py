@@ -1,0 +1,271 @@
+"""Lines of a machine whose planes feel each other, with their gradient; arrays and scalars only.
+
+Scaled units as in `identification._kernels`: slopes are multiplied and moments divided by a lever, all receptances are in m/N.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+
+class MachineArrays(NamedTuple):
+    """A machine as the kernel reads it.
+
+    omega_n (m,); psi (m, 6): flange t, r in X and in Y, fixture x, y; factor (m, m) lower triangular; softening (m, m) or (0, 0);
+    skew (m, m) or (0, 0); residual (4, 4) lower triangular factor; fixture_residual (2, 4); joint (4,): k_t, k_r, c_t, c_r.
+    """
+
+    omega_n: np.ndarray
+    psi: np.ndarray
+    factor: np.ndarray
+    softening: np.ndarray
+    skew: np.ndarray
+    residual: np.ndarray
+    fixture_residual: np.ndarray
+    joint: np.ndarray
+
+
+class PointArrays(NamedTuple):
+    """Points at which a cut's line is asked for: (p,) omega, relative speed x, spindle speed; (p, 2) places of the line of X and of Y
+    or -1; (p, 4, 4) A22 and (p, 4, 2) A21 of the cut's tooling; (p, 2) complex forces in X and Y.
+    """
+
+    omega: np.ndarray
+    x: np.ndarray
+    speed: np.ndarray
+    place: np.ndarray
+    flange: np.ndarray
+    tip: np.ndarray
+    force: np.ndarray
+
+
+class LineArrays(NamedTuple):
+    """What the kernel fills for one axis: (n, o, 2) displacement by the force in X and in Y [m]; (n, o, q) its gradient, or (0, o, q)."""
+
+    parts: np.ndarray
+    gradient: np.ndarray
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _factorise(matrix):
+    """Replace a square complex matrix by its factors L U without pivoting; the pivots' inverses stand on the diagonal.
+
+    Z / (i omega) has a positive semidefinite Hermitian part: such matrices need no pivoting.
+    """
+    m = matrix.shape[0]
+    for j in range(m):
+        inverse = 1.0 / matrix[j, j]
+        matrix[j, j] = inverse
+        for i in range(j + 1, m):
+            ratio = matrix[i, j] * inverse
+            matrix[i, j] = ratio
+            for k in range(j + 1, m):
+                matrix[i, k] -= ratio * matrix[j, k]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _solve(factors, right):
+    """Solve L U x = right in place, all columns."""
+    m, columns = right.shape
+    for i in range(m):
+        for k in range(i):
+            ratio = factors[i, k]
+            for c in range(columns):
+                right[i, c] -= ratio * right[k, c]
+    for i in range(m - 1, -1, -1):
+        for k in range(i + 1, m):
+            ratio = factors[i, k]
+            for c in range(columns):
+                right[i, c] -= ratio * right[k, c]
+        inverse = factors[i, i]
+        for c in range(columns):
+            right[i, c] *= inverse
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _solve_transposed(factors, right):
+    """Solve (L U)^T x = right in place, all columns."""
+    m, columns = right.shape
+    for i in range(m):
+        inverse = factors[i, i]
+        for c in range(columns):
+            right[i, c] *= inverse
+        for k in range(i + 1, m):
+            ratio = factors[i, k]
+            for c in range(columns):
+                right[k, c] -= ratio * right[i, c]
+    for i in range(m - 1, -1, -1):
+        for k in range(i):
+            ratio = factors[i, k]
+            for c in range(columns):
+                right[k, c] -= ratio * right[i, c]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def coupled_lines(machine, points, lines_x, lines_y):
+    """Fill the lines of both axes: displacement of flange, or of gap and fixture, per force in X and in Y, and its gradient.
+
+    B = Psi^T Z^-1 Psi + R R^T, Z = K - w^2 + i w (L L^T + W G), E = A22 + K_joint^-1 + B; an output whose row is b (the flange's own,
+    or the fixture's, or their difference) answers b x with x = E^-1 A21 F. With y = E^-T b^T, v = the row's share of the flange - y
+    and p = Z^-T (Psi v + the row's share of the fixture), q = Z^-1 Psi x: d line = v^T dB x + p^T (dPsi x - dZ q) - y^T dK_joint^-1 x.
+
+    The gradient's columns: log omega_n (m), psi's first four columns by rows (4 m), factor's lower triangle by rows, residual's lower
+    triangle by rows (10), with two outputs psi's last two columns by rows (2 m) and the fixture's residual (8), with softening its
+    lower triangle by rows, with skew its entries above the diagonal by rows, joint (4).
+    """
+    omega_n, psi, factor, softening, skew, residual, fixture_residual, joint = machine
+    m = omega_n.size
+    soft, turns = softening.shape[0] > 0, skew.shape[0] > 0
+    damping = factor @ factor.T
+    static = residual @ residual.T
+    stiffness = np.zeros((m, m))
+    dynamic = np.empty((m, m), dtype=np.complex128)
+    right = np.empty((m, 6), dtype=np.complex128)
+    left = np.empty((m, 6), dtype=np.complex128)
+    block = np.empty((6, 4), dtype=np.complex128)
+    together = np.empty((4, 4), dtype=np.complex128)
+    carried = np.empty((4, 2), dtype=np.complex128)
+    x, v, b, rx, rv = np.empty((5, 4), dtype=np.complex128)
+    column = np.empty((4, 1), dtype=np.complex128)
+    y = column[:, 0]
+    p, q, lp, lq, kp, kq = np.empty((6, m), dtype=np.complex128)
+    for f in range(points.omega.size):
+        w, relative, speed = points.omega[f], points.x[f], points.speed[f]
+        for i in range(m):
+            for j in range(m):
+                k_ij = omega_n[i] ** 2 if i == j else 0.0
+                if soft:
+                    k_ij += relative * softening[i, j] * omega_n[i] * omega_n[j]
+                stiffness[i, j] = k_ij
+                d_ij = damping[i, j]
+                if turns:
+                    d_ij += speed * skew[i, j]
+                dynamic[i, j] = complex(k_ij - (w * w if i == j else 0.0), w * d_ij)
+            for a in range(6):
+                right[i, a] = psi[i, a]
+        _factorise(dynamic)
+        if turns:
+            left[:] = right
+            _solve_transposed(dynamic, left)
+        _solve(dynamic, right)
+        # without gyroscopic coupling Z is symmetric
+        back = left if turns else right
+        for a in range(6):
+            for c in range(4):
+                total = complex(static[a, c], 0.0) if a < 4 else complex(fixture_residual[a - 4, c], 0.0)
+                for i in range(m):
+                    total += psi[i, a] * right[i, c]
+                block[a, c] = total
+        k_t, k_r = 1.0 / complex(joint[0], w * joint[2]), 1.0 / complex(joint[1], w * joint[3])
+        for a in range(4):
+            for c in range(4):
+                together[a, c] = points.flange[f, a, c] + block[a, c]
+            together[a, a] += k_t if a % 2 == 0 else k_r
+        _factorise(together)
+        for a in range(4):
+            for c in range(2):
+                carried[a, c] = points.tip[f, a, c]
+        _solve(together, carried)
+        for a in range(4):
+            x[a] = carried[a, 0] * points.force[f, 0] + carried[a, 1] * points.force[f, 1]
+        for i in range(m):
+            total = complex(0.0, 0.0)
+            for c in range(4):
+                total += right[i, c] * x[c]
+            q[i] = total
+        for axis in range(2):
+            row_number = points.place[f, axis]
+            if row_number < 0:
+                continue
+            parts = lines_x.parts if axis == 0 else lines_y.parts
+            gradient = lines_x.gradient if axis == 0 else lines_y.gradient
+            outputs = parts.shape[1]
+            for o in range(outputs):
+                # share of flange and fixture in the output
+                flange = 1.0 if o == 0 else 0.0
+                fixture = 0.0 if outputs == 1 else 2.0 * o - 1.0
+                for c in range(4):
+                    b[c] = flange * block[2 * axis, c] + fixture * block[4 + axis, c]
+                for side in range(2):
+                    total = complex(0.0, 0.0)
+                    for c in range(4):
+                        total += b[c] * carried[c, side]
+                    parts[row_number, o, side] = total * points.force[f, side]
+                if gradient.shape[0] == 0:
+                    continue
+                y[:] = b
+                _solve_transposed(together, column)
+                for c in range(4):
+                    v[c] = -y[c]
+                v[2 * axis] += flange
+                for i in range(m):
+                    total = fixture * back[i, 4 + axis]
+                    for c in range(4):
+                        total += back[i, c] * v[c]
+                    p[i] = total
+                for j in range(m):
+                    sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
+                    for i in range(j, m):
+                        sum_p += factor[i, j] * p[i]
+                        sum_q += factor[i, j] * q[i]
+                    lp[j], lq[j] = sum_p, sum_q
+                for i in range(m):
+                    sum_p, sum_q = stiffness[i, i] * p[i], stiffness[i, i] * q[i]
+                    if soft:
+                        sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
+                        for j in range(m):
+                            sum_p += stiffness[i, j] * p[j]
+                            sum_q += stiffness[i, j] * q[j]
+                    kp[i], kq[i] = sum_p, sum_q
+                for j in range(4):
+                    sum_x, sum_v = complex(0.0, 0.0), complex(0.0, 0.0)
+                    for i in range(j, 4):
+                        sum_x += residual[i, j] * x[i]
+                        sum_v += residual[i, j] * v[i]
+                    rx[j], rv[j] = sum_x, sum_v
+                row = gradient[row_number, o]
+                k = m
+                for i in range(m):
+                    row[i] = -p[i] * kq[i] - kp[i] * q[i]
+                    for c in range(4):
+                        row[k] = v[c] * q[i] + p[i] * x[c]
+                        k += 1
+                turn = complex(0.0, -w)
+                for i in range(m):
+                    for j in range(i + 1):
+                        row[k] = turn * (p[i] * lq[j] + lp[j] * q[i])
+                        k += 1
+                for i in range(4):
+                    for j in range(i + 1):
+                        row[k] = v[i] * rx[j] + rv[j] * x[i]
+                        k += 1
+                if outputs == 2:
+                    for i in range(m):
+                        row[k + axis] = fixture * q[i]
+                        row[k + 1 - axis] = 0.0
+                        k += 2
+                    for c in range(4):
+                        row[k + 4 * axis + c] = fixture * x[c]
+                        row[k + 4 * (1 - axis) + c] = 0.0
+                    k += 8
+                if soft:
+                    for i in range(m):
+                        scale = -relative * omega_n[i]
+                        for j in range(i):
+                            row[k] = scale * omega_n[j] * (p[i] * q[j] + p[j] * q[i])
+                            k += 1
+                        row[k] = scale * omega_n[i] * p[i] * q[i]
+                        k += 1
+                if turns:
+                    turn = complex(0.0, -w * speed)
+                    for i in range(m):
+                        for j in range(i + 1, m):
+                            row[k] = turn * (p[i] * q[j] - p[j] * q[i])
+                            k += 1
+                row[k] = (y[0] * x[0] + y[2] * x[2]) * k_t * k_t
+                row[k + 1] = (y[1] * x[1] + y[3] * x[3]) * k_r * k_r
+                row[k + 2] = complex(0.0, w) * row[k]
+                row[k + 3] = complex(0.0, w) * row[k + 1]

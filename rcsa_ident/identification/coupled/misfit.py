@@ -1,0 +1,116 @@
+"""Misfit of both planes together: each line is moved by the forces along both axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.identification._kernels import whiten
+from rcsa_ident.identification.coupled._kernels import LineArrays, MachineArrays, PointArrays, coupled_lines
+from rcsa_ident.identification.coupled.data import CoupledData
+from rcsa_ident.identification.coupled.parameters import DIRECTIONS, CoupledLayout, CoupledParameters, chain, skew_chain, unpack
+from rcsa_ident.identification.coupled.priors import coupled_prior_rows
+from rcsa_ident.identification.misfit import Answer, Misfit, WeightedLines
+from rcsa_ident.identification.parameters import JOINT, scaled_joint
+from rcsa_ident.identification.priors import PriorRows, Priors
+
+
+class CoupledMisfit(Misfit):
+    """The residual of an identification in which both planes feel each other.
+
+    Parameters
+    ----------
+    data : CoupledData
+    priors : Priors
+    model_error : tuple of float [-]
+        As in `Misfit`.
+    cut_weight : array, shape (k,), optional
+        As in `Misfit`.
+    """
+
+    def __init__(
+        self, data: CoupledData, priors: Priors, model_error: tuple[float, ...], cut_weight: FloatArray | None = None
+    ) -> None:
+        super().__init__(data.base, priors, model_error, cut_weight)
+        self.points_data = data
+
+    def prior(self, layout: CoupledLayout) -> PriorRows:  # type: ignore[override]
+        """Return the priors of a layout's unknowns."""
+        return coupled_prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients])
+
+    def _answers(self, theta: FloatArray, layout: CoupledLayout, normal: bool) -> Sequence[Answer]:  # type: ignore[override]
+        data, machine, logs = self.points_data, unpack(theta, layout), theta[layout.joint]
+        named = len(self.data.coefficients)
+        coefficients = theta[layout.force]
+        force = data.force * np.exp(data.slope[:, :, : min(named, coefficients.size)] @ coefficients[:named])
+        lines = [_lines(axis, layout, normal) for axis in self._axes]
+        coupled_lines(
+            MachineArrays(
+                machine.omega_n,
+                np.hstack([machine.psi, machine.fixture]),
+                machine.factor,
+                machine.softening,
+                machine.skew,
+                machine.residual,
+                machine.fixture_residual,
+                scaled_joint(logs),
+            ),
+            PointArrays(
+                data.omega, data.relative_speed, data.speed, data.place, data.flange[layout.turning], data.tip[layout.turning], force
+            ),
+            *lines,
+        )
+        answers = []
+        for i, (axis, found) in enumerate(zip(self.data.axes, lines, strict=True)):
+            own = np.flatnonzero(data.place[:, i] >= 0)
+            at = np.empty(own.size, dtype=np.intp)
+            at[data.place[own, i]] = own
+            # smooth errors are those of the axis' own lines, whichever force has moved them
+            smooth = axis.force_slope[:, named : layout.coefficients]
+            factor = np.exp(smooth @ coefficients[named:]) / axis.force
+            parts = found.parts * factor[:, None, None]
+            if normal:
+                found.gradient[:] *= factor[:, None, None]
+            change = np.einsum("nos,nsc->noc", parts, data.slope[at][:, :, : min(named, layout.coefficients)])
+            model = parts.sum(axis=2)
+            extra = np.concatenate([change, model[:, :, None] * smooth[:, None, :]], axis=2)
+            answers.append(_CoupledAnswer(model, found.gradient, extra, machine, theta))
+        return answers
+
+
+def _lines(axis: WeightedLines, layout: CoupledLayout, normal: bool) -> LineArrays:
+    """Room for what the kernel says of an axis' lines."""
+    n, o = axis.points.shape[0], axis.outputs
+    columns = layout.skews.start + JOINT
+    if layout.skew:
+        columns += layout.modes * (layout.modes - 1) // 2
+    return LineArrays(np.empty((n, o, 2), dtype=complex), np.empty((n if normal else 0, o, columns), dtype=complex))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _CoupledAnswer:
+    """One axis' lines, their gradient in kernel units, and the machine behind them."""
+
+    model: ComplexArray
+    gradient: ComplexArray
+    extra: ComplexArray
+    machine: CoupledParameters
+    theta: FloatArray
+
+    def jacobian(self, lines: WeightedLines, layout: CoupledLayout) -> tuple[FloatArray, ComplexArray]:
+        """As in `Answer`; the change with the flange's receptance is left out."""
+        gradient = self.gradient
+        if layout.skew:
+            first = layout.skews.start
+            skew = gradient[:, :, first:-JOINT] @ skew_chain(self.theta, layout)
+            gradient = np.concatenate([gradient[:, :, :first], skew, gradient[:, :, -JOINT:]], axis=2)
+        scale = np.concatenate([chain(self.machine, layout), scaled_joint(self.theta[layout.joint])])
+        rows = gradient.reshape(-1, gradient.shape[2])
+        own = np.empty((2 * rows.shape[0], rows.shape[1]))
+        model = self.model.ravel()
+        whiten(rows, np.empty((rows.shape[0], 0), dtype=complex), model, lines.weight, scale, own)
+        extra = self.extra.reshape(rows.shape[0], -1) * -np.sqrt(lines.weight)[:, None]
+        return np.hstack([own, np.concatenate([extra.real, extra.imag])]), np.zeros((0, 0, DIRECTIONS), dtype=complex)
