@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -154,10 +154,8 @@ def poles(structure: Structure, max_omega: float, snapshots: int = 6, tolerance:
         Directions whose share of the solutions is smaller are dropped.
     """
     bands = _Bands.of(structure)
-    points = 0.5 * max_omega * (1.0 - np.cos(np.pi * (np.arange(snapshots) + 0.5) / snapshots))
-    solutions = np.hstack(list(_unit_responses(structure, bands, points)))
     rigid = _rigid_body_modes(bands, max_omega)
-    basis = _elastic_basis(np.hstack([solutions.real, solutions.imag]), bands, rigid, tolerance)
+    basis = _elastic_basis(_snapshots(structure, [bands], max_omega, snapshots), bands, rigid, tolerance)
     mass, damping, stiffness = (basis.T @ bands.times(band, basis) for band in (bands.mass.real, bands.damping.real, bands.stiffness))
     elastic = _diagonalise(mass, damping, stiffness, basis[structure.index], structure.coordinates)
     small, at_ports = 1e-7j * max_omega, rigid[structure.index]
@@ -168,6 +166,39 @@ def poles(structure: Structure, max_omega: float, snapshots: int = 6, tolerance:
         np.vstack([elastic.inputs, at_ports.T / (2.0 * small), -at_ports.T / (2.0 * small)]),
         structure.coordinates,
     )
+
+
+def projection_basis(
+    structure: Structure, rigid: FloatArray, moments: Sequence[FloatArray], max_omega: float, snapshots: int = 6, tolerance: float = 3e-7
+) -> FloatArray:
+    """Return a basis as `poles` projects on, for equations that moments across the velocity join; shape (d, k).
+
+    Parameters
+    ----------
+    structure : Structure
+    rigid : array, shape (d, r)
+        Its rigid-body motions, mass-orthonormal; the basis is orthogonal to them.
+    moments : sequence of arrays, shape (d, d)
+        Symmetric, within the bands of the mass. The dynamic stiffness loses omega times one of them; the basis is good for each of
+        them and what lies between.
+    max_omega, snapshots, tolerance
+        As in `poles`; so many snapshots for each of the moments.
+    """
+    bands = _Bands.of(structure)
+    rows, cols = np.nonzero(structure.mass)
+    changed = []
+    for moment in moments:
+        damping = bands.damping.copy()
+        damping[bands.half + rows - cols, cols] += 1j * moment[rows, cols]
+        changed.append(replace(bands, damping=damping))
+    return _elastic_basis(_snapshots(structure, changed, max_omega, snapshots), bands, rigid, tolerance)
+
+
+def _snapshots(structure: Structure, equations: Sequence[_Bands], max_omega: float, count: int) -> FloatArray:
+    """Solutions of some equations at Chebyshev points of the band, real and imaginary parts side by side."""
+    points = 0.5 * max_omega * (1.0 - np.cos(np.pi * (np.arange(count) + 0.5) / count))
+    solutions = np.hstack([x for each in equations for x in _unit_responses(structure, each, points)])
+    return np.hstack([solutions.real, solutions.imag])
 
 
 def _elastic_basis(columns: FloatArray, bands: _Bands, rigid: FloatArray, tolerance: float) -> FloatArray:

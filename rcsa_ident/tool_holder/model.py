@@ -19,6 +19,7 @@ from rcsa_ident.tool_holder.timoshenko import (
     cowper,
     refined_beam_matrices,
     refined_layer_matrices,
+    refined_rotary_matrices,
     section,
     stacked,
     together,
@@ -65,22 +66,59 @@ def tool_holder_structure(
     Stations stand at every step of either body, and both bodies have nodes at all of them over the insertion, so that
     the contact is integrated over elements that match. A rigid connection makes one beam of the two there.
     """
+    return free_body(assembly, max_frequency, axis, shear_coefficient, refinement).structure
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FreeBody:
+    """A free assembly with what a spindle that turns needs to know of it.
+
+    Parameters
+    ----------
+    structure : Structure
+        Of one bending plane.
+    rotary : array, shape (d, d)
+        The rotary inertia's share of its mass. Turning with W, a slope's rate asks for a moment 2 W times it in the other plane: of a
+        thin slice the polar moment of inertia is twice the diametral one.
+    rigid : array, shape (d, 2)
+        Translation and rotation about the tip, as no spring feels them: unit deflection, unit slope.
+    """
+
+    structure: Structure
+    rotary: FloatArray
+    rigid: FloatArray
+
+
+def free_body(
+    assembly: ToolAssembly,
+    max_frequency: float,
+    axis: Dof = Dof.X,
+    shear_coefficient: ShearCoefficient = cowper,
+    refinement: int = 1,
+) -> FreeBody:
+    """Return what `tool_holder_structure` does, with the rotary inertia apart and the rigid-body motions."""
     layered = assembly.contact is not None and assembly.insertion > 0.0
     stations, elements = _mesh(assembly, max_frequency, shear_coefficient, refinement, merged=not layered)
     length = np.diff(stations)
     first_freedom, d = _number(elements, stations.size, layered)
-    mass, damping, stiffness, loss = (np.zeros((d, d)) for _ in range(4))
+    mass, damping, stiffness, loss, rotary = (np.zeros((d, d)) for _ in range(5))
     freedoms = np.array([_freedoms(first_freedom, e) for e in elements])
     sections = stacked([e.section for e in elements])
-    matrices = refined_beam_matrices(sections, length[[e.first for e in elements]])
-    for total, each in zip((mass, stiffness, loss), matrices, strict=True):
+    sizes = length[[e.first for e in elements]]
+    matrices = (*refined_beam_matrices(sections, sizes), refined_rotary_matrices(sections, sizes))
+    for total, each in zip((mass, stiffness, loss, rotary), matrices, strict=True):
         _add(total, freedoms, each)
     if layered:
         assert assembly.contact is not None
         _tie(elements, freedoms, length, assembly.contact, stiffness, damping)
     tip, flange = (first_freedom[_node(e.body, e.first + end)] for e, end in ((elements[0], 0), (elements[-1], 1)))
     index = np.array([tip, tip + 1, flange, flange + 1])
-    return Structure(mass, damping, stiffness, loss, (*plane("tip", axis), *plane("flange", axis)), index)
+    rigid = np.zeros((d, 2))
+    for (station, kind), number in first_freedom.items():
+        if kind < 2:
+            rigid[number], rigid[number + 1] = (1.0, stations[station]), (0.0, 1.0)
+    structure = Structure(mass, damping, stiffness, loss, (*plane("tip", axis), *plane("flange", axis)), index)
+    return FreeBody(structure, rotary, rigid)
 
 
 def tool_holder_receptance(

@@ -173,6 +173,13 @@ def refined_beam_matrices(beam: Section, length: float | FloatArray) -> tuple[Fl
     return mass, bending + shear, damping
 
 
+def refined_rotary_matrices(beam: Section, length: float | FloatArray) -> FloatArray:
+    """Return the rotary inertia's share of the mass of `refined_beam_matrices`, shape (6, 6), or (m, 6, 6)."""
+    size = np.asarray(length, dtype=float)
+    _, rotation = _refined_shapes(size, 12.0 * beam.bending / (beam.shear * size**2))
+    return _moment(beam.rotary, rotation, _GAUSS_W[:, None] * size[..., None, None])
+
+
 def _refined_shapes(length: FloatArray, ratio: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Shape functions at the Gauss points with the two inner ones behind, shape (5, 6), or (m, 5, 6)."""
     deflection, rotation = shape_functions(_GAUSS_X, length, ratio)
