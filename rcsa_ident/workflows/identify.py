@@ -24,6 +24,7 @@ from rcsa_ident.signals.measurement import Reading, measure_cut
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.tool_holder.turning import turning_pair
 
 #: Change of an unknown (all are logarithms or of order one) from which a slope is taken.
 _STEP = 1e-5
@@ -135,7 +136,12 @@ def data_of(campaign: Campaign, readings: Sequence[Reading]) -> IdentificationDa
     teeth = {name: t.cutter.teeth for name, t in campaign.toolings.items()}
     known = campaign.workpiece.coefficients
     edges = [known.edge_spread if edge > 0.0 else 0.0 for edge in (known.tangential_edge, known.radial_edge)]
-    return prepare(measurements, receptances, teeth, (known.tangential_spread, known.ratio_spread, *edges))
+    turning = {name: partial(_turning, campaign, name) for name in campaign.toolings}
+    return prepare(measurements, receptances, teeth, (known.tangential_spread, known.ratio_spread, *edges), turning)
+
+
+def _turning(campaign: Campaign, name: str, omega: FloatArray, ratio: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    return turning_pair(campaign.toolings[name].assembly, omega, ratio)
 
 
 def _receptance(campaign: Campaign, name: str, omega: FloatArray) -> Receptance:
