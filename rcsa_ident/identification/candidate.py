@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.identification.parameters import Layout
+from rcsa_ident.identification.parameters import Unknowns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -16,7 +16,7 @@ class Candidate:
     ----------
     theta : array, shape (p,)
         Unknowns, see `parameters`.
-    layout : Layout
+    layout : Unknowns
     nuisance : array, shape (k, 2)
         Delay [s] and angle to the air cut [rad] of each cut, at their optimum for these unknowns.
     cost : float [-]
@@ -26,12 +26,12 @@ class Candidate:
     """
 
     theta: FloatArray
-    layout: Layout
+    layout: Unknowns
     nuisance: FloatArray
     cost: float
     information: FloatArray
 
     @property
-    def point(self) -> tuple[FloatArray, Layout, FloatArray]:
+    def point(self) -> tuple[FloatArray, Unknowns, FloatArray]:
         """Unknowns, their layout and the cuts' delays and angles: where `refine` starts."""
         return self.theta, self.layout, self.nuisance

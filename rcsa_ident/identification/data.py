@@ -331,8 +331,8 @@ def _slopes(slope: ComplexArray, uncertain: Sequence[int], tooling: int, count: 
 
 def _both_forces(lines: Sequence[tuple[AxisLines, int]], uncertain: Sequence[int], count: int) -> dict[str, ComplexArray]:
     """Forces along both axes in the lines of one, where all cuts tell them."""
-    found = [(each.force, each.across, each.across_slope, tooling) for each, tooling in lines]
-    if any(across is None for _, across, _, _ in found):
+    found = [(e.force, e.across, e.across_slope, t) for e, t in lines if e.across is not None and e.across_slope is not None]
+    if len(found) < len(lines):
         return {}
     return {
         "force": np.concatenate([force for force, _, _, _ in found]),

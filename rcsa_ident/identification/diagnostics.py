@@ -13,7 +13,7 @@ from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import JOINT
+from rcsa_ident.identification.parameters import JOINT, planes
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import Identification, IdentificationCode
 from rcsa_ident.identification.status import Status
@@ -146,7 +146,7 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
     def note(code: IdentificationCode, sentence: str) -> None:
         notes.append(Remark(code, sentence))
 
-    layout, priors = solution.layout, misfit.priors
+    layout, priors = planes(solution.layout), misfit.priors
     deviation = np.sqrt(np.diag(covariance))
     for name, std in zip(_JOINT, deviation[layout.joint], strict=True):
         if std > INFORMED * priors.joint_spread:
@@ -218,4 +218,4 @@ def _difference(axis: AxisData, one: Candidate, two: Candidate) -> tuple[float, 
 def _flange_posterior(candidate: Candidate) -> Posterior:
     size = candidate.layout.tail + JOINT
     covariance = np.linalg.inv(candidate.information)[:size, :size]
-    return Posterior(candidate.theta[:size], covariance, candidate.layout.axes[0])
+    return Posterior(candidate.theta[:size], covariance, planes(candidate.layout).axes[0])

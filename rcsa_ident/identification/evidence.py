@@ -17,7 +17,7 @@ from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.method import Phase, finite, perform
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import GIVE_UP_SOON, Report, cut_weights, drop_modes, exchange_modes, model_error
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, parameter_names, unpack
+from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, parameter_names, planes, unpack
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import BOTH, Progress, Stage, Step
@@ -105,7 +105,7 @@ def _report_to(axis: str, trace: list[Step], progress: Progress | None) -> Repor
     """Return what keeps each stage of a search in its trace, and tells of it."""
 
     def report(stage: Stage, cost: float, solution: Solution) -> None:
-        step = Step(axis, stage, cost, sum(a.modes for a in solution.layout.axes))
+        step = Step(axis, stage, cost, sum(solution.layout.modes_of_axes))
         trace.append(step)
         if progress is not None:
             progress(replace(step, candidate=solution.candidate))
@@ -168,7 +168,7 @@ class SearchAxis:
         if known is None:
             rng = np.random.default_rng(self.sequence)
             population = explore(Misfit(data, method.priors, (method.coarse[0],)), method.search, band, rng, report)
-            return [(s.theta, s.layout.axes[0], s.evaluation.nuisance) for s in population[: method.candidates]]
+            return [(s.theta, planes(s.layout).axes[0], s.evaluation.nuisance) for s in population[: method.candidates]]
         # the last polish asks again whether the machine changes with speed
         plain = pack(unpack(known.theta[:-JOINT], known.layout))
         return [(np.concatenate([plain, known.theta[-JOINT:]]), AxisLayout(known.layout.modes), np.zeros((len(data.cut_ids), 2)))]
@@ -244,10 +244,10 @@ def _result(
 def _axis_result(
     i: int, data: IdentificationData, misfit: Misfit, solution: Solution, covariance: np.ndarray, rival: Solution
 ) -> AxisResult:
-    axis, layout = data.axes[i], solution.layout
+    axis, layout, others = data.axes[i], planes(solution.layout), planes(rival.layout)
     own = replace(layout.axes[i], fixture=False)
     entries = np.r_[layout.axis(i).start + layout.axes[i].machine, layout.joint]
-    other = rival.theta[np.r_[rival.layout.axis(i).start + rival.layout.axes[i].machine, rival.layout.joint]]
+    other = rival.theta[np.r_[others.axis(i).start + others.axes[i].machine, others.joint]]
     posterior = Posterior(solution.theta[entries], covariance[np.ix_(entries, entries)], own, data.speed_range, (other,))
     modes, joint = posterior.machine(axis.axis)
     rest = solution.evaluation.residual.lines[i]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -14,7 +15,7 @@ from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.method import Phase, finite, perform
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import Report, cut_weights, evidence, exchange_modes, grow_modes, model_error
-from rcsa_ident.identification.parameters import Layout, pack, unpack
+from rcsa_ident.identification.parameters import Layout, Unknowns, pack, planes, unpack
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import Stage, Step
 from rcsa_ident.scaleout import Map
@@ -89,12 +90,16 @@ def fit_jointly(
     map : callable
         The builtin, or a pool's.
     """
+
+    def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> Misfit:
+        return Misfit(data, priors, shares, weight)
+
     start = _from_several_starts(data, priors, searched, map).point
-    found, misfit = _refine_and_learn_noise(data, priors, start, *_noise(searched), report)
+    found, misfit = refine_and_learn_noise(misfit_of, start, *learned_noise(searched), report)
     middle, half = data.speed_range
     if half > LEAST_SPEED_RANGE * middle:
         with_softening = _start(data, found, True)
-        moving, other = _refine_and_learn_noise(data, priors, with_softening, misfit.model_error, misfit.cut_weight, report)
+        moving, other = refine_and_learn_noise(misfit_of, with_softening, misfit.model_error, misfit.cut_weight, report)
         if evidence(moving, other) < evidence(found, misfit):
             found, misfit = moving, other
     omega = np.concatenate([a.omega for a in data.axes])
@@ -104,7 +109,7 @@ def fit_jointly(
     for _ in range(GROWN):
         found = grow_modes(found, misfit, band)
         report(Stage.GROW, found.cost, found)
-    return *_refine_and_learn_noise(data, priors, found.candidate.point, misfit.model_error, misfit.cut_weight, report), chosen
+    return *refine_and_learn_noise(misfit_of, found.candidate.point, misfit.model_error, misfit.cut_weight, report), chosen
 
 
 def _from_several_starts(data: IdentificationData, priors: Priors, searched: list[AxisSearch], map: Map) -> Candidate:
@@ -150,9 +155,9 @@ class JointStart:
         """Return the polished candidate."""
         data, priors = self.data, self.priors
         best = [s.candidates[0] for s in self.searched]
-        shares, weight = _noise(self.searched)
+        shares, weight = learned_noise(self.searched)
         chosen = best if self.source is None else [best[self.source % len(best)]]
-        layout = Layout(tuple(c.layout.axes[0] for c in best), len(data.coefficient_spread))
+        layout = Layout(tuple(planes(c.layout).axes[0] for c in best), len(data.coefficient_spread))
         force = np.zeros(layout.coefficients)
         named = len(data.coefficients)
         force[:named] = np.mean([c.theta[c.layout.force][:named] for c in chosen], axis=0)
@@ -163,24 +168,39 @@ class JointStart:
         return refine(Misfit(data, priors, shares, weight), *_start(data, start, False), 60).candidate
 
 
-def _noise(searched: list[AxisSearch]) -> tuple[tuple[float, ...], FloatArray]:
-    """Model error of each axis, and the cuts' weights, as the searches have learned them."""
+def learned_noise(searched: list[AxisSearch]) -> tuple[tuple[float, ...], FloatArray]:
+    """Return the model error of each axis, and the cuts' weights, as the searches have learned them."""
     return tuple(s.model_error for s in searched), np.min([s.cut_weight for s in searched], axis=0)
 
 
-def _refine_and_learn_noise(
-    data: IdentificationData,
-    priors: Priors,
-    start: tuple[FloatArray, Layout, FloatArray],
+def refine_and_learn_noise(
+    misfit_of: Callable[[tuple[float, ...], FloatArray], Misfit],
+    start: tuple[FloatArray, Unknowns, FloatArray],
     shares: tuple[float, ...],
     weight: FloatArray,
     report: Report,
+    tolerance: float = 1e-5,
 ) -> tuple[Solution, Misfit]:
-    """Polish and learn the noise in turns until it stays."""
+    """Polish and learn the noise in turns until it stays.
+
+    Parameters
+    ----------
+    misfit_of : callable
+        The model error of each axis and the cuts' weights to a misfit.
+    start : (array, Unknowns, array)
+        Unknowns, their layout, the cuts' delays and angles.
+    shares : tuple of float [-]
+        Model error of each axis to begin with.
+    weight : array, shape (k,)
+        Factor on each cut's weights to begin with.
+    report : callable of (stage, cost, solution)
+    tolerance : float
+        As in `refine`.
+    """
     theta, layout, nuisance = start
     for _ in range(4):
-        misfit = Misfit(data, priors, shares, weight)
-        found = refine(misfit, theta, layout, nuisance, 300, tolerance=1e-5)
+        misfit = misfit_of(shares, weight)
+        found = refine(misfit, theta, layout, nuisance, 300, tolerance=tolerance)
         report(Stage.POLISH, found.cost, found)
         learned = model_error(found, misfit)
         if all(abs(a / b - 1.0) < 0.05 for a, b in zip(learned, shares, strict=True)):
@@ -191,7 +211,7 @@ def _refine_and_learn_noise(
 
 def _start(data: IdentificationData, found: Solution, softening: bool) -> tuple[FloatArray, Layout, FloatArray]:
     """Return a vector with all that the data may tell, from one with less: what is new starts at nothing."""
-    old = found.layout
+    old = planes(found.layout)
     axes = tuple(replace(a, fixture=axis.outputs == 2, softening=softening) for a, axis in zip(old.axes, data.axes, strict=True))
     layout = Layout(axes, len(data.coefficient_spread), data.clampings)
     parts = [pack(unpack(found.theta[old.axis(i)], old.axes[i]), axes[i]) for i in range(len(axes))]
@@ -200,11 +220,11 @@ def _start(data: IdentificationData, found: Solution, softening: bool) -> tuple[
     nuisance = found.evaluation.nuisance
     angles = found.theta[old.clamping]
     if not old.clampings and layout.clampings:
-        angles, nuisance = _tooth_angles(data, nuisance)
+        angles, nuisance = tooth_angles(data, nuisance)
     return np.concatenate([*parts, found.theta[old.joint], force, angles]), layout, nuisance
 
 
-def _tooth_angles(data: IdentificationData, nuisance: FloatArray) -> tuple[FloatArray, FloatArray]:
+def tooth_angles(data: IdentificationData, nuisance: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return each clamping's tooth angle from delays fitted without it, and the delays in the tooth-passing period that it means."""
     angles, nuisance = np.zeros(data.clampings), nuisance.copy()
     period = data.cut_prior.tooth_period

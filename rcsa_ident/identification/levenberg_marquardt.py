@@ -9,8 +9,9 @@ import scipy.linalg
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.candidate import Candidate
-from rcsa_ident.identification.misfit import DELAY_UNIT, Evaluation, Misfit
-from rcsa_ident.identification.parameters import Layout
+from rcsa_ident.identification.linearisation import DELAY_UNIT
+from rcsa_ident.identification.misfit import Evaluation, Misfit
+from rcsa_ident.identification.parameters import Unknowns
 
 #: No parameter (all are logarithms or of order one) moves further in one step.
 LARGEST_STEP = 1.0
@@ -29,7 +30,7 @@ class Solution:
     Parameters
     ----------
     theta : array, shape (p,)
-    layout : Layout
+    layout : Unknowns
     evaluation : Evaluation
         Cost and residual there, with normal equations.
     converged : bool
@@ -38,7 +39,7 @@ class Solution:
     """
 
     theta: FloatArray
-    layout: Layout
+    layout: Unknowns
     evaluation: Evaluation
     converged: bool
     steps: int
@@ -57,7 +58,7 @@ class Solution:
 def refine(
     misfit: Misfit,
     theta: FloatArray,
-    layout: Layout,
+    layout: Unknowns,
     nuisance: FloatArray,
     max_steps: int,
     grid: int = 0,
@@ -69,7 +70,7 @@ def refine(
     ----------
     misfit : Misfit
     theta : array, shape (p,)
-    layout : Layout
+    layout : Unknowns
     nuisance : array, shape (k, 2)
         Delay [s] and angle [rad] at which each cut's own fit starts.
     max_steps : int
@@ -107,7 +108,7 @@ def refine(
     return Solution(theta, layout, here, False, max_steps)
 
 
-def _step(misfit: Misfit, theta: FloatArray, layout: Layout, here: Evaluation, damping: float) -> FloatArray | None:
+def _step(misfit: Misfit, theta: FloatArray, layout: Unknowns, here: Evaluation, damping: float) -> FloatArray | None:
     """Damped step with geodesic acceleration [transtrum2012]: it bends along the valley, not into its wall."""
     linear = here.linear
     assert linear is not None

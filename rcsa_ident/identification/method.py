@@ -20,6 +20,7 @@ class Phase(StrEnum):
     SEARCH = "search"
     OTHER_AXIS = "from the other axis"
     BOTH_AXES = "both axes"
+    COUPLED = "both planes together"
 
 
 class Task(Protocol):

@@ -11,49 +11,19 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification._kernels import cross_frf, fit_cuts, mix_cuts, whiten
 from rcsa_ident.identification.data import AxisData, CutPrior, IdentificationData
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, AxisParameters, Layout, chain, residual_turn, scaled_joint, unpack
+from rcsa_ident.identification.linearisation import DELAY_UNIT, Linearisation, Residual
+from rcsa_ident.identification.parameters import (
+    JOINT,
+    AxisLayout,
+    AxisParameters,
+    Layout,
+    Unknowns,
+    chain,
+    residual_turn,
+    scaled_joint,
+    unpack,
+)
 from rcsa_ident.identification.priors import PriorRows, Priors, prior_rows
-
-#: Unit of a delay in the normal equations [s].
-DELAY_UNIT = 1e-6
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Residual:
-    """Everything whose squares add up to the cost, in standard deviations.
-
-    Parameters
-    ----------
-    lines : tuple of arrays, shape (2 n,)
-        Residuals of each axis: real parts of all lines, then imaginary parts.
-    own : array, shape (p,)
-        Residuals of the parameters' priors.
-    cuts : array, shape (k, 2)
-        Residuals of the cuts' priors: delay, angle.
-    """
-
-    lines: tuple[FloatArray, ...]
-    own: FloatArray
-    cuts: FloatArray
-
-    def minus(self, other: Residual, factor: float = 1.0) -> Residual:
-        """Return the residual less another one times a factor."""
-        lines = tuple(a - factor * b for a, b in zip(self.lines, other.lines, strict=True))
-        return Residual(lines, self.own - factor * other.own, self.cuts - factor * other.cuts)
-
-    def times(self, factor: float) -> Residual:
-        """Return the residual times a factor."""
-        return Residual(tuple(factor * a for a in self.lines), factor * self.own, factor * self.cuts)
-
-    @property
-    def chi2(self) -> tuple[float, ...]:
-        """Sum of squares of each axis' lines, in standard deviations."""
-        return tuple(float(r @ r) for r in self.lines)
-
-    @property
-    def cost(self) -> float:
-        """Sum of all squares, those of the priors too."""
-        return sum(self.chi2) + float(self.own @ self.own) + float(np.sum(self.cuts**2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,136 +62,6 @@ class Evaluation:
         return self.linear.hessian
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Linearisation:
-    """Residual to first order in the parameters and in each cut's delay and angle; the latter two are eliminated.
-
-    Parameters
-    ----------
-    layout : Layout
-    jacobians : tuple of arrays, shape (2 n, q + c)
-        Change of each axis' lines with its own parameters, the joint's and the coefficients'.
-    columns : tuple of complex arrays, shape (n, 2)
-        The lines' change with their cut's delay (in `DELAY_UNIT`) and angle.
-    cut : tuple of int arrays, shape (n,)
-        The cut that each line belongs to.
-    own : array, shape (p, p)
-        The priors' change.
-    cut_prior : array, shape (k, 2)
-        Square roots of the weights of the cuts' priors.
-    clamping : (array of int, array), shape (k,) each
-        Place in the vector of the tooth angle that a cut's prior depends on, and by how much (0 where by none).
-    gradient, hessian : arrays, shapes (p,), (p, p)
-        Of half the cost, the cuts' unknowns eliminated.
-    inner : array, shape (k, 2, 2)
-        Normal equations of each cut's delay and angle.
-    mixed : array, shape (k, 2, p)
-        What couples them to the parameters.
-    compliance : tuple of complex arrays, shape (n, o, 3)
-        Change of each axis' model with the flange's receptance tt, tr, rr at its lines, for what may be added to it.
-    """
-
-    layout: Layout
-    jacobians: tuple[FloatArray, ...]
-    columns: tuple[ComplexArray, ...]
-    cut: tuple[np.ndarray, ...]
-    own: FloatArray
-    cut_prior: FloatArray
-    clamping: tuple[np.ndarray, FloatArray]
-    gradient: FloatArray
-    hessian: FloatArray
-    inner: FloatArray
-    mixed: FloatArray
-    compliance: tuple[ComplexArray, ...]
-
-    def follow(self, step: FloatArray) -> FloatArray:
-        """Return how delay and angle of each cut follow a step of the parameters, shape (k, 2)."""
-        return -_solve_pairs(self.inner, self.mixed @ step)
-
-    def push(self, step: FloatArray, cuts: FloatArray) -> Residual:
-        """Return the residual's change with a step of the parameters and of the cuts' unknowns."""
-        shared = step[self._shared]
-        lines = []
-        for i, (jacobian, columns, cut) in enumerate(zip(self.jacobians, self.columns, self.cut, strict=True)):
-            turned = columns[:, 0] * cuts[cut, 0] + columns[:, 1] * cuts[cut, 1]
-            change = jacobian @ np.concatenate([step[self.layout.axis(i)], shared])
-            lines.append(change + np.concatenate([turned.real, turned.imag]))
-        prior = self.cut_prior * cuts
-        prior[:, 0] += self.clamping[1] * step[self.clamping[0]]
-        return Residual(tuple(lines), self.own @ step, prior)
-
-    def pull(self, residual: Residual) -> FloatArray:
-        """Return the gradient that a residual would have, the cuts' unknowns eliminated, shape (p,)."""
-        slope = self.own.T @ residual.own
-        right = self.cut_prior * residual.cuts
-        for i, (jacobian, columns, cut, r) in enumerate(zip(self.jacobians, self.columns, self.cut, residual.lines, strict=True)):
-            down = jacobian.T @ r
-            block = self.layout.axis(i)
-            size = block.stop - block.start
-            slope[block] += down[:size]
-            slope[self._shared] += down[size:]
-            n = cut.size
-            for j in range(2):
-                right[:, j] += np.bincount(cut, columns[:, j].real * r[:n] + columns[:, j].imag * r[n:], minlength=right.shape[0])
-        np.add.at(slope, self.clamping[0], self.clamping[1] * residual.cuts[:, 0])
-        return slope - np.tensordot(_solve_pairs(self.inner, right), self.mixed, axes=2)
-
-    def border(self, i: int, rows: FloatArray, residual: Residual) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return what further unknowns of axis `i` would add to the normal equations, three of them at a time.
-
-        Parameters
-        ----------
-        i : int
-            Number of the axis.
-        rows : array, shape (2 n, 3 q)
-            Change of the axis' lines with them.
-        residual : Residual
-
-        Returns
-        -------
-        gradient (3 q,), own matrices (q, 3, 3), mixed with the parameters (p, 3 q), the cuts' unknowns eliminated from all
-        """
-        columns, cut = self.columns[i], self.cut[i]
-        n, q = cut.size, rows.shape[1]
-        cuts = self.inner.shape[0]
-        turned = np.zeros((cuts, 2, q))
-        start = np.flatnonzero(np.diff(cut, prepend=-1))
-        for j in range(2):
-            products = columns[:, j].real[:, None] * rows[:n] + columns[:, j].imag[:, None] * rows[n:]
-            turned[cut[start], j] = np.add.reduceat(products, start, axis=0)
-        solved = np.linalg.solve(self.inner, turned)
-        right = self.cut_prior * residual.cuts
-        for lines, index, r in zip(self.columns, self.cut, residual.lines, strict=True):
-            for j in range(2):
-                right[:, j] += np.bincount(index, lines[:, j].real * r[: index.size] + lines[:, j].imag * r[index.size :], minlength=cuts)
-        gradient = rows.T @ residual.lines[i] - np.tensordot(right, solved, axes=2)
-        threes = rows.reshape(2 * n, -1, 3)
-        own = np.einsum("nki,nkj->kij", threes, threes, optimize=True)
-        own -= np.einsum("cjki,cjkl->kil", turned.reshape(cuts, 2, -1, 3), solved.reshape(cuts, 2, -1, 3), optimize=True)
-        mixed = np.zeros((self.layout.size, q))
-        block = self.layout.axis(i)
-        products = self.jacobians[i].T @ rows
-        mixed[block], mixed[self._shared] = products[: block.stop - block.start], products[block.stop - block.start :]
-        mixed -= np.tensordot(self.mixed, solved, axes=((0, 1), (0, 1)))
-        return gradient, own, mixed
-
-    @property
-    def _shared(self) -> slice:
-        return slice(self.layout.tail, self.layout.force.stop)
-
-    def delay_std(self, covariance: FloatArray) -> FloatArray:
-        """Return the standard deviation of each cut's delay, shape (k,) [s]: its own fit's, and what the parameters add.
-
-        Parameters
-        ----------
-        covariance : array, shape (p, p)
-            Covariance of the parameters.
-        """
-        follow = np.linalg.solve(self.inner, self.mixed)[:, 0]
-        own = np.linalg.inv(self.inner)[:, 0, 0]
-        return np.sqrt(own + np.einsum("kp,pq,kq->k", follow, covariance, follow)) * DELAY_UNIT
-
-
 class Misfit:
     """The residual of an identification.
 
@@ -256,7 +96,7 @@ class Misfit:
         """Number of real residuals of the lines."""
         return 2 * sum(a.omega.size for a in self._axes)
 
-    def evaluate(self, theta: FloatArray, layout: Layout, nuisance: FloatArray, grid: int = 0, normal: bool = False) -> Evaluation:
+    def evaluate(self, theta: FloatArray, layout: Unknowns, nuisance: FloatArray, grid: int = 0, normal: bool = False) -> Evaluation:
         """Return the cost at `theta`, and with `normal` its gradient and Hessian.
 
         Parameters
@@ -281,11 +121,11 @@ class Misfit:
         linear = self._linearise(layout, answers, residual, nuisance, prior) if normal else None
         return Evaluation(residual.cost, nuisance, tuple(models), residual, linear)
 
-    def models(self, theta: FloatArray, layout: Layout) -> tuple[ComplexArray, ...]:
+    def models(self, theta: FloatArray, layout: Unknowns) -> tuple[ComplexArray, ...]:
         """Return the model's cross FRFs on the lines of each axis, shapes (n, o) [m/N]; no delay and no noise is in them."""
         return tuple(answer.model for answer in self._answers(theta, layout, False))
 
-    def residual_at(self, theta: FloatArray, layout: Layout, nuisance: FloatArray) -> Residual:
+    def residual_at(self, theta: FloatArray, layout: Unknowns, nuisance: FloatArray) -> Residual:
         """Return the residual with the cuts' delays and angles as they are given.
 
         Parameters
@@ -297,8 +137,9 @@ class Misfit:
         """
         return self._residual(theta, layout, self.models(theta, layout), nuisance, self._cut_prior(theta, layout))
 
-    def prior(self, layout: Layout) -> PriorRows:
+    def prior(self, layout: Unknowns) -> PriorRows:
         """Return the priors of a layout's unknowns."""
+        assert isinstance(layout, Layout)
         return prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients])
 
     def without_delay(self, i: int, nuisance: FloatArray) -> ComplexArray:
@@ -310,8 +151,9 @@ class Misfit:
         """Return the weights of an axis' lines, shape (n, o) [N^2/m^2]."""
         return self._axes[i].weight.reshape(-1, self._axes[i].outputs)
 
-    def _answers(self, theta: FloatArray, layout: Layout, normal: bool) -> Sequence[Answer]:
+    def _answers(self, theta: FloatArray, layout: Unknowns, normal: bool) -> Sequence[Answer]:
         """What the model says of each axis' lines, with `normal` ready to be linearised."""
+        assert isinstance(layout, Layout)
         logs = theta[layout.joint]
         joint = scaled_joint(logs)
         answers = []
@@ -330,7 +172,7 @@ class Misfit:
             answers.append(_AxisAnswer(values, gradient, axis, part, logs))
         return answers
 
-    def _cut_prior(self, theta: FloatArray, layout: Layout) -> CutPrior:
+    def _cut_prior(self, theta: FloatArray, layout: Unknowns) -> CutPrior:
         """What is known of each cut, with the triggers of unknown tooth angle where that is an unknown of the layout."""
         prior = self.data.cut_prior
         if not layout.clampings:
@@ -342,7 +184,9 @@ class Misfit:
         weight[known] = self.data.edge[known, 1]
         return replace(prior, delay=delay, delay_weight=weight)
 
-    def _residual(self, theta: FloatArray, layout: Layout, models: Sequence[ComplexArray], nuisance: FloatArray, prior: CutPrior) -> Residual:
+    def _residual(
+        self, theta: FloatArray, layout: Unknowns, models: Sequence[ComplexArray], nuisance: FloatArray, prior: CutPrior
+    ) -> Residual:
         lines = tuple(axis.rest(model, nuisance) for axis, model in zip(self._axes, models, strict=True))
         own = self.prior(layout).residual(theta)
         cuts = np.sqrt(prior.weights) * nuisance
@@ -350,7 +194,7 @@ class Misfit:
         return Residual(lines, own, cuts)
 
     def _linearise(
-        self, layout: Layout, answers: Sequence[Answer], residual: Residual, nuisance: FloatArray, prior: CutPrior
+        self, layout: Unknowns, answers: Sequence[Answer], residual: Residual, nuisance: FloatArray, prior: CutPrior
     ) -> Linearisation:
         """Gauss-Newton matrices of the parameters after eliminating two unknowns per cut (Schur complement)."""
         size, cuts = layout.size, len(self.data.cut_ids)
@@ -401,7 +245,7 @@ class Misfit:
         )
         return replace(linear, gradient=linear.pull(residual))
 
-    def _clamping(self, layout: Layout, prior: CutPrior) -> tuple[np.ndarray, FloatArray]:
+    def _clamping(self, layout: Unknowns, prior: CutPrior) -> tuple[np.ndarray, FloatArray]:
         """Place of the tooth angle that each cut's prior depends on, and the prior's change with it."""
         cuts = len(self.data.cut_ids)
         if not layout.clampings:
@@ -443,7 +287,7 @@ class WeightedLines:
         measured, air = self.turned(nuisance)
         return np.stack([1j * self.omega * DELAY_UNIT * measured, -1j * self.order * air], axis=1) * self._root[:, None]
 
-    def jacobian(self, gradient: ComplexArray, model: ComplexArray, scale: FloatArray, layout: Layout) -> FloatArray:
+    def jacobian(self, gradient: ComplexArray, model: ComplexArray, scale: FloatArray, layout: Unknowns) -> FloatArray:
         """The residual's change with the axis' own parameters, the joint and the coefficients, shape (2 n o, q + c)."""
         rows = gradient.reshape(-1, gradient.shape[2])
         out = np.empty((2 * rows.shape[0], rows.shape[1] + layout.coefficients))
@@ -459,7 +303,7 @@ class Answer(Protocol):
         """Cross FRFs without delay and noise, shape (n, o) [m/N]."""
         ...
 
-    def jacobian(self, lines: WeightedLines, layout: Layout) -> tuple[FloatArray, ComplexArray]:
+    def jacobian(self, lines: WeightedLines, layout: Unknowns) -> tuple[FloatArray, ComplexArray]:
         """Return the residual's change with the axis' own parameters, the joint and the coefficients, shape (2 n o, q + c), and the
         model's change with the flange's receptance."""
         ...
@@ -475,19 +319,12 @@ class _AxisAnswer:
     layout: AxisLayout
     joint: FloatArray
 
-    def jacobian(self, lines: WeightedLines, layout: Layout) -> tuple[FloatArray, ComplexArray]:
+    def jacobian(self, lines: WeightedLines, layout: Unknowns) -> tuple[FloatArray, ComplexArray]:
         core = self.layout.core
         compliance = self.gradient[:, :, core - 3 : core].copy()
         self.gradient[:, :, core - 3 : core] = compliance @ residual_turn(self.axis.residual)
         scale = np.concatenate([chain(self.axis, self.layout), scaled_joint(self.joint)])
         return lines.jacobian(self.gradient, self.model, scale, layout), compliance
-
-
-def _solve_pairs(inner: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve symmetric 2 x 2 systems (k, 2, 2) for right sides (k, 2)."""
-    a, b, c = inner[:, 0, 0], inner[:, 0, 1], inner[:, 1, 1]
-    determinant = a * c - b * b
-    return np.stack([(c * right[:, 0] - b * right[:, 1]) / determinant, (a * right[:, 1] - b * right[:, 0]) / determinant], axis=1)
 
 
 def _without_information(inner: FloatArray, period: FloatArray) -> None:

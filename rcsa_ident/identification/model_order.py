@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import AxisParameters, Layout, pack, unpack, with_mode, without_mode
+from rcsa_ident.identification.parameters import AxisParameters, Layout, Unknowns, pack, unpack, with_mode, without_mode
 from rcsa_ident.identification.progress import Stage
 
 #: Walks down end where the evidence lies this far behind the best seen: nothing below comes back from there. The second one is
@@ -32,6 +33,8 @@ CLOSE = 1.2
 
 #: Told of a stage, the cost or evidence that it came to, and its solution.
 Report = Callable[[Stage, float, Solution], None]
+#: A vector and its layout that were not fitted yet.
+Trial = tuple[FloatArray, Unknowns]
 
 
 def evidence(solution: Solution, misfit: Misfit) -> float:
@@ -49,7 +52,53 @@ def evidence(solution: Solution, misfit: Misfit) -> float:
     return value if sign > 0.0 and np.isfinite(value) else np.inf
 
 
-def drop_modes(solution: Solution, misfit: Misfit, report: Report | None = None, smallest: int = 2, give_up: float = GIVE_UP) -> Solution:
+class ModeSteps(Protocol):
+    """How a model comes to have one mode less or more."""
+
+    def groups(self, layout: Unknowns) -> int:
+        """Return how many sets of modes there are, each with its own lines."""
+        ...
+
+    def fewer(self, solution: Solution, smallest: int) -> list[Trial]:
+        """Return all models with one mode less, none of them with less than the smallest number."""
+        ...
+
+    def more(self, solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, float]) -> list[Trial]:
+        """Return the most promising models with one mode more in set `i`."""
+        ...
+
+
+class _PlaneSteps:
+    """Each axis has its own modes."""
+
+    def groups(self, layout: Unknowns) -> int:
+        return len(layout.modes_of_axes)
+
+    def fewer(self, solution: Solution, smallest: int) -> list[Trial]:
+        trials: list[Trial] = []
+        layout = solution.layout
+        assert isinstance(layout, Layout)
+        for i, part in enumerate(layout.axes):
+            axis = unpack(solution.theta[layout.axis(i)], part)
+            if axis.order > smallest:
+                trials += [_with_axis(solution, i, each) for each in [without_mode(axis, m) for m in range(axis.order)] + merged(axis)]
+        return trials
+
+    def more(self, solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, float]) -> list[Trial]:
+        return [_with_axis(solution, i, axis) for axis in promising(solution, misfit, i, band_hz)]
+
+
+PLANES: ModeSteps = _PlaneSteps()
+
+
+def drop_modes(
+    solution: Solution,
+    misfit: Misfit,
+    report: Report | None = None,
+    smallest: int = 2,
+    give_up: float = GIVE_UP,
+    steps: ModeSteps = PLANES,
+) -> Solution:
     """Return the best of the models with ever fewer modes.
 
     Every mode of every axis in turn is left out, and close modes are merged; the likeliest omissions get two steps, the two best
@@ -65,21 +114,17 @@ def drop_modes(solution: Solution, misfit: Misfit, report: Report | None = None,
         Fewest modes of an axis.
     give_up : float
         The walk ends where the evidence lies this far behind the best seen.
+    steps : ModeSteps
     """
     best, best_evidence = solution, evidence(solution, misfit)
     here = solution
     while True:
-        trials = []
-        for i, layout in enumerate(here.layout.axes):
-            axis = unpack(here.theta[here.layout.axis(i)], layout)
-            fewer = [without_mode(axis, mode) for mode in range(axis.order)] + merged(axis) if axis.order > smallest else []
-            for each in fewer:
-                theta, changed = _with_axis(here, i, each)
-                trials.append((misfit.evaluate(theta, changed, here.evaluation.nuisance).cost, theta, changed))
+        nuisance = here.evaluation.nuisance
+        trials = [(misfit.evaluate(theta, layout, nuisance).cost, theta, layout) for theta, layout in steps.fewer(here, smallest)]
         if not trials:
             break
         trials.sort(key=lambda t: t[0])
-        tried = [refine(misfit, theta, layout, here.evaluation.nuisance, max_steps=2) for _, theta, layout in trials[:TRIED]]
+        tried = [refine(misfit, theta, layout, nuisance, max_steps=2) for _, theta, layout in trials[:TRIED]]
         here = _polished(tried, misfit, 2, WALK)
         value = evidence(here, misfit)
         if report is not None:
@@ -92,7 +137,12 @@ def drop_modes(solution: Solution, misfit: Misfit, report: Report | None = None,
 
 
 def exchange_modes(
-    solution: Solution, misfit: Misfit, band_hz: tuple[float, float], report: Report | None = None, rounds: int = 3
+    solution: Solution,
+    misfit: Misfit,
+    band_hz: tuple[float, float],
+    report: Report | None = None,
+    rounds: int = 3,
+    steps: ModeSteps = PLANES,
 ) -> Solution:
     """Return the best model that is reached by adding a mode where it helps most and dropping those that are not needed.
 
@@ -109,15 +159,15 @@ def exchange_modes(
     report : callable of (stage, cost, solution), optional
     rounds : int
         Most rounds.
+    steps : ModeSteps
     """
     best, best_evidence = solution, evidence(solution, misfit)
     for _ in range(rounds):
         trials = []
-        for i in range(len(best.layout.axes)):
-            for axis in promising(best, misfit, i, band_hz):
-                theta, layout = _with_axis(best, i, axis)
+        for i in range(steps.groups(best.layout)):
+            for theta, layout in steps.more(best, misfit, i, band_hz):
                 trials.append(refine(misfit, theta, layout, best.evaluation.nuisance, max_steps=6))
-        reached = drop_modes(_polished(trials, misfit, 2), misfit, give_up=GIVE_UP_SOON)
+        reached = drop_modes(_polished(trials, misfit, 2), misfit, give_up=GIVE_UP_SOON, steps=steps)
         value = evidence(reached, misfit)
         if report is not None:
             report(Stage.EXCHANGE, reached.cost, reached)
@@ -127,7 +177,7 @@ def exchange_modes(
     return best
 
 
-def grow_modes(solution: Solution, misfit: Misfit, band_hz: tuple[float, float]) -> Solution:
+def grow_modes(solution: Solution, misfit: Misfit, band_hz: tuple[float, float], steps: ModeSteps = PLANES) -> Solution:
     """Return the model with one more mode for each axis, whether or not the evidence asks for it.
 
     A machine has more modes than the data can show. A model that leaves them out is sure of what it cannot know; with them the
@@ -140,11 +190,11 @@ def grow_modes(solution: Solution, misfit: Misfit, band_hz: tuple[float, float])
     misfit : Misfit
     band_hz : (float, float) [Hz]
         Lowest and highest line.
+    steps : ModeSteps
     """
-    for i in range(len(solution.layout.axes)):
+    for i in range(steps.groups(solution.layout)):
         trials = []
-        for axis in promising(solution, misfit, i, band_hz):
-            theta, layout = _with_axis(solution, i, axis)
+        for theta, layout in steps.more(solution, misfit, i, band_hz):
             trials.append(refine(misfit, theta, layout, solution.evaluation.nuisance, max_steps=6))
         solution = _polished(trials, misfit, 1)
     return solution
@@ -169,26 +219,52 @@ def promising(solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, 
     count : int
         Number of frequencies that are tried.
     """
+    layout = solution.layout
+    assert isinstance(layout, Layout)
+    places = new_modes(solution, misfit, (i,), band_hz, count)
+    axis = unpack(solution.theta[layout.axis(i)], layout.axes[i])
+    return [with_mode(axis, omega_n, (float(shape[0]), float(shape[1])), zeta) for omega_n, zeta, shape in places]
+
+
+def new_modes(
+    solution: Solution, misfit: Misfit, axes: Sequence[int], band_hz: tuple[float, float], count: int
+) -> list[tuple[float, float, FloatArray]]:
+    """Return natural frequency [rad/s], damping ratio and shape of the modes that promise most, best first; see `promising`.
+
+    Parameters
+    ----------
+    solution : Solution
+        With normal equations; its compliance tells what the shape has an entry for.
+    misfit : Misfit
+    axes : sequence of int
+        Whose lines such a mode moves.
+    band_hz : (float, float) [Hz]
+    count : int
+    """
     linear = solution.evaluation.linear
     assert linear is not None
-    data, residual = misfit.data.axes[i], solution.evaluation.residual
-    places = 2.0 * np.pi * np.geomspace(0.3 * band_hz[0], 2.5 * band_hz[1], PLACES)
-    frequency, damping = np.tile(places, len(NEW_DAMPING)), np.repeat(NEW_DAMPING, PLACES)
-    omega, size = data.omega[:, None], np.sqrt(misfit.weight(i))
-    shape = 1.0 / (frequency**2 - omega**2 + 2j * damping * frequency * omega)
-    # change of the whitened lines, shape (n o, places, 3)
-    columns = -linear.compliance[i][:, :, None, :] * shape[:, None, :, None] * size[:, :, None, None]
-    columns = columns.reshape(-1, frequency.size * 3)
-    gradient, own, mixed = linear.border(i, np.concatenate([columns.real, columns.imag]), residual)
+    entries = linear.compliance[axes[0]].shape[2]
+    directions = int(np.sqrt(2 * entries))
+    place_hz = 2.0 * np.pi * np.geomspace(0.3 * band_hz[0], 2.5 * band_hz[1], PLACES)
+    frequency, damping = np.tile(place_hz, len(NEW_DAMPING)), np.repeat(NEW_DAMPING, PLACES)
+    rows = {}
+    for i in axes:
+        omega, size = misfit.data.axes[i].omega[:, None], np.sqrt(misfit.weight(i))
+        shape = 1.0 / (frequency**2 - omega**2 + 2j * damping * frequency * omega)
+        # change of the whitened lines, shape (n o, places, entries)
+        columns = -linear.compliance[i][:, :, None, :] * shape[:, None, :, None] * size[:, :, None, None]
+        columns = columns.reshape(-1, frequency.size * entries)
+        rows[i] = np.concatenate([columns.real, columns.imag])
+    gradient, own, mixed = linear.border(rows, entries, solution.evaluation.residual)
     posterior = np.linalg.solve(solution.evaluation.hessian, np.column_stack([mixed, linear.gradient]))
-    promise, shapes = np.zeros(frequency.size), np.zeros((frequency.size, 2))
+    promise, shapes = np.zeros(frequency.size), np.zeros((frequency.size, directions))
     for k in range(frequency.size):
-        entries = slice(3 * k, 3 * k + 3)
-        matrix = own[k] - mixed[:, entries].T @ posterior[:, entries] + 1e-9 * np.trace(own[k]) * np.eye(3)
-        right = gradient[entries] - mixed[:, entries].T @ posterior[:, -1]
-        shapes[k] = _rank_one(-np.linalg.solve(matrix, right))
+        part = slice(entries * k, entries * (k + 1))
+        matrix = own[k] - mixed[:, part].T @ posterior[:, part] + 1e-9 * np.trace(own[k]) * np.eye(entries)
+        right = gradient[part] - mixed[:, part].T @ posterior[:, -1]
+        shapes[k] = rank_one(-np.linalg.solve(matrix, right))
         # what the nearest rank-one shape keeps of the promise
-        kept = np.array([shapes[k, 0] ** 2, shapes[k, 0] * shapes[k, 1], shapes[k, 1] ** 2])
+        kept = np.outer(shapes[k], shapes[k])[np.triu_indices(directions)]
         promise[k] = 2.0 * kept @ right + kept @ matrix @ kept
     if not np.all(np.isfinite(promise)):
         raise FloatingPointError("no finite promise of another mode")
@@ -197,8 +273,7 @@ def promising(solution: Solution, misfit: Misfit, i: int, band_hz: tuple[float, 
     # one of each hill: its neighbours lead to the same place
     tops = np.flatnonzero((hill <= np.append(np.inf, hill[:-1])) & (hill <= np.append(hill[1:], np.inf)))
     chosen = best[tops[np.argsort(hill[tops], kind="stable")][:count]]
-    axis = unpack(solution.theta[solution.layout.axis(i)], solution.layout.axes[i])
-    return [with_mode(axis, float(frequency[k]), (float(shapes[k, 0]), float(shapes[k, 1])), float(damping[k])) for k in chosen]
+    return [(float(frequency[k]), float(damping[k]), shapes[k]) for k in chosen]
 
 
 def merged(axis: AxisParameters) -> list[AxisParameters]:
@@ -209,7 +284,7 @@ def merged(axis: AxisParameters) -> list[AxisParameters]:
         if axis.omega_n[high] < CLOSE * axis.omega_n[low]:
             both = axis.psi[[low, high]]
             psi, omega_n, fixture = axis.psi.copy(), axis.omega_n.copy(), axis.fixture.copy()
-            psi[low] = _rank_one(np.array([both[:, 0] @ both[:, 0], both[:, 0] @ both[:, 1], both[:, 1] @ both[:, 1]]))
+            psi[low] = rank_one(np.array([both[:, 0] @ both[:, 0], both[:, 0] @ both[:, 1], both[:, 1] @ both[:, 1]]))
             # both modes' motion of the fixture, and whichever sign the new shape has
             fixture[low] = psi[low] @ (axis.fixture[[low, high]] @ both) / (psi[low] @ psi[low])
             share = np.sum(both**2, axis=1) / max(float(np.sum(both**2)), 1e-300)
@@ -218,10 +293,14 @@ def merged(axis: AxisParameters) -> list[AxisParameters]:
     return found
 
 
-def _rank_one(entries: FloatArray) -> FloatArray:
-    """Shape psi whose psi psi^T is nearest to a symmetric matrix (tt, tr, rr)."""
-    values, vectors = np.linalg.eigh(np.array([[entries[0], entries[1]], [entries[1], entries[2]]]))
-    return np.sqrt(max(values[1], 1e-4)) * vectors[:, 1]
+def rank_one(entries: FloatArray) -> FloatArray:
+    """Shape psi whose psi psi^T is nearest to a symmetric matrix, given by its upper triangle's rows: (tt, tr, rr) of one plane."""
+    size = int(np.sqrt(2 * entries.size))
+    matrix = np.zeros((size, size))
+    rows, cols = np.triu_indices(size)
+    matrix[rows, cols] = matrix[cols, rows] = entries
+    values, vectors = np.linalg.eigh(matrix)
+    return np.sqrt(max(values[-1], 1e-4)) * vectors[:, -1]
 
 
 def _polished(trials: list[Solution], misfit: Misfit, count: int, steps: int = 30) -> Solution:
@@ -231,9 +310,10 @@ def _polished(trials: list[Solution], misfit: Misfit, count: int, steps: int = 3
     return min((refine(misfit, t.theta, t.layout, t.evaluation.nuisance, steps) for t in near), key=lambda s: s.cost)
 
 
-def _with_axis(solution: Solution, i: int, axis: AxisParameters) -> tuple[FloatArray, Layout]:
+def _with_axis(solution: Solution, i: int, axis: AxisParameters) -> Trial:
     """The vector with another axis in place of axis `i`."""
     old = solution.layout
+    assert isinstance(old, Layout)
     axes = tuple(replace(a, modes=axis.order) if k == i else a for k, a in enumerate(old.axes))
     block = old.axis(i)
     theta = np.concatenate([solution.theta[: block.start], pack(axis, axes[i]), solution.theta[block.stop :]])

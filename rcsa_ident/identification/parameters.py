@@ -10,6 +10,7 @@ a passive machine with real modes.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -68,9 +69,52 @@ class AxisLayout:
         return np.concatenate([places[: self.core], places[self.size - self.pairs * self.softening :]])
 
 
+class Unknowns(ABC):
+    """Which unknown stands where in a vector: those of machines first, then what all their lines share."""
+
+    __slots__ = ()
+    #: Cutting coefficients whose scale is unknown, and clampings whose tooth angle at the trigger's edge is.
+    coefficients: int
+    clampings: int
+
+    @property
+    @abstractmethod
+    def tail(self) -> int:
+        """Place in the vector at which begins what all axes share."""
+
+    @property
+    @abstractmethod
+    def modes_of_axes(self) -> tuple[int, ...]:
+        """Numbers of modes that may be exchanged with each other without changing anything."""
+
+    @abstractmethod
+    def axis(self, i: int) -> slice:
+        """Return the part of the machines that the lines of an axis depend on."""
+
+    @property
+    def size(self) -> int:
+        """Length of the vector."""
+        return self.tail + JOINT + self.coefficients + self.clampings
+
+    @property
+    def joint(self) -> slice:
+        """Places of the logarithms of the joint's stiffnesses and damping."""
+        return slice(self.tail, self.tail + JOINT)
+
+    @property
+    def force(self) -> slice:
+        """Places of the logarithms of the cutting coefficients' scales."""
+        return slice(self.tail + JOINT, self.size - self.clampings)
+
+    @property
+    def clamping(self) -> slice:
+        """Places of the clampings' tooth angles [rad]."""
+        return slice(self.size - self.clampings, self.size)
+
+
 @dataclass(frozen=True, slots=True)
-class Layout:
-    """Which unknown stands where in the vector.
+class Layout(Unknowns):
+    """Each axis has its own machine.
 
     Parameters
     ----------
@@ -91,11 +135,6 @@ class Layout:
         return sum(a.size for a in self.axes)
 
     @property
-    def size(self) -> int:
-        """Length of the vector."""
-        return self.tail + JOINT + self.coefficients + self.clampings
-
-    @property
     def modes_of_axes(self) -> tuple[int, ...]:
         """Modes of each axis: those of one may be exchanged with each other without changing anything."""
         return tuple(a.modes for a in self.axes)
@@ -105,20 +144,11 @@ class Layout:
         first = sum(a.size for a in self.axes[:i])
         return slice(first, first + self.axes[i].size)
 
-    @property
-    def joint(self) -> slice:
-        """Places of the logarithms of the joint's stiffnesses and damping."""
-        return slice(self.tail, self.tail + JOINT)
 
-    @property
-    def force(self) -> slice:
-        """Places of the logarithms of the cutting coefficients' scales."""
-        return slice(self.tail + JOINT, self.size - self.clampings)
-
-    @property
-    def clamping(self) -> slice:
-        """Places of the clampings' tooth angles [rad]."""
-        return slice(self.size - self.clampings, self.size)
+def planes(layout: Unknowns) -> Layout:
+    """Return the layout as one whose axes have their own machines, which it is known to be."""
+    assert isinstance(layout, Layout)
+    return layout
 
 
 def flange_layout(*modes: int) -> Layout:

@@ -185,7 +185,7 @@ def test_border_is_that_of_the_dense_augmented_problem(case, i):
     # projection on what the cuts' unknowns cannot reach
     whole = whole - cuts @ np.linalg.lstsq(cuts, whole, rcond=None)[0]
     square, slope = whole.T @ whole, whole.T @ flat(residual)
-    gradient, own, mixed = case.here.linear.border(i, rows, residual)
+    gradient, own, mixed = case.here.linear.border({i: rows}, 3, residual)
     scale = np.sqrt(np.diag(square))
     np.testing.assert_allclose(gradient, slope[size:], atol=1e-5 * np.abs(slope[size:]).max())
     for k in range(2):
@@ -271,7 +271,7 @@ def test_a_cut_that_one_axis_did_not_see(few):
     std = found.linear.delay_std(np.linalg.inv(found.hessian))
     assert std[2] == pytest.approx(data.cut_prior.tooth_period[2] / np.sqrt(12.0))
     rows = np.random.default_rng(1).standard_normal((found.residual.lines[0].size, 3))
-    assert all(np.all(np.isfinite(part)) for part in found.linear.border(0, rows, found.residual))
+    assert all(np.all(np.isfinite(part)) for part in found.linear.border({0: rows}, 3, found.residual))
     both = Misfit(data, Priors(), SHARES).evaluate(theta, flange_layout(3, 2), np.zeros((len(data.cut_ids), 2)), grid=16, normal=True)
     assert np.all(np.isfinite(both.hessian))
 

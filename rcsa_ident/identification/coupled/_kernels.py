@@ -43,10 +43,14 @@ class PointArrays(NamedTuple):
 
 
 class LineArrays(NamedTuple):
-    """What the kernel fills for one axis: (n, o, 2) displacement by the force in X and in Y [m]; (n, o, q) its gradient, or (0, o, q)."""
+    """What the kernel fills for one axis: (n, o, 2) displacement by the force in X and in Y [m]; (n, o, q) its gradient, or (0, o, q);
+    (n, o, 4) v and (n, 4) x, with which a change dB of the flange's receptance moves it by v^T dB x, or (0, o, 4) and (0, 4).
+    """
 
     parts: np.ndarray
     gradient: np.ndarray
+    felt: np.ndarray
+    moved: np.ndarray
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -182,6 +186,8 @@ def coupled_lines(machine, points, lines_x, lines_y):
                 continue
             parts = lines_x.parts if axis == 0 else lines_y.parts
             gradient = lines_x.gradient if axis == 0 else lines_y.gradient
+            felt = lines_x.felt if axis == 0 else lines_y.felt
+            moved = lines_x.moved if axis == 0 else lines_y.moved
             outputs = parts.shape[1]
             for o in range(outputs):
                 # share of flange and fixture in the output
@@ -201,6 +207,9 @@ def coupled_lines(machine, points, lines_x, lines_y):
                 for c in range(4):
                     v[c] = -y[c]
                 v[2 * axis] += flange
+                for c in range(4):
+                    felt[row_number, o, c] = v[c]
+                    moved[row_number, c] = x[c]
                 for i in range(m):
                     total = fixture * back[i, 4 + axis]
                     for c in range(4):

@@ -14,7 +14,7 @@ from rcsa_ident.identification.coupled.data import CoupledData
 from rcsa_ident.identification.coupled.parameters import DIRECTIONS, CoupledLayout, CoupledParameters, chain, skew_chain, unpack
 from rcsa_ident.identification.coupled.priors import coupled_prior_rows
 from rcsa_ident.identification.misfit import Answer, Misfit, WeightedLines
-from rcsa_ident.identification.parameters import JOINT, scaled_joint
+from rcsa_ident.identification.parameters import JOINT, Unknowns, scaled_joint
 from rcsa_ident.identification.priors import PriorRows, Priors
 
 
@@ -31,17 +31,17 @@ class CoupledMisfit(Misfit):
         As in `Misfit`.
     """
 
-    def __init__(
-        self, data: CoupledData, priors: Priors, model_error: tuple[float, ...], cut_weight: FloatArray | None = None
-    ) -> None:
+    def __init__(self, data: CoupledData, priors: Priors, model_error: tuple[float, ...], cut_weight: FloatArray | None = None) -> None:
         super().__init__(data.base, priors, model_error, cut_weight)
         self.points_data = data
 
-    def prior(self, layout: CoupledLayout) -> PriorRows:  # type: ignore[override]
+    def prior(self, layout: Unknowns) -> PriorRows:
         """Return the priors of a layout's unknowns."""
+        assert isinstance(layout, CoupledLayout)
         return coupled_prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients])
 
-    def _answers(self, theta: FloatArray, layout: CoupledLayout, normal: bool) -> Sequence[Answer]:  # type: ignore[override]
+    def _answers(self, theta: FloatArray, layout: Unknowns, normal: bool) -> Sequence[Answer]:
+        assert isinstance(layout, CoupledLayout)
         data, machine, logs = self.points_data, unpack(theta, layout), theta[layout.joint]
         named = len(self.data.coefficients)
         coefficients = theta[layout.force]
@@ -77,7 +77,7 @@ class CoupledMisfit(Misfit):
             change = np.einsum("nos,nsc->noc", parts, data.slope[at][:, :, : min(named, layout.coefficients)])
             model = parts.sum(axis=2)
             extra = np.concatenate([change, model[:, :, None] * smooth[:, None, :]], axis=2)
-            answers.append(_CoupledAnswer(model, found.gradient, extra, machine, theta))
+            answers.append(_CoupledAnswer(model, found.gradient, extra, _compliance(found, factor), machine, theta))
         return answers
 
 
@@ -87,7 +87,17 @@ def _lines(axis: WeightedLines, layout: CoupledLayout, normal: bool) -> LineArra
     columns = layout.skews.start + JOINT
     if layout.skew:
         columns += layout.modes * (layout.modes - 1) // 2
-    return LineArrays(np.empty((n, o, 2), dtype=complex), np.empty((n if normal else 0, o, columns), dtype=complex))
+    rows = n if normal else 0
+    shapes = (n, o, 2), (rows, o, columns), (rows, o, DIRECTIONS), (rows, DIRECTIONS)
+    return LineArrays(*(np.empty(shape, dtype=complex) for shape in shapes))
+
+
+def _compliance(lines: LineArrays, factor: ComplexArray) -> ComplexArray:
+    """The lines' change with the flange's symmetric receptance, its upper triangle by rows, shape (n, o, 10)."""
+    rows, cols = np.triu_indices(DIRECTIONS)
+    both = lines.felt[:, :, :, None] * lines.moved[:, None, None, :]
+    found: ComplexArray = both[:, :, rows, cols] + np.where(rows != cols, both[:, :, cols, rows], 0.0)
+    return found * factor[: found.shape[0], None, None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,11 +107,13 @@ class _CoupledAnswer:
     model: ComplexArray
     gradient: ComplexArray
     extra: ComplexArray
+    compliance: ComplexArray
     machine: CoupledParameters
     theta: FloatArray
 
-    def jacobian(self, lines: WeightedLines, layout: CoupledLayout) -> tuple[FloatArray, ComplexArray]:
-        """As in `Answer`; the change with the flange's receptance is left out."""
+    def jacobian(self, lines: WeightedLines, layout: Unknowns) -> tuple[FloatArray, ComplexArray]:
+        """As in `Answer`; the flange's receptance is asked for its upper triangle by rows."""
+        assert isinstance(layout, CoupledLayout)
         gradient = self.gradient
         if layout.skew:
             first = layout.skews.start
@@ -113,4 +125,4 @@ class _CoupledAnswer:
         model = self.model.ravel()
         whiten(rows, np.empty((rows.shape[0], 0), dtype=complex), model, lines.weight, scale, own)
         extra = self.extra.reshape(rows.shape[0], -1) * -np.sqrt(lines.weight)[:, None]
-        return np.hstack([own, np.concatenate([extra.real, extra.imag])]), np.zeros((0, 0, DIRECTIONS), dtype=complex)
+        return np.hstack([own, np.concatenate([extra.real, extra.imag])]), self.compliance

@@ -21,9 +21,9 @@ from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.identification.parameters import (
     DAMPING_UNIT,
     FIXTURE_UNIT,
-    JOINT,
     RESIDUAL_UNIT,
     AxisParameters,
+    Unknowns,
     lower_factor,
     lower_triangle,
 )
@@ -37,7 +37,7 @@ EVERY_PAIR = -1
 
 
 @dataclass(frozen=True, slots=True)
-class CoupledLayout:
+class CoupledLayout(Unknowns):
     """Which unknown of both planes stands where in the vector.
 
     Parameters
@@ -89,11 +89,6 @@ class CoupledLayout:
         """Place in the vector at which the machine's own part ends."""
         return self.core + self._fixture_size + self.pairs * self.softening + self.skew_size
 
-    @property
-    def size(self) -> int:
-        """Length of the vector."""
-        return self.tail + JOINT + self.coefficients + self.clampings
-
     def axis(self, i: int) -> slice:
         """Return what an axis' lines depend on: the whole machine."""
         del i
@@ -133,21 +128,6 @@ class CoupledLayout:
     def skews(self) -> slice:
         """Places of the gyroscopic coupling."""
         return slice(self.softenings.stop, self.tail)
-
-    @property
-    def joint(self) -> slice:
-        """Places of the logarithms of the joint's stiffnesses and damping."""
-        return slice(self.tail, self.tail + JOINT)
-
-    @property
-    def force(self) -> slice:
-        """Places of the logarithms of the cutting coefficients' scales."""
-        return slice(self.tail + JOINT, self.size - self.clampings)
-
-    @property
-    def clamping(self) -> slice:
-        """Places of the clampings' tooth angles [rad]."""
-        return slice(self.size - self.clampings, self.size)
 
     @property
     def modes_of_axes(self) -> tuple[int, ...]:

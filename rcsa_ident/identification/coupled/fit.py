@@ -1,0 +1,185 @@
+"""Both planes together: from what each has found for itself to one machine, as far across as the evidence asks for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.identification.candidate import Candidate
+from rcsa_ident.identification.coupled.data import CoupledData
+from rcsa_ident.identification.coupled.misfit import CoupledMisfit
+from rcsa_ident.identification.coupled.modes import COUPLED
+from rcsa_ident.identification.coupled.parameters import CoupledLayout, pack, unpack
+from rcsa_ident.identification.coupled.score import coupled_start
+from rcsa_ident.identification.joint_fit import LEAST_SPEED_RANGE, AxisSearch, learned_noise, refine_and_learn_noise, tooth_angles
+from rcsa_ident.identification.levenberg_marquardt import Solution, refine
+from rcsa_ident.identification.method import Phase, finite, perform
+from rcsa_ident.identification.misfit import Misfit
+from rcsa_ident.identification.model_order import Report, evidence, exchange_modes, grow_modes
+from rcsa_ident.identification.parameters import Layout, planes
+from rcsa_ident.identification.priors import Priors
+from rcsa_ident.identification.progress import Stage
+from rcsa_ident.scaleout import Map
+
+#: Model errors from coarse to fine: what each plane has found for itself was bent to explain the other one's forces.
+SHARES = (0.05, 0.01, 0.003)
+#: The first of them with gyroscopic coupling, which starts as weak as this share of its prior: at none it would have no gradient.
+WITH_SKEW, FIRST_SKEW = 0.01, 0.3
+#: Most discs whose slopes make the gyroscopic coupling.
+MOST_DISCS = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoupledSearch:
+    """What a start has come to.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    evidence : float [-]
+        Minus twice the log evidence.
+    model_error : tuple of float [-]
+        Of each axis, as the search has learned it.
+    cut_weight : array, shape (k,)
+        As the search has learned it.
+    """
+
+    candidate: Candidate
+    evidence: float
+    model_error: tuple[float, ...]
+    cut_weight: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoupledStart:
+    """A polish of both planes together from what each has found for itself; it answers with a `CoupledSearch`.
+
+    Parameters
+    ----------
+    data : CoupledData
+        With the flange's motion as the only output.
+    priors : Priors
+    searched : list of AxisSearch
+        Of X and of Y.
+    skew, turning : int
+        As in `CoupledLayout`.
+    """
+
+    phase: ClassVar[Phase] = Phase.COUPLED
+    data: CoupledData
+    priors: Priors
+    searched: list[AxisSearch]
+    skew: int
+    turning: int
+
+    def run(self) -> CoupledSearch:
+        """Refine from coarse to fine, and learn the noise."""
+        theta, layout, nuisance = self._start()
+        weight = learned_noise(self.searched)[1]
+        for share in SHARES:
+            if share == WITH_SKEW and self.skew:
+                theta, layout = with_discs(theta, layout, self.skew, self.priors)
+            misfit = CoupledMisfit(self.data, self.priors, (share, share), weight)
+            found = refine(misfit, theta, layout, nuisance, 60, grid=32 if share >= WITH_SKEW else 0, tolerance=1e-3)
+            theta, nuisance = found.theta, found.evaluation.nuisance
+        shares = (SHARES[-1], SHARES[-1])
+        found, learned = refine_and_learn_noise(self._misfit, found.candidate.point, shares, weight, _unheard, 1e-4)
+        return CoupledSearch(found.candidate, evidence(found, learned), learned.model_error, learned.cut_weight)
+
+    def _misfit(self, shares: tuple[float, ...], weight: FloatArray) -> Misfit:
+        return CoupledMisfit(self.data, self.priors, shares, weight)
+
+    def _start(self) -> tuple[FloatArray, CoupledLayout, FloatArray]:
+        best = [s.candidates[0] for s in self.searched]
+        named, coefficients = len(self.data.base.coefficients), len(self.data.base.coefficient_spread)
+        force = np.zeros(coefficients)
+        force[:named] = np.mean([c.theta[c.layout.force][:named] for c in best], axis=0)
+        joint = np.mean([c.theta[c.layout.joint] for c in best], axis=0)
+        theta = np.concatenate([*(c.theta[c.layout.axis(0)] for c in best), joint, force])
+        layout = Layout(tuple(planes(c.layout).axes[0] for c in best), coefficients)
+        return *coupled_start(theta, layout, turning=self.turning), best[0].nuisance
+
+
+def with_discs(theta: FloatArray, layout: CoupledLayout, discs: int, priors: Priors) -> tuple[FloatArray, CoupledLayout]:
+    """Return a vector with more discs than it has, the new ones so weak that nothing changes but the gradient."""
+    wider = replace(layout, skew=discs)
+    rng = np.random.default_rng(discs)
+    new = FIRST_SKEW * np.sqrt(priors.skew) * rng.standard_normal(wider.skew_size - layout.skew_size)
+    return np.concatenate([theta[: layout.tail], new, theta[layout.tail :]]), wider
+
+
+def fit_coupled(
+    data: CoupledData, priors: Priors, searched: list[AxisSearch], report: Report, map: Map = map
+) -> tuple[Solution, CoupledMisfit, Solution]:
+    """Return the solution of both planes together, its misfit, and what the evidence alone would have chosen.
+
+    Parameters
+    ----------
+    data : CoupledData
+        With both outputs where they were recorded.
+    priors : Priors
+    searched : list of AxisSearch
+        Of X and of Y, each as if it did not feel the other.
+    report : callable of (stage, cost, solution)
+    map : callable
+        The builtin, or a pool's.
+    """
+    summed = data.summed()
+    kinds = ((0, 0), (1, 1), (1, -1)) if data.turns else ((0, 0),)
+    starts = finite(map(perform, [CoupledStart(summed, priors, searched, *kind) for kind in kinds]))
+    best = min(starts, key=lambda start: start.evidence)
+    omega = np.concatenate([a.omega for a in data.base.axes])
+    band = float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))
+    rough = CoupledMisfit(summed, priors, best.model_error, best.cut_weight)
+    found = refine(rough, *best.candidate.point, max_steps=60)
+    found = exchange_modes(found, rough, band, report, rounds=3, steps=COUPLED)
+
+    def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> CoupledMisfit:
+        return CoupledMisfit(data, priors, shares, weight)
+
+    def better(here: tuple[Solution, Misfit], start: tuple[FloatArray, CoupledLayout, FloatArray]) -> tuple[Solution, Misfit]:
+        there = refine_and_learn_noise(misfit_of, start, here[1].model_error, here[1].cut_weight, report)
+        return there if evidence(*there) < evidence(*here) else here
+
+    here = refine_and_learn_noise(misfit_of, _start(data, found), rough.model_error, rough.cut_weight, report)
+    while 0 < _layout(here[0]).skew < MOST_DISCS:
+        layout = _layout(here[0])
+        there = better(here, (*with_discs(here[0].theta, layout, layout.skew + 1, priors), here[0].evaluation.nuisance))
+        if there is here:
+            break
+        here = there
+    middle, half = data.base.speed_range
+    if half > LEAST_SPEED_RANGE * middle:
+        here = better(here, _start(data, here[0], softening=True))
+    chosen = here[0]
+    grown = chosen
+    for _ in range(2):
+        grown = grow_modes(grown, here[1], band, steps=COUPLED)
+    report(Stage.GROW, grown.cost, grown)
+    found, misfit = refine_and_learn_noise(misfit_of, grown.candidate.point, here[1].model_error, here[1].cut_weight, report)
+    assert isinstance(misfit, CoupledMisfit)
+    return found, misfit, chosen
+
+
+def _layout(solution: Solution) -> CoupledLayout:
+    assert isinstance(solution.layout, CoupledLayout)
+    return solution.layout
+
+
+def _start(data: CoupledData, found: Solution, softening: bool = False) -> tuple[FloatArray, CoupledLayout, FloatArray]:
+    """Return a vector with all that the data may tell, from one with less: what is new starts at nothing."""
+    old = _layout(found)
+    layout = replace(old, fixture=data.base.axes[0].outputs == 2, softening=softening, clampings=data.base.clampings)
+    discs = found.theta[old.skews].reshape(old.skew, 2, old.modes)
+    nuisance, angles = found.evaluation.nuisance, found.theta[old.clamping]
+    if not old.clampings and layout.clampings:
+        angles, nuisance = tooth_angles(data.base, nuisance)
+    machine = pack(unpack(found.theta, old), layout, discs)
+    return np.concatenate([machine, found.theta[old.joint], found.theta[old.force], angles]), layout, nuisance
+
+
+def _unheard(stage: Stage, cost: float, solution: Solution) -> None:
+    del stage, cost, solution
