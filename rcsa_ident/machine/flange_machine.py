@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance, Substructure
 from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_part import FlangePart, JointedFlange, independent_parts
@@ -27,8 +28,9 @@ class FlangeMachine(Machine):
         Coordinates at ``flange``, those of one substructure feel nothing of another's.
     known : (float, float) [rad/s]
         Lowest and highest frequency at which the flange is known.
-    joint : LumpedJoint or None
-        None where the flange holds the joint's compliance, as one that was decoupled from clamped tool-holders does.
+    joint : LumpedJoint, mapping of Dof to LumpedJoint, or None
+        Of all bending planes, or by the planes' machine axes. None (or not in the mapping) where the flange holds the joint's compliance,
+        as one that was decoupled from clamped tool-holders does.
     name : str
     ends : bool
         Whether nothing at all is known beyond `known`, as of a measurement.
@@ -45,7 +47,7 @@ class FlangeMachine(Machine):
 
     flanges: tuple[Substructure, ...]
     known: tuple[float, float]
-    joint: LumpedJoint | None = None
+    joint: LumpedJoint | Mapping[Dof, LumpedJoint] | None = None
     name: str = "flange"
     ends: bool = False
 
@@ -61,8 +63,16 @@ class FlangeMachine(Machine):
             look = flange.receptance(frozen(np.linspace(*self.known, 5)))
             for group in independent_parts(look):
                 own = flange if group == look.rows else _Group(flange, group)
-                found.append(FlangePart(group, JointedFlange(own, self.joint)))
+                found.append(FlangePart(group, JointedFlange(own, self._joint(group))))
         return tuple(found)
+
+    def _joint(self, group: tuple[Coordinate, ...]) -> LumpedJoint | None:
+        if not isinstance(self.joint, Mapping):
+            return self.joint
+        first, *others = (self.joint.get(c.dof.plane) for c in group)
+        if any(each != first for each in others):
+            raise InputError("flange joint", "another one for X than for Y", "one joint for bending planes that feel each other")
+        return first
 
     @property
     def band(self) -> tuple[float, float]:

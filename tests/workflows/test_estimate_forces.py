@@ -10,6 +10,7 @@ import pytest
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
+from rcsa_ident.io.flanges import read_flange_machine, write_flange_machine
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.observer.tuning import PaperWalk, Resonators
@@ -18,7 +19,7 @@ from rcsa_ident.signals.measurement import NO_AIR
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.workflows.estimate_forces import observe, trigger_speed, wear_of
 from tests.fixtures import by_hand
-from tests.fixtures.flange_machine import BAND, flange_machine, paper_cut
+from tests.fixtures.flange_machine import BAND, decoupled_file, flange_machine, paper_cut
 from tests.fixtures.virtual_cut import relative_error, virtual_cut
 
 RPM = np.pi / 30.0
@@ -99,6 +100,22 @@ def test_a_measured_flange_gives_the_forces_of_its_modes(found):
     high = watch(paper_cut().cut, paper_cut().air, machine=measured(450.0, 4400.0))
     assert high.band[0] == 2.0 * np.pi * 450.0
     assert any("harmonics below 450 Hz are left out" in note for note in high.notes)
+
+
+@pytest.mark.slow
+def test_a_flange_that_holds_its_joint_is_refused(tmp_path, found):
+    """It tells the tip, and not the spindle's motion behind the joint, which is what the sensor sees."""
+    decoupled = read_flange_machine(decoupled_file(tmp_path / "FLANGE.csv"))
+    with pytest.raises(InputError, match=r"machine: found a flange that holds .* \(X, Y\), allowed is .*bare flange with its joint"):
+        watch(paper_cut().cut, paper_cut().air, machine=decoupled)
+    # with the joint of one axis alone, and a record of both
+    bare = measured(373.0, 4400.0)
+    with pytest.raises(InputError, match=r"\(Y\)"):
+        watch(paper_cut().cut, paper_cut().air, machine=replace(bare, joint={Dof.X: bare.joint}))
+    # by its file a bare flange with its joint is what it was
+    write_flange_machine(tmp_path / "BARE.csv", bare)
+    again = watch(paper_cut().cut, paper_cut().air, machine=read_flange_machine(tmp_path / "BARE.csv"))
+    assert np.all(relative_error(again.estimate.force, paper_cut().force, paper_cut().cut.rate) < 0.03)
 
 
 @pytest.mark.slow
