@@ -25,7 +25,7 @@ class FlangeMachine(Machine):
     Parameters
     ----------
     flanges : tuple of Substructure
-        Coordinates at ``flange``, those of one substructure feel nothing of another's.
+        Coordinates at ``flange``, each of one substructure alone; those of one feel nothing of another's.
     known : (float, float) [rad/s]
         Lowest and highest frequency at which the flange is known.
     joint : LumpedJoint, mapping of Dof to LumpedJoint, or None
@@ -54,6 +54,10 @@ class FlangeMachine(Machine):
     def __post_init__(self) -> None:
         if not self.flanges or not 0.0 <= self.known[0] < self.known[1]:
             raise InputError("flange", f"{len(self.flanges)} from {self.known[0]:g} to {self.known[1]:g} rad/s", "one or more, in a band")
+        taken = [c for part in self.parts for c in part.coordinates]
+        twice = dict.fromkeys(str(c) for c in taken if taken.count(c) > 1)
+        if twice:
+            raise InputError("flange coordinates", f"{', '.join(twice)} of several flanges", "each bending plane of one flange alone")
 
     @cached_property
     def parts(self) -> tuple[FlangePart, ...]:

@@ -211,6 +211,13 @@ def test_a_flange_is_one_or_more_in_a_band():
             FlangeMachine(flanges, band)
 
 
+def test_a_bending_plane_of_two_flanges_is_refused():
+    x, y = one_plane(Dof.X), one_plane(Dof.Y)
+    for flanges, words in (((x, x), "flange.x, flange.x'"), ((y, oblique()), "flange.y, flange.y'")):
+        with pytest.raises(InputError, match=f"found {words} of several flanges"):
+            FlangeMachine(flanges, BAND, JOINT)
+
+
 def test_a_joint_of_each_bending_plane():
     x, y = one_plane(Dof.X), one_plane(Dof.Y, 0.93)
     other = LumpedJoint(1e9, 3e6)
