@@ -15,6 +15,8 @@ from rcsa_ident.dynamics.receptance import Receptance, Substructure
 from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_part import FlangePart, JointedFlange, independent_parts
 from rcsa_ident.machine.machine import STEP, Machine
+from rcsa_ident.machine.measured import MeasuredFlange
+from rcsa_ident.remarks import Remark
 from rcsa_ident.units import to_hz
 
 
@@ -68,6 +70,19 @@ class FlangeMachine(Machine):
             for group in independent_parts(look):
                 own = flange if group == look.rows else _Group(flange, group)
                 found.append(FlangePart(group, JointedFlange(own, self._joint(group))))
+        return tuple(found)
+
+    @cached_property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What speaks against everything that is computed with it: frequencies of a measurement that lie too far apart."""
+        found = []
+        for flange in self.flanges:
+            if isinstance(flange, MeasuredFlange):
+                low, high = max(flange.band[0], self.known[0]), min(flange.band[1], self.known[1])
+                omega = self.lines()
+                remark = flange.coarse(omega[(omega >= low) & (omega <= high)])
+                if remark is not None:
+                    found.append(remark.of(", ".join(c.dof.upper() for c in flange.coordinates if not c.dof.is_slope)))
         return tuple(found)
 
     def _joint(self, group: tuple[Coordinate, ...]) -> LumpedJoint | None:

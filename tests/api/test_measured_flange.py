@@ -204,3 +204,14 @@ def test_forces_with_the_sensors_of_the_query(client: Client, http, tmp_path):
     assert problem.status_code == 422
     assert problem.json()["errors"][0]["field"] == "machine"
     assert "a flange that holds the compliance of its joint" in problem.json()["detail"]
+
+
+def test_a_flange_measured_too_coarsely_is_said(client, text):
+    head, *rows = text.splitlines()
+    id = client.make_machine("m").id
+    client.identify(id, "\n".join([head, *rows[::60]]) + "\n")
+    client.write_tooling("T1", by_hand.TOOLING)
+    (lobes,) = client.lobes(id, "T1", speeds=SPEEDS, cut=CUT).toolings
+    for warnings in (client.tooltip(id, "T1").warnings, lobes.warnings):
+        for axis in "XY":
+            assert any(w.startswith(f"{axis}: flange measured too coarsely") for w in warnings)

@@ -128,6 +128,18 @@ def test_a_hammer_test_behind_the_joint_does_not_stand_beside_a_decoupled_flange
     run("compare", flange, monitored / "T.toml", "--hammer", f"tip={monitored / 'tap.csv'}")
 
 
+def test_a_flange_measured_too_coarsely_is_said(tmp_path, tooling_file, flange):
+    """Where whatever else speaks against a machine is said: warnings of the answer, and lines of the console."""
+    head, *rows = flange.read_text(encoding="utf-8").splitlines()
+    flange.write_text("\n".join([head, *rows[::60]]) + "\n", encoding="utf-8")
+    asked = ("lobes", flange, tooling_file, *CUT, *SPEEDS, "--out", tmp_path / "L.csv")
+    for axis in "XY":
+        assert any(w.startswith(f"{axis}: flange measured too coarsely") for w in answer_of(*asked)["warnings"])
+        assert f"{axis}: flange measured too coarsely" in run(*asked).stderr.replace("\n", " ")
+    tip = run("tooltip", flange, tooling_file, "--out", tmp_path / "F.csv")
+    assert "flange measured too coarsely" in tip.stderr.replace("\n", " ")
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -17,7 +17,7 @@ from rcsa_ident.dynamics.structure import Structure
 from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.machine import LOWEST
-from rcsa_ident.machine.measured import MeasuredFlange
+from rcsa_ident.machine.measured import FlangeCode, MeasuredFlange
 from rcsa_ident.tool_holder.model import tool_holder_receptance, tool_holder_structure
 from tests.coupling.test_rcsa import TOOL, spindle_structure
 from tests.machine.planes import (
@@ -231,6 +231,15 @@ def test_a_joint_of_each_bending_plane():
     assert FlangeMachine((oblique(),), BAND, {Dof.X: JOINT, Dof.Y: JOINT}).parts[0].believed.joint == JOINT
     with pytest.raises(InputError, match="one joint for bending planes that feel each other"):
         FlangeMachine((oblique(),), BAND, {Dof.X: JOINT, Dof.Y: other})
+
+
+def test_a_coarse_measurement_speaks_against_the_machine():
+    """Between the lowest and the highest frequency that both know; modes and a fine measurement say nothing."""
+    (remark,) = FlangeMachine((sampled(60.0),), BAND, JOINT).remarks
+    assert remark.code is FlangeCode.COARSE
+    assert remark.startswith("X, Y: flange measured too coarsely")
+    for flange in (sampled(2.0), oblique()):
+        assert FlangeMachine((flange,), BAND, JOINT).remarks == ()
 
 
 def test_a_measured_flange_gives_what_its_modes_give():
