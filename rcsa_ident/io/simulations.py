@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.hdf5 import write_hdf5
@@ -86,11 +86,21 @@ def write_simulation(
             progress(done, total)
     write_text(truth / "records.csv", "\n".join(rows) + "\n")
     for true in receptances:
-        _write_columns(truth / "tip" / f"{true.tooling}.csv", ("frequency_hz",), true.frequency_hz, true.tip)
-        _write_columns(truth / "cross" / f"{true.tooling}.csv", ("frequency_hz",), true.frequency_hz, true.cross)
+        for place, values in (("tip", true.tip), ("cross", true.cross)):
+            names, columns = _directions(values)
+            _write_columns(truth / place / f"{true.tooling}.csv", ("frequency_hz",), true.frequency_hz, columns, names)
     names = [f"{axis}_{entry}" for axis in "XY" for entry in ("tF", "tM", "rF", "rM")]
     _write_columns(truth / "spindle.csv", ("frequency_hz",), flange.frequency_hz, flange.values.reshape(-1, 8), names)
     return SimulatedCampaign(out, truth, total)
+
+
+def _directions(values: ComplexArray) -> tuple[list[str], ComplexArray]:
+    """Names and columns of a 2 x 2 receptance: direct terms, then motion in X under a force in Y and the reverse, where there are some."""
+    chosen = [(0, 0), (1, 1)]
+    if np.any(values[:, 0, 1]) or np.any(values[:, 1, 0]):
+        chosen += [(0, 1), (1, 0)]
+    names = ["XY"[row] if row == col else "XY"[row] + "XY"[col] for row, col in chosen]
+    return names, np.stack([values[:, row, col] for row, col in chosen], axis=1)
 
 
 def _write_columns(path: Path, first: tuple[str], abscissa: FloatArray, values: np.ndarray, names: Sequence[str] = ("X", "Y")) -> None:

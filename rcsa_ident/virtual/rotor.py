@@ -74,9 +74,7 @@ def rotor(spindle: VirtualSpindle, tooling: ToolAssembly | None, refinement: int
     housing = mesh.new_node()
     freedoms = 2 * mesh.count
     x, y, between = (_block(mesh, spindle, tooling is not None, nodes, housing, *axes) for axes in ((0, 0), (1, 1), (0, 1)))
-    blocks = {
-        name: scipy.sparse.csc_array(scipy.sparse.block_array([[x[name], between[name]], [between[name], y[name]]])) for name in x
-    }
+    blocks = {name: scipy.sparse.csc_array(scipy.sparse.block_array([[x[name], between[name]], [between[name], y[name]]])) for name in x}
     turning = mesh.sum(mesh.rotary, freedoms)
     if not spindle.gyroscopic:
         turning = scipy.sparse.csc_array((freedoms, freedoms))
