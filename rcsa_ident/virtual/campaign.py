@@ -70,8 +70,8 @@ class TrueFlange:
     Parameters
     ----------
     frequency_hz : array, shape (n,)
-    values : complex array, shape (n, 2, 2, 2)
-        Axis (X, Y), then [[tF, tM], [rF, rM]].
+    values : complex array, shape (n, 4, 4)
+        Translation and slope in X, then in Y, under force and moment in X, then in Y.
     """
 
     frequency_hz: FloatArray

@@ -156,7 +156,7 @@ class VirtualSpindle:
     @property
     def coupled(self) -> bool:
         """True where a force in X also moves the tool in Y."""
-        return self.gyroscopic or any(part.angle != 0.0 for part in (self.housing, *self.bearings))
+        return self.gyroscopic or any(angle != 0.0 for angle in (self.housing.angle, *(b.angle for b in self.bearings)))
 
 
 def _pair(field: str, values: PerAxis, check: Callable[[str, float, str], float], unit: str = "") -> None:

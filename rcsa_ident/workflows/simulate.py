@@ -85,12 +85,19 @@ def true_receptances(setup: VirtualSetup, tooling: Tooling, speed: float | None 
     return TrueReceptances(tooling.name, speed, frequency, values[:, :2], values[:, 2:])
 
 
+def truth_speeds(setup: VirtualSetup) -> tuple[float, ...]:
+    """Return the spindle speeds [rad/s] at which the truth is wanted: the mean of the plan's, then, where it matters, its ends."""
+    programmed = setup.plan.spindle_speeds
+    ends = (min(programmed), max(programmed)) if setup.spindle.speed_dependent else ()
+    return tuple(dict.fromkeys((float(np.mean(programmed)), *ends)))
+
+
 def true_flange(setup: VirtualSetup) -> TrueFlange:
     """Return the flange receptances without a tooling, from the full equations at the mean of the programmed speeds."""
     frequency, speed = _truth_frequency(), float(np.mean(setup.plan.spindle_speeds))
     planes = ("flange.x", "flange.x'", "flange.y", "flange.y'")
     values = frequency_response(rotor(setup.spindle, None), 2.0 * np.pi * frequency, speed, inputs=planes, outputs=planes)
-    return TrueFlange(frequency, np.stack([values[:, :2, :2], values[:, 2:, 2:]], axis=1))
+    return TrueFlange(frequency, values)
 
 
 def _truth_frequency() -> FloatArray:
