@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.machines import CONDITIONS, EVALUATION
+from benchmarks.machines import CONDITIONS, named
 from benchmarks.page import append_row, read_rows
 from benchmarks.study import Run, machine_of, perform
 from rcsa_ident.arrays import FloatArray
@@ -277,12 +277,12 @@ def main(arguments: Sequence[str]) -> None:
         prog="benchmarks lobes_truth", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--scratch", type=Path, help="folder of campaigns and results of the study; default: a new temporary one")
-    parser.add_argument("--machines", nargs="+", default=[str(s) for s in EVALUATION], help="seeds, or names in data/machines")
+    parser.add_argument("--machines", nargs="+", default=["drawn"], help="as of the study (default: drawn)")
     parser.add_argument("--condition", choices=tuple(CONDITIONS), default="no-trigger")
     parser.add_argument("--seed", type=int, default=1, help="of the search")
     parser.add_argument("--cuts", type=int, default=CUTS)
     given = parser.parse_args(arguments)
     scratch = given.scratch or Path(tempfile.mkdtemp(prefix="rcsa-ident-study-"))
-    rows = run(scratch, given.machines, given.condition, given.seed, given.cuts)
+    rows = run(scratch, named(given.machines), given.condition, given.seed, given.cuts)
     if rows:
         print(f"\n{table(rows)}")

@@ -8,6 +8,7 @@ identification of the development machines: docs/study.md says what changed then
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -85,6 +86,9 @@ duration_s = 0.28
 settling_s = 0.25
 """
 
+#: What the names of the coupled machines begin with; those of the others are their seeds alone.
+_COUPLED = "coupled-"
+
 Holder = dict[str, Any]
 Tool = dict[str, Any]
 
@@ -123,6 +127,23 @@ def random_machine(seed: int, folder: Path, coupled: bool = False) -> Path:
         depth *= 0.9
     write(depth)
     return path
+
+
+def drawn(name: str) -> tuple[int, bool] | None:
+    """Return seed and whether it is coupled of a drawn machine, as ``3`` or ``coupled-203``; None of another name."""
+    seed = name.removeprefix(_COUPLED)
+    return (int(seed), seed != name) if seed.isdigit() else None
+
+
+def is_coupled(name: str) -> bool:
+    """Return whether the name is that of a coupled machine."""
+    return (drawn(name) or (0, False))[1]
+
+
+def named(names: Sequence[str]) -> list[str]:
+    """Return the machines' names; ``drawn`` and ``coupled`` stand for the ten of either kind."""
+    groups = {"drawn": [str(seed) for seed in EVALUATION], "coupled": [f"{_COUPLED}{seed}" for seed in COUPLED]}
+    return [each for name in names for each in groups.get(name, [name])]
 
 
 def under(machine: MachineFile, condition: str) -> MachineFile:
