@@ -69,7 +69,7 @@ def test_coupled_seeds_are_fixed_and_their_machines_stay_what_they_were(coupled)
     assert COUPLED == (201, 202, 203, 204, 205, 206, 207, 208, 209, 210)
     assert COUPLED_DEVELOPMENT == (301, 302, 303)
     joined = "".join(text for path, _ in coupled.values() for text in texts(path.parent).values())
-    assert hashlib.sha256(joined.encode()).hexdigest() == ""
+    assert hashlib.sha256(joined.encode()).hexdigest() == "16f583bb30ee7b60fdb21c250394da898d85f3215d042f67515f46401665013b"
 
 
 def test_a_coupled_machine_is_the_same_seeds_machine_with_turned_elements_and_gyroscopic_moments(coupled):
