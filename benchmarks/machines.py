@@ -27,7 +27,7 @@ from rcsa_ident.workflows.simulate import true_receptances
 
 EVALUATION = tuple(range(1, 11))
 DEVELOPMENT = (101, 102, 103)
-#: Seeds of the coupled machines, by the same rule; fixed on 2026-11-22, before any identification knew of cross terms.
+#: Seeds of the coupled machines, by the same rule; fixed on 2026-11-22, before the package identified cross terms.
 COUPLED = tuple(range(201, 211))
 COUPLED_DEVELOPMENT = (301, 302, 303)
 #: Housing and bearings of a coupled machine are turned by at most so much [deg].

@@ -5,8 +5,8 @@ and identified, the result is written and read; its tooltip FRFs are compared wi
 Every finished run is a line of ``results.jsonl`` in the scratch folder; a study that was interrupted goes on from there.
 
 `benchmarks.comparison` says what the errors are. Beside the ten machines of the first study stand ten whose planes are coupled
-(``--machines drawn coupled``): seeds 201 to 210, and 301 to 303 for development, fixed on 2026-11-22, before any identification
-knew of cross terms; none of the ten had been identified or looked at by then.
+(``--machines drawn coupled``): seeds 201 to 210, and 301 to 303 for development, fixed on 2026-11-22, before the package
+identified cross terms; the ten had not been simulated by then, nor their truth computed.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ import pytest
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.virtual.machine import Bearing
+from rcsa_ident.virtual.milling import mill_cut
 from rcsa_ident.virtual.reduction import poles, reduced
 from rcsa_ident.virtual.rotor import frequency_response, rotor, turned
 
@@ -139,3 +140,19 @@ def test_an_angle_beyond_half_a_turn_is_refused(hpm, angle):
         Bearing(0.05, (1e8, 1e8), (1e3, 1e3), angle=angle)
     with pytest.raises(InputError, match=r"housing\.angle"):
         dataclasses.replace(hpm.spindle.housing, angle=angle)
+
+
+def test_a_turned_machine_with_its_feed_turned_cuts_as_before(hpm, tooling):
+    angle = np.radians(30.0)
+    c, s = np.cos(angle), np.sin(angle)
+    histories = []
+    for own in (0.0, angle):
+        spindle = with_angles(hpm.spindle, np.degrees(own), np.degrees(own), gyroscopic=True)
+        dynamics = poles(reduced(rotor(spindle, tooling.assembly)), SPEED)
+        conditions = dataclasses.replace(hpm.plan.conditions(SPEED), feed_angle=own)
+        histories.append(mill_cut(dynamics, tooling.cutter, conditions, hpm.workpiece.coefficients, 5e-6, 4000))
+    turn = np.array([[c, -s], [s, c]])
+    for name in ("force", "tip", "flange", "fixture"):
+        straight, oblique = (getattr(history, name) for history in histories)
+        # a reduced machine whose planes are coupled has a few shapes more
+        assert np.allclose(oblique, straight @ turn.T, rtol=0.0, atol=1e-3 * np.abs(straight).max())
