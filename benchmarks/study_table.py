@@ -146,17 +146,17 @@ def coupled_table(rows: Sequence[dict[str, Any]]) -> str:
             seconds = np.median([sum(row["seconds"].values()) for row in group])
             lines.append("| " + " | ".join([*cells, f"{converged} of {len(group)}", f"{seconds:.1f}"]) + " |")
     aims, most = (", ".join(f"{kind} {aim:g}" for kind, aim in these.items()) for these in (COUPLED_AIMS, COUPLED_WORST))
-    above = sum(r["status"] == "converged" and max(e for kind in AIMS for e in r[kind]["errors"]) > WORST for r in members)
+    above = counts(members)["converged above"]
     lines += ["", f"Aims: medians {aims}; worst {most}; cross terms {CROSS_AIM:g} of their own norm.", "", *_bands(rows), ""]
     lines += [f"Of {len(members)} runs, {above} are `converged` with an error above {WORST} in a tooling that never cut.", ""]
     columns = [f"{kind} {name}" if name == "XX" else name for kind in COUPLED_AIMS for name in ("XX", "YY", "XY / XX", "XY / XY")]
     lines += ["| machine | condition | seed | " + " | ".join(columns) + " | status | seconds |", "|" + "---|" * (len(columns) + 5)]
     for row in members:
-        errors = []
+        shown: list[float] = []
         for kind in COUPLED_AIMS:
             found = row[kind]
-            errors += [max(found["errors"][0::2]), max(found["errors"][1::2]), max(found["cross"]), max(found["cross_own"])]
-        cells = [row["machine"], row["condition"], str(row["seed"]), *(f"{e:.4f}" for e in errors), row["status"]]
+            shown += [max(found["errors"][0::2]), max(found["errors"][1::2]), max(found["cross"]), max(found["cross_own"])]
+        cells = [row["machine"], row["condition"], str(row["seed"]), *(f"{e:.4f}" for e in shown), row["status"]]
         lines.append("| " + " | ".join([*cells, f"{sum(row['seconds'].values()):.1f}"]) + " |")
     doubts = [f"- {r['machine']}, {r['condition']}: {reason}" for r in members for reason in r["reasons"]]
     return "\n".join([*lines, "", *doubts]).rstrip() + "\n"
