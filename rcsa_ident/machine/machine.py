@@ -24,6 +24,7 @@ from rcsa_ident.shown import Drawn, Shown
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.tool_holder.turning import turning_receptance
 
 #: Lower end of the receptances that limits are computed from, and their step [Hz].
 LOWEST, STEP = 100.0, 1.0
@@ -106,6 +107,14 @@ class Machine(TipSource, Drawn):
         return False
 
     @property
+    def turning(self) -> float | None:
+        """Spindle speed [rad/s] at which tool-holders on it have their gyroscopic moments, positive from +Y to +X; None: they have none.
+
+        The moments couple the planes: a machine that turns is one part, with translation and slope of X and of Y.
+        """
+        return None
+
+    @property
     def lowest(self) -> float:
         """Frequency [rad/s] at which curves begin unless another is asked for: 100 Hz, or where a measurement begins."""
         assert self.band is not None
@@ -168,8 +177,10 @@ class Machine(TipSource, Drawn):
         UncertainReceptance
             Points ``tip`` and ``spindle``; the tool-holder is taken for exact.
         """
-        holder = tool_holder_receptance(_assembly(tooling), frozen(omega))
-        return respond_over(self._along(axes), frozen(omega), at_ends, holder)
+        assembly, omega = _assembly(tooling), frozen(omega)
+        turning = self.turning
+        holder = tool_holder_receptance(assembly, omega) if turning is None else turning_receptance(assembly, omega, turning)
+        return respond_over(self._along(axes), omega, at_ends, holder)
 
     def tip(
         self,
@@ -191,7 +202,7 @@ class Machine(TipSource, Drawn):
             Standard deviation of the tool-holder's stiffness, as a share: the mesh alone by default; 0.01 for a modulus from a handbook.
         """
         sides = self.sides(self.lines() if omega is None else omega)
-        tip = tip_over_sides(sides, _assembly(tooling), stiffness_spread)
+        tip = tip_over_sides(sides, _assembly(tooling), stiffness_spread, self.turning)
         return tip if spread else replace(tip, variation=None)
 
     def _along(self, axes: Sequence[Dof] | None) -> list[FlangePart]:
