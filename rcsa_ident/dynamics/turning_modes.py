@@ -92,36 +92,25 @@ class TurningModes(Shown):
         if self._stiffness[0].min(initial=1.0) <= 0.0:
             raise InputError("stiffness_change", "one that leaves no stiffness", "a stiffness that stays positive definite")
 
+    @property
+    def stiffness(self) -> FloatArray:
+        """K, shape (m, m) [rad^2/s^2]."""
+        own = np.diag(self.omega_n**2)
+        return own if self.stiffness_change is None else own + 0.5 * (self.stiffness_change + self.stiffness_change.T)
+
     @cached_property
     def _stiffness(self) -> tuple[FloatArray, FloatArray]:
         """Eigenvalues of K, and the shapes that go with them."""
         if self.stiffness_change is None:
             return self.omega_n**2, np.eye(self.omega_n.size)
-        squares, turn = np.linalg.eigh(np.diag(self.omega_n**2) + 0.5 * (self.stiffness_change + self.stiffness_change.T))
+        squares, turn = np.linalg.eigh(self.stiffness)
         return squares, turn
 
     @cached_property
     def _poles(self) -> PoleResidue:
         squares, turn = self._stiffness
-        natural, psi = np.sqrt(squares), turn.T @ self.psi
-        damping, moments = turn.T @ self.damping @ turn, self.speed * (turn.T @ self.gyroscopic @ turn)
-        value, right = _free_motions(natural, damping + moments)
-        for _ in range(3):
-            # two poles that are about to become one have a single shape: a few millionths more damping tell them apart
-            if np.linalg.cond(right) < _COINCIDING:
-                break
-            damping = damping * (1.0 + _MORE_DAMPING)
-            value, right = _free_motions(natural, damping + moments)
-        m = natural.size
-        force = np.zeros((2 * m, psi.shape[1]))
-        force[m:] = psi
-        inputs = np.linalg.solve(right, force)
-        outputs = (psi / natural[:, None]).T @ right[:m]
-        kept = value.imag >= 0.0
-        outputs = np.where(value.imag == 0.0, 0.5, 1.0) * outputs
-        value, outputs, inputs = value[kept], outputs[:, kept], inputs[kept]
-        order = np.argsort(np.abs(value), kind="stable")
-        return PoleResidue(value[order], outputs[:, order], inputs[order], self.residual)
+        moments = self.speed * (turn.T @ self.gyroscopic @ turn)
+        return gyroscopic_poles(np.sqrt(squares), turn.T @ self.damping @ turn, moments, turn.T @ self.psi, self.residual)
 
     def pole_residue(self) -> PoleResidue:
         """Return the same as poles and residues between all coordinates, left and right shapes apart."""
@@ -144,6 +133,34 @@ class TurningModes(Shown):
     def __str__(self) -> str:
         turning = f"{to_rpm(self.speed):.0f} rev/min"
         return f"{', '.join(str(c) for c in self.coordinates)} at {turning}: {frequencies('modes', self.omega_n)}"
+
+
+def gyroscopic_poles(natural: FloatArray, damping: FloatArray, moments: FloatArray, psi: FloatArray, residual: FloatArray) -> PoleResidue:
+    """Return psi^T [diag(natural^2) - w^2 + i w (damping + moments)]^-1 psi + residual as poles, rising.
+
+    Parameters
+    ----------
+    natural : array, shape (m,) [rad/s]
+    damping, moments : array, shape (m, m) [rad/s]
+        Symmetric and skew.
+    psi : array, shape (m, d) [1/sqrt(kg), 1/sqrt(kg m^2)]
+    residual : array, shape (d, d) [m/N, rad/N, m/(N m), rad/(N m)]
+    """
+    value, right = _free_motions(natural, damping + moments)
+    for _ in range(3):
+        # two poles that are about to become one have a single shape: a few millionths more damping tell them apart
+        if np.linalg.cond(right) < _COINCIDING:
+            break
+        damping = damping * (1.0 + _MORE_DAMPING)
+        value, right = _free_motions(natural, damping + moments)
+    m = natural.size
+    force = np.zeros((2 * m, psi.shape[1]))
+    force[m:] = psi
+    inputs = np.linalg.solve(right, force)
+    outputs = np.where(value.imag == 0.0, 0.5, 1.0) * ((psi / natural[:, None]).T @ right[:m])
+    kept = np.flatnonzero(value.imag >= 0.0)
+    order = kept[np.argsort(np.abs(value[kept]), kind="stable")]
+    return PoleResidue(value[order], outputs[:, order], inputs[order], residual)
 
 
 def _free_motions(natural: FloatArray, velocity: FloatArray) -> tuple[ComplexArray, ComplexArray]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.machine.flange_part import FlangePart
+from rcsa_ident.machine.mode_synthesis import poles_of
 from rcsa_ident.machine.responses import at_ends, at_flange, respond_over
 from rcsa_ident.machine.tip import Side, tip_over_sides
 from rcsa_ident.machining_setup import Tooling, Workpiece
@@ -202,7 +204,10 @@ class Machine(TipSource, Drawn):
             Standard deviation of the tool-holder's stiffness, as a share: the mesh alone by default; 0.01 for a modulus from a handbook.
         """
         sides = self.sides(self.lines() if omega is None else omega)
-        tip = tip_over_sides(sides, _assembly(tooling), stiffness_spread, self.turning)
+        assembly, turning = _assembly(tooling), self.turning
+        tip = tip_over_sides(sides, assembly, stiffness_spread, turning)
+        if turning is not None:
+            tip = replace(tip, poles=partial(poles_of, assembly, sides[0].part.believed, float(tip.omega[-1])))
         return tip if spread else replace(tip, variation=None)
 
     def _along(self, axes: Sequence[Dof] | None) -> list[FlangePart]:

@@ -8,15 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.turning_modes import TurningModes
 from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_part import FlangePart, JointedFlange
 from rcsa_ident.machine.machine import Machine
+from rcsa_ident.machine.mode_synthesis import FLANGE
 from rcsa_ident.units import to_hz, to_rpm
-
-#: Directions of the flange, X plane and Y plane.
-FLANGE = (*plane("flange", Dof.X), *plane("flange", Dof.Y))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

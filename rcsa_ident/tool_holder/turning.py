@@ -200,10 +200,23 @@ def turning_pair(
     return TurningToolHolder.of(assembly, highest, fastest, shear_coefficient).pair(omega, ratio)
 
 
+def turning_tool_holder(assembly: ToolAssembly, highest: float, speed: float) -> TurningToolHolder:
+    """Return a reduced assembly that is good for a spindle speed; those who ask at many speeds find it made.
+
+    Parameters
+    ----------
+    assembly : ToolAssembly
+    highest : float [rad/s]
+        Frequency up to which it is good.
+    speed : float [rad/s]
+        Of either sense.
+    """
+    return _kept(assembly, highest, 2.0 ** float(np.ceil(np.log2(max(abs(speed), 1.0)))))
+
+
 @lru_cache(maxsize=8)
-def turning_tool_holder(assembly: ToolAssembly, highest: float, rung: int) -> TurningToolHolder:
-    """Return the reduced assembly for spindle speeds up to 2^rung rad/s: those who ask at many speeds find it made."""
-    return TurningToolHolder.of(assembly, highest, 2.0**rung)
+def _kept(assembly: ToolAssembly, highest: float, fastest: float) -> TurningToolHolder:
+    return TurningToolHolder.of(assembly, highest, fastest)
 
 
 def entries_at_speed(
@@ -220,8 +233,7 @@ def entries_at_speed(
     places : sequence of (row, column)
         Of translation and slope of the tip, then of the flange.
     """
-    rung = int(np.ceil(np.log2(max(abs(speed), 1.0))))
-    return turning_tool_holder(assembly, float(omega[-1]), rung).at_speed(omega, speed, places)
+    return turning_tool_holder(assembly, float(omega[-1]), speed).at_speed(omega, speed, places)
 
 
 def turning_receptance(assembly: ToolAssembly, omega: FloatArray, speed: float) -> Receptance:

@@ -15,7 +15,8 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation
 from rcsa_ident.machine.machine import Machine
-from rcsa_ident.machine.turning_machine import FLANGE, TurningMachine
+from rcsa_ident.machine.mode_synthesis import FLANGE
+from rcsa_ident.machine.turning_machine import TurningMachine
 from rcsa_ident.tool_holder.geometry import stiffened
 from rcsa_ident.tool_holder.turning import turning_receptance
 from rcsa_ident.virtual.rotor import frequency_response
