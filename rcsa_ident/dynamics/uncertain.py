@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.receptance import Receptance
 
 Places = NDArray[np.intp]
@@ -63,9 +64,12 @@ class UncertainReceptance(Receptance):
         As of a `Receptance`; rows and columns are the same.
     variation : Spread or None
         None where the receptance is taken for exact.
+    poles : callable, returns PoleResidue or None; default none
+        What stands for it where modes are needed, known without a fit; asked only then.
     """
 
     variation: Spread | None = None
+    poles: Callable[[], PoleResidue | None] | None = None
 
     @property
     def spread(self) -> ComplexArray:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_part import FlangePart
+from rcsa_ident.machine.mode_synthesis import poles_of
 from rcsa_ident.machine.responses import at_ends, at_flange, respond_over
 from rcsa_ident.machine.tip import Side, tip_over_sides
 from rcsa_ident.machining_setup import Tooling, Workpiece
@@ -25,6 +27,7 @@ from rcsa_ident.shown import Drawn, Shown
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.tool_holder.turning import turning_receptance
 
 #: Lower end of the receptances that limits are computed from, and their step [Hz].
 LOWEST, STEP = 100.0, 1.0
@@ -107,6 +110,14 @@ class Machine(TipSource, Drawn):
         return False
 
     @property
+    def turning(self) -> float | None:
+        """Spindle speed [rad/s] at which tool-holders on it have their gyroscopic moments, positive from +Y to +X; None: they have none.
+
+        The moments couple the planes: a machine that turns is one part, with translation and slope of X and of Y.
+        """
+        return None
+
+    @property
     def lowest(self) -> float:
         """Frequency [rad/s] at which curves begin unless another is asked for: 100 Hz, or where a measurement begins."""
         assert self.band is not None
@@ -169,8 +180,10 @@ class Machine(TipSource, Drawn):
         UncertainReceptance
             Points ``tip`` and ``spindle``; the tool-holder is taken for exact.
         """
-        holder = tool_holder_receptance(_assembly(tooling), frozen(omega))
-        return respond_over(self._along(axes), frozen(omega), at_ends, holder)
+        assembly, omega = _assembly(tooling), frozen(omega)
+        turning = self.turning
+        holder = tool_holder_receptance(assembly, omega) if turning is None else turning_receptance(assembly, omega, turning)
+        return respond_over(self._along(axes), omega, at_ends, holder)
 
     def tip(
         self,
@@ -192,7 +205,10 @@ class Machine(TipSource, Drawn):
             Standard deviation of the tool-holder's stiffness, as a share: the mesh alone by default; 0.01 for a modulus from a handbook.
         """
         sides = self.sides(self.lines() if omega is None else omega)
-        tip = tip_over_sides(sides, _assembly(tooling), stiffness_spread)
+        assembly, turning = _assembly(tooling), self.turning
+        tip = tip_over_sides(sides, assembly, stiffness_spread, turning)
+        if turning is not None:
+            tip = replace(tip, poles=partial(poles_of, assembly, sides[0].part.believed, float(tip.omega[-1])))
         return tip if spread else replace(tip, variation=None)
 
     def check_behind_joint(self, axes: Sequence[Dof] | None = None) -> None:

@@ -14,6 +14,7 @@ from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import Places, UncertainReceptance, Variation
+from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_part import FlangePart, JointedFlange
 
 Respond = Callable[[JointedFlange, Receptance | None, FloatArray], Receptance]
@@ -30,7 +31,7 @@ def respond_over(parts: Sequence[FlangePart], omega: FloatArray, respond: Respon
     respond : callable
         A candidate, its share of the tool-holder and frequencies to a receptance: `at_flange` or `at_ends`.
     holder : Receptance or None
-        Free tool-holder in one bending plane.
+        Free tool-holder in one bending plane, or in both where they feel each other.
     """
     each = [PartResponse(part, respond, None if holder is None else in_planes(holder, part), omega) for part in parts]
     whole = Receptance.block_diagonal([part.nominal for part in each])
@@ -115,6 +116,17 @@ def in_plane(holder: Receptance, axis: Dof) -> Receptance:
 
 
 def in_planes(holder: Receptance, part: FlangePart) -> Receptance:
-    """Return a tool-holder's receptance in all bending planes of a part, which it does not couple."""
+    """Return a tool-holder's receptance in all bending planes of a part; one that is given in a single plane does not couple them."""
+    if len({c.dof.plane for c in holder.rows}) > 1:
+        return _ordered(holder, part)
     blocks = [in_plane(holder, c.dof) for c in part.coordinates if not c.dof.is_slope]
     return blocks[0] if len(blocks) == 1 else Receptance.block_diagonal(blocks)
+
+
+def _ordered(holder: Receptance, part: FlangePart) -> Receptance:
+    """A tool-holder in both planes, in the part's order."""
+    wanted = [Coordinate(point, c.dof) for point in ("tip", "flange") for c in part.coordinates]
+    if set(wanted) != set(holder.rows):
+        found = ", ".join(str(c) for c in part.coordinates)
+        raise InputError("machine", f"a part with {found}", "one part with both bending planes: a tool-holder that turns couples them")
+    return holder.block(wanted)

@@ -15,7 +15,8 @@ from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 
-#: Speeds of one block share one tip receptance: relative width of a block.
+#: Speeds of one block share one tip receptance: relative width of a block. On a spindle that turns (gyroscopic moments alone, 6000 to
+#: 22 000 rev/min in 321 speeds, 53 tips) limits are off by 1e-4 in the median and 8e-4 at the most; errors go with the width.
 BLOCK = 0.025
 #: Largest ratio of speeds over which the spread that the posterior leaves is taken for a straight line.
 STRAIGHT = 1.6

@@ -13,15 +13,19 @@ from functools import cached_property
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.coupling._kernels import tip_changes, tips_over
-from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.coupling._kernels import changes_of_planes, tip_changes, tips_of_planes, tips_over
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.uncertain import Places, UncertainReceptance, Variation
+from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange
 from rcsa_ident.tool_holder.geometry import ToolAssembly, stiffened
 from rcsa_ident.tool_holder.model import tool_holder_poles
+from rcsa_ident.tool_holder.turning import both_planes, entries_at_speed
 
 #: Of a tool-holder's receptances (translation and slope of the tip, then of the flange): tip, tip over flange, flange over tip, flange.
 _ENTRIES = ((0, 0), (0, 2), (0, 3), (2, 0), (3, 0), (2, 2), (2, 3), (3, 2), (3, 3))
+#: The same of receptances that are symmetric.
+_SYMMETRIC = ((0, 0), (0, 2), (0, 3), (2, 2), (2, 3), (3, 3))
 
 
 def _none() -> ComplexArray:
@@ -153,16 +157,20 @@ class Holder:
         return self._tip_of_planes(w)
 
     def _tip_of_planes(self, w: ComplexArray) -> ComplexArray:
-        """The same where planes feel each other: the holder's blocks stand on the diagonal, once for each plane."""
-        count, n = w.shape[-1] // 2, self.tip_tip.size
+        """The same where planes feel each other."""
+        tip_tip, forward, back, middle = self.blocks(w.shape[-1] // 2)
+        found: ComplexArray = tip_tip - forward @ np.linalg.solve(middle + w, np.broadcast_to(back, (*w.shape[:-1], back.shape[-1])))
+        return found
+
+    def blocks(self, count: int) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+        """Return A11, A12, A21, A22 of some planes, which it does not couple, shapes (n, a, a), (n, a, 2 a), (n, 2 a, a), (n, 2 a, 2 a)."""
+        n = self.tip_tip.size
         unit = np.eye(count)
         a12, a21, a22 = self.free[1:3].T, self.free[3:5].T, self.free[5:9].T.reshape(n, 2, 2)
         forward = np.einsum("ab,ni->nabi", unit, a12).reshape(n, count, 2 * count)
         back = np.einsum("ab,ni->naib", unit, a21).reshape(n, 2 * count, count)
         middle = np.einsum("ab,nij->naibj", unit, a22).reshape(n, 2 * count, 2 * count)
-        tip_tip = self.tip_tip[:, None, None] * unit
-        found: ComplexArray = tip_tip - forward @ np.linalg.solve(middle + w, np.broadcast_to(back, (*w.shape[:-1], count)))
-        return found
+        return self.tip_tip[:, None, None] * unit, forward, back, middle
 
     def changes(self, side: Side, places: Places) -> ComplexArray:
         """Return C11's change along each step of a part, shape (p, k, b / 2, b / 2), per standard deviation; places are this holder's."""
@@ -174,7 +182,53 @@ class Holder:
                 return np.zeros((0, places.size, 1, 1), dtype=complex)
             found: ComplexArray = tip_changes(self.tip_tip, self.flange, self.carried, ends.ahead, ends.behind, weight, own)
             return found[:, :, None, None]
-        return weight[:, None, None, None] * (self.tip(ends.ahead[:, own]) - self.tip(ends.behind[:, own]))
+        _, forward, back, middle = self.blocks(len(side.axes))
+        across: ComplexArray = changes_of_planes(forward, back, middle, ends.ahead, ends.behind, weight, own)
+        return across
+
+
+class TurningHolder(Holder):
+    """A tool-holder that turns with the spindle: its gyroscopic moments couple both planes.
+
+    Parameters
+    ----------
+    assembly : ToolAssembly
+    omega : array, shape (n,) [rad/s]
+    speed : float [rad/s]
+        Of the spindle.
+    axes : tuple of Coordinate
+        The tip's translations, in their order.
+    """
+
+    def __init__(self, assembly: ToolAssembly, omega: FloatArray, speed: float, axes: tuple[Coordinate, ...]) -> None:
+        dofs = tuple(c.dof for c in axes)
+        if set(dofs) != {Dof.X, Dof.Y}:
+            raise InputError("machine", f"known along {', '.join(dofs)}", "both bending planes: a tool-holder that turns couples them")
+        # from +Y to +X is backwards for whoever calls Y the first axis
+        sense = 1.0 if dofs[0] is Dof.X else -1.0
+        pair = entries_at_speed(assembly, omega, sense * speed, _SYMMETRIC)
+
+        def block(*places: tuple[int, ...]) -> ComplexArray:
+            of_each = [np.moveaxis(each[np.array(places)], -1, 0) for each in pair]
+            return np.ascontiguousarray(both_planes(of_each[0], of_each[1]))
+
+        self.all = block((0,)), block((1, 2)), block((1,), (2,)), block((3, 4), (4, 5))
+
+    def at(self, places: Places) -> Holder:
+        """Return the same at some of the frequencies."""
+        part = object.__new__(TurningHolder)
+        part.all = tuple(np.ascontiguousarray(each[places]) for each in self.all)  # type: ignore[assignment]
+        return part
+
+    def tip(self, w: ComplexArray) -> ComplexArray:
+        """Return C11 of the translations for W, shape (..., n, 4, 4) -> (..., n, 2, 2), at this holder's frequencies."""
+        found: ComplexArray = tips_of_planes(*self.all, np.ascontiguousarray(w.reshape(-1, *w.shape[-3:])))
+        return found.reshape(*w.shape[:-2], 2, 2)
+
+    def blocks(self, count: int) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+        """Return A11, A12, A21, A22 of both planes."""
+        del count
+        return self.all
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,6 +244,8 @@ class TipSpread:
     assembly : ToolAssembly
     stiffness_spread : float
         Standard deviation of the tool-holder's stiffness, as a share.
+    turning : float or None [rad/s]
+        Spindle speed of the tool-holder's gyroscopic moments.
     """
 
     sides: Sequence[Side]
@@ -197,6 +253,7 @@ class TipSpread:
     holder: Holder
     assembly: ToolAssembly
     stiffness_spread: float
+    turning: float | None = None
 
     @property
     def covers(self) -> frozenset[int]:
@@ -210,7 +267,9 @@ class TipSpread:
     def at(self, places: Places) -> tuple[Variation, ...]:
         """Return the variations at some of the frequencies."""
         holder, omega = self.holder.at(places), self.sides[0].omega[places]
-        stiffer = Holder(stiffened(self.assembly, self.stiffness_spread), omega) if self.stiffness_spread > 0.0 else None
+        stiffer = None
+        if self.stiffness_spread > 0.0:
+            stiffer = holder_of(stiffened(self.assembly, self.stiffness_spread), omega, self.sides, self.turning)
         found = []
         for side, members in self._known:
             here = holder.tip(side.nominal[places])
@@ -227,7 +286,14 @@ class TipSpread:
         return np.concatenate([np.zeros((0, self.sides[0].omega.size), dtype=complex), *curves])
 
 
-def tip_over_sides(sides: Sequence[Side], assembly: ToolAssembly, stiffness_spread: float) -> UncertainReceptance:
+def holder_of(assembly: ToolAssembly, omega: FloatArray, sides: Sequence[Side], turning: float | None) -> Holder:
+    """Return a tool-holder at some frequencies as the machine's parts need it, turning or not."""
+    return Holder(assembly, omega) if turning is None else TurningHolder(assembly, omega, turning, sides[0].axes)
+
+
+def tip_over_sides(
+    sides: Sequence[Side], assembly: ToolAssembly, stiffness_spread: float, turning: float | None = None
+) -> UncertainReceptance:
     """Return the tip's receptance of a tooling on a machine, with its spread where something is not known.
 
     Parameters
@@ -237,9 +303,11 @@ def tip_over_sides(sides: Sequence[Side], assembly: ToolAssembly, stiffness_spre
     assembly : ToolAssembly
     stiffness_spread : float
         Standard deviation of the tool-holder's stiffness, as a share.
+    turning : float or None [rad/s]
+        Spindle speed of the tool-holder's gyroscopic moments, which couple the planes: the machine is one part then. None leaves them out.
     """
     omega = sides[0].omega
-    holder = Holder(assembly, omega)
+    holder = holder_of(assembly, omega, sides, turning)
     axes = [c for side in sides for c in side.axes]
     values, members = np.zeros((omega.size, len(axes), len(axes)), dtype=complex), []
     for side in sides:
@@ -247,5 +315,5 @@ def tip_over_sides(sides: Sequence[Side], assembly: ToolAssembly, stiffness_spre
         values[:, own[0] : own[-1] + 1, own[0] : own[-1] + 1] = holder.tip(side.nominal)
         members.append(own)
     known = any(side.part.doubt is not None for side in sides)
-    spread = TipSpread(tuple(sides), tuple(members), holder, assembly, stiffness_spread) if known else None
+    spread = TipSpread(tuple(sides), tuple(members), holder, assembly, stiffness_spread, turning) if known else None
     return UncertainReceptance(omega, values, tuple(axes), tuple(axes), spread)

@@ -14,6 +14,7 @@ from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.poles import PoleResidue, frequencies
 from rcsa_ident.dynamics.rational import fitted_poles
 from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 
 #: Lines per half-power bandwidth of the least damped mode, and the most there may be.
@@ -24,6 +25,9 @@ _ABOVE, _STRETCH = 10.0, 1.03
 TIP = (Coordinate("tip", Dof.X), Coordinate("tip", Dof.Y))
 #: What a fit of a receptance may be beside it, root mean square.
 FIT_TOLERANCE = 2e-3
+#: How far poles that are known without a fit may be beside the receptance: materials lose a constant share, modes one that grows with
+#: frequency, which between resonances is a few thousandths.
+NEAR_ENOUGH = 5e-3
 #: Damping ratio of a fitted pole outside the band, at least: lightly damped, it would chatter.
 DAMPED_OUTSIDE = 0.1
 
@@ -139,7 +143,17 @@ class ModeArrays(NamedTuple):
 
 
 def fitted_modes(tip: Receptance) -> tuple[TipModes, float]:
-    """Return modes that stand for the tip's receptance, and how far they are beside it: the norm of what is left, as a share."""
+    """Return modes that stand for the tip's receptance, and how far they are beside it: the norm of what is left, as a share.
+
+    Poles that the receptance knows without a fit are taken where they are near enough, else a rational function is fitted.
+    """
+    known = tip.poles() if isinstance(tip, UncertainReceptance) and tip.poles is not None else None
+    if known is not None and np.all(known.pole.real < 0.0):
+        above = tip.omega > 0.0
+        values = tip.values[above]
+        error = float(np.linalg.norm(known.response(tip.omega[above]) - values) / np.linalg.norm(values))
+        if error <= NEAR_ENOUGH:
+            return TipModes.joined([known]), error
     found, error = fitted_poles(tip.omega, tip.values, FIT_TOLERANCE, DAMPED_OUTSIDE)
     return TipModes.joined([found]), error
 

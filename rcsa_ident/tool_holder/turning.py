@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -20,6 +21,8 @@ import scipy.linalg
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics._kernels import pole_sum
+from rcsa_ident.dynamics.coordinates import Dof, plane
+from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.structure import projection_basis
 from rcsa_ident.errors import InputError
 from rcsa_ident.tool_holder.geometry import ToolAssembly
@@ -109,17 +112,14 @@ class TurningToolHolder:
         """
         omega, ratio = np.broadcast_arrays(np.asarray(omega, dtype=float), np.asarray(ratio, dtype=float))
         speed = ratio * omega
-        if omega.size > _MANY and np.ptp(speed) <= _SAME * np.max(np.abs(speed)) and abs(speed[0]) > _SLOW * self.highest:
-            rows, columns = np.array(_UPPER).T
-            found = np.empty((2, omega.size, 4, 4), dtype=complex)
-            for whole, entries in zip(found, self.at_speed(omega, float(speed[0]), _UPPER), strict=True):
-                whole[:, rows, columns] = whole[:, columns, rows] = entries.T
-            return found[0], found[1]
+        if omega.size > _MANY and np.ptp(speed) <= _SAME * np.max(np.abs(speed)):
+            forward, backward = (_symmetric(each) for each in self.at_speed(omega, float(speed[0]), _UPPER))
+            return forward, backward
         forward, backward = (self._solved(omega, sense * speed) for sense in (1.0, -1.0))
         return forward, backward
 
     def at_speed(self, omega: FloatArray, speed: float, places: Sequence[tuple[int, int]]) -> tuple[ComplexArray, ComplexArray]:
-        """Return some entries (row, column) of A+ and A- at one spindle speed, shape (g, n) each: from its poles, for many frequencies.
+        """Return some entries (row, column) of A+ and A- at one spindle speed, shape (g, n) each: many frequencies from its poles.
 
         Parameters
         ----------
@@ -128,7 +128,11 @@ class TurningToolHolder:
         places : sequence of (row, column)
         """
         rows, columns = np.array(places).T
-        forward, backward = (self._poles(omega, sense * speed, rows, columns) for sense in (1.0, -1.0))
+        if omega.size > _MANY and abs(speed) > _SLOW * self.highest:
+            forward, backward = (self._poles(omega, sense * speed, rows, columns) for sense in (1.0, -1.0))
+        else:
+            turning = np.full(omega.size, speed)
+            forward, backward = (self._solved(omega, sense * turning)[:, rows, columns].T for sense in (1.0, -1.0))
         return forward, backward
 
     def _solved(self, omega: FloatArray, speed: FloatArray) -> ComplexArray:
@@ -196,6 +200,66 @@ def turning_pair(
     return TurningToolHolder.of(assembly, highest, fastest, shear_coefficient).pair(omega, ratio)
 
 
+def turning_tool_holder(assembly: ToolAssembly, highest: float, speed: float) -> TurningToolHolder:
+    """Return a reduced assembly that is good for a spindle speed; those who ask at many speeds find it made.
+
+    Parameters
+    ----------
+    assembly : ToolAssembly
+    highest : float [rad/s]
+        Frequency up to which it is good.
+    speed : float [rad/s]
+        Of either sense.
+    """
+    return _kept(assembly, highest, 2.0 ** float(np.ceil(np.log2(max(abs(speed), 1.0)))))
+
+
+@lru_cache(maxsize=8)
+def _kept(assembly: ToolAssembly, highest: float, fastest: float) -> TurningToolHolder:
+    return TurningToolHolder.of(assembly, highest, fastest)
+
+
+def entries_at_speed(
+    assembly: ToolAssembly, omega: FloatArray, speed: float, places: Sequence[tuple[int, int]]
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return some entries (row, column) of A+ and A- at one spindle speed, shape (g, n) each.
+
+    Parameters
+    ----------
+    assembly : ToolAssembly
+    omega : array, shape (n,) [rad/s], above 0, ascending
+    speed : float [rad/s]
+        Positive where the cutter turns from +Y to +X.
+    places : sequence of (row, column)
+        Of translation and slope of the tip, then of the flange.
+    """
+    return turning_tool_holder(assembly, float(omega[-1]), speed).at_speed(omega, speed, places)
+
+
+def turning_receptance(assembly: ToolAssembly, omega: FloatArray, speed: float) -> Receptance:
+    """Return the free receptances of both bending planes at one spindle speed, shape (n, 8, 8).
+
+    Parameters
+    ----------
+    assembly : ToolAssembly
+    omega : array, shape (n,) [rad/s], above 0, ascending
+    speed : float [rad/s]
+        Positive where the cutter turns from +Y to +X.
+
+    Returns
+    -------
+    Receptance
+        Points ``tip`` and ``flange``, each with translation and slope of X, then of Y.
+    """
+    omega = frozen(omega)
+    forward, backward = (_symmetric(each) for each in entries_at_speed(assembly, omega, speed, _UPPER))
+    # plane by plane as it comes, point by point as it goes
+    order = np.array([0, 1, 4, 5, 2, 3, 6, 7])
+    values = both_planes(forward, backward)[:, order][:, :, order]
+    ends = tuple(c for point in ("tip", "flange") for axis in (Dof.X, Dof.Y) for c in plane(point, axis))
+    return Receptance(omega, values, ends, ends)
+
+
 def both_planes(forward: ComplexArray, backward: ComplexArray) -> ComplexArray:
     """Return [[S, i D], [-i D, S]] of any block of A+ and A-: X plane, then Y plane, shapes (..., r, c) -> (..., 2 r, 2 c)."""
     alike, across = 0.5 * (forward + backward), 0.5j * (forward - backward)
@@ -203,4 +267,12 @@ def both_planes(forward: ComplexArray, backward: ComplexArray) -> ComplexArray:
         [np.concatenate([alike, across], axis=-1), np.concatenate([-across, alike], axis=-1)],
         axis=-2,
     )
+    return found
+
+
+def _symmetric(upper: ComplexArray) -> ComplexArray:
+    """The whole of what `_UPPER` names, shape (10, n) -> (n, 4, 4)."""
+    rows, columns = np.array(_UPPER).T
+    found = np.empty((upper.shape[1], 4, 4), dtype=complex)
+    found[:, rows, columns] = found[:, columns, rows] = upper.T
     return found

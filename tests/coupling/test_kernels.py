@@ -57,3 +57,34 @@ def test_no_steps_no_changes():
     tip, flange, _, _, carried = parts(rng)
     nothing = np.zeros((LINES, 0, 3), dtype=complex)
     assert kernels.tip_changes(tip, flange, carried, nothing, nothing, np.zeros(0), np.arange(LINES)).shape == (0, LINES)
+
+
+def blocks(rng, lines=LINES):
+    """A11, A12, A21, A22 of two planes that feel each other."""
+    return numbers(rng, lines, 2, 2), numbers(rng, lines, 2, 4), numbers(rng, lines, 4, 2), numbers(rng, lines, 4, 4)
+
+
+def of_planes(tip_tip, forward, back, flange, w):
+    """The same as `by_solving`, block by block."""
+    return np.array([a - b @ np.linalg.inv(d + e) @ c for a, b, c, d, e in zip(tip_tip, forward, back, flange, w, strict=True)])
+
+
+def test_tips_of_planes():
+    rng = np.random.default_rng(5)
+    parts = blocks(rng)
+    behind = numbers(rng, STEPS, LINES, 4, 4)
+    # a diagonal entry that is zero asks for another pivot
+    behind[:, :, 0, 0] = -parts[3][:, 0, 0]
+    found = kernels.tips_of_planes(*parts, behind)
+    np.testing.assert_allclose(found, [of_planes(*parts, w) for w in behind], rtol=1e-8)
+
+
+def test_changes_of_planes_at_some_of_the_frequencies():
+    rng = np.random.default_rng(6)
+    parts = blocks(rng)
+    ahead, behind, weight = numbers(rng, STEPS, 30, 4, 4), numbers(rng, STEPS, 30, 4, 4), rng.uniform(0.5, 2.0, STEPS)
+    places = np.sort(rng.choice(30, LINES, replace=False))
+    found = kernels.changes_of_planes(*parts[1:], ahead, behind, weight, places)
+    expected = [weight[i] * (of_planes(*parts, ahead[i, places]) - of_planes(*parts, behind[i, places])) for i in range(STEPS)]
+    np.testing.assert_allclose(found, expected, rtol=1e-8)
+    assert kernels.changes_of_planes(*parts[1:], ahead[:0], behind[:0], weight[:0], places).shape == (0, LINES, 2, 2)

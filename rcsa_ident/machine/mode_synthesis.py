@@ -1,0 +1,102 @@
+"""A tool-holder and a machine that turn as one set of poles: component mode synthesis, without a fit.
+
+Both sides stand in few coordinates of unit mass; joint and residual compliance, one behind the other, are a spring and a damper between
+their flanges. The poles of the whole at a spindle speed cost a small eigenvalue problem, where a rational fit costs seconds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.dynamics.coordinates import Dof, plane
+from rcsa_ident.dynamics.poles import PoleResidue
+from rcsa_ident.dynamics.turning_modes import TurningModes, gyroscopic_poles
+from rcsa_ident.machine.flange_part import JointedFlange
+from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.tool_holder.turning import TurningToolHolder, turning_tool_holder
+
+#: Directions of the flange, X plane and Y plane.
+FLANGE = (*plane("flange", Dof.X), *plane("flange", Dof.Y))
+#: Poles beyond so many times the tool-holder's highest frequency are a residual compliance.
+BEYOND = 2.0
+
+
+def synthesised_poles(holder: TurningToolHolder, flange: TurningModes, joint: LumpedJoint | None) -> PoleResidue | None:
+    """Return the tip's 2 x 2 receptance of a tool-holder on a machine as poles, or None where joint and residual hold rigidly.
+
+    Parameters
+    ----------
+    holder : TurningToolHolder
+    flange : TurningModes
+        Over translation and slope of the flange in X, then in Y; its speed is the tool-holder's, too.
+    joint : LumpedJoint or None
+
+    Notes
+    -----
+    Modes with real coefficients have no hysteretic loss: the materials' loss S becomes viscous, S_ij / sqrt(w_i w_j) between modes of
+    the whole, the same at each resonance. The joint's damper behind a residual compliance is taken to first order. Both are below
+    1e-3 of the receptance on the tests' machines.
+    """
+    between = _spring(flange, joint)
+    if between is None:
+        return None
+    spring, damper = between
+    h, m = len(holder.damping), flange.omega_n.size
+    n = 2 * h + m
+    planes = (slice(0, h), slice(h, 2 * h))
+    stiffness, damping, loss, moments = (np.zeros((n, n)) for _ in range(4))
+    gap, tip = np.zeros((4, n)), np.zeros((2, n))
+    for k, own in enumerate(planes):
+        stiffness[own, own], loss[own, own], damping[own, own] = holder.stiffness.real, holder.stiffness.imag, holder.damping
+        gap[2 * k : 2 * k + 2, own] = holder.ports[2:]
+        tip[k, own] = holder.ports[0]
+    moments[planes[0], planes[1]], moments[planes[1], planes[0]] = -2.0 * holder.rotary, 2.0 * holder.rotary
+    own = slice(2 * h, n)
+    stiffness[own, own], damping[own, own], moments[own, own] = flange.stiffness, flange.damping, flange.gyroscopic
+    gap[:, own] = -flange.psi.T
+    squares, shapes = scipy.linalg.eigh(stiffness + gap.T @ spring @ gap)
+    natural = np.sqrt(squares)
+    viscous = shapes.T @ (damping + gap.T @ damper @ gap) @ shapes + shapes.T @ loss @ shapes / np.sqrt(np.outer(natural, natural))
+    poles = gyroscopic_poles(natural, viscous, flange.speed * (shapes.T @ moments @ shapes), (tip @ shapes).T, np.zeros((2, 2)))
+    return _within(poles, BEYOND * holder.highest)
+
+
+def poles_of(assembly: ToolAssembly, believed: JointedFlange, highest: float) -> PoleResidue | None:
+    """Return the same of a flange and the joint in front of it, or None where it does not stand in modes.
+
+    Parameters
+    ----------
+    assembly : ToolAssembly
+    believed : JointedFlange
+        Of both bending planes.
+    highest : float [rad/s]
+        Up to which the tip is asked for.
+    """
+    flange = believed.flange
+    if not isinstance(flange, TurningModes) or flange.coordinates != FLANGE:
+        return None
+    return synthesised_poles(turning_tool_holder(assembly, highest, flange.speed), flange, believed.joint)
+
+
+def _spring(flange: TurningModes, joint: LumpedJoint | None) -> tuple[FloatArray, FloatArray] | None:
+    """Stiffness and damping of joint and residual compliance behind each other, shape (4, 4) each; None where they are rigid."""
+    compliance, lag = np.array(flange.residual), np.zeros(4)
+    if joint is not None:
+        stiffness = np.array([joint.translational_stiffness, joint.rotational_stiffness] * 2)
+        compliance[np.arange(4), np.arange(4)] += 1.0 / stiffness
+        lag = np.array([joint.translational_damping, joint.rotational_damping] * 2) / stiffness**2
+    scale = np.sqrt(np.diag(compliance))
+    if not np.all(scale > 0.0) or np.linalg.cond(compliance / np.outer(scale, scale)) > 1e8:
+        return None
+    spring = np.linalg.inv(compliance / np.outer(scale, scale)) / np.outer(scale, scale)
+    return spring, spring @ (lag[:, None] * spring)
+
+
+def _within(poles: PoleResidue, highest: float) -> PoleResidue:
+    """The poles up to a frequency [rad/s]; those beyond it are what they are at rest."""
+    kept = np.abs(poles.pole) <= highest
+    beyond = poles.outputs[:, ~kept] / -poles.pole[~kept] @ poles.inputs[~kept]
+    return PoleResidue(poles.pole[kept], poles.outputs[:, kept], poles.inputs[kept], poles.constant + 2.0 * beyond.real)
