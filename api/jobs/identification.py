@@ -22,10 +22,11 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
-from rcsa_ident.identification.method import Method, Task
+from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.preview import Preview
 from rcsa_ident.identification.progress import BOTH, Silent, Step
 from rcsa_ident.identification.result import Identification
+from rcsa_ident.identification.task import Task
 from rcsa_ident.io.identifications import identification_to_json
 from rcsa_ident.io.results import check_result, layout, plain
 from rcsa_ident.machining_setup import Campaign, Cut

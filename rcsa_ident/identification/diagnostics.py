@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -61,21 +61,21 @@ def failed(data: IdentificationData, seed: int, method: str) -> Identification:
 
 
 def diagnose(
-    data: IdentificationData, searched: list[AxisSearch], solution: Solution, misfit: Misfit, posteriors: Sequence[Posterior]
+    data: IdentificationData, solution: Solution, misfit: Misfit, bands: Sequence[float], further: Sequence[Remark] = ()
 ) -> list[Remark]:
     """Return the reasons for `suspect`.
 
     Parameters
     ----------
     data : IdentificationData
-    searched : list of AxisSearch
-        One for each axis.
     solution : Solution
         All axes together.
     misfit : Misfit
         The one whose minimum it is.
-    posteriors : sequence of Posterior
-        One for each axis.
+    bands : sequence of float [-]
+        Relative standard deviation of the machine's contribution to the tooltip FRF, for each axis.
+    further : sequence of Remark
+        Reasons that only this kind of fit has.
     """
     reasons: list[Remark] = []
 
@@ -103,17 +103,8 @@ def diagnose(
     if np.mean(bad) > MOST_BAD_CUTS:
         words = f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, namely {_named(data, bad, misfit)}"
         doubt(IdentificationCode.CONTRADICTING_CUTS, words)
-    for axis, found in zip(data.axes, searched, strict=True):
-        if len(found.candidates) > 1 and found.evidences[1] - found.evidences[0] < EVIDENCE_TIE:
-            difference, band = _difference(axis, *found.candidates[:2])
-            if difference > max(LARGEST_DIFFERENCE, 3.0 * band):
-                doubt(
-                    IdentificationCode.TWO_SOLUTIONS,
-                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.1f} % in the machine's "
-                    f"contribution to the tooltip FRF, more than its standard deviation of {100 * band:.1f} % explains",
-                )
-    for axis, posterior in zip(data.axes, posteriors, strict=True):
-        band = _band(posterior, axis)
+    reasons += further
+    for axis, band in zip(data.axes, bands, strict=True):
         if band > LARGEST_BAND:
             doubt(
                 IdentificationCode.WIDE_POSTERIOR,
@@ -130,7 +121,31 @@ def diagnose(
     return reasons
 
 
-def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covariance: FloatArray) -> list[Remark]:
+def two_solutions(data: IdentificationData, searched: Sequence[AxisSearch]) -> list[Remark]:
+    """Return for which axes two answers of equal evidence differ, and by how much.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    searched : sequence of AxisSearch
+        One for each axis.
+    """
+    found = []
+    for axis, search in zip(data.axes, searched, strict=True):
+        if len(search.candidates) > 1 and search.evidences[1] - search.evidences[0] < EVIDENCE_TIE:
+            difference, band = _difference(axis, *search.candidates[:2])
+            if difference > max(LARGEST_DIFFERENCE, 3.0 * band):
+                words = (
+                    f"{str(axis.axis).upper()}: two solutions of equal evidence differ by {100 * difference:.1f} % in the machine's "
+                    f"contribution to the tooltip FRF, more than its standard deviation of {100 * band:.1f} % explains"
+                )
+                found.append(Remark(IdentificationCode.TWO_SOLUTIONS, words))
+    return found
+
+
+def remarks(
+    data: IdentificationData, solution: Solution, misfit: Misfit, covariance: FloatArray, natural: Mapping[str, FloatArray]
+) -> list[Remark]:
     """Return what the data cannot tell, and what was done about single cuts.
 
     Parameters
@@ -140,13 +155,15 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
     misfit : Misfit
     covariance : array, shape (p, p)
         Covariance of all unknowns.
+    natural : mapping of str to array [rad/s]
+        Natural frequencies of each machine, under the name of its axes.
     """
     notes: list[Remark] = []
 
     def note(code: IdentificationCode, sentence: str) -> None:
         notes.append(Remark(code, sentence))
 
-    layout, priors = planes(solution.layout), misfit.priors
+    layout, priors = solution.layout, misfit.priors
     deviation = np.sqrt(np.diag(covariance))
     for name, std in zip(_JOINT, deviation[layout.joint], strict=True):
         if std > INFORMED * priors.joint_spread:
@@ -155,15 +172,16 @@ def remarks(data: IdentificationData, solution: Solution, misfit: Misfit, covari
                 f"joint: the {name} cannot be separated from the flange's own compliance (known to within a factor of {np.exp(std):.1f}); "
                 "the tooltip FRF depends on both together",
             )
-    for i, axis in enumerate(data.axes):
-        natural = np.exp(solution.theta[layout.axis(i)][: layout.axes[i].modes]) / (2.0 * np.pi)
-        low, high = float(axis.omega.min() / (2.0 * np.pi)), float(axis.omega.max() / (2.0 * np.pi))
-        outside = np.sort(natural[(natural < low) | (natural > high)])
+    low = min(float(axis.omega.min()) for axis in data.axes) / (2.0 * np.pi)
+    high = max(float(axis.omega.max()) for axis in data.axes) / (2.0 * np.pi)
+    for name, omega_n in natural.items():
+        frequency = omega_n / (2.0 * np.pi)
+        outside = np.sort(frequency[(frequency < low) | (frequency > high)])
         if outside.size:
             listed = ", ".join(f"{f:.0f}" for f in outside)
             note(
                 IdentificationCode.MODES_OUTSIDE_BAND,
-                f"{str(axis.axis).upper()}: modes at {listed} Hz lie outside the excited band of {low:.0f} to {high:.0f} Hz: "
+                f"{name}: modes at {listed} Hz lie outside the excited band of {low:.0f} to {high:.0f} Hz: "
                 "they represent all dynamics of the machine outside it",
             )
     for c, coefficient in enumerate(data.coefficients):
@@ -197,8 +215,8 @@ def _machine_contribution(axis: AxisData) -> Callable[[JointedFlange], ComplexAr
     return contribution
 
 
-def _band(posterior: Posterior, axis: AxisData) -> float:
-    """Relative standard deviation of what a tooltip feels of the machine."""
+def deviation_of_tip(posterior: Posterior, axis: AxisData) -> float:
+    """Return the relative standard deviation of what a tooltip feels of the machine."""
     value, changes = posterior.part(axis.axis).response(_machine_contribution(axis))
     assert changes is not None
     return float(np.linalg.norm(changes) / max(float(np.linalg.norm(value)), 1e-300))
@@ -212,7 +230,7 @@ def _difference(axis: AxisData, one: Candidate, two: Candidate) -> tuple[float, 
     size = np.linalg.norm(value)
     if size == 0.0:
         return 0.0, 0.0
-    return float(np.linalg.norm(value - other) / size), _band(first, axis)
+    return float(np.linalg.norm(value - other) / size), deviation_of_tip(first, axis)
 
 
 def _flange_posterior(candidate: Candidate) -> Posterior:

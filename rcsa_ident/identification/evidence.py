@@ -10,27 +10,29 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.answer import CoupledFit, Fit, PlaneFit
+from rcsa_ident.identification.candidate import Candidate
+from rcsa_ident.identification.coupled.data import CoupledData, couplable, coupled_data
+from rcsa_ident.identification.coupled.fit import fit_coupled
+from rcsa_ident.identification.coupled.misfit import CoupledMisfit
+from rcsa_ident.identification.coupled.score import Coupling, coupling
 from rcsa_ident.identification.data import IdentificationData
-from rcsa_ident.identification.diagnostics import diagnose, failed, not_finite, remarks
-from rcsa_ident.identification.joint_fit import AxisSearch, axis_search, fit_jointly
+from rcsa_ident.identification.diagnostics import failed, not_finite
+from rcsa_ident.identification.joint_fit import AxisSearch, axis_search, first_starts, fit_jointly, learned_noise
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
-from rcsa_ident.identification.method import Phase, finite, perform
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import GIVE_UP_SOON, Report, cut_weights, drop_modes, exchange_modes, model_error
-from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, parameter_names, planes, unpack
+from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, planes, unpack
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import BOTH, Progress, Stage, Step
-from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.result import Identification
 from rcsa_ident.identification.search import SearchSettings, explore
-from rcsa_ident.identification.status import Status
+from rcsa_ident.identification.task import Phase, finite, perform
 from rcsa_ident.scaleout import Map
 
 #: Share of the lines by which force model, tool-holder or sensors may be wrong alike at neighbouring frequencies.
 SMOOTH_ERROR = 2e-3
-#: Factor on the posterior's standard deviations for what no model of finitely many modes can tell of itself: on three virtual
-#: machines drawn for development (`benchmarks.machines`), the errors' root mean square was that many deviations.
-WIDER = 1.4
 #: Searches from new starts, until one axis has come to the same answer twice.
 ATTEMPTS = 3
 
@@ -79,7 +81,17 @@ class EvidenceSelection:
             return failed(data, seed, self.name)
         try:
             searched = self._search(data, seed, map, progress)
-            return _result(self, data, searched, seed, map, progress)
+            trace = [step for search in searched for step in search.trace]
+            report = _report_to(BOTH, trace, progress)
+            together = self._together(data, searched, map)
+            if together.coupled:
+                assert together.points is not None
+                assert together.coupling is not None
+                found = fit_coupled(together.points, self.priors, searched, report, map)
+                fitted: Fit = CoupledFit(data, together.points, together.coupling, *found)
+            else:
+                fitted = PlaneFit(data, searched, *fit_jointly(together.data, self.priors, searched, together.first, report))
+            return replace(fitted.answer(seed, self.name), trace=tuple(trace))
         except (ArithmeticError, np.linalg.LinAlgError):
             return failed(data, seed, self.name)
 
@@ -96,9 +108,37 @@ class EvidenceSelection:
                 both = zip(parts, found, found[::-1], strict=True)
                 found = finite(map(perform, [SearchFromOtherAxis(self, part, own, other, progress) for part, own, other in both]))
             searched = [a.joined(b) for a, b in zip(searched, found, strict=True)] if searched else found
-            if self.start is not None or any(s.confirmed for s in searched):
+            # planes that feel each other bend each other's answers: no further search of one of them alone would end that
+            if self.start is not None or any(s.confirmed for s in searched) or self._together(data, searched, map).coupled:
                 break
         return searched
+
+    def _together(self, data: IdentificationData, searched: list[AxisSearch], map: Map) -> _Together:
+        """Both axes' answers polished together, and what the lines say against planes that feel nothing of each other."""
+        smooth = data.with_smooth_errors(SMOOTH_ERROR)
+        first = first_starts(smooth, self.priors, searched, map)
+        if not couplable(data):
+            return _Together(smooth, first)
+        points = coupled_data(smooth)
+        misfit = CoupledMisfit(points, self.priors, *learned_noise(searched))
+        best = first[0]
+        if {axis.outputs for axis in smooth.axes} != {axis.outputs for axis in points.base.axes}:
+            return _Together(smooth, first)
+        return _Together(smooth, first, points, coupling(best.theta, planes(best.layout), best.nuisance, misfit))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Together:
+    """Where the fit of both axes begins: first polishes, best first, and how much the planes feel each other, where that can be told."""
+
+    data: IdentificationData
+    first: list[Candidate]
+    points: CoupledData | None = None
+    coupling: Coupling | None = None
+
+    @property
+    def coupled(self) -> bool:
+        return self.coupling is not None and self.coupling.found
 
 
 def _report_to(axis: str, trace: list[Step], progress: Progress | None) -> Report:
@@ -207,70 +247,3 @@ class SearchFromOtherAxis:
         found = drop_modes(refine(misfit, found.theta, found.layout, found.evaluation.nuisance, 100), misfit, give_up=GIVE_UP_SOON)
         report(Stage.OTHER_AXIS, found.cost, found)
         return own.joined(axis_search(found, misfit, trace))
-
-
-def _result(
-    method: EvidenceSelection, data: IdentificationData, searched: list[AxisSearch], seed: int, map: Map, progress: Progress | None
-) -> Identification:
-    trace = [step for s in searched for step in s.trace]
-    report = _report_to(BOTH, trace, progress)
-    solution, misfit, chosen = fit_jointly(data.with_smooth_errors(SMOOTH_ERROR), method.priors, searched, report, map)
-    evaluation, force = solution.evaluation, solution.layout.force
-    assert evaluation.linear is not None
-    covariance = WIDER**2 * np.linalg.inv(evaluation.hessian)
-    covariance = 0.5 * (covariance + covariance.T)
-    axes = {axis.axis: _axis_result(i, data, misfit, solution, covariance, chosen) for i, axis in enumerate(data.axes)}
-    reasons = diagnose(data, searched, solution, misfit, [p for p in (axis.posterior for axis in axes.values()) if p is not None])
-    # wider bands do not make less known than was known before
-    known = np.minimum(np.sqrt(np.diag(covariance)[force]), misfit.data.coefficient_spread)
-    scales = zip(solution.theta[force].tolist(), known.tolist(), strict=True)
-    return Identification(
-        status=Status.SUSPECT if reasons else Status.CONVERGED,
-        reasons=tuple(reasons),
-        seed=seed,
-        method=method.name,
-        axes=axes,
-        cut_ids=data.cut_ids,
-        delay=evaluation.nuisance[:, 0],
-        delay_std=evaluation.linear.delay_std(covariance),
-        spindle_speed=data.spindle_speed,
-        trace=tuple(trace),
-        notes=tuple(remarks(data, solution, misfit, covariance)),
-        # the smooth errors stand behind them, unnamed
-        coefficients=dict(zip(data.coefficients, scales, strict=False)),
-    )
-
-
-def _axis_result(
-    i: int, data: IdentificationData, misfit: Misfit, solution: Solution, covariance: np.ndarray, rival: Solution
-) -> AxisResult:
-    axis, layout, others = data.axes[i], planes(solution.layout), planes(rival.layout)
-    own = replace(layout.axes[i], fixture=False)
-    entries = np.r_[layout.axis(i).start + layout.axes[i].machine, layout.joint]
-    other = rival.theta[np.r_[others.axis(i).start + others.axes[i].machine, others.joint]]
-    posterior = Posterior(solution.theta[entries], covariance[np.ix_(entries, entries)], own, data.speed_range, (other,))
-    modes, joint = posterior.machine(axis.axis)
-    rest = solution.evaluation.residual.lines[i]
-    half = rest.size // 2
-    squares = (rest[:half] ** 2 + rest[half:] ** 2).reshape(-1, axis.outputs).mean(axis=1)
-    tooling = data.cut_tooling[axis.cut]
-    per_tooling = {name: float(squares[tooling == t].mean() / 2.0) for t, name in enumerate(data.toolings) if np.any(tooling == t)}
-    measured = misfit.without_delay(i, solution.evaluation.nuisance)
-    response = np.abs(measured) ** 2
-    return AxisResult(
-        modes=modes,
-        joint=joint,
-        chi2_per_point=float(squares.mean() / 2.0),
-        per_tooling=per_tooling,
-        model_error=misfit.model_error[i],
-        parameters=parameter_names(own),
-        posterior=posterior,
-        measured={
-            "omega": axis.omega,
-            "value": measured,
-            "model": np.sum(solution.evaluation.models[i], axis=1),
-            "tooling": tooling,
-            "cut": axis.cut,
-            "coherence": response / np.maximum(response + 2.0 * axis.noise, 1e-300),
-        },
-    )

@@ -19,10 +19,10 @@ from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification._kernels import best_grid_misfit, modal_cross_frf
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.diagnostics import failed, not_finite
-from rcsa_ident.identification.method import Phase, finite, perform
 from rcsa_ident.identification.progress import Progress, Stage, Step
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
 from rcsa_ident.identification.status import Status
+from rcsa_ident.identification.task import Phase, finite, perform
 from rcsa_ident.remarks import Remark
 from rcsa_ident.scaleout import Map
 

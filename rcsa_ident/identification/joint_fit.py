@@ -12,12 +12,12 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
-from rcsa_ident.identification.method import Phase, finite, perform
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import Report, cut_weights, evidence, exchange_modes, grow_modes, model_error
 from rcsa_ident.identification.parameters import Layout, Unknowns, pack, planes, unpack
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import Stage, Step
+from rcsa_ident.identification.task import Phase, finite, perform
 from rcsa_ident.scaleout import Map
 
 #: Relative range of speeds below which nothing is asked about a change with speed.
@@ -74,8 +74,14 @@ def axis_search(solution: Solution, misfit: Misfit, trace: list[Step]) -> AxisSe
     return AxisSearch([solution.candidate], [evidence(solution, misfit)], misfit.model_error[0], misfit.cut_weight, trace)
 
 
+def first_starts(data: IdentificationData, priors: Priors, searched: list[AxisSearch], map: Map = map) -> list[Candidate]:
+    """Return both axes' answers polished together with one joint and one force, from two starts, best first."""
+    found = finite(map(perform, [JointStart(data, priors, searched, *start) for start in STARTS[:2]]))
+    return sorted(found, key=lambda candidate: candidate.cost)
+
+
 def fit_jointly(
-    data: IdentificationData, priors: Priors, searched: list[AxisSearch], report: Report, map: Map = map
+    data: IdentificationData, priors: Priors, searched: list[AxisSearch], first: list[Candidate], report: Report
 ) -> tuple[Solution, Misfit, Solution]:
     """Return the solution of all axes together, the misfit whose minimum it is, and what the evidence alone would have chosen.
 
@@ -86,15 +92,15 @@ def fit_jointly(
     priors : Priors
     searched : list of AxisSearch
         One for each axis.
+    first : list of Candidate
+        From `first_starts`.
     report : callable of (stage, cost, solution)
-    map : callable
-        The builtin, or a pool's.
     """
 
     def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> Misfit:
         return Misfit(data, priors, shares, weight)
 
-    start = _from_several_starts(data, priors, searched, map).point
+    start = _from_several_starts(data, priors, searched, first).point
     found, misfit = refine_and_learn_noise(misfit_of, start, *learned_noise(searched), report)
     middle, half = data.speed_range
     if half > LEAST_SPEED_RANGE * middle:
@@ -112,19 +118,18 @@ def fit_jointly(
     return *refine_and_learn_noise(misfit_of, found.candidate.point, misfit.model_error, misfit.cut_weight, report), chosen
 
 
-def _from_several_starts(data: IdentificationData, priors: Priors, searched: list[AxisSearch], map: Map) -> Candidate:
+def _from_several_starts(data: IdentificationData, priors: Priors, searched: list[AxisSearch], first: list[Candidate]) -> Candidate:
     """Return the axes' answers polished together with one joint and one force.
 
     Where each axis has found its own joint and its own force, what lies between them may end in another valley: from a few
     starts, until two have come to the same answer.
     """
-    tasks = [JointStart(data, priors, searched, *start) for start in STARTS]
-    found = finite(map(perform, tasks[:2]))
-    for task in tasks[2:]:
+    found = list(first)
+    for start in STARTS[2:]:
         found.sort(key=lambda candidate: candidate.cost)
         if found[1].cost - found[0].cost < SAME_POLISH:
             break
-        found.append(task.run())
+        found.append(JointStart(data, priors, searched, *start).run())
     return min(found, key=lambda candidate: candidate.cost)
 
 

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.turning_modes import TurningModes
 from rcsa_ident.errors import InputError
+from rcsa_ident.identification.coupled.posterior import CoupledPosterior
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.flange_part import FlangePart
@@ -49,6 +51,8 @@ class IdentifiedMachine(Machine):
         That it was recorded with.
     name : str
         The campaign's.
+    whole : CoupledPosterior or None
+        Of a machine whose planes feel each other; `identified` then is each plane at standstill, without the other one.
     """
 
     identified: Mapping[Dof, MachineAxis]
@@ -60,11 +64,14 @@ class IdentifiedMachine(Machine):
     identified_workpiece: Workpiece | None = None
     sensors: tuple[Sensor, ...] = ()
     name: str = ""
+    whole: CoupledPosterior | None = None
     kept_sides: tuple[Side, ...] = field(default=(), repr=False)
 
     @cached_property
     def parts(self) -> tuple[FlangePart, ...]:
-        """The bending planes of X and Y."""
+        """The bending planes of X and Y, as one where they feel each other."""
+        if self.whole is not None:
+            return (self.whole.part(self.speed),)
         return tuple(part.part(axis, self.speed) for axis, part in self.identified.items())
 
     @property
@@ -73,8 +80,20 @@ class IdentifiedMachine(Machine):
         return self.identified_band
 
     @property
+    def turning(self) -> float | None:
+        """Spindle speed [rad/s] at which tool-holders on it have their gyroscopic moments; None where the cuts show none."""
+        if self.whole is None or not self.whole.turns:
+            return None
+        flange = self.whole.candidate(self.whole.best, self.speed).flange
+        assert isinstance(flange, TurningModes)
+        return flange.speed
+
+    @property
     def softening_range(self) -> tuple[float, float] | None:
         """Lowest and highest spindle speed [rad/s] between which this one model changes; None where it does not."""
+        if self.whole is not None:
+            middle, half = self.whole.speed_range
+            return (middle - half, middle + half) if self.whole.turns or self.whole.best.layout.softening else None
         return next((r for r in (part.softening_range for part in self.identified.values()) if r is not None), None)
 
     @property
@@ -86,6 +105,8 @@ class IdentifiedMachine(Machine):
     @property
     def unknowns(self) -> int:
         """Directions of the posterior of all axes, of the model that has most of them."""
+        if self.whole is not None:
+            return self.whole.best.theta.size
         models = (self.identified, *(axes for _, axes in self.speed_models))
         return max(sum(0 if part.posterior is None else part.posterior.theta.size for part in each.values()) for each in models)
 
@@ -167,7 +188,7 @@ class IdentifiedMachine(Machine):
         return min(range(len(ranges)), key=lambda k: max(ranges[k][0] - speed, speed - ranges[k][1], 0.0))
 
     def _single(self, number: int) -> IdentifiedMachine:
-        return replace(self, identified=self.speed_models[number][1], speed_models=(), kept_sides=())
+        return replace(self, identified=self.speed_models[number][1], speed_models=(), kept_sides=(), whole=None)
 
     def _model(self, speed: float) -> IdentifiedMachine:
         return self._single(self._number(speed)) if self.speed_models else self

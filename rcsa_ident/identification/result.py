@@ -14,6 +14,7 @@ from rcsa_ident.cutting.force import ForceCoefficient
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
+from rcsa_ident.identification.coupled.posterior import CoupledPosterior
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.progress import Step
@@ -43,6 +44,7 @@ class IdentificationCode(StrEnum):
     JOINT_UNKNOWN = "joint-unknown"
     MODES_OUTSIDE_BAND = "modes-outside-band"
     COEFFICIENT_UNKNOWN = "coefficient-unknown"
+    PLANES_COUPLED = "planes-coupled"
     CUTS_WEIGHTED_DOWN = "cuts-weighted-down"
 
 
@@ -113,6 +115,8 @@ class Identification(Shown):
         That it cut.
     sensors : tuple of Sensor
         That recorded it.
+    whole : CoupledPosterior or None
+        Where both planes had to be fitted together; `axes` then hold each plane at standstill, without the other one.
     """
 
     status: Status
@@ -130,6 +134,7 @@ class Identification(Shown):
     campaign: str = ""
     workpiece: Workpiece | None = None
     sensors: tuple[Sensor, ...] = ()
+    whole: CoupledPosterior | None = None
 
     @property
     def at_minimum(self) -> bool:
@@ -163,6 +168,7 @@ class Identification(Shown):
             identified_workpiece=self.workpiece,
             sensors=self.sensors,
             name=self.campaign,
+            whole=self.whole,
         )
 
     def __str__(self) -> str:

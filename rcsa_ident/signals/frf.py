@@ -64,8 +64,8 @@ class AxisLines:
 
     def of(self, keep: np.ndarray) -> AxisLines:
         """Return some of the lines: a mask or indices, shape (n,)."""
-        every = (getattr(self, each.name) for each in fields(self))
-        return AxisLines(*(None if each is None else each[keep] for each in every))
+        every = ((each.name, getattr(self, each.name)) for each in fields(self))
+        return replace(self, **{name: value[keep] for name, value in every if value is not None})
 
 
 class Estimator(Protocol):

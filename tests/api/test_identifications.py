@@ -25,7 +25,7 @@ from api.stores.entities import Machine
 from api.stores.jobs import Event, Job, Outcome
 from rcsa_ident.cli import app
 from rcsa_ident.errors import InputError
-from rcsa_ident.identification.method import Phase
+from rcsa_ident.identification.task import Phase
 from rcsa_ident.io.recordings import read_cut
 from rcsa_ident.io.setups import read_campaign
 from tests.api import identifying

@@ -11,13 +11,13 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
-from rcsa_ident.identification.method import Phase
 from rcsa_ident.identification.parameters import AxisLayout, parameter_names
 from rcsa_ident.identification.preview import Preview
 from rcsa_ident.identification.progress import BOTH, Stage
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.status import Status
+from rcsa_ident.identification.task import Phase
 from rcsa_ident.remarks import says
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, open_shop
 

@@ -16,12 +16,12 @@ from rcsa_ident.identification.coupled.parameters import CoupledLayout, pack, un
 from rcsa_ident.identification.coupled.score import coupled_start
 from rcsa_ident.identification.joint_fit import LEAST_SPEED_RANGE, AxisSearch, learned_noise, refine_and_learn_noise, tooth_angles
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
-from rcsa_ident.identification.method import Phase, finite, perform
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import Report, evidence, exchange_modes, grow_modes
 from rcsa_ident.identification.parameters import Layout, planes
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import Stage
+from rcsa_ident.identification.task import Phase, finite, perform
 from rcsa_ident.scaleout import Map
 
 #: Model errors from coarse to fine: what each plane has found for itself was bent to explain the other one's forces.
@@ -129,12 +129,12 @@ def fit_coupled(
     """
     summed = data.summed()
     kinds = ((0, 0), (1, 1), (1, -1)) if data.turns else ((0, 0),)
-    starts = finite(map(perform, [CoupledStart(summed, priors, searched, *kind) for kind in kinds]))
+    starts: list[CoupledSearch] = finite(map(perform, [CoupledStart(summed, priors, searched, *kind) for kind in kinds]))
     best = min(starts, key=lambda start: start.evidence)
     omega = np.concatenate([a.omega for a in data.base.axes])
     band = float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))
     rough = CoupledMisfit(summed, priors, best.model_error, best.cut_weight)
-    found = refine(rough, *best.candidate.point, max_steps=60)
+    found = refine(rough, *best.candidate.point, 60)
     found = exchange_modes(found, rough, band, report, rounds=3, steps=COUPLED)
 
     def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> CoupledMisfit:

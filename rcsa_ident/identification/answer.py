@@ -1,0 +1,275 @@
+"""From the last fit to the answer: machine, deviations, and what speaks against it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.dynamics.coordinates import plane
+from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.identification.coupled.data import CoupledData
+from rcsa_ident.identification.coupled.parameters import CoupledLayout
+from rcsa_ident.identification.coupled.posterior import CoupledPosterior, CoupledUnknowns
+from rcsa_ident.identification.coupled.score import Coupling
+from rcsa_ident.identification.data import LEVER, IdentificationData
+from rcsa_ident.identification.diagnostics import deviation_of_tip, diagnose, remarks, two_solutions
+from rcsa_ident.identification.joint_fit import AxisSearch
+from rcsa_ident.identification.levenberg_marquardt import Solution
+from rcsa_ident.identification.misfit import Misfit
+from rcsa_ident.identification.parameters import Layout, parameter_names, planes
+from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
+from rcsa_ident.identification.status import Status
+from rcsa_ident.machine.flange_part import JointedFlange
+from rcsa_ident.remarks import Remark
+
+#: Factor on the posterior's standard deviations for what no model of finitely many modes can tell of itself: on three virtual
+#: machines drawn for development (`benchmarks.machines`), the errors' root mean square was that many deviations.
+WIDER = 1.4
+#: Share of the largest motion above which it is told how much of it the other axis' force makes.
+LARGE = 0.3
+
+
+class Fit(ABC):
+    """What the last fit has come to.
+
+    A subclass holds `data` (all cuts), `solution`, `misfit` (whose minimum it is) and `rival`: what the evidence alone would have chosen.
+    """
+
+    data: IdentificationData
+    solution: Solution
+    misfit: Misfit
+    rival: Solution
+
+    @abstractmethod
+    def machines(self) -> dict[str, Any]:
+        """Return the fields `axes` and, where both planes are one machine, `whole` of the answer."""
+
+    @abstractmethod
+    def doubts(self) -> tuple[list[Remark], list[Remark]]:
+        """Return the reasons for `suspect` and the notes that belong to this kind of fit."""
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance of all unknowns, shape (p, p)."""
+        found = WIDER**2 * np.linalg.inv(self.solution.evaluation.hessian)
+        return 0.5 * (found + found.T)
+
+    def answer(self, seed: int, method: str) -> Identification:
+        """Return the answer, without its trace.
+
+        Parameters
+        ----------
+        seed : int
+        method : str
+            Its name in a result file.
+        """
+        data, solution, misfit = self.data, self.solution, self.misfit
+        evaluation, force = solution.evaluation, solution.layout.force
+        assert evaluation.linear is not None
+        reasons, notes = self.doubts()
+        # wider bands do not make less known than was known before
+        known = np.minimum(np.sqrt(np.diag(self.covariance)[force]), misfit.data.coefficient_spread)
+        scales = zip(solution.theta[force].tolist(), known.tolist(), strict=True)
+        return Identification(
+            status=Status.SUSPECT if reasons else Status.CONVERGED,
+            reasons=tuple(reasons),
+            seed=seed,
+            method=method,
+            **self.machines(),
+            cut_ids=data.cut_ids,
+            delay=evaluation.nuisance[:, 0],
+            delay_std=evaluation.linear.delay_std(self.covariance),
+            spindle_speed=data.spindle_speed,
+            trace=(),
+            notes=tuple(notes),
+            # the smooth errors stand behind them, unnamed
+            coefficients=dict(zip(data.coefficients, scales, strict=False)),
+        )
+
+    def _axis(self, i: int, **machine: Any) -> AxisResult:
+        """The answer of one axis: its machine as it is given, and how its lines were met."""
+        data, misfit, solution = self.misfit.data, self.misfit, self.solution
+        axis = data.axes[i]
+        rest = solution.evaluation.residual.lines[i]
+        half = rest.size // 2
+        squares = (rest[:half] ** 2 + rest[half:] ** 2).reshape(-1, axis.outputs).mean(axis=1)
+        tooling = data.cut_tooling[axis.cut]
+        per_tooling = {name: float(squares[tooling == t].mean() / 2.0) for t, name in enumerate(data.toolings) if np.any(tooling == t)}
+        measured = misfit.without_delay(i, solution.evaluation.nuisance)
+        response = np.abs(measured) ** 2
+        return AxisResult(
+            chi2_per_point=float(squares.mean() / 2.0),
+            per_tooling=per_tooling,
+            model_error=misfit.model_error[i],
+            measured={
+                "omega": axis.omega,
+                "value": measured,
+                "model": np.sum(solution.evaluation.models[i], axis=1),
+                "tooling": tooling,
+                "cut": axis.cut,
+                "coherence": response / np.maximum(response + 2.0 * axis.noise, 1e-300),
+            },
+            **machine,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneFit(Fit):
+    """Each axis with its own machine.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    searched : list of AxisSearch
+        One for each axis.
+    solution : Solution
+    misfit : Misfit
+    rival : Solution
+    """
+
+    data: IdentificationData
+    searched: list[AxisSearch]
+    solution: Solution
+    misfit: Misfit
+    rival: Solution
+
+    def machines(self) -> dict[str, Any]:
+        """Return each axis with its posterior."""
+        axes = {}
+        for i, axis in enumerate(self.data.axes):
+            modes, joint = self.posteriors[i].machine(axis.axis)
+            names = parameter_names(self.posteriors[i].layout)
+            axes[axis.axis] = self._axis(i, modes=modes, joint=joint, parameters=names, posterior=self.posteriors[i])
+        return {"axes": axes}
+
+    @cached_property
+    def posteriors(self) -> list[Posterior]:
+        """What is known of each axis and of the joint."""
+        layout, others = planes(self.solution.layout), planes(self.rival.layout)
+        found = []
+        for i in range(len(self.data.axes)):
+            entries = _entries(layout, i)
+            own, other = replace(layout.axes[i], fixture=False), self.rival.theta[_entries(others, i)]
+            covariance = self.covariance[np.ix_(entries, entries)]
+            found.append(Posterior(self.solution.theta[entries], covariance, own, self.data.speed_range, (other,)))
+        return found
+
+    def doubts(self) -> tuple[list[Remark], list[Remark]]:
+        """Return the reasons for `suspect` and the notes."""
+        data, layout = self.data, planes(self.solution.layout)
+        bands = [deviation_of_tip(posterior, axis) for posterior, axis in zip(self.posteriors, data.axes, strict=True)]
+        reasons = diagnose(data, self.solution, self.misfit, bands, two_solutions(data, self.searched))
+        natural = {
+            str(axis.axis).upper(): np.exp(self.solution.theta[layout.axis(i)][: layout.axes[i].modes]) for i, axis in enumerate(data.axes)
+        }
+        return reasons, remarks(data, self.solution, self.misfit, self.covariance, natural)
+
+
+def _entries(layout: Layout, i: int) -> np.ndarray:
+    """Places of an axis' flange and the joint."""
+    found: np.ndarray = np.r_[layout.axis(i).start + layout.axes[i].machine, layout.joint]
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledFit(Fit):
+    """Both planes as one machine.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    points : CoupledData
+    coupling : Coupling
+        What spoke against planes that feel nothing of each other.
+    solution : Solution
+    misfit : Misfit
+    rival : Solution
+    """
+
+    data: IdentificationData
+    points: CoupledData
+    coupling: Coupling
+    solution: Solution
+    misfit: Misfit
+    rival: Solution
+
+    def machines(self) -> dict[str, Any]:
+        """Return both planes as one machine, and each at standstill without the other."""
+        standing, joint = self.posterior.best.standing(), self.posterior.best.joint
+        axes = {}
+        for i, axis in enumerate(self.data.axes):
+            own = slice(2 * i, 2 * i + 2)
+            modes = ModalModel(
+                standing.omega_n, standing.zeta, standing.phi[:, own], standing.residual[own, own], plane("flange", axis.axis)
+            )
+            axes[axis.axis] = self._axis(i, modes=modes, joint=joint, parameters=(), posterior=None)
+        return {"axes": axes, "whole": self.posterior}
+
+    @cached_property
+    def posterior(self) -> CoupledPosterior:
+        """What is known of both planes and of the joint."""
+        layout = _coupled(self.solution)
+        entries = np.r_[layout.machine, layout.joint]
+        return CoupledPosterior(
+            _unknowns(self.solution), self.covariance[np.ix_(entries, entries)], self.data.speed_range, (_unknowns(self.rival),)
+        )
+
+    def doubts(self) -> tuple[list[Remark], list[Remark]]:
+        """Return the reasons for `suspect` and the notes, first of them how much the planes feel each other."""
+        layout = _coupled(self.solution)
+        value, changes = self.posterior.part(None).response(self._contribution)
+        assert changes is not None
+        bands = [float(np.linalg.norm(changes[:, :, i, i]) / max(float(np.linalg.norm(value[:, i, i])), 1e-300)) for i in range(2)]
+        reasons = diagnose(self.data, self.solution, self.misfit, bands)
+        natural = {"X and Y": np.exp(self.solution.theta[: layout.modes])}
+        found = remarks(self.data, self.solution, self.misfit, self.covariance, natural)
+        return reasons, [Remark(IdentificationCode.PLANES_COUPLED, self._in_words(value)), *found]
+
+    def _contribution(self, machine: JointedFlange) -> ComplexArray:
+        """What a tip of the cut toolings feels of the machine, A12 (A22 + W)^-1 A21, shape (p, 2, 2)."""
+        points, turning = self.points, _coupled(self.solution).turning
+        scale = np.array([1.0, LEVER, 1.0, LEVER])
+        tip = points.tip[turning]
+        # A12 of a tool-holder that turns is A21 of one that turns the other way, transposed
+        back = points.tip[-turning].transpose(0, 2, 1)
+        together = points.flange[turning] + np.outer(scale, scale) * machine.interface(points.omega)
+        found: ComplexArray = back @ np.linalg.solve(together, tip)
+        return found
+
+    def _in_words(self, contribution: ComplexArray) -> str:
+        """How strong the coupling is, where, and of which kind."""
+        size = np.abs(contribution)
+        shares = []
+        for i, j in ((0, 1), (1, 0)):
+            own = size[:, j, j]
+            large = np.flatnonzero(own > LARGE * own.max())
+            share = size[large, i, j] / own[large]
+            shares.append((float(share.max()), float(self.points.omega[large[share.argmax()]])))
+        (x_by_y, at_x), (y_by_x, at_y) = shares
+        share, omega, force, moved = (x_by_y, at_x, "Y", "X") if x_by_y >= y_by_x else (y_by_x, at_y, "X", "Y")
+        kinds = {
+            0: "their principal directions lie out of X and Y",
+            1: "the spindle's gyroscopic moments couple them, more so the faster it turns",
+            -1: "gyroscopic moments couple them, and the spindle seems to turn the other way: a left-hand cutter, or X and Y exchanged",
+        }
+        return (
+            f"X and Y feel each other: a force in {force} moves the tool in {moved} by up to {100.0 * share:.0f} % of what it moves it in "
+            f"{force} (at {omega / (2.0 * np.pi):.0f} Hz): {kinds[_coupled(self.solution).turning]}; everything computed with this machine "
+            "takes it into account"
+        )
+
+
+def _coupled(solution: Solution) -> CoupledLayout:
+    assert isinstance(solution.layout, CoupledLayout)
+    return solution.layout
+
+
+def _unknowns(solution: Solution) -> CoupledUnknowns:
+    layout = _coupled(solution)
+    return CoupledUnknowns(solution.theta[np.r_[layout.machine, layout.joint]], layout.flange)

@@ -1,0 +1,139 @@
+"""What is known of both planes after all cuts, and which machines that allows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.coupling.joint import LumpedJoint
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
+from rcsa_ident.dynamics.modal import ModalModel, damped_modes
+from rcsa_ident.dynamics.turning_modes import TurningModes
+from rcsa_ident.errors import InputError
+from rcsa_ident.identification.coupled.parameters import CoupledLayout, unpack
+from rcsa_ident.identification.data import LEVER
+from rcsa_ident.identification.parameters import JOINT, joint_of
+from rcsa_ident.identification.posterior import LONGEST_STEP
+from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation
+
+#: Directions of the flange in the order of the unknowns.
+FLANGE: tuple[Coordinate, ...] = (*plane("flange", Dof.X), *plane("flange", Dof.Y))
+_SI = np.array([1.0, 1.0 / LEVER, 1.0, 1.0 / LEVER])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoupledUnknowns:
+    """Unknowns of a whole machine's flange and of the joint.
+
+    Parameters
+    ----------
+    theta : array, shape (p,)
+    layout : CoupledLayout
+        Of a flange: without fixture, forces and tooth angles.
+    """
+
+    theta: FloatArray
+    layout: CoupledLayout
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "theta", frozen(self.theta))
+        if self.theta.shape != (self.layout.size,):
+            raise InputError("unknowns", self.theta.size, f"{self.layout.size} for {self.layout.modes} modes and a joint")
+
+    @property
+    def joint(self) -> LumpedJoint:
+        """The joint."""
+        return joint_of(self.theta[-JOINT:])
+
+    def modes(self, speed: float, x: float = 0.0) -> TurningModes:
+        """Return the modes at a spindle speed [rad/s] and relative speed x."""
+        machine = unpack(self.theta, self.layout).at(x)
+        sense = -1.0 if self.layout.turning < 0 else 1.0
+        skew = sense * machine.skew if machine.skew.size else np.zeros((machine.order, machine.order))
+        residual = machine.residual @ machine.residual.T * np.outer(_SI, _SI)
+        return TurningModes(machine.omega_n, machine.factor @ machine.factor.T, skew, machine.psi * _SI, residual, sense * speed, FLANGE)
+
+    def standing(self) -> ModalModel:
+        """Return the modes of the machine that does not turn, in both planes, at the middle of the campaign's speeds else."""
+        machine = unpack(self.theta, self.layout)
+        residual = machine.residual @ machine.residual.T * np.outer(_SI, _SI)
+        return damped_modes(machine.omega_n, machine.factor @ machine.factor.T, machine.psi * _SI, residual, FLANGE)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoupledPosterior:
+    """Unknowns of both planes with their covariance.
+
+    Parameters
+    ----------
+    best : CoupledUnknowns
+        The most probable ones.
+    covariance : array, shape (p, p)
+    speed_range : (float, float) [rad/s]
+        Middle of the campaign's spindle speeds and half their range.
+    rivals : tuple of CoupledUnknowns
+        Other models of the same data: how far they differ belongs to what is not known.
+    """
+
+    best: CoupledUnknowns
+    covariance: FloatArray
+    speed_range: tuple[float, float]
+    rivals: tuple[CoupledUnknowns, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "covariance", frozen(self.covariance))
+        if self.covariance.shape != (self.best.theta.size,) * 2:
+            raise InputError("covariance", self.covariance.shape, f"a square matrix for {self.best.theta.size} unknowns")
+
+    @property
+    def turns(self) -> bool:
+        """Whether tool-holders have their gyroscopic moments."""
+        return self.best.layout.turning != 0
+
+    def candidate(self, unknowns: CoupledUnknowns, speed: float | None) -> JointedFlange:
+        """Return what stands behind the flange at a spindle speed [rad/s], by default the campaign's middle one.
+
+        Outside the campaign's speeds the stiffness is that of the nearest of them; gyroscopic moments go on with the speed.
+        """
+        middle, half = self.speed_range
+        speed = middle if speed is None else speed
+        x = 0.0 if half == 0.0 else float(np.clip((speed - middle) / half, -1.0, 1.0))
+        return JointedFlange(unknowns.modes(speed, x), unknowns.joint)
+
+    def part(self, speed: float | None) -> FlangePart:
+        """Return both planes as one part of the flange, with what is not known of it, at a spindle speed [rad/s]."""
+        return FlangePart(FLANGE, self.candidate(self.best, speed), _OpenQuestion(self, speed))
+
+    def doubt(self, speed: float | None) -> Doubt:
+        """Return the machines a step to both sides along each of the covariance's own axes, and the rivals."""
+        values, vectors = np.linalg.eigh(self.covariance)
+        steps = []
+        for size, direction in zip(np.sqrt(np.maximum(values, 0.0)), vectors.T, strict=True):
+            # stiff directions take a full deviation, loose ones a step that stays linear
+            step = min(size, LONGEST_STEP)
+            if step > 0.0:
+                moved = (replace(self.best, theta=self.best.theta + sign * step * direction) for sign in (1.0, -1.0))
+                ahead, behind = (self.candidate(each, speed) for each in moved)
+                steps.append(Perturbation(ahead, behind, size / (2.0 * step)))
+        return Doubt(tuple(steps), tuple(self.candidate(rival, speed) for rival in self.rivals))
+
+
+@dataclass(frozen=True, eq=False)
+class _OpenQuestion:
+    """What a posterior leaves open, worked out when it is asked for; another process works it out for itself."""
+
+    posterior: CoupledPosterior
+    speed: float | None
+
+    @cached_property
+    def answer(self) -> Doubt:
+        return self.posterior.doubt(self.speed)
+
+    def __call__(self) -> Doubt:
+        return self.answer
+
+    def __reduce__(self) -> tuple[type[_OpenQuestion], tuple[CoupledPosterior, float | None]]:
+        return type(self), (self.posterior, self.speed)
