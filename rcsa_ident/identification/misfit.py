@@ -169,7 +169,7 @@ class Misfit:
                 scale = np.exp(lines.force_slope @ theta[layout.force])[:, None]
                 values *= scale
                 gradient *= scale[:, :, None] if normal else 1.0
-            answers.append(_AxisAnswer(values, gradient, axis, part, logs))
+            answers.append(_AxisAnswer(values, gradient, axis, part, np.exp(logs)))
         return answers
 
     def _cut_prior(self, theta: FloatArray, layout: Unknowns) -> CutPrior:
@@ -323,7 +323,7 @@ class _AxisAnswer:
         core = self.layout.core
         compliance = self.gradient[:, :, core - 3 : core].copy()
         self.gradient[:, :, core - 3 : core] = compliance @ residual_turn(self.axis.residual)
-        scale = np.concatenate([chain(self.axis, self.layout), scaled_joint(self.joint)])
+        scale = np.concatenate([chain(self.axis, self.layout), scaled_joint(np.log(self.joint))])
         return lines.jacobian(self.gradient, self.model, scale, layout), compliance
 
 

@@ -113,6 +113,8 @@ def test_log_volume_is_that_of_the_information(layout, spreads):
 
 def test_wider_priors_fill_more():
     narrow, wide = Priors(shape=0.5), Priors(shape=5.0)
-    assert prior_rows(flange_layout(3), narrow).log_volume - prior_rows(flange_layout(3), wide).log_volume == pytest.approx(2.0 * 6 * np.log(10.0))
+    assert prior_rows(flange_layout(3), narrow).log_volume - prior_rows(flange_layout(3), wide).log_volume == pytest.approx(
+        2.0 * 6 * np.log(10.0)
+    )
     fixture = Layout((AxisLayout(3, fixture=True),))
     assert prior_rows(fixture, narrow).log_volume - prior_rows(fixture, wide).log_volume == pytest.approx(2.0 * 9 * np.log(10.0))

@@ -40,17 +40,11 @@ class CoupledSearch:
     ----------
     candidate : Candidate
     evidence : float [-]
-        Minus twice the log evidence.
-    model_error : tuple of float [-]
-        Of each axis, as the search has learned it.
-    cut_weight : array, shape (k,)
-        As the search has learned it.
+        Minus twice the log evidence at the finest of `SHARES`.
     """
 
     candidate: Candidate
     evidence: float
-    model_error: tuple[float, ...]
-    cut_weight: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +70,7 @@ class CoupledStart:
     turning: int
 
     def run(self) -> CoupledSearch:
-        """Refine from coarse to fine, and learn the noise."""
+        """Refine from coarse to fine."""
         theta, layout, nuisance = self._start()
         weight = learned_noise(self.searched)[1]
         for share in SHARES:
@@ -85,12 +79,7 @@ class CoupledStart:
             misfit = CoupledMisfit(self.data, self.priors, (share, share), weight)
             found = refine(misfit, theta, layout, nuisance, 60, grid=32 if share >= WITH_SKEW else 0, tolerance=1e-3)
             theta, nuisance = found.theta, found.evaluation.nuisance
-        shares = (SHARES[-1], SHARES[-1])
-        found, learned = refine_and_learn_noise(self._misfit, found.candidate.point, shares, weight, _unheard, 1e-4)
-        return CoupledSearch(found.candidate, evidence(found, learned), learned.model_error, learned.cut_weight)
-
-    def _misfit(self, shares: tuple[float, ...], weight: FloatArray) -> Misfit:
-        return CoupledMisfit(self.data, self.priors, shares, weight)
+        return CoupledSearch(found.candidate, evidence(found, misfit))
 
     def _start(self) -> tuple[FloatArray, CoupledLayout, FloatArray]:
         best = [s.candidates[0] for s in self.searched]
@@ -128,23 +117,30 @@ def fit_coupled(
         The builtin, or a pool's.
     """
     summed = data.summed()
-    kinds = ((0, 0), (1, 1), (1, -1)) if data.turns else ((0, 0),)
+    kinds = ((0, 0), (1, 1)) if data.turns else ((0, 0),)
     starts: list[CoupledSearch] = finite(map(perform, [CoupledStart(summed, priors, searched, *kind) for kind in kinds]))
     best = min(starts, key=lambda start: start.evidence)
+    if _skew(best.candidate) > 0:
+        starts = finite(map(perform, [CoupledStart(summed, priors, searched, 1, -1)]))
+        best = min(best, *starts, key=lambda start: start.evidence)
     omega = np.concatenate([a.omega for a in data.base.axes])
     band = float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))
-    rough = CoupledMisfit(summed, priors, best.model_error, best.cut_weight)
-    found = refine(rough, *best.candidate.point, 60)
-    found = exchange_modes(found, rough, band, report, rounds=3, steps=COUPLED)
+
+    def rough_of(shares: tuple[float, ...], weight: FloatArray) -> CoupledMisfit:
+        return CoupledMisfit(summed, priors, shares, weight)
+
+    weight = learned_noise(searched)[1]
+    found, rough = refine_and_learn_noise(rough_of, best.candidate.point, (SHARES[-1], SHARES[-1]), weight, report, 1e-4)
+    found = exchange_modes(found, rough, band, report, rounds=2, steps=COUPLED)
 
     def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> CoupledMisfit:
         return CoupledMisfit(data, priors, shares, weight)
 
     def better(here: tuple[Solution, Misfit], start: tuple[FloatArray, CoupledLayout, FloatArray]) -> tuple[Solution, Misfit]:
-        there = refine_and_learn_noise(misfit_of, start, here[1].model_error, here[1].cut_weight, report)
+        there = refine_and_learn_noise(misfit_of, start, here[1].model_error, here[1].cut_weight, report, 1e-4)
         return there if evidence(*there) < evidence(*here) else here
 
-    here = refine_and_learn_noise(misfit_of, _start(data, found), rough.model_error, rough.cut_weight, report)
+    here = refine_and_learn_noise(misfit_of, _start(data, found), rough.model_error, rough.cut_weight, report, 1e-4)
     while 0 < _layout(here[0]).skew < MOST_DISCS:
         layout = _layout(here[0])
         there = better(here, (*with_discs(here[0].theta, layout, layout.skew + 1, priors), here[0].evaluation.nuisance))
@@ -164,6 +160,11 @@ def fit_coupled(
     return found, misfit, chosen
 
 
+def _skew(candidate: Candidate) -> int:
+    assert isinstance(candidate.layout, CoupledLayout)
+    return candidate.layout.skew
+
+
 def _layout(solution: Solution) -> CoupledLayout:
     assert isinstance(solution.layout, CoupledLayout)
     return solution.layout
@@ -179,7 +180,3 @@ def _start(data: CoupledData, found: Solution, softening: bool = False) -> tuple
         angles, nuisance = tooth_angles(data.base, nuisance)
     machine = pack(unpack(found.theta, old), layout, discs)
     return np.concatenate([machine, found.theta[old.joint], found.theta[old.force], angles]), layout, nuisance
-
-
-def _unheard(stage: Stage, cost: float, solution: Solution) -> None:
-    del stage, cost, solution
