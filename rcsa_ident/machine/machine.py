@@ -48,6 +48,14 @@ class TipSource(Shown, ABC):
         return None
 
     @property
+    def turning(self) -> float | None:
+        """Spindle speed [rad/s] at which tool-holders on it have their gyroscopic moments, positive from +Y to +X; None: they have none.
+
+        The moments couple the planes: a machine that turns is one part, with translation and slope of X and of Y.
+        """
+        return None
+
+    @property
     def unknowns(self) -> int:
         """Independent directions in which it may differ from what is believed."""
         return 0
@@ -107,14 +115,6 @@ class Machine(TipSource, Drawn):
     def ends(self) -> bool:
         """Whether it answers at no frequency beyond `band`, as a measurement does."""
         return False
-
-    @property
-    def turning(self) -> float | None:
-        """Spindle speed [rad/s] at which tool-holders on it have their gyroscopic moments, positive from +Y to +X; None: they have none.
-
-        The moments couple the planes: a machine that turns is one part, with translation and slope of X and of Y.
-        """
-        return None
 
     @property
     def lowest(self) -> float:
