@@ -48,14 +48,6 @@ class TipSource(Shown, ABC):
         return None
 
     @property
-    def turning(self) -> float | None:
-        """Spindle speed [rad/s] at which tool-holders on it have their gyroscopic moments, positive from +Y to +X; None: they have none.
-
-        The moments couple the planes: a machine that turns is one part, with translation and slope of X and of Y.
-        """
-        return None
-
-    @property
     def unknowns(self) -> int:
         """Independent directions in which it may differ from what is believed."""
         return 0
@@ -115,6 +107,14 @@ class Machine(TipSource, Drawn):
     def ends(self) -> bool:
         """Whether it answers at no frequency beyond `band`, as a measurement does."""
         return False
+
+    @property
+    def turning(self) -> float | None:
+        """Spindle speed [rad/s] at which tool-holders on it have their gyroscopic moments, positive from +Y to +X; None: they have none.
+
+        The moments couple the planes: a machine that turns is one part, with translation and slope of X and of Y.
+        """
+        return None
 
     @property
     def lowest(self) -> float:
@@ -206,8 +206,8 @@ class Machine(TipSource, Drawn):
         sides = self.sides(self.lines() if omega is None else omega)
         assembly, turning = _assembly(tooling), self.turning
         tip = tip_over_sides(sides, assembly, stiffness_spread, turning)
-        if turning is not None:
-            tip = replace(tip, poles=partial(poles_of, assembly, sides[0].part.believed, float(tip.omega[-1])))
+        if len(sides) == 1:
+            tip = replace(tip, poles=partial(poles_of, assembly, sides[0].part.believed, float(tip.omega[-1]), turning))
         return tip if spread else replace(tip, variation=None)
 
     def _along(self, axes: Sequence[Dof] | None) -> list[FlangePart]:

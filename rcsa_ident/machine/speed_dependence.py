@@ -53,7 +53,7 @@ def tips_over_speed(
         blocks = _blocks(own, known)
         tips = _ChangingTip(model, tooling, omega, own, known, spread, stiffness_spread)
         middles = [tips.middle(own[block]) for block in blocks]
-        if spread and model.turning is not None:
+        if tips.coupled:
             tips.share_nodes(middles)
         for block, middle in zip(blocks, middles, strict=True):
             yield places[block], tips.at(middle)
@@ -93,6 +93,12 @@ class _ChangingTip:
     def middle(self, speeds: FloatArray) -> float:
         """Return the middle of a block's speeds, as far as they are known."""
         return float(np.mean(np.clip([speeds.min(), speeds.max()], *self.known)))
+
+    @property
+    def coupled(self) -> bool:
+        """Whether there is a spread, over planes that feel each other."""
+        known = [tip.values for tip in self.tips if isinstance(tip, UncertainReceptance) and tip.variation is not None]
+        return any(np.any(values[:, ~np.eye(values.shape[1], dtype=bool)]) for values in known)
 
     def share_nodes(self, speeds: Sequence[float]) -> None:
         """Let all blocks draw at the same frequencies: variations over both planes at once are too dear to be worked out for each."""
