@@ -4,7 +4,8 @@
 reduced machine at the spindle speed, its softening and gyroscopic moments included (`rcsa_ident.virtual.limit`). Beside it stand
 limits by zero-order and by multi-frequency lobes, from the true tip receptances (the error of the method alone) and from the
 identified ones, for the toolings that never cut. Depths are compared where the truth changes by less than 20 % over +-1 % of
-speed; the share of speeds left out is told. Random cuts with depths from half to twice the true limit, even in the logarithm, at
+speed; the share of speeds left out is told. On coupled machines the limits are also those that the direct receptances alone give.
+Random cuts with depths from half to twice the true limit, even in the logarithm, at
 any speed, are classed stable or not. Machines, campaigns and results are those of ``python -m benchmarks study`` in the same
 scratch folder; what is missing there is made. True limits are kept there, too.
 """
@@ -21,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.machines import CONDITIONS, EVALUATION
+from benchmarks.machines import CONDITIONS, named
 from benchmarks.page import append_row, read_rows
 from benchmarks.study import Run, machine_of, perform
 from rcsa_ident.arrays import FloatArray
@@ -59,6 +60,8 @@ SHALLOWEST = 5e-5
 #: Error of the depth that is aimed for.
 AIM = 0.05
 METHODS: dict[str, StabilityMethod] = {"zero-order": ZeroOrder(), "multi-frequency": MultiFrequency()}
+#: What the names of limits without cross terms end with.
+DIRECT_ALONE = ", without cross terms"
 #: Tooth periods of a simulated cut, and those at its end that are compared with as many before them.
 TEETH, LAST = 300, 30
 
@@ -174,6 +177,14 @@ def _limits(truth: Truth, found: Found, speed: float, draws: int = 0) -> Iterato
     for name, method in METHODS.items():
         yield f"true receptance, {name}", asked(truth, true, speed, method, 0)
         yield f"identified, {name}", asked(truth, identified, speed, method, draws)
+        if truth.setup.spindle.coupled:
+            yield f"true receptance, {name}{DIRECT_ALONE}", asked(truth, _direct(true), speed, method, 0)
+            yield f"identified, {name}{DIRECT_ALONE}", asked(truth, _direct(identified), speed, method, 0)
+
+
+def _direct(tip: Receptance) -> Receptance:
+    """The receptance without its cross terms and its spread."""
+    return Receptance(tip.omega, tip.values * np.eye(len(tip.rows)), tip.rows, tip.cols)
 
 
 def _cut(truth: Truth, found: Found, speed: float, rng: np.random.Generator) -> dict[str, Any]:
@@ -242,14 +253,18 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
         "| limit from | median error | 90 % | worst | within 5 % | where it is steep | cuts classed right | wrong, 5-95 % probable |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    for name in rows[0]["limits"]:
-        error = np.concatenate([errors_of(row, name) for row in rows])
-        right = [cut["said"][name] == cut["stable"] for cut in cuts]
-        wrong = [cut["probability"][name.split(", ")[1]] for cut, r in zip(cuts, right, strict=True) if not r]
-        open_ = [p for p in wrong if p is not None and 0.05 <= p <= 0.95] if name.startswith("identified") else None
+    for name in dict.fromkeys(name for row in rows for name in row["limits"]):
+        # limits without cross terms are those of coupled machines only
+        having = [row for row in rows if name in row["limits"]]
+        error = np.concatenate([errors_of(row, name) for row in having])
+        asked_for = [cut for row in having for cut in row["cuts"]]
+        right = [cut["said"][name] == cut["stable"] for cut in asked_for]
+        spread = name.startswith("identified") and not name.endswith(DIRECT_ALONE)
+        wrong = [cut["probability"][name.split(", ")[1]] for cut, r in zip(asked_for, right, strict=True) if not r]
+        open_ = [p for p in wrong if p is not None and 0.05 <= p <= 0.95] if spread else None
         quantiles = " | ".join(f"{100.0 * q:.2f} %" for q in (np.median(error), np.quantile(error, 0.9), error.max()))
         doubtful = "-" if open_ is None else f"{len(open_)} of {len(wrong)}"
-        steep = np.concatenate([errors_of(row, name, steep=True) for row in rows])
+        steep = np.concatenate([errors_of(row, name, steep=True) for row in having])
         share = " | ".join(f"{100.0 * np.mean(e < AIM):.1f} %" if e.size else "-" for e in (error, steep))
         lines.append(f"| {name} | {quantiles} | {share} | {sum(right)} of {len(right)} | {doubtful} |")
     agree = np.mean([cut["settles"] == cut["stable"] for cut in cuts])
@@ -277,12 +292,12 @@ def main(arguments: Sequence[str]) -> None:
         prog="benchmarks lobes_truth", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--scratch", type=Path, help="folder of campaigns and results of the study; default: a new temporary one")
-    parser.add_argument("--machines", nargs="+", default=[str(s) for s in EVALUATION], help="seeds, or names in data/machines")
+    parser.add_argument("--machines", nargs="+", default=["drawn"], help="as of the study (default: drawn)")
     parser.add_argument("--condition", choices=tuple(CONDITIONS), default="no-trigger")
     parser.add_argument("--seed", type=int, default=1, help="of the search")
     parser.add_argument("--cuts", type=int, default=CUTS)
     given = parser.parse_args(arguments)
     scratch = given.scratch or Path(tempfile.mkdtemp(prefix="rcsa-ident-study-"))
-    rows = run(scratch, given.machines, given.condition, given.seed, given.cuts)
+    rows = run(scratch, named(given.machines), given.condition, given.seed, given.cuts)
     if rows:
         print(f"\n{table(rows)}")

@@ -8,6 +8,7 @@ identification of the development machines: docs/study.md says what changed then
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,15 +16,22 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.cutting.process import MillingProcess
-from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.io.machines import MachineFile, read_machine
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.machine.known_tip import measured_tip
+from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.stability.lobes import stability_lobes
+from rcsa_ident.stability.tip_modes import TIP
+from rcsa_ident.units import from_hz
 from rcsa_ident.workflows.simulate import true_receptances
 
 EVALUATION = tuple(range(1, 11))
 DEVELOPMENT = (101, 102, 103)
+#: Seeds of the coupled machines, by the same rule; fixed on 2026-11-22, before the package identified cross terms.
+COUPLED = tuple(range(201, 211))
+COUPLED_DEVELOPMENT = (301, 302, 303)
+#: Housing and bearings of a coupled machine are turned by at most so much [deg].
+TURNED = 20.0
 #: What tells the campaigns of one machine apart: trigger or none, and the factor on the noise of gap and accelerometer.
 CONDITIONS = {"trigger": (True, 1.0), "no-trigger": (False, 1.0), "noise-x3": (False, 3.0)}
 #: Toolings that cut, and those that never do: one in a holder that cut, one in another.
@@ -78,20 +86,36 @@ duration_s = 0.28
 settling_s = 0.25
 """
 
+#: What the names of the coupled machines begin with; those of the others are their seeds alone.
+_COUPLED = "coupled-"
+
 Holder = dict[str, Any]
 Tool = dict[str, Any]
 
 
-def random_machine(seed: int, folder: Path) -> Path:
-    """Draw a machine with its toolings, write both into `folder`, and return the machine file; same seed, same files."""
-    rngs = np.random.default_rng(seed).spawn(5)
-    gyroscopic, spindle = _spindle(rngs[0])
+def random_machine(seed: int, folder: Path, coupled: bool = False) -> Path:
+    """Draw a machine with its toolings, write both into `folder`, and return the machine file; same seed, same files.
+
+    Parameters
+    ----------
+    seed : int
+    folder : Path
+        Made if it is not there.
+    coupled : bool
+        Turn housing and bearings by angles of their own, drawn evenly within +-`TURNED`, and let gyroscopic moments act; all else is as
+        the same seed draws it without, but for the depth of cut.
+    """
+    rngs = np.random.default_rng(seed).spawn(6)
+    turn = rngs[5] if coupled else None
+    housing = _housing_and_joint(rngs[1], turn)
+    gyroscopic, spindle = _spindle(rngs[0], turn)
+    gyroscopic = gyroscopic or coupled
     depth, angle = rngs[4].uniform(0.2, 0.4), rngs[4].uniform(0.0, 360.0)
     (folder / "toolings").mkdir(parents=True, exist_ok=True)
     for name, text in _toolings(rngs[2]).items():
         (folder / "toolings" / f"{name}.toml").write_text(text, encoding="utf-8")
-    head = f'[machine]\nname = "Drawn machine {seed}"\ngyroscopic = {"true" if gyroscopic else "false"}\n'
-    parts = [head, spindle, _housing_and_joint(rngs[1]), SENSORS.format(angle=angle), _workpiece(rngs[3])]
+    head = f'[machine]\nname = "{"Coupled" if coupled else "Drawn"} machine {seed}"\ngyroscopic = {"true" if gyroscopic else "false"}\n'
+    parts = [head, spindle, housing, SENSORS.format(angle=angle), _workpiece(rngs[3])]
     path = folder / "machine.toml"
 
     def write(depth: float) -> None:
@@ -105,6 +129,23 @@ def random_machine(seed: int, folder: Path) -> Path:
     return path
 
 
+def drawn(name: str) -> tuple[int, bool] | None:
+    """Return seed and whether it is coupled of a drawn machine, as ``3`` or ``coupled-203``; None of another name."""
+    seed = name.removeprefix(_COUPLED)
+    return (int(seed), seed != name) if seed.isdigit() else None
+
+
+def is_coupled(name: str) -> bool:
+    """Return whether the name is that of a coupled machine."""
+    return (drawn(name) or (0, False))[1]
+
+
+def named(names: Sequence[str]) -> list[str]:
+    """Return the machines' names; ``drawn`` and ``coupled`` stand for the ten of either kind."""
+    groups = {"drawn": [str(seed) for seed in EVALUATION], "coupled": [f"{_COUPLED}{seed}" for seed in COUPLED]}
+    return [each for name in names for each in groups.get(name, [name])]
+
+
 def under(machine: MachineFile, condition: str) -> MachineFile:
     """Return the machine with the sensors of one of the `CONDITIONS`."""
     trigger, noise = CONDITIONS[condition]
@@ -114,18 +155,26 @@ def under(machine: MachineFile, condition: str) -> MachineFile:
 
 
 def least_limit(machine: MachineFile) -> float:
-    """Return the least depth [m] at which a cut of the campaign can chatter, from the true tip receptances (zero-order limit)."""
+    """Return the least depth [m] at which a cut of the campaign can chatter, from the true tip receptances (zero-order limit).
+
+    Those at the mean of the speeds; of a coupled machine also those at the slowest and the fastest.
+    """
     plan = machine.plan
     least = np.inf
     for path in machine.toolings:
         tooling = read_tooling(path)
-        true = true_receptances(machine, tooling)
-        tip = measured_tip({axis: (true.frequency_hz, true.tip[:, i]) for i, axis in enumerate((Dof.X, Dof.Y))})
+        process = MillingProcess(tooling.cutter, machine.workpiece.coefficients, plan.engagement, plan.feed_angle)
         speeds = np.linspace(0.99 * min(plan.spindle_speeds), 1.01 * max(plan.spindle_speeds), 2000)
-        coefficients = machine.workpiece.coefficients
-        lobes = stability_lobes(tip, MillingProcess(tooling.cutter, coefficients, plan.engagement, plan.feed_angle), speeds, 1.0)
-        least = min(least, float(lobes.limit_depth.min()))
+        for speed in (None, min(plan.spindle_speeds), max(plan.spindle_speeds))[: 3 if machine.spindle.coupled else 1]:
+            lobes = stability_lobes(true_tip(machine, tooling, speed), process, speeds, 1.0)
+            least = min(least, float(lobes.limit_depth.min()))
     return least
+
+
+def true_tip(machine: MachineFile, tooling: Tooling, speed: float | None = None) -> Receptance:
+    """Return the tip's true receptance, cross terms included, at a spindle speed [rad/s], by default the mean of the plan's."""
+    true = true_receptances(machine, tooling, speed)
+    return Receptance(from_hz(true.frequency_hz), true.tip, TIP, TIP)
 
 
 def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
@@ -137,7 +186,12 @@ def _pair(rng: np.random.Generator, value: float) -> str:
     return f"[{value:.5g}, {value * (1.0 - rng.uniform(0.0, 0.15)):.5g}]"
 
 
-def _spindle(rng: np.random.Generator) -> tuple[bool, str]:
+def _angle(turn: np.random.Generator | None) -> list[str]:
+    """The line of an element's angle, where elements are turned."""
+    return [] if turn is None else [f"angle_deg = {turn.uniform(-TURNED, TURNED):.2f}"]
+
+
+def _spindle(rng: np.random.Generator, turn: np.random.Generator | None) -> tuple[bool, str]:
     """Whether gyroscopic moments act, and the text of shaft and bearings; the shaft is within 25 % of one of two."""
     kind = int(rng.integers(2))
     lines = ["[shaft]", "segments = ["]
@@ -164,6 +218,7 @@ def _spindle(rng: np.random.Generator) -> tuple[bool, str]:
             f"position_mm = {place * length:.1f}",
             f"stiffness = {_pair(rng, stiffness * _log_uniform(rng, 0.5, 2.0))}",
             f"damping = {_pair(rng, damping * damped * _log_uniform(rng, 0.8, 1.25))}",
+            *_angle(turn),
         ]
         if softening:
             lines.append(f"softening_per_rpm = {softening:.3g}")
@@ -171,7 +226,7 @@ def _spindle(rng: np.random.Generator) -> tuple[bool, str]:
     return bool(rng.random() < 0.1), "\n".join(lines)
 
 
-def _housing_and_joint(rng: np.random.Generator) -> str:
+def _housing_and_joint(rng: np.random.Generator, turn: np.random.Generator | None) -> str:
     kind = int(rng.integers(2))
     mass, inertia, *springs = _HOUSINGS[kind]
     heavy = rng.uniform(0.75, 1.25)
@@ -187,6 +242,7 @@ def _housing_and_joint(rng: np.random.Generator) -> str:
         f"damping = {_pair(rng, damping)}",
         f"tilting_stiffness = {_pair(rng, tilting_stiffness)}",
         f"tilting_damping = {_pair(rng, tilting_damping)}",
+        *_angle(turn),
         "",
         "[joint]",
         f"translational_stiffness = {_log_uniform(rng, 1.0e9, 1.0e10):.4g}",

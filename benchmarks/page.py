@@ -33,6 +33,11 @@ def append_row(path: Path, row: dict[str, Any]) -> None:
         file.write(("" if whole else "\n") + json.dumps(row) + "\n")
 
 
+def write_rows(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """Write a file of results anew."""
+    path.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+
+
 def write_block(name: str, text: str, page: Path = PAGE) -> None:
     """Replace what stands between the page's two marks of this name."""
     begin, end = f"<!-- {name}: written by python -m benchmarks -->", f"<!-- end of {name} -->"

@@ -7,16 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.machines import CONDITIONS
+from benchmarks.machines import CONDITIONS, drawn
 from rcsa_ident.arrays import FloatArray
 
 #: Aims for toolings that never cut, and what no run that calls itself converged may exceed.
 AIMS, WORST = {"similar": 0.01, "different": 0.025}, 0.05
+#: The same of coupled machines: medians, the worst of toolings that never cut, cross terms over their own norm.
+COUPLED_AIMS = {"cut": 0.005, "similar": 0.01, "different": 0.015}
+COUPLED_WORST, CROSS_AIM = {"similar": 0.02, "different": 0.04}, 0.05
 
 
 def line(row: dict[str, Any]) -> str:
     """Return a run in one line."""
     errors = "  ".join(f"{kind} {row[kind]['errors'][0]:.4f} {row[kind]['errors'][1]:.4f}" for kind in AIMS)
+    if "cross" in row["similar"]:
+        errors += "  XY over direct, over own " + "  ".join(f"{max(row[kind][n]):.4f}" for kind in AIMS for n in ("cross", "cross_own"))
     bands = ""
     if row["similar"]["bands"]:
         bands = "  90 % band " + " ".join(f"{100 * row[kind]['bands']['90']:.0f}" for kind in ("cut", *AIMS))
@@ -36,7 +41,7 @@ def _summary(rows: Sequence[dict[str, Any]]) -> list[str]:
     ]
     groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for row in rows:
-        machines = "drawn" if row["machine"].isdigit() else row["machine"]
+        machines = "drawn" if drawn(row["machine"]) else row["machine"]
         groups.setdefault((machines, row["condition"], row["method"]), []).append(row)
     for key, members in groups.items():
         cells = [*key, str(len(members))]
@@ -58,15 +63,17 @@ def _medians(members: Sequence[dict[str, Any]]) -> FloatArray:
 
 
 def _bands(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Coverage of the default method's bands, mean over the runs and the least of them."""
+    """Coverage of the default method's bands on drawn machines, mean over the runs and the least of them."""
     lines = [
         "| condition | toolings | in the 50 % band | in the 90 % band | least of a run | rms error / deviation |",
         "|---|---|---|---|---|---|",
     ]
     for condition in CONDITIONS:
-        members = [r for r in rows if r["condition"] == condition and r["method"] == "default" and r["machine"].isdigit()]
+        members = [r for r in rows if r["condition"] == condition and r["method"] == "default" and drawn(r["machine"])]
         for kind in ("cut", *AIMS) if members else ():
             bands = [row[kind]["bands"] for row in members if row[kind]["bands"]]
+            if not bands:
+                continue
             half, most, rms = (np.array([b[name] for b in bands]) for name in ("50", "90", "rms"))
             lines.append(
                 f"| {condition} | {kind} | {100 * half.mean():.0f} % | {100 * most.mean():.0f} % | {100 * most.min():.0f} % "
@@ -77,7 +84,7 @@ def _bands(rows: Sequence[dict[str, Any]]) -> list[str]:
 
 def counts(rows: Sequence[dict[str, Any]]) -> dict[str, int]:
     """Return how the default method's status meets the truth: runs, converged above `WORST`, good runs, good ones called suspect."""
-    members = [r for r in rows if r["method"] == "default" and r["machine"].isdigit()]
+    members = [r for r in rows if r["method"] == "default" and drawn(r["machine"])]
     worst = [max(e for kind in AIMS for e in r[kind]["errors"]) for r in members]
     good = [all(e <= aim for kind, aim in AIMS.items() for e in r[kind]["errors"]) for r in members]
     converged = [r["status"] == "converged" for r in members]
@@ -111,4 +118,45 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
             cells = [row["machine"], row["condition"], str(row["seed"]), *errors, row["status"], *shares, modes, seconds]
             lines.append("| " + " | ".join(cells) + " |")
     doubts = [f"- {r['machine']}, {r['condition']}: {reason}" for r in rows if r["method"] == "default" for reason in r["reasons"]]
+    return "\n".join([*lines, "", *doubts]).rstrip() + "\n"
+
+
+def coupled_table(rows: Sequence[dict[str, Any]]) -> str:
+    """Return the coupled machines' part as Markdown: errors of XX, YY and of the cross terms, each at the worst of three speeds.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        With ``cross`` and ``cross_own`` beside ``errors`` of each kind of tooling.
+    """
+    members = [r for r in rows if r["method"] == "default"]
+    lines = [
+        "| condition | toolings | runs | XX, YY: median | worst | XY over XX: median | worst | XY over XY: median | worst "
+        "| converged | seconds |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for condition in dict.fromkeys(r["condition"] for r in members):
+        group = [r for r in members if r["condition"] == condition]
+        for kind in COUPLED_AIMS:
+            cells = [condition, kind, str(len(group))]
+            for name in ("errors", "cross", "cross_own"):
+                errors = np.array([e for row in group for e in row[kind][name]])
+                cells += [f"{np.median(errors):.4f}", f"{errors.max():.4f}"]
+            converged = sum(row["status"] == "converged" for row in group)
+            seconds = np.median([sum(row["seconds"].values()) for row in group])
+            lines.append("| " + " | ".join([*cells, f"{converged} of {len(group)}", f"{seconds:.1f}"]) + " |")
+    aims, most = (", ".join(f"{kind} {aim:g}" for kind, aim in these.items()) for these in (COUPLED_AIMS, COUPLED_WORST))
+    above = counts(members)["converged above"]
+    lines += ["", f"Aims: medians {aims}; worst {most}; cross terms {CROSS_AIM:g} of their own norm.", "", *_bands(rows), ""]
+    lines += [f"Of {len(members)} runs, {above} are `converged` with an error above {WORST} in a tooling that never cut.", ""]
+    columns = [f"{kind} {name}" if name == "XX" else name for kind in COUPLED_AIMS for name in ("XX", "YY", "XY / XX", "XY / XY")]
+    lines += ["| machine | condition | seed | " + " | ".join(columns) + " | status | seconds |", "|" + "---|" * (len(columns) + 5)]
+    for row in members:
+        shown: list[float] = []
+        for kind in COUPLED_AIMS:
+            found = row[kind]
+            shown += [max(found["errors"][0::2]), max(found["errors"][1::2]), max(found["cross"]), max(found["cross_own"])]
+        cells = [row["machine"], row["condition"], str(row["seed"]), *(f"{e:.4f}" for e in shown), row["status"]]
+        lines.append("| " + " | ".join([*cells, f"{sum(row['seconds'].values()):.1f}"]) + " |")
+    doubts = [f"- {r['machine']}, {r['condition']}: {reason}" for r in members for reason in r["reasons"]]
     return "\n".join([*lines, "", *doubts]).rstrip() + "\n"

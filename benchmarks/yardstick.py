@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.study import FREQUENCY, relative_error
+from benchmarks.comparison import FREQUENCY, relative_error
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof

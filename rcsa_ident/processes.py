@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import importlib
+import io
 import multiprocessing
 import os
+import pickle
 import signal
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.reduction import ForkingPickler
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 from rcsa_ident.scaleout import ClusterMap
@@ -33,6 +36,8 @@ EARLY = ("rcsa_ident.io.recordings", "rcsa_ident.workflows.identify", "rcsa_iden
 THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 #: Seconds between two steps of one process that are shown.
 PAUSE = 0.1
+#: What the running script is called as a module, here and where another process has started it.
+_SCRIPT = ("__main__", "__mp_main__")
 
 #: Takes axis, stage and cost of a search.
 Show = Callable[[str, str, float], None]
@@ -83,6 +88,9 @@ ForkingPickler.register(Relay, _with_line)
 @dataclass(frozen=True, slots=True, eq=False)
 class Workers:
     """A `map` that may run in several processes; results come in the order of the tasks.
+
+    Helpers do not run the script that starts them. What it defines itself, or what cannot be pickled, is therefore computed in this process
+    alone, and a `RuntimeWarning` says so.
 
     Parameters
     ----------
@@ -149,20 +157,62 @@ def _run_chunk(chunk: _Chunk) -> list[Any]:
     return [chunk.function(task) for task in chunk.tasks]
 
 
+class _Unsendable(Exception):
+    """A task cannot go to a helper; the message says why."""
+
+
+class _Parcel(ForkingPickler):
+    """A pickler that refuses what only the running script defines: the helpers could not find it."""
+
+    def reducer_override(self, obj: Any) -> Any:
+        """Look at each function and class by the way, as the pickler will name it, and leave the work to the pickler."""
+        if isinstance(obj, type | FunctionType) and obj.__module__ in _SCRIPT:
+            raise _Unsendable(f"{obj.__qualname__} is defined in the script that runs, which the helpers do not run")
+        return NotImplemented
+
+
+def _packed(function: Callable[[Any], Any], task: Any) -> bytes:
+    """Return a task as it is sent: packed here, since neither a helper that cannot unpack nor a pool's thread tells in words.
+
+    Raises
+    ------
+    _Unsendable
+        It names what only the script knows, or what cannot be pickled.
+    """
+    held = io.BytesIO()
+    try:
+        _Parcel(held, pickle.HIGHEST_PROTOCOL).dump((function, task))
+    except (pickle.PicklingError, AttributeError, TypeError, ValueError) as error:
+        # what pickle raises, and what it is given raises: functions within functions, locks, open files
+        raise _Unsendable(str(error)) from error
+    return held.getvalue()
+
+
+def _run_packed(parcel: bytes) -> Any:
+    function, task = pickle.loads(parcel)
+    return function(task)
+
+
 class _Shared:
-    """Tasks of which each helper has one at a time; the main process does what it would otherwise wait for."""
+    """Tasks of which each helper has one at a time; the main process does what it would otherwise wait for, or what cannot be sent."""
 
     def __init__(self, pool: ProcessPoolExecutor, function: Callable[[Any], Any], tasks: Sequence[Any]) -> None:
         self.pool, self.function, self.tasks = pool, function, tasks
         self.futures: dict[int, Future[Any]] = {}
         self.next, self.lock = 0, threading.Lock()
+        #: Why the helpers get no more.
+        self.alone: _Unsendable | None = None
 
     def run(self, helpers: int) -> Iterator[Any]:
         for _ in range(helpers):
             self._send()
         own: dict[int, Any] = {}
+        warned = False
         for i in range(len(self.tasks)):
             while not (i in own or (i in self.futures and self.futures[i].done())):
+                if self.alone is not None and not warned:
+                    warned = True
+                    _warn_alone(self.alone)
                 with self.lock:
                     mine, self.next = self.next, self.next + 1
                 if mine >= len(self.tasks):
@@ -173,9 +223,15 @@ class _Shared:
     def _send(self) -> None:
         with self.lock:
             i = self.next
-            if i >= len(self.tasks):
+            if i >= len(self.tasks) or self.alone is not None:
                 return
-            self.futures[i] = self.pool.submit(self.function, self.tasks[i])
+            try:
+                parcel = _packed(self.function, self.tasks[i])
+            except _Unsendable as reason:
+                # said by the main process, which now does the rest
+                self.alone = reason
+                return
+            self.futures[i] = self.pool.submit(_run_packed, parcel)
             self.next += 1
         # called by the pool's own thread as soon as the helper is free
         self.futures[i].add_done_callback(self._more)
@@ -185,6 +241,11 @@ class _Shared:
             # a pool that is being ended takes no more
             with suppress(RuntimeError):
                 self._send()
+
+
+def _warn_alone(reason: _Unsendable) -> None:
+    what = "put it into a module of its own to use several processes, or ask for processes=1"
+    warnings.warn(f"computed in this process alone: {reason}; {what}", RuntimeWarning, stacklevel=2)
 
 
 @contextmanager

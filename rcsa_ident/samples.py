@@ -15,7 +15,7 @@ from rcsa_ident.io.machines import MachineFile, read_machine
 from rcsa_ident.io.setups import CAMPAIGN_FILE, read_tooling
 from rcsa_ident.io.simulations import Progress, SimulatedCampaign, write_simulation
 from rcsa_ident.machining_setup import Tooling
-from rcsa_ident.workflows.simulate import simulate, true_flange, true_receptances
+from rcsa_ident.workflows.simulate import simulate, true_flange, true_receptances, truth_speeds
 
 #: Cuts of a sample campaign that is made on the spot: three in ten of those in the repository's, and a good answer all the same.
 SAMPLE_CUTS = 24
@@ -46,7 +46,7 @@ def simulate_campaign(
     if len({t.name for t in known}) != len(known):
         raise InputError("cuts.toolings", ", ".join(t.name for t in known), "toolings with different names")
     cuts = simulate(setup, toolings, seed, mapper)
-    truths = (true_receptances(setup, tooling) for tooling in known)
+    truths = (true_receptances(setup, tooling, speed) for tooling in known for speed in truth_speeds(setup))
     return write_simulation(out, setup, toolings, cuts, truths, true_flange(setup), progress)
 
 

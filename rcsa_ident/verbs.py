@@ -78,7 +78,8 @@ def identify(
     start : Result or IdentifiedMachine, optional
         An earlier answer for the same machine, whose modes are refined; with the default method.
     processes : int or None
-        With this one; by default one a core, at most 8. They run nothing of the script that calls this.
+        With this one; by default one a core, at most 8. They run nothing of the script that calls this: a method that it defines itself
+        is computed in this process alone, with a `RuntimeWarning`.
     progress : bool or None
         Whether a line tells how far it is; by default where somebody looks on, in a terminal or a notebook.
 

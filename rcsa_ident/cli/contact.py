@@ -111,20 +111,20 @@ def _taps(tooling: Path, texts: list[str], on: Path | None, low: float, high: fl
 
 def _supports(path: Path) -> tuple[dict[Dof, Support], tuple[float, float]]:
     """What an assembly was clamped in, per axis, and the band where it is known [Hz]."""
+    from rcsa_ident.cli.results import read_identified, tell
     from rcsa_ident.coupling.joint import LumpedJoint
     from rcsa_ident.workflows.contact import Support
 
     if path.suffix.lower() == ".csv":
-        from rcsa_ident.io.flanges import read_flange_csv
+        from rcsa_ident.io.flanges import read_flange_machine
 
-        flanges = read_flange_csv(path)
-        # a decoupled flange holds its joint already
+        known = read_flange_machine(path)
+        tell(known, path)
+        # a flange without a joint of its own holds the joint's compliance already
         rigid = LumpedJoint(1e18, 1e18)
-        edges = [f.band for f in flanges.values()]
-        band = to_hz(max(e[0] for e in edges)), to_hz(min(e[1] for e in edges))
-        return {axis: Support(flange, rigid) for axis, flange in flanges.items()}, band
-    from rcsa_ident.cli.results import read_identified, tell
-
+        sides = {part.coordinates[0].dof: part.believed for part in known.parts}
+        low, high = known.band
+        return {axis: Support(side.flange, side.joint or rigid) for axis, side in sides.items()}, (to_hz(low), to_hz(high))
     machine, data = read_identified(path)
     tell(machine, path)
     return {axis: Support(part.spindle, part.joint) for axis, part in machine.identified.items()}, (data["band_hz"][0], data["band_hz"][1])

@@ -37,7 +37,10 @@ def decouple(
     out: Annotated[Path, typer.Option(help="FLANGE.csv to write.", show_default=False)],
     beside: Annotated[
         Path | None,
-        typer.Option(help="RESULT.json whose joint is removed as well, and whose flange is drawn for comparison.", show_default=False),
+        typer.Option(
+            help="RESULT.json whose joint is removed as well and written beside the flange, and whose flange is drawn for comparison.",
+            show_default=False,
+        ),
     ] = None,
     from_: Annotated[float, typer.Option("--from", help="Lowest frequency that is used, Hz.")] = 200.0,
     to: Annotated[float | None, typer.Option("--to", help="Highest frequency that is used, Hz; default: all.", show_default=False)] = None,
@@ -66,11 +69,12 @@ def decouple(
     taps = _taps(tap, positive("--from", from_, "Hz"), math.inf if to is None else positive("--to", to, "Hz"))
     stages = Stages(quiet=json_)
     with stages.stage("decoupling"):
-        found = {axis: flange_from_taps(own, axis, machine[axis].joint if axis in machine else None, share) for axis, own in taps.items()}
+        joints = {axis: machine[axis].joint for axis in taps if axis in machine}
+        found = {axis: flange_from_taps(own, axis, joints.get(axis), share) for axis, own in taps.items()}
     omega = next(iter(found.values())).receptance.omega
     if any(not np.array_equal(f.receptance.omega, omega) for f in found.values()):
         raise InputError("frequencies", "different ones for X and Y", "the same for both axes")
-    write_flange_csv(out, to_hz(omega), {a: f.receptance.values for a, f in found.items()}, {a: f.std for a, f in found.items()})
+    write_flange_csv(out, to_hz(omega), {a: f.receptance.values for a, f in found.items()}, {a: f.std for a, f in found.items()}, joints)
     if plot is not None:
         _draw(found, machine, plot)
     if json_:

@@ -32,7 +32,7 @@ class ObserverName(StrEnum):
 @answers
 def forces(
     result: Annotated[
-        Path, typer.Argument(help="RESULT.json of an identification, or FLANGE.csv of a measured flange.", show_default=False)
+        Path, typer.Argument(help="RESULT.json of an identification, or FLANGE.csv of a bare flange with its joint.", show_default=False)
     ],
     tooling: Annotated[Path, typer.Argument(help="TOOLING.toml of the tool that was cutting.", show_default=False)],
     recording: Annotated[Path, typer.Argument(help="Recording of the cut; channels as in the campaign.", show_default=False)],
@@ -113,7 +113,7 @@ def forces(
         try:
             found = observe(machine, setup.assembly, setup.cutter.teeth, cut, still, programmed, method, bandwidth, smooth)
         except InputError as error:
-            raise error if error.where else error.at(str(recording)) from None
+            raise error if error.where else error.at(str(result if error.field == "machine" else recording)) from None
     level = None
     if idle_percent is not None:
         settled = max(each.kalman.gain.shape[0] for each in found.observer.axes)

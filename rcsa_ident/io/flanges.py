@@ -1,13 +1,18 @@
-"""FLANGE.csv: the receptance block of a spindle's flange over frequency, measured or decoupled, with what is known of its errors."""
+"""FLANGE.csv: the receptance block of a spindle's flange over frequency, measured or decoupled, with what is known of its errors.
+
+With columns of the joint it is the flange alone, and the joint stands in front of it; without them the joint's compliance is part of it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import astuple, fields
 from pathlib import Path
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
@@ -19,10 +24,16 @@ from rcsa_ident.units import from_hz, to_hz
 
 #: Entries of [[tF, tM], [rF, rM]]; a flange is reciprocal, so rF is tM.
 _ENTRIES = {"tF": (0, 0), "tM": (0, 1), "rM": (1, 1)}
+#: Columns of the joint, the same in every line, by the names that they have in RESULT.json.
+_JOINT = tuple(f"joint_{each.name}" for each in fields(LumpedJoint))
 
 
 def write_flange_csv(
-    path: str | Path, frequency_hz: FloatArray, values: Mapping[Dof, ComplexArray], std: Mapping[Dof, FloatArray] | None = None
+    path: str | Path,
+    frequency_hz: FloatArray,
+    values: Mapping[Dof, ComplexArray],
+    std: Mapping[Dof, FloatArray] | None = None,
+    joints: Mapping[Dof, LumpedJoint] | None = None,
 ) -> None:
     """Write flange receptances: ``frequency_hz, X_tF_re, X_tF_im, X_tM_re, ..., Y_rM_im`` in m/N, rad/N and rad/(N m).
 
@@ -33,6 +44,9 @@ def write_flange_csv(
     values : mapping of Dof to complex array, shape (n, 2, 2)
     std : mapping of Dof to array, shape (n, 2, 2), optional
         Columns ``X_tF_std`` and so on: of the real and of the imaginary part each.
+    joints : mapping of Dof to LumpedJoint, optional
+        Columns ``X_joint_translational_stiffness`` and so on [N/m, N m/rad, N s/m, N m s/rad], of the joint in front of `values`; an axis
+        without them has its joint's compliance in `values`.
     """
     columns: dict[str, FloatArray] = {"frequency_hz": np.asarray(frequency_hz, dtype=float)}
     for axis, block in values.items():
@@ -41,6 +55,9 @@ def write_flange_csv(
             columns |= {f"{head}_re": block[:, i, j].real, f"{head}_im": block[:, i, j].imag}
             if std is not None:
                 columns[f"{head}_std"] = std[axis][:, i, j]
+        if joints is not None and axis in joints:
+            parts = zip(_JOINT, astuple(joints[axis]), strict=True)
+            columns |= {f"{axis.upper()}_{name}": np.full(columns["frequency_hz"].size, value) for name, value in parts}
     table = np.stack(list(columns.values()), axis=1)
     if not np.all(np.isfinite(table)):
         raise InputError("flange receptance", "not finite", "finite numbers", str(path))
@@ -48,23 +65,26 @@ def write_flange_csv(
 
 
 def write_flange_machine(path: str | Path, machine: FlangeMachine) -> None:
-    """Write the flange of a machine, the joint's compliance with it, as what is decoupled from clamped tool-holders holds it.
+    """Write the flange of a machine, and the joint in front of it where there is one apart from it.
 
     Raises
     ------
     InputError
         If its bending planes feel each other: the file has no columns for that.
     """
-    omega, values = machine.lines(), {}
+    omega, values, joints = machine.lines(), {}, {}
     for part in machine.parts:
         if len(part.coordinates) > 2:
             raise InputError("flange", "bending planes that feel each other", "planes apart from each other", str(path))
-        values[part.coordinates[0].dof] = part.believed.interface(omega)
-    write_flange_csv(path, np.round(to_hz(omega), 9), values)
+        axis, believed = part.coordinates[0].dof, part.believed
+        values[axis] = believed.flange.receptance(omega).values
+        if believed.joint is not None:
+            joints[axis] = believed.joint
+    write_flange_csv(path, np.round(to_hz(omega), 9), values, joints=joints)
 
 
 def read_flange_csv(path: str | Path) -> dict[Dof, MeasuredFlange]:
-    """Return the flange of each axis in a file; further columns are left alone.
+    """Return the flange of each axis in a file, without the joint that may stand in front of it; further columns are left alone.
 
     Raises
     ------
@@ -75,12 +95,12 @@ def read_flange_csv(path: str | Path) -> dict[Dof, MeasuredFlange]:
 
 
 def read_flange_machine(path: str | Path) -> FlangeMachine:
-    """Return a machine that is known by the flange of such a file; what was decoupled holds the joint's compliance already.
+    """Return a machine that is known by the flange of such a file, with its joint; without one the flange holds the joint's compliance.
 
     Raises
     ------
     InputError
-        As `read_flange_csv`.
+        As `read_flange_csv`; or the columns of a joint are not complete, or change from line to line.
     """
     return _machine(read_table(path, "flange"), Path(path).stem)
 
@@ -92,7 +112,28 @@ def flange_machine_of(text: str, name: str = "flange") -> FlangeMachine:
 
 def _machine(table: TextTable, name: str) -> FlangeMachine:
     flanges = tuple(_flanges(table).values())
-    return FlangeMachine(flanges, flanges[0].band, name=name, ends=True)
+    return FlangeMachine(flanges, flanges[0].band, _joints(table), name, ends=True)
+
+
+def _joints(table: TextTable) -> dict[Dof, LumpedJoint] | None:
+    """The joint of each axis that has one."""
+    found = {}
+    for axis in (Dof.X, Dof.Y):
+        names = [f"{axis.upper()}_{name}" for name in _JOINT]
+        if not any(name in table.header for name in names):
+            continue
+        missing = [name for name in names if name not in table.header]
+        if missing:
+            raise InputError(f"column {missing[0]}", "nothing", "stiffness and damping of a joint, all four", table.where)
+        columns = table.columns(names)
+        for name, column in zip(names, columns, strict=True):
+            if np.any(column != column[0]):
+                raise InputError(f"column {name}", "different numbers", "the same number in every line", table.where)
+        try:
+            found[axis] = LumpedJoint(*(float(column[0]) for column in columns))
+        except InputError as error:
+            raise error.at(table.where) from None
+    return found or None
 
 
 def _flanges(table: TextTable) -> dict[Dof, MeasuredFlange]:

@@ -17,8 +17,8 @@ from rcsa_ident.virtual.machine import Bearing, CutPlan, FlangeJoint, Housing, P
 from rcsa_ident.virtual.sensors import SensorSuite
 
 _TOP = ("machine", "shaft", "materials", "bearings", "housing", "joint", "sensors", "workpiece", "cuts")
-_BEARING = ("position_mm", "stiffness", "damping", "softening_per_rpm")
-_HOUSING = ("position_mm", "mass", "inertia", "stiffness", "damping", "tilting_stiffness", "tilting_damping")
+_BEARING = ("position_mm", "stiffness", "damping", "softening_per_rpm", "angle_deg")
+_HOUSING = ("position_mm", "mass", "inertia", "stiffness", "damping", "tilting_stiffness", "tilting_damping", "angle_deg")
 _JOINT = ("translational_stiffness", "translational_damping", "rotational_stiffness", "rotational_damping")
 _SENSORS = (
     "sampling_rate_hz", "fixture_position_mm", "flange_sensitivity", "flange_noise_nm", "flange_drift_um", "flange_delay_s",
@@ -77,7 +77,7 @@ def read_machine(path: str | Path) -> MachineFile:
             bearings=tuple(_bearing(table) for table in top.tables("bearings", _BEARING)),
             housing=_housing(top.table("housing", _HOUSING)),
             joint=_joint(top.table("joint", _JOINT)),
-            gyroscopic=_flag(head, "gyroscopic"),
+            gyroscopic=_flag(head, "gyroscopic", True),
             fixture_position=sensors.number("fixture_position_mm", "mm", 0.0, least=-1000.0, most=5000.0) * 1e-3,
         )
         fastest = max(plan.spindle_speeds)
@@ -102,6 +102,7 @@ def _bearing(table: Table) -> Bearing:
         _pair(table, "stiffness", "N/m"),
         _pair(table, "damping", "N s/m"),
         table.number("softening_per_rpm", "1/(rev/min)", 0.0, least=-1e-3, most=1e-3) / from_rpm(1.0),
+        _angle(table),
     )
 
 
@@ -114,6 +115,7 @@ def _housing(table: Table) -> Housing:
         damping=_pair(table, "damping", "N s/m"),
         tilting_stiffness=_pair(table, "tilting_stiffness", "N m/rad"),
         tilting_damping=_pair(table, "tilting_damping", "N m s/rad"),
+        angle=_angle(table),
     )
 
 
@@ -178,8 +180,13 @@ def _pair(table: Table, key: str, unit: str) -> PerAxis:
     return x, y
 
 
-def _flag(table: Table, key: str) -> bool:
-    value = table.value(key, "true or false", False)
+def _angle(table: Table) -> float:
+    """Of an element's principal directions about the spindle's axis."""
+    return float(np.radians(table.number("angle_deg", "deg", 0.0, least=-180.0, most=180.0)))
+
+
+def _flag(table: Table, key: str, usual: bool = False) -> bool:
+    value = table.value(key, "true or false", usual)
     if not isinstance(value, bool):
         table.refuse(key, describe(value), "true or false")
     return value

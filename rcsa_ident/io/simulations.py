@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.hdf5 import write_hdf5
@@ -30,8 +30,9 @@ class SimulatedCampaign:
     ----------
     folder : Path
     truth : Path
-        ``tip/``, ``cross/``, ``spindle.csv``: receptances; ``records.csv``: true speeds and tooth angles at the first sample;
-        ``forces/``: lines of the true force. No reader of the folder sees it.
+        ``tip/``, ``cross/``, ``spindle.csv``: receptances at the mean of the speeds, with the terms between X and Y where there are
+        some; ``tip/`` and ``cross/`` of a machine that changes with the speed also at the slowest and the fastest. ``records.csv``:
+        true speeds and tooth angles at the first sample; ``forces/``: lines of the true force. No reader of the folder sees it.
     cuts : int
     """
 
@@ -85,12 +86,38 @@ def write_simulation(
         if progress is not None:
             progress(done, total)
     write_text(truth / "records.csv", "\n".join(rows) + "\n")
+    mean = float(np.mean(setup.plan.spindle_speeds))
     for true in receptances:
-        _write_columns(truth / "tip" / f"{true.tooling}.csv", ("frequency_hz",), true.frequency_hz, true.tip)
-        _write_columns(truth / "cross" / f"{true.tooling}.csv", ("frequency_hz",), true.frequency_hz, true.cross)
-    names = [f"{axis}_{entry}" for axis in "XY" for entry in ("tF", "tM", "rF", "rM")]
-    _write_columns(truth / "spindle.csv", ("frequency_hz",), flange.frequency_hz, flange.values.reshape(-1, 8), names)
+        speed = None if true.spindle_speed == mean else true.spindle_speed
+        for place, values in (("tip", true.tip), ("cross", true.cross)):
+            names, columns = _directions(values[:, :, None, :, None])
+            _write_columns(truth / place / true_name(true.tooling, speed), ("frequency_hz",), true.frequency_hz, columns, names)
+    names, columns = _directions(flange.values.reshape(-1, 2, 2, 2, 2), tuple(f"_{entry}" for entry in ("tF", "tM", "rF", "rM")))
+    _write_columns(truth / "spindle.csv", ("frequency_hz",), flange.frequency_hz, columns, names)
     return SimulatedCampaign(out, truth, total)
+
+
+def true_name(tooling: str, speed: float | None = None) -> str:
+    """Return the name of a file of true receptances, at the mean of the speeds or at another one [rad/s]."""
+    return f"{tooling}.csv" if speed is None else f"{tooling}-{to_rpm(speed):.0f}rpm.csv"
+
+
+def _directions(values: ComplexArray, entries: tuple[str, ...] = ("",)) -> tuple[list[str], ComplexArray]:
+    """Names and columns of receptances over both axes: X, Y, and motion in X under a force in Y and the reverse, where there are some.
+
+    Parameters
+    ----------
+    values : complex array, shape (n, 2, k, 2, k)
+        Axis and what moves there, axis and what acts there.
+    entries : tuple of str
+        Endings of the k * k names.
+    """
+    chosen = [(0, 0), (1, 1)]
+    if np.any(values[:, 0, :, 1]) or np.any(values[:, 1, :, 0]):
+        chosen += [(0, 1), (1, 0)]
+    names = ["XY"[row] if row == col else "XY"[row] + "XY"[col] for row, col in chosen]
+    columns = [values[:, row, :, col].reshape(values.shape[0], -1) for row, col in chosen]
+    return [name + entry for name in names for entry in entries], np.concatenate(columns, axis=1)
 
 
 def _write_columns(path: Path, first: tuple[str], abscissa: FloatArray, values: np.ndarray, names: Sequence[str] = ("X", "Y")) -> None:

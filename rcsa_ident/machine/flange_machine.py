@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,11 +10,13 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.coupling.joint import LumpedJoint
-from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance, Substructure
 from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_part import FlangePart, JointedFlange, independent_parts
 from rcsa_ident.machine.machine import STEP, Machine
+from rcsa_ident.machine.measured import MeasuredFlange
+from rcsa_ident.remarks import Remark
 from rcsa_ident.units import to_hz
 
 
@@ -24,11 +27,12 @@ class FlangeMachine(Machine):
     Parameters
     ----------
     flanges : tuple of Substructure
-        Coordinates at ``flange``, those of one substructure feel nothing of another's.
+        Coordinates at ``flange``, each of one substructure alone; those of one feel nothing of another's.
     known : (float, float) [rad/s]
         Lowest and highest frequency at which the flange is known.
-    joint : LumpedJoint or None
-        None where the flange holds the joint's compliance, as one that was decoupled from clamped tool-holders does.
+    joint : LumpedJoint, mapping of Dof to LumpedJoint, or None
+        Of all bending planes, or by the planes' machine axes. None (or not in the mapping) where the flange holds the joint's compliance,
+        as one that was decoupled from clamped tool-holders does.
     name : str
     ends : bool
         Whether nothing at all is known beyond `known`, as of a measurement.
@@ -45,13 +49,17 @@ class FlangeMachine(Machine):
 
     flanges: tuple[Substructure, ...]
     known: tuple[float, float]
-    joint: LumpedJoint | None = None
+    joint: LumpedJoint | Mapping[Dof, LumpedJoint] | None = None
     name: str = "flange"
     ends: bool = False
 
     def __post_init__(self) -> None:
         if not self.flanges or not 0.0 <= self.known[0] < self.known[1]:
             raise InputError("flange", f"{len(self.flanges)} from {self.known[0]:g} to {self.known[1]:g} rad/s", "one or more, in a band")
+        taken = [c for part in self.parts for c in part.coordinates]
+        twice = dict.fromkeys(str(c) for c in taken if taken.count(c) > 1)
+        if twice:
+            raise InputError("flange coordinates", f"{', '.join(twice)} of several flanges", "each bending plane of one flange alone")
 
     @cached_property
     def parts(self) -> tuple[FlangePart, ...]:
@@ -61,8 +69,29 @@ class FlangeMachine(Machine):
             look = flange.receptance(frozen(np.linspace(*self.known, 5)))
             for group in independent_parts(look):
                 own = flange if group == look.rows else _Group(flange, group)
-                found.append(FlangePart(group, JointedFlange(own, self.joint)))
+                found.append(FlangePart(group, JointedFlange(own, self._joint(group))))
         return tuple(found)
+
+    @cached_property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What speaks against everything that is computed with it: frequencies of a measurement that lie too far apart."""
+        found = []
+        for flange in self.flanges:
+            if isinstance(flange, MeasuredFlange):
+                low, high = max(flange.band[0], self.known[0]), min(flange.band[1], self.known[1])
+                omega = self.lines()
+                remark = flange.coarse(omega[(omega >= low) & (omega <= high)])
+                if remark is not None:
+                    found.append(remark.of(", ".join(c.dof.upper() for c in flange.coordinates if not c.dof.is_slope)))
+        return tuple(found)
+
+    def _joint(self, group: tuple[Coordinate, ...]) -> LumpedJoint | None:
+        if not isinstance(self.joint, Mapping):
+            return self.joint
+        first, *others = (self.joint.get(c.dof.plane) for c in group)
+        if any(each != first for each in others):
+            raise InputError("flange joint", "another one for X than for Y", "one joint for bending planes that feel each other")
+        return first
 
     @property
     def band(self) -> tuple[float, float]:

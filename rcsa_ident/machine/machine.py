@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
+from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_part import FlangePart
 from rcsa_ident.machine.mode_synthesis import poles_of
 from rcsa_ident.machine.responses import at_ends, at_flange, respond_over
@@ -209,6 +210,27 @@ class Machine(TipSource, Drawn):
         if len(sides) == 1:
             tip = replace(tip, poles=partial(poles_of, assembly, sides[0].part.believed, float(tip.omega[-1]), turning))
         return tip if spread else replace(tip, variation=None)
+
+    def check_behind_joint(self, axes: Sequence[Dof] | None = None) -> None:
+        """Refuse a machine that does not tell the spindle's own motion behind the joint, where a sensor at the flange looks.
+
+        A tip feels flange and joint only together, W = B33 + K^-1. Coupled rigidly, a flange that holds K^-1 moves as the tool-holder
+        does in front of the joint; the sensor sees the spindle move, which is less by the force through the joint times K^-1.
+
+        Parameters
+        ----------
+        axes : sequence of Dof, default all
+
+        Raises
+        ------
+        InputError
+            If the flange along one of these axes holds the joint's compliance, as far as it is known.
+        """
+        held = [c.dof.upper() for part in self._along(axes) if part.believed.joint is None for c in part.coordinates if not c.dof.is_slope]
+        if held:
+            found = f"a flange that holds the compliance of its joint, as a decoupled one does ({', '.join(held)})"
+            allowed = "an identified machine, or a bare flange with its joint: the sensor looks at the spindle behind the joint"
+            raise InputError("machine", found, allowed)
 
     def _along(self, axes: Sequence[Dof] | None) -> list[FlangePart]:
         """The parts that some axes feel."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 
@@ -10,9 +11,17 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.remarks import Remark
 
-#: Estimated relative error of the interpolation from which on the measured grid is called coarse.
-COARSE = 0.02
+#: Estimated relative error of the interpolation from which on the measured grid is called coarse, and the share of the frequencies that
+#: are asked for at which it has to be: a narrow antiresonance alone changes no limit.
+COARSE, COARSE_SHARE = 0.02, 0.01
+
+
+class FlangeCode(StrEnum):
+    """What may be said of a measured flange."""
+
+    COARSE = "coarse"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,17 +76,21 @@ class MeasuredFlange:
         values, error = self._interpolated(omega)
         return np.max(error / np.maximum(_size(values), 1e-300), axis=(1, 2))
 
-    def coarse(self, omega: FloatArray) -> str | None:
-        """Return a warning where the measured frequencies are too far apart for those that are asked, else None."""
+    def coarse(self, omega: FloatArray) -> Remark | None:
+        """Return a remark where the measured frequencies are too far apart for those that are asked for [rad/s], else None.
+
+        Noise of the measurement looks the same: both leave open what the receptance is between two measured frequencies.
+        """
         omega = np.asarray(omega, dtype=float)
         error = self.interpolation_error(omega)
-        wide = error > COARSE
-        if not wide.any():
+        share = float(np.mean(error > COARSE))
+        if share < COARSE_SHARE:
             return None
         worst = int(np.argmax(error))
-        return (
-            f"flange measured too coarsely at {np.mean(wide) * 100.0:.0f} % of the frequencies: the interpolation may be "
-            f"{error[worst] * 100.0:.0f} % off at {omega[worst] / (2.0 * np.pi):.0f} Hz"
+        return Remark(
+            FlangeCode.COARSE,
+            f"flange measured too coarsely or with too much noise at {share * 100.0:.0f} % of the frequencies: between the measured ones "
+            f"its receptance may be {error[worst] * 100.0:.0f} % off at {omega[worst] / (2.0 * np.pi):.0f} Hz",
         )
 
     def _interpolated(self, omega: FloatArray) -> tuple[ComplexArray, FloatArray]:

@@ -45,17 +45,19 @@ class SimulatedCut:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrueReceptances:
-    """Of one tooling on the machine, from the full equations.
+    """Of one tooling on the machine at a spindle speed, from the full equations.
 
     Parameters
     ----------
     tooling : str
+    spindle_speed : float [rad/s]
     frequency_hz : array, shape (n,)
-    tip, cross : complex arrays, shape (n, 2) [m/N]
-        Tip-tip and flange-tip, X and Y.
+    tip, cross : complex arrays, shape (n, 2, 2) [m/N]
+        Tip-tip and flange-tip: motion in X and Y, then force in X and Y.
     """
 
     tooling: str
+    spindle_speed: float
     frequency_hz: FloatArray
     tip: ComplexArray
     cross: ComplexArray
@@ -68,8 +70,8 @@ class TrueFlange:
     Parameters
     ----------
     frequency_hz : array, shape (n,)
-    values : complex array, shape (n, 2, 2, 2)
-        Axis (X, Y), then [[tF, tM], [rF, rM]].
+    values : complex array, shape (n, 4, 4)
+        Translation and slope in X, then in Y, under force and moment in X, then in Y.
     """
 
     frequency_hz: FloatArray

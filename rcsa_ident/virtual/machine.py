@@ -23,17 +23,21 @@ class Bearing:
     ----------
     position : float [m]
         Distance from the spindle's flange face towards the rear.
-    stiffness : two floats, X and Y [N/m]
-        Stiffness at standstill.
-    damping : two floats, X and Y [N s/m]
+    stiffness : two floats [N/m]
+        Stiffness at standstill along the two principal directions, X and Y where these are not turned.
+    damping : two floats [N s/m]
+        Along the same.
     softening : float [s/rad], default 0
         Share of the stiffness lost per spindle speed: k = k0 (1 - softening Omega).
+    angle : float [rad], default 0
+        Of the principal directions about the spindle's axis, from +X towards +Y.
     """
 
     position: float
     stiffness: PerAxis
     damping: PerAxis
     softening: float = 0.0
+    angle: float = 0.0
 
     def __post_init__(self) -> None:
         non_negative("bearings.position", self.position, "m")
@@ -41,11 +45,12 @@ class Bearing:
         _pair("bearings.damping", self.damping, non_negative, "N s/m")
         if not np.isfinite(self.softening):
             raise InputError("bearings.softening", self.softening, "a finite number")
+        _angle("bearings.angle", self.angle)
 
 
 @dataclass(frozen=True, slots=True)
 class Housing:
-    """A rigid body in each bending plane, on springs and dampers to the ground.
+    """A rigid body, on springs and dampers to the ground.
 
     Parameters
     ----------
@@ -53,8 +58,12 @@ class Housing:
         Of its centre of mass and of its support, from the flange face towards the rear.
     mass : float [kg]
     inertia : float [kg m^2]
-    stiffness, damping : two floats, X and Y [N/m], [N s/m]
-    tilting_stiffness, tilting_damping : two floats, X and Y [N m/rad], [N m s/rad]
+    stiffness, damping : two floats [N/m], [N s/m]
+        Along the two principal directions, X and Y where these are not turned.
+    tilting_stiffness, tilting_damping : two floats [N m/rad], [N m s/rad]
+        In the planes of the same.
+    angle : float [rad], default 0
+        Of the principal directions about the spindle's axis, from +X towards +Y.
     """
 
     position: float
@@ -64,6 +73,7 @@ class Housing:
     damping: PerAxis
     tilting_stiffness: PerAxis
     tilting_damping: PerAxis
+    angle: float = 0.0
 
     def __post_init__(self) -> None:
         positive("housing.mass", self.mass, "kg")
@@ -72,6 +82,7 @@ class Housing:
             _pair(f"housing.{name}", getattr(self, name), positive)
         for name in ("damping", "tilting_damping"):
             _pair(f"housing.{name}", getattr(self, name), non_negative)
+        _angle("housing.angle", self.angle)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,8 +120,8 @@ class VirtualSpindle:
     bearings : tuple of Bearing
     housing : Housing
     joint : FlangeJoint
-    gyroscopic : bool
-        Whether the spinning parts couple the two bending planes.
+    gyroscopic : bool, default True
+        Whether the moments of the spinning parts couple the two bending planes, as those of every real spindle do.
     fixture_position : float [m]
         Where on the housing the flange sensor is held, from the flange face towards the rear.
     """
@@ -119,7 +130,7 @@ class VirtualSpindle:
     bearings: tuple[Bearing, ...]
     housing: Housing
     joint: FlangeJoint
-    gyroscopic: bool = False
+    gyroscopic: bool = True
     fixture_position: float = 0.0
 
     def __post_init__(self) -> None:
@@ -142,12 +153,22 @@ class VirtualSpindle:
         """True where the dynamics change with the spindle's speed."""
         return self.gyroscopic or any(b.softening != 0.0 for b in self.bearings)
 
+    @property
+    def coupled(self) -> bool:
+        """True where a force in X also moves the tool in Y."""
+        return self.gyroscopic or any(angle != 0.0 for angle in (self.housing.angle, *(b.angle for b in self.bearings)))
+
 
 def _pair(field: str, values: PerAxis, check: Callable[[str, float, str], float], unit: str = "") -> None:
     if len(values) != 2:
         raise InputError(field, list(values), "two numbers, X and Y")
     for value in values:
         check(field, value, unit)
+
+
+def _angle(field: str, value: float) -> None:
+    if not -np.pi <= value <= np.pi:
+        raise InputError(field, value, "-pi to pi [rad]")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,7 +15,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.tool_holder.geometry import ToolAssembly
-from rcsa_ident.virtual.machine import VirtualSpindle
+from rcsa_ident.virtual.machine import PerAxis, VirtualSpindle
 from rcsa_ident.virtual.mesh import SHAFT, TOOL, Mesh, add_tooling, element_edges, nanometres
 
 _AXES = (Dof.X, Dof.Y)
@@ -72,10 +72,9 @@ def rotor(spindle: VirtualSpindle, tooling: ToolAssembly | None, refinement: int
     mesh.body(SHAFT, 0.0, spindle.shaft, element_edges(0.0, spindle.shaft, stops, refinement))
     nodes = {z: node for (body, z), node in mesh.nodes.items() if body == SHAFT}
     housing = mesh.new_node()
-    planes = [_plane(mesh, spindle, tooling is not None, nodes, housing, axis) for axis in (0, 1)]
     freedoms = 2 * mesh.count
-    names = ("mass", "damping", "stiffness", "loss", "softening")
-    blocks = {name: scipy.sparse.block_diag([p[name] for p in planes], format="csc") for name in names}
+    x, y, between = (_block(mesh, spindle, tooling is not None, nodes, housing, *axes) for axes in ((0, 0), (1, 1), (0, 1)))
+    blocks = {name: scipy.sparse.csc_array(scipy.sparse.block_array([[x[name], between[name]], [between[name], y[name]]])) for name in x}
     turning = mesh.sum(mesh.rotary, freedoms)
     if not spindle.gyroscopic:
         turning = scipy.sparse.csc_array((freedoms, freedoms))
@@ -150,34 +149,60 @@ def frequency_motion(model: Rotor, omega: FloatArray, inputs: tuple[str, ...], s
     return values
 
 
-def _plane(mesh: Mesh, spindle: VirtualSpindle, loaded: bool, nodes: dict[int, int], housing: int, axis: int) -> dict:
-    """The matrices of one bending plane."""
+def turned(values: PerAxis, angle: float) -> FloatArray:
+    """Return T diag(values) T^T with T = [[cos, -sin], [sin, cos]] of the angle, shape (2, 2), along the machine's X and Y.
+
+    Parameters
+    ----------
+    values : two floats
+        Along the first and the second principal direction.
+    angle : float [rad]
+        Of the first principal direction, from +X towards +Y; at 0 the diagonal is `values` to the last bit.
+    """
+    c, s = float(np.cos(angle)), float(np.sin(angle))
+    first, second = values
+    across = (first - second) * s * c
+    return np.array([[first * c**2 + second * s**2, across], [across, first * s**2 + second * c**2]])
+
+
+def _block(
+    mesh: Mesh, spindle: VirtualSpindle, loaded: bool, nodes: dict[int, int], housing: int, row: int, col: int
+) -> dict[str, scipy.sparse.csc_array]:
+    """The matrices of one bending plane, or those between the two: of housing and bearings, where their angles are not 0."""
     freedoms = 2 * mesh.count
-    damping, stiffness, softening = list(mesh.damping), list(mesh.stiffness), []
+    own = row == col
+    damping, stiffness, softening = (list(mesh.damping), list(mesh.stiffness), []) if own else ([], [], [])
     w, r = 2 * housing, 2 * housing + 1
     body = spindle.housing
     index = np.array([w, r])
-    stiffness.append((index, np.diag([body.stiffness[axis], body.tilting_stiffness[axis]])))
-    damping.append((index, np.diag([body.damping[axis], body.tilting_damping[axis]])))
+    if own or body.angle != 0.0:
+        springs = [turned(values, body.angle)[row, col] for values in (body.stiffness, body.tilting_stiffness)]
+        dampers = [turned(values, body.angle)[row, col] for values in (body.damping, body.tilting_damping)]
+        stiffness.append((index, np.diag(springs)))
+        damping.append((index, np.diag(dampers)))
     for bearing in spindle.bearings:
+        if not own and bearing.angle == 0.0:
+            continue
         # shaft deflection minus the housing's at the bearing: w_h + (z - z_h) r_h
         index = np.array([2 * nodes[nanometres(bearing.position)], w, r])
         gap = np.array([1.0, -1.0, -(bearing.position - body.position)])
         square = np.outer(gap, gap)
-        stiffness.append((index, bearing.stiffness[axis] * square))
-        softening.append((index, bearing.stiffness[axis] * bearing.softening * square))
-        damping.append((index, bearing.damping[axis] * square))
-    if loaded:
+        spring, damper = (turned(values, bearing.angle)[row, col] for values in (bearing.stiffness, bearing.damping))
+        stiffness.append((index, spring * square))
+        softening.append((index, spring * bearing.softening * square))
+        damping.append((index, damper * square))
+    if own and loaded:
         face = mesh.flange
         difference = np.array([[1.0, -1.0], [-1.0, 1.0]])
         joint = spindle.joint
-        for k, spring, damper in (
+        for k, stiff, damped in (
             (0, joint.translational_stiffness, joint.translational_damping),
             (1, joint.rotational_stiffness, joint.rotational_damping),
         ):
             index = np.array([2 * face + k, 2 * nodes[0] + k])
-            stiffness.append((index, spring * difference))
-            damping.append((index, damper * difference))
-    mass = [*mesh.mass, (np.array([w, r]), np.diag([body.mass, body.inertia]))]
-    parts = {"mass": mass, "damping": damping, "stiffness": stiffness, "loss": mesh.loss, "softening": softening}
+            stiffness.append((index, stiff * difference))
+            damping.append((index, damped * difference))
+    mass = [*mesh.mass, (np.array([w, r]), np.diag([body.mass, body.inertia]))] if own else []
+    loss = mesh.loss if own else []
+    parts = {"mass": mass, "damping": damping, "stiffness": stiffness, "loss": loss, "softening": softening}
     return {name: mesh.sum(part, freedoms) for name, part in parts.items()}

@@ -140,6 +140,8 @@ def _one(
     if assembly is None or place is Place.FLANGE:
         ends, response = ("flange", "flange"), machine.receptance(omega, (axis,))
     else:
+        if place is not Place.TIP:
+            machine.check_behind_joint((axis,))
         ends = {Place.TIP: ("tip", "tip"), Place.CROSS: ("spindle", "tip"), Place.SPINDLE: ("spindle", "spindle")}[place]
         response = machine.coupled(assembly, omega, (axis,))
     entry = Coordinate(ends[0], axis), Coordinate(ends[1], axis)

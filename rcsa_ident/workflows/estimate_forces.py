@@ -98,6 +98,7 @@ def observe(
     Parameters
     ----------
     machine : Machine
+        Its flange without the joint in front of it, and the joint: the sensor looks at the spindle.
     assembly : ToolAssembly
         Of the tooling that was cut with; it need not be one of the identification's.
     teeth : int
@@ -115,7 +116,7 @@ def observe(
     Raises
     ------
     InputError
-        If the recording has no displacement or no speed.
+        If the recording has no displacement or no speed, or the machine's flange holds the joint's compliance, as a decoupled one does.
     Unsteady
         If it has lost samples, no steady part, or a vibration that does not follow the speed.
     """
@@ -125,6 +126,7 @@ def observe(
     axes = tuple(axis for axis in measured_axes(cut) if axis in machine.axes)
     if not axes:
         raise InputError("sensors", "no displacement along an identified axis", "a displacement sensor for X or Y")
+    machine.check_behind_joint(axes)
     programmed = trigger_speed(cut) if programmed is None else programmed
     assert machine.band is not None
     identified = machine.band

@@ -69,13 +69,27 @@ def simulate(setup: VirtualSetup, toolings: Sequence[Tooling], seed: int, map: M
     yield from map(_Worker(setup), list(_jobs(setup, toolings, np.random.default_rng(seed))))
 
 
-def true_receptances(setup: VirtualSetup, tooling: Tooling) -> TrueReceptances:
-    """Return tip-tip and flange-tip from the full equations at the mean of the programmed speeds."""
-    frequency, speed = _truth_frequency(), float(np.mean(setup.plan.spindle_speeds))
+def true_receptances(setup: VirtualSetup, tooling: Tooling, speed: float | None = None) -> TrueReceptances:
+    """Return tip-tip and flange-tip from the full equations.
+
+    Parameters
+    ----------
+    setup : VirtualSetup
+    tooling : Tooling
+    speed : float [rad/s], optional
+        Of the spindle; by default the mean of the programmed speeds.
+    """
+    frequency, speed = _truth_frequency(), float(np.mean(setup.plan.spindle_speeds)) if speed is None else speed
     outputs = ("tip.x", "tip.y", "flange.x", "flange.y")
     values = frequency_response(rotor(setup.spindle, tooling.assembly), 2.0 * np.pi * frequency, speed, outputs=outputs)
-    tip, cross = (np.stack([values[:, first, 0], values[:, first + 1, 1]], axis=1) for first in (0, 2))
-    return TrueReceptances(tooling.name, frequency, tip, cross)
+    return TrueReceptances(tooling.name, speed, frequency, values[:, :2], values[:, 2:])
+
+
+def truth_speeds(setup: VirtualSetup) -> tuple[float, ...]:
+    """Return the spindle speeds [rad/s] at which the truth is wanted: the mean of the plan's, then, where it matters, its ends."""
+    programmed = setup.plan.spindle_speeds
+    ends = (min(programmed), max(programmed)) if setup.spindle.speed_dependent else ()
+    return tuple(dict.fromkeys((float(np.mean(programmed)), *ends)))
 
 
 def true_flange(setup: VirtualSetup) -> TrueFlange:
@@ -83,7 +97,7 @@ def true_flange(setup: VirtualSetup) -> TrueFlange:
     frequency, speed = _truth_frequency(), float(np.mean(setup.plan.spindle_speeds))
     planes = ("flange.x", "flange.x'", "flange.y", "flange.y'")
     values = frequency_response(rotor(setup.spindle, None), 2.0 * np.pi * frequency, speed, inputs=planes, outputs=planes)
-    return TrueFlange(frequency, np.stack([values[:, :2, :2], values[:, 2:, 2:]], axis=1))
+    return TrueFlange(frequency, values)
 
 
 def _truth_frequency() -> FloatArray:

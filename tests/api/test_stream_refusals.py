@@ -14,7 +14,8 @@ from starlette.websockets import WebSocketDisconnect
 from api.security import make_key
 from api.streams.frames import packed
 from tests.api.streaming import STREAM, closed, send, streaming, until
-from tests.fixtures.force_stream import hello
+from tests.fixtures.flange_machine import decoupled_file
+from tests.fixtures.force_stream import SENSORS, hello, signals
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +106,21 @@ def test_a_hello_that_says_nothing_usable_is_answered(shop, change, status, fiel
     assert (code, problem["status"]) == (1008, status)
     if field is not None:
         assert problem["errors"][0]["field"] == field
+
+
+def test_a_stream_on_a_decoupled_flange_is_refused(shop, tmp_path):
+    """Once its first samples are there, from which its observer is made; as of a recording."""
+    http, id = shop
+    decoupled = http.post("/v1/machines", json={"name": "decoupled"}).json()["id"]
+    text = decoupled_file(tmp_path / "FLANGE.csv").read_bytes()
+    assert http.put(f"/v1/machines/{decoupled}/identification", content=text, headers={"Content-Type": "text/csv"}).status_code == 201
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id, sensors=SENSORS) | {"machine": decoupled, "settle_s": 0.5})
+        send(socket, 0, signals(2.0, 2.5))
+        code, problem = closed(socket)
+    assert (code, problem["status"]) == (1008, 422)
+    assert problem["errors"][0]["field"] == "machine"
+    assert "a flange that holds the compliance of its joint" in problem["detail"]
 
 
 @pytest.mark.parametrize(

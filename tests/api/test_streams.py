@@ -51,6 +51,20 @@ def joined(frames) -> np.ndarray:
 
 
 @pytest.mark.slow
+def test_what_speaks_against_the_machine_is_said_when_the_stream_is_ready(shop):
+    """As it is with the forces of a recording."""
+    http, id = shop
+    doubted = json.dumps(json.loads(result()) | {"status": "suspect", "reasons": ["too few cuts"]})
+    path = f"/v1/machines/{id}/identification"
+    assert http.put(path, content=doubted, headers={"Content-Type": "application/json"}).status_code == 200
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        send(socket, 0, signals(2.0, 2.3))
+        notes = until(socket, "ready")[0]["notes"]
+    assert notes[0] == "the identification is suspect: too few cuts"
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [True, False])
 def test_live_forces_are_those_of_the_batch(shop, text):
     http, id = shop

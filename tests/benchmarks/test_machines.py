@@ -6,7 +6,23 @@ import numpy as np
 import pytest
 
 from benchmarks import machines
-from benchmarks.machines import CONDITIONS, CUT, DEVELOPMENT, EVALUATION, HELD_OUT, MARGIN, least_limit, random_machine, under
+from benchmarks.machines import (
+    CONDITIONS,
+    COUPLED,
+    COUPLED_DEVELOPMENT,
+    CUT,
+    DEVELOPMENT,
+    EVALUATION,
+    HELD_OUT,
+    MARGIN,
+    TURNED,
+    is_coupled,
+    least_limit,
+    named,
+    random_machine,
+    under,
+)
+from benchmarks.machines import drawn as named_one
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
 
@@ -35,6 +51,55 @@ def test_the_machines_stay_what_they_were(drawn):
     # one that is drawn anew would make the study's figures those of other machines
     joined = "".join(text for seed in ALL for text in texts(drawn[seed].parent).values())
     assert hashlib.sha256(joined.encode()).hexdigest() == "88884ddcf72b78e6f08e51a2c7e31b0c2ee6b88367f80a93a03ea8124e2bb5bb"
+
+
+@pytest.fixture(scope="module")
+def coupled(tmp_path_factory):
+    """Every coupled machine as it is drawn, and what the same seed draws without coupling."""
+    root = tmp_path_factory.mktemp("coupled")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(machines, "least_limit", lambda machine: np.inf)
+        return {
+            seed: [random_machine(seed, root / f"{seed}-{kind}", coupled=kind) for kind in (True, False)]
+            for seed in (*COUPLED, *COUPLED_DEVELOPMENT)
+        }
+
+
+def test_coupled_seeds_are_fixed_and_their_machines_stay_what_they_were(coupled):
+    assert COUPLED == (201, 202, 203, 204, 205, 206, 207, 208, 209, 210)
+    assert COUPLED_DEVELOPMENT == (301, 302, 303)
+    joined = "".join(text for path, _ in coupled.values() for text in texts(path.parent).values())
+    assert hashlib.sha256(joined.encode()).hexdigest() == "16f583bb30ee7b60fdb21c250394da898d85f3215d042f67515f46401665013b"
+
+
+def test_a_coupled_machine_is_the_same_seeds_machine_with_turned_elements_and_gyroscopic_moments(coupled):
+    angles = []
+    for seed, paths in coupled.items():
+        one, other = (texts(path.parent) for path in paths)
+        kept = [text for text in one["machine.toml"].splitlines() if not text.startswith("angle_deg")]
+        plain = (
+            other["machine.toml"]
+            .replace("gyroscopic = false", "gyroscopic = true")
+            .replace(f"Drawn machine {seed}", f"Coupled machine {seed}")
+        )
+        assert kept == plain.splitlines()
+        assert {name: text for name, text in one.items() if name != "machine.toml"} == {
+            name: text for name, text in other.items() if name != "machine.toml"
+        }
+        spindle = read_machine(paths[0]).spindle
+        own = np.degrees([spindle.housing.angle, *(b.angle for b in spindle.bearings)])
+        assert spindle.gyroscopic
+        assert np.unique(own).size == own.size
+        assert np.all(own != 0.0)
+        angles += own.tolist()
+    assert -TURNED <= min(angles) < -0.8 * TURNED
+    assert 0.8 * TURNED < max(angles) <= TURNED
+
+
+def test_names_of_drawn_machines():
+    assert [named_one(name) for name in ("7", "coupled-207", "hpm", "coupled-hpm")] == [(7, False), (207, True), None, None]
+    assert named(["drawn", "hpm", "coupled"]) == [*(str(s) for s in EVALUATION), "hpm", *(f"coupled-{s}" for s in COUPLED)]
+    assert [is_coupled(name) for name in ("7", "coupled-207", "stiff")] == [False, True, False]
 
 
 def test_no_two_are_alike(drawn):

@@ -5,23 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks import search_trace, study, yardstick
+from benchmarks import comparison, search_trace, study, yardstick
+from benchmarks.comparison import BANDS, FREQUENCY, compared, compared_at_speeds, coverage, in_deviations, relative_error
 from benchmarks.page import read_rows
-from benchmarks.study import (
-    BANDS,
-    FREQUENCY,
-    INSIDE,
-    Run,
-    compared,
-    coverage,
-    in_deviations,
-    planned,
-    relative_error,
-)
-from benchmarks.study_table import counts, line, table
+from benchmarks.study import INSIDE, Run, planned
+from benchmarks.study_table import counts, coupled_table, line, table
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.search import SearchSettings
@@ -29,6 +21,7 @@ from rcsa_ident.io.curves import write_frf_csv
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machine.flange_machine import FlangeMachine
+from rcsa_ident.stability.tip_modes import TIP
 
 TOOLINGS = study.MACHINES / "toolings"
 
@@ -95,6 +88,63 @@ def test_tooltips_are_compared_with_the_truth_of_their_own_tooling_and_axis(mach
     assert (FREQUENCY[0], FREQUENCY[-1], FREQUENCY.size) == (600.0, 4000.0, 681)
 
 
+def test_a_failed_identification_predicts_no_motion(tmp_path):
+    files = [TOOLINGS / f"{name}.toml" for name in ("S1-ER32", "S2-PG25", "S3-PG25-long", "S4-shrink")]
+    found = compared(None, SimpleNamespace(toolings=files[:2], truth_toolings=files[2:]), tmp_path)
+    assert found == {kind: {"errors": [1.0] * n, "bands": None} for kind, n in (("cut", 4), ("similar", 2), ("different", 2))}
+
+
+class Known:
+    """A machine that knows the truth but for a factor on each term at each speed."""
+
+    def __init__(self, truth, factors, speed=None):
+        self.truth, self.factors, self.speed = truth, factors, speed
+
+    def at(self, speed):
+        return Known(self.truth, self.factors, round(speed))
+
+    def tip(self, tooling, omega):
+        values = np.array(self.factors.get((tooling.name, self.speed), np.ones((2, 2)))) * self.truth[tooling.name, self.speed]
+        return UncertainReceptance(omega, values, TIP, TIP)
+
+
+def test_cross_terms_are_compared_at_the_worst_of_three_speeds(tmp_path):
+    names = ("S1-ER32", "S2-PG25", "S3-PG25-long", "S4-shrink")
+    files = [TOOLINGS / f"{name}.toml" for name in names]
+    (tmp_path / "tip").mkdir()
+    frequency = np.arange(5.0, 4500.1, 5.0)
+    rng = np.random.default_rng(3)
+    truth = {}
+    for name in names:
+        for speed, ending in ((800, "-7639rpm"), (1000, ""), (1200, "-11459rpm")):
+            # every curve has as large a norm in the band as its entry says
+            values = np.exp(2j * np.pi * rng.random((frequency.size, 2, 2))) * [[1.0, 0.1], [0.2, 2.0]]
+            further = {"XY": values[:, 0, 1], "YX": values[:, 1, 0]}
+            parts = {f"{key}_{part}": getattr(v, full) for key, v in further.items() for part, full in (("re", "real"), ("im", "imag"))}
+            write_frf_csv(tmp_path / "tip" / f"{name}{ending}.csv", frequency, {"X": values[:, 0, 0], "Y": values[:, 1, 1]}, parts)
+            truth[name, speed] = values[(frequency >= 599.0) & (frequency <= 4001.0)]
+    factors = {
+        ("S1-ER32", 800): [[1.1, 1.0], [1.0, 1.0]],
+        ("S1-ER32", 1200): [[1.0, 1.0], [1.0, 0.8]],
+        ("S3-PG25-long", 1000): [[1.0, 1.5], [1.0, 1.0]],
+        ("S4-shrink", 1200): [[1.0, 1.5], [0.0, 1.0]],
+    }
+    plan = SimpleNamespace(spindle_speeds=(800.0, 1000.0, 1200.0))
+    setup = SimpleNamespace(toolings=files[:2], truth_toolings=files[2:], plan=plan)
+    found = compared_at_speeds(Known(truth, factors), setup, tmp_path)
+    assert found["cut"]["errors"] == pytest.approx([0.1, 0.2, 0.0, 0.0], abs=1e-4)
+    assert found["cut"]["cross"] == found["cut"]["cross_own"] == pytest.approx([0.0, 0.0], abs=1e-4)
+    assert found["similar"]["errors"] == pytest.approx([0.0, 0.0], abs=1e-4)
+    # 0.5 of 0.1, over 1 and over itself
+    assert (found["similar"]["cross"], found["similar"]["cross_own"]) == ([pytest.approx(0.05)], [pytest.approx(0.5)])
+    # YX is lost: 0.2 over 2
+    assert (found["different"]["cross"], found["different"]["cross_own"]) == ([pytest.approx(0.1)], [pytest.approx(1.0)])
+    lost = compared_at_speeds(None, setup, tmp_path)
+    assert lost["cut"]["errors"] == [1.0] * 4
+    assert (lost["cut"]["cross"], lost["cut"]["cross_own"]) == ([pytest.approx(0.1)] * 2, [1.0] * 2)
+    assert all(lost[kind]["bands"] is None for kind in lost)
+
+
 def row(machine, similar, different, status="converged", method="default", condition="trigger"):
     bands = {"50": 0.5, "90": 0.9, "rms": 1.0} if method == "default" else None
     errors = {"cut": [0.001] * 4, "similar": similar, "different": different}
@@ -140,6 +190,28 @@ def test_the_table_holds_all_machines_and_says_median_and_worst():
     assert "- 5, trigger: a doubt" in text
 
 
+def coupled_row(machine, errors, cross, own, status="converged"):
+    found = row(machine, errors, errors, status, condition="no-trigger")
+    for kind, count in (("cut", 2), ("similar", 1), ("different", 1)):
+        found[kind] |= {"cross": [cross] * count, "cross_own": [own] * count}
+    return found
+
+
+def test_the_table_of_coupled_machines_holds_their_cross_terms():
+    rows = [coupled_row("coupled-201", [0.004, 0.006], 0.002, 0.04), coupled_row("coupled-202", [0.06, 0.02], 0.01, 0.2, "suspect")]
+    text = coupled_table(rows)
+    assert "| no-trigger | similar | 2 | 0.0130 | 0.0600 | 0.0060 | 0.0100 | 0.1200 | 0.2000 | 1 of 2 | 5.0 |" in text
+    assert "| coupled-201 | no-trigger | 1 | 0.0010 | 0.0010 | 0.0020 | 0.0400 | 0.0040 | 0.0060 |" in text
+    assert "Of 2 runs, 0 are `converged` with an error above 0.05" in text
+    assert "- coupled-202, no-trigger: a doubt" in text
+    assert "XY over direct, over own 0.0020  0.0400" in line(rows[0])
+
+
+def test_the_published_method_is_not_run_on_coupled_machines():
+    runs = planned(["1", "coupled-201"], ["no-trigger"], ["default", "paper, literal"], [1])
+    assert [(r.machine, r.method) for r in runs] == [("1", "default"), ("1", "paper, literal"), ("coupled-201", "default")]
+
+
 def test_every_run_is_planned_once():
     runs = planned(["1", "2", INSIDE], ["trigger", "no-trigger"], ["default", "paper, literal"], [1, 2])
     assert len(set(runs)) == len({r.name for r in runs}) == len(runs) == 2 * (2 + 2 * 2) + 2 * 2
@@ -181,7 +253,7 @@ def scratch(tmp_path_factory):
 
 @pytest.fixture
 def coarse(monkeypatch):
-    for module in (study, yardstick):
+    for module in (comparison, yardstick):
         monkeypatch.setattr(module, "FREQUENCY", np.arange(600.0, 4000.1, 100.0))
     for module in (study, search_trace):
         monkeypatch.setattr(module, "warm", lambda: None)

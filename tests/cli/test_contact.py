@@ -74,12 +74,17 @@ def test_a_band_that_does_not_tell_it(taps):
     assert (taps / "C.toml").exists()
 
 
-def test_clamped_in_a_measured_flange(taps):
-    """The same tool on a flange that FLANGE.csv describes, joint included: what was put in comes out."""
+@pytest.mark.parametrize("joint", [None, LumpedJoint(2e10, 5e7, 2000.0, 10.0)], ids=["joint included", "joint beside it"])
+def test_clamped_in_a_measured_flange(taps, joint):
+    """The same tool on a flange that FLANGE.csv describes, with its joint: what was put in comes out."""
     omega = 2.0 * np.pi * np.arange(150.0, 6100.0, 10.0)
     psi = np.array([[0.3, 3.0], [-0.25, 2.0], [0.2, -4.0]])
     modes = normal_modes(2.0 * np.pi * np.array([700.0, 1300.0, 2500.0]), np.array([0.05, 0.04, 0.06]), psi, plane("flange"))
-    write_flange_csv(taps / "FLANGE.csv", omega / (2.0 * np.pi), {Dof.X: modes.receptance(omega).values})
+    values, joints = modes.receptance(omega).values, None
+    if joint is not None:
+        values = values - np.eye(2) * joint.compliance_along(omega, [c.dof for c in modes.coordinates])[:, None, :]
+        joints = {Dof.X: joint}
+    write_flange_csv(taps / "FLANGE.csv", omega / (2.0 * np.pi), {Dof.X: values}, joints=joints)
     kept = omega[20:-20:2]
     for name in ("T1", "LONG"):
         a = replace(read_tooling(taps / f"{name}.toml").assembly, contact=TRUE)

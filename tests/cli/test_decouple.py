@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 
@@ -11,17 +12,20 @@ import pytest
 
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
-from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.coordinates import Dof, plane
+from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import write_frf_csv
-from rcsa_ident.io.flanges import read_flange_csv
+from rcsa_ident.io.flanges import read_flange_csv, read_flange_machine
 from rcsa_ident.io.machines import read_machine
+from rcsa_ident.io.results import spindle_to_json, write_result
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from rcsa_ident.workflows.compare import Place
 from rcsa_ident.workflows.decouple import FlangeTap, flange_from_taps
 from tests.cli.measurements import run
+from tests.fixtures import by_hand
 
 MACHINES = Path(__file__).resolve().parents[2] / "data" / "machines"
 FREQUENCY = np.arange(400.0, 3000.0, 10.0)
@@ -93,6 +97,27 @@ def test_the_flange_carries_another_tooling(taps):
     answer = json.loads(run("decouple", *options(taps), "--out", out, "--json").output)
     assert answer["axes"]["X"]["condition_median"] < 20.0
     assert answer["axes"]["Y"]["frequencies"] == FREQUENCY.size
+
+
+@pytest.mark.slow
+def test_with_its_joint_known_the_bare_flange_comes_out_and_the_joint_with_it(taps):
+    """Every reader then couples through the joint: the tip is right, and so is the spindle's own motion, which forces need."""
+    assembly, joint = read_tooling(MACHINES / "toolings" / "S1-ER32.toml").assembly, LumpedJoint(**asdict(spindle().joint))
+    modes = normal_modes([6000.0], [0.05], [[0.2, 0.1]], plane("flange"))
+    made = by_hand.result_text(taps)
+    data = json.loads(made) | {"status": "converged", "reasons": [], "axes": {axis: spindle_to_json(modes, joint) for axis in "XY"}}
+    write_result(taps / "RESULT.json", data)
+    out = taps / "BARE.csv"
+    run("decouple", *options(taps), "--beside", taps / "RESULT.json", "--out", out)
+    machine = read_flange_machine(out)
+    assert [part.believed.joint for part in machine.parts] == [joint, joint]
+    machine.check_behind_joint()
+    ports = ("tip.x", "flange.x")
+    true = frequency_response(rotor(spindle(), assembly), OMEGA, 0.0, inputs=("tip.x",), outputs=ports)[:, :, 0]
+    coupled = machine.coupled(assembly, OMEGA)
+    for row, expected in zip(("tip.x", "spindle.x"), true.T, strict=True):
+        found = coupled.between(row, "tip.x")
+        assert np.linalg.norm(found - expected) < 0.05 * np.linalg.norm(expected)
 
 
 @pytest.mark.slow

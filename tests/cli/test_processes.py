@@ -92,6 +92,46 @@ def test_a_progress_that_goes_to_a_cluster_tells_nobody(two):
     assert heard == [("x", "search", 1.0)]
 
 
+def test_what_cannot_be_pickled_is_computed_here_and_said(two):
+    with pytest.warns(RuntimeWarning, match="in this process alone: .*<lambda>.*processes=1"):
+        assert list(two.map(lambda x: x + 1, range(5))) == [1, 2, 3, 4, 5]
+    # a task that cannot be sent is enough; the helpers are still there for others
+    mixed = [lambda: 0, 1, 2, 3]
+    with pytest.warns(RuntimeWarning, match="in this process alone"):
+        assert list(two.map(callable, mixed)) == [callable(each) for each in mixed]
+    assert len(set(two.map(own_process, range(20)))) == 2
+
+
+#: Functions and classes of its own reach the tasks as function, as instance and within a task.
+SCRIPT = """
+import os
+from functools import partial
+from operator import methodcaller
+from rcsa_ident.processes import workers
+
+class Gain:
+    def __call__(self, x): return 3 * x
+    def two(self): return 2
+
+def gain(x, by): return by * x
+
+print("once")
+with workers(2, ()) as pool:
+    print(list(pool.map(partial(gain, by=3), range(4))), list(pool.map_many(Gain(), range(4))))
+    print(list(pool.map(methodcaller("two"), [Gain(), Gain()])), list(pool.map(os.path.basename, ["a/b", "c/d"])))
+"""
+
+
+def test_what_a_script_defines_is_computed_in_its_own_process(tmp_path):
+    """The helpers do not run the script, and so cannot know it: it works, and says why it takes longer."""
+    (tmp_path / "script.py").write_text(SCRIPT, encoding="utf-8")
+    done = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, timeout=PATIENCE, check=True)
+    assert done.stdout.splitlines() == ["once", "[0, 3, 6, 9] [0, 3, 6, 9]", "[2, 2] ['b', 'd']"]
+    for name in ("gain", "Gain"):
+        assert f"{name} is defined in the script that runs, which the helpers do not run; put it into a module of its own" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 @pytest.mark.slow
 def test_after_an_error_no_worker_is_left():
     children, others = [], multiprocessing.active_children()

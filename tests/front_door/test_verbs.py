@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import os
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ import rcsa_ident as ri
 from rcsa_ident import verbs
 from tests.fixtures import by_hand
 from tests.fixtures.paths import SAMPLES
+from tests.fixtures.waiting import PATIENCE
 
 
 class Answered:
@@ -100,6 +103,39 @@ def test_processes_do_not_run_the_script_again(tmp_path):
     )
     done = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["once", "3", "True"]
+
+
+@pytest.mark.slow
+def test_a_method_of_the_script_identifies_with_several_processes(tmp_path):
+    """What its long work goes through cannot be found by the helpers: it is done here, and said."""
+    (tmp_path / "script.py").write_text(
+        "import sys\n"
+        "from dataclasses import replace\n"
+        "import rcsa_ident as ri\n"
+        "from tests.fixtures import by_hand\n"
+        "class MyMethod:\n"
+        "    def one(self, axis): return axis.upper()\n"
+        "    def run(self, data, seed, map, progress=None):\n"
+        "        print(*map(self.one, ['x', 'y']))\n"
+        "        known = by_hand.identification()\n"
+        "        return replace(known, cut_ids=tuple(data.cut_ids), delay=known.delay[: len(data.cut_ids)])\n"
+        "campaign = ri.read_campaign(sys.argv[1])\n"
+        "campaign = replace(campaign, cuts=campaign.cuts[:2])\n"
+        "print(ri.identify(campaign, method=MyMethod(), processes=2))\n"
+    )
+    root = Path(__file__).parents[2]
+    done = subprocess.run(
+        [sys.executable, "script.py", str(SAMPLES)],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(root)},
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=True,
+    )
+    assert done.stdout.splitlines()[0] == "X Y"
+    assert "2 cuts" in done.stdout
+    assert "MyMethod is defined in the script that runs" in done.stderr
 
 
 def test_forces_of_a_file_need_sensors(nouns):

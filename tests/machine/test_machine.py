@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcsa_ident.coupling.assembly import assemble
+from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.modal import normal_modes
@@ -16,7 +17,7 @@ from rcsa_ident.dynamics.structure import Structure
 from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.machine import LOWEST
-from rcsa_ident.machine.measured import MeasuredFlange
+from rcsa_ident.machine.measured import FlangeCode, MeasuredFlange
 from rcsa_ident.tool_holder.model import tool_holder_receptance, tool_holder_structure
 from tests.coupling.test_rcsa import TOOL, spindle_structure
 from tests.machine.planes import (
@@ -208,6 +209,37 @@ def test_a_flange_is_one_or_more_in_a_band():
     for flanges, band in (((), BAND), ((one_plane(Dof.X),), (5.0, 5.0)), ((one_plane(Dof.X),), (-1.0, 5.0))):
         with pytest.raises(InputError, match="one or more, in a band"):
             FlangeMachine(flanges, band)
+
+
+def test_a_bending_plane_of_two_flanges_is_refused():
+    x, y = one_plane(Dof.X), one_plane(Dof.Y)
+    for flanges, words in (((x, x), "flange.x, flange.x'"), ((y, oblique()), "flange.y, flange.y'")):
+        with pytest.raises(InputError, match=f"found {words} of several flanges"):
+            FlangeMachine(flanges, BAND, JOINT)
+
+
+def test_a_joint_of_each_bending_plane():
+    x, y = one_plane(Dof.X), one_plane(Dof.Y, 0.93)
+    other = LumpedJoint(1e9, 3e6)
+    machine = FlangeMachine((x, y), BAND, {Dof.X: JOINT, Dof.Y: other})
+    assert [part.believed.joint for part in machine.parts] == [JOINT, other]
+    machine.check_behind_joint()
+    half = FlangeMachine((x, y), BAND, {Dof.X: JOINT})
+    half.check_behind_joint((Dof.X,))
+    with pytest.raises(InputError, match=r"holds the compliance of its joint.*\(Y\)"):
+        half.check_behind_joint()
+    assert FlangeMachine((oblique(),), BAND, {Dof.X: JOINT, Dof.Y: JOINT}).parts[0].believed.joint == JOINT
+    with pytest.raises(InputError, match="one joint for bending planes that feel each other"):
+        FlangeMachine((oblique(),), BAND, {Dof.X: JOINT, Dof.Y: other})
+
+
+def test_a_coarse_measurement_speaks_against_the_machine():
+    """Between the lowest and the highest frequency that both know; modes and a fine measurement say nothing."""
+    (remark,) = FlangeMachine((sampled(60.0),), BAND, JOINT).remarks
+    assert remark.code is FlangeCode.COARSE
+    assert remark.startswith("X, Y: flange measured too coarsely")
+    for flange in (sampled(2.0), oblique()):
+        assert FlangeMachine((flange,), BAND, JOINT).remarks == ()
 
 
 def test_a_measured_flange_gives_what_its_modes_give():

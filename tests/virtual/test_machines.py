@@ -31,6 +31,32 @@ def test_softening_is_per_speed(machines_folder):
     assert spindle.speed_dependent
 
 
+def test_angles_are_in_degrees_and_each_element_has_its_own(machines_folder, tmp_path):
+    text = (machines_folder / "hpm.toml").read_text()
+    text = text.replace("position_mm = 86.0", "position_mm = 86.0\nangle_deg = -17.0").replace(
+        "mass = 160.0", "mass = 160.0\nangle_deg = 14.0"
+    )
+    path = tmp_path / "turned.toml"
+    path.write_text(text)
+    spindle = read_machine(path).spindle
+    assert np.degrees([spindle.housing.angle, *(b.angle for b in spindle.bearings)]) == pytest.approx([14.0, 0.0, -17.0, 0.0])
+    assert spindle.coupled
+    assert not spindle.speed_dependent
+
+
+def test_a_machine_is_gyroscopic_unless_it_says_otherwise(machines_folder, tmp_path):
+    text = (machines_folder / "hpm.toml").read_text()
+    path = tmp_path / "silent.toml"
+    path.write_text(text.replace("gyroscopic = false\n", ""))
+    assert read_machine(path).spindle.gyroscopic
+    assert [read_machine(machines_folder / f"{name}.toml").spindle.gyroscopic for name in ("hpm", "stiff", "table2")] == [
+        False,
+        True,
+        False,
+    ]
+    assert not read_machine(machines_folder / "hpm.toml").spindle.coupled
+
+
 CASES = [
     ("[shaft]", "[shafts]", "shafts", "did you mean shaft"),
     ("position_mm = 48.0", "position_mm = 4800.0", "position_mm", "440"),
@@ -38,6 +64,10 @@ CASES = [
     ("stiffness = [3.6e8, 3.3e8]", "stiffness = [3.6e8, -1.0]", "bearings.stiffness", "greater than 0"),
     ("damping = [8.5e3, 7.6e3]", "damping = [8.5e3, nan]", "bearings[0].damping", "finite"),
     ("mass = 160.0", "mass = 0.0", "housing.mass", "above 0"),
+    ("mass = 160.0", "mass = 160.0\nangle_deg = 200.0", "housing.angle_deg", "at most 180"),
+    ("mass = 160.0", "mass = 160.0\nangle = 20.0", "housing.angle", "did you mean angle_deg"),
+    ("position_mm = 86.0", 'position_mm = 86.0\nangle_deg = "oblique"', "bearings[1].angle_deg", "finite number"),
+    ("position_mm = 86.0", "position_mm = 86.0\nangle_deg = [10.0, 20.0]", "bearings[1].angle_deg", "finite number"),
     ("gyroscopic = false", 'gyroscopic = "no"', "machine.gyroscopic", "true or false"),
     ("trigger = false", "triger = false", "sensors.triger", "did you mean trigger"),
     ("roundness_orders = 8", "roundness_orders = 8.5", "sensors.roundness_orders", "whole number"),

@@ -9,11 +9,13 @@ import pytest
 from rcsa_ident.cutting.force import force_lines
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
+from rcsa_ident.io.curves import read_tip
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.samples import simulate_campaign as simulate
 from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.virtual.rotor import frequency_response, rotor
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +27,20 @@ def small(hpm):
 @pytest.fixture(scope="module")
 def written(small, tmp_path_factory):
     return simulate(small, tmp_path_factory.mktemp("run") / "campaign", seed=7)
+
+
+@pytest.fixture(scope="module")
+def turned(small):
+    """Housing and bearings at angles of their own, and gyroscopic moments."""
+    spindle = small.spindle
+    bearings = tuple(dataclasses.replace(b, angle=np.radians(a)) for b, a in zip(spindle.bearings, (-17.0, -4.0, 11.0), strict=True))
+    housing = dataclasses.replace(spindle.housing, angle=np.radians(14.0))
+    return dataclasses.replace(small, spindle=dataclasses.replace(spindle, bearings=bearings, housing=housing, gyroscopic=True))
+
+
+@pytest.fixture(scope="module")
+def coupled(turned, tmp_path_factory):
+    return simulate(turned, tmp_path_factory.mktemp("coupled") / "campaign", seed=7)
 
 
 @pytest.fixture
@@ -44,11 +60,13 @@ def true_records(result):
     return {r["record"]: (float(r["spindle_speed_rpm"]) * np.pi / 30.0, np.radians(float(r["tooth_angle_deg"]))) for r in rows}
 
 
-def receptance(path, axis, omega):
+def receptances(path, omega):
+    """The curves of a file of the truth by their names, at these frequencies."""
+    header = path.read_text().splitlines()[0].split(",")
     table = np.loadtxt(path, delimiter=",", skiprows=1)
-    column = 1 if axis is Dof.X else 3
     frequency = omega / (2.0 * np.pi)
-    return np.interp(frequency, table[:, 0], table[:, column]) + 1j * np.interp(frequency, table[:, 0], table[:, column + 1])
+    parts = {name: np.interp(frequency, table[:, 0], column) for name, column in zip(header[1:], table[:, 1:].T, strict=True)}
+    return {name[:-3]: parts[name] + 1j * parts[f"{name[:-3]}_im"] for name in parts if name.endswith("_re")}
 
 
 def lines(values, angle, orders):
@@ -59,30 +77,59 @@ def lines(values, angle, orders):
 
 
 @pytest.mark.slow
-def test_recordings_hold_the_true_cross_receptance(written):
-    # what a reader of the folder, told speed and tooth angle, finds: cut minus air, over the analytic force
-    campaign, truth = read_campaign(written.folder), true_records(written)
+@pytest.mark.parametrize("machine", ["written", "coupled"])
+def test_recordings_hold_the_true_cross_receptance(machine, request):
+    # what a reader of the folder, told speed and tooth angle, finds: cut minus air, against the analytic force of both axes
+    result = request.getfixturevalue(machine)
+    campaign, truth = read_campaign(result.folder), true_records(result)
     tooling = campaign.toolings["S1-ER32"]
     for cut in campaign.cuts:
-        for axis in (Dof.X, Dof.Y):
-            seen = []
-            for kind, path in (("cut", cut.recording), ("air", cut.air)):
-                speed, start = truth[f"{cut.id}_{kind}"]
-                recording = read_recording(path, campaign.sensors)
-                orders = np.arange(1, int(2.0 * np.pi * 4300.0 / speed))
-                angle = start + speed * recording.time
+        seen: dict[Dof, list] = {Dof.X: [], Dof.Y: []}
+        for kind, path in (("cut", cut.recording), ("air", cut.air)):
+            speed, start = truth[f"{cut.id}_{kind}"]
+            recording = read_recording(path, campaign.sensors)
+            orders = np.arange(1, int(2.0 * np.pi * 4300.0 / speed))
+            angle = start + speed * recording.time
+            for axis, lists in seen.items():
                 gap = lines(recording.channel(Quantity.DISPLACEMENT, axis)[1], angle, orders)
                 bend = lines(recording.channel(Quantity.ACCELERATION, axis)[1], angle, orders) / (orders * speed) ** 2
-                seen.append(gap - bend)
-            speed, _ = truth[f"{cut.id}_cut"]
-            count = min(s.size for s in seen)
-            orders = np.arange(1, count + 1)
+                lists.append(gap - bend)
+        speed, _ = truth[f"{cut.id}_cut"]
+        programmed = round(cut.conditions.spindle_speed * 30.0 / np.pi)
+        name = "S1-ER32.csv" if machine == "written" else f"S1-ER32-{programmed}rpm.csv"
+        for row, axis in enumerate("XY"):
+            cut_lines, air_lines = seen[Dof(axis.lower())]
+            orders = np.arange(1, min(cut_lines.size, air_lines.size) + 1)
             teeth = orders % 4 == 0
-            found = (seen[0][:count] - seen[1][:count])[teeth]
+            found = (cut_lines[: orders.size] - air_lines[: orders.size])[teeth]
             conditions = dataclasses.replace(cut.conditions, spindle_speed=speed)
-            force = force_lines(tooling.cutter, conditions, campaign.workpiece.coefficients, orders[teeth])[:, 0 if axis is Dof.X else 1]
-            expected = receptance(written.truth / "cross" / "S1-ER32.csv", axis, orders[teeth] * speed) * force
+            force = force_lines(tooling.cutter, conditions, campaign.workpiece.coefficients, orders[teeth])
+            h = receptances(result.truth / "cross" / name, orders[teeth] * speed)
+            expected = h[axis] * force[:, row]
+            if machine == "coupled":
+                apart = np.linalg.norm(found - expected)
+                expected = expected + h["XY" if axis == "X" else "YX"] * force[:, 1 - row]
+                assert np.linalg.norm(found - expected) < 0.5 * apart
             assert np.linalg.norm(found - expected) < 1e-2 * np.linalg.norm(expected)
+
+
+@pytest.mark.slow
+def test_the_truth_of_a_coupled_machine_has_both_cross_terms_at_three_speeds(coupled, turned, tooling):
+    names = {"S1-ER32.csv": 11850.0, "S1-ER32-8200rpm.csv": 8200.0, "S1-ER32-15500rpm.csv": 15500.0}
+    assert {p.name for p in (coupled.truth / "tip").iterdir()} == {p.name for p in (coupled.truth / "cross").iterdir()} == set(names)
+    omega = 2.0 * np.pi * np.array([700.0, 1500.0, 2900.0])
+    for name, rpm in names.items():
+        model = rotor(turned.spindle, tooling.assembly)
+        values = frequency_response(model, omega, rpm * np.pi / 30.0, outputs=("tip.x", "tip.y"))
+        written = receptances(coupled.truth / "tip" / name, omega)
+        for key, (row, col) in {"X": (0, 0), "Y": (1, 1), "XY": (0, 1), "YX": (1, 0)}.items():
+            assert written[key] == pytest.approx(values[:, row, col], rel=1e-7)
+        tip = read_tip(coupled.truth / "tip" / name)
+        there = np.searchsorted(tip.omega, omega - 1e-3)
+        assert np.allclose(tip.values[there], values, rtol=1e-7)
+    header = (coupled.truth / "spindle.csv").read_text().splitlines()[0].split(",")
+    assert len(header) == 1 + 4 * 8
+    assert header[17:19] == ["XY_tF_re", "XY_tF_im"]
 
 
 @pytest.mark.slow

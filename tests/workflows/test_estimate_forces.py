@@ -10,6 +10,7 @@ import pytest
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
+from rcsa_ident.io.flanges import read_flange_machine, write_flange_machine
 from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.observer.tuning import PaperWalk, Resonators
@@ -18,7 +19,7 @@ from rcsa_ident.signals.measurement import NO_AIR
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.workflows.estimate_forces import observe, trigger_speed, wear_of
 from tests.fixtures import by_hand
-from tests.fixtures.flange_machine import BAND, flange_machine, paper_cut
+from tests.fixtures.flange_machine import BAND, decoupled_file, flange_machine, paper_cut
 from tests.fixtures.virtual_cut import relative_error, virtual_cut
 
 RPM = np.pi / 30.0
@@ -66,14 +67,17 @@ def test_a_missing_air_cut_is_said():
 
 
 @pytest.mark.slow
-def test_one_axis_alone_is_watched(found):
-    whole = flange_machine()
-    only = watch(paper_cut().cut, paper_cut().air, machine=replace(whole, flanges=whole.flanges[1:]))
-    assert only.estimate.axes == (Dof.Y,)
-    # speed and angle to the air cut come from fewer channels
-    np.testing.assert_allclose(
-        only.estimate.force[4000:, 0], found.estimate.force[4000:, 1], atol=0.03 * np.abs(found.estimate.force).max()
-    )
+@pytest.mark.parametrize("place", [0, 1])
+def test_one_axis_alone_is_watched(place):
+    """Its own sensors and its own machine, whatever stands beside it in the record."""
+    whole, settled = flange_machine(), slice(2000, None)
+    one = replace(whole, flanges=whole.flanges[place : place + 1])
+    only = watch(paper_cut().cut, paper_cut().air, machine=one)
+    assert only.estimate.axes == (Dof.X, Dof.Y)[place : place + 1]
+    assert relative_error(only.estimate.force, paper_cut().force[:, place : place + 1], paper_cut().cut.rate) < 0.05
+    # without an air cut, whose angle comes from fewer channels then, only the last digits of the speed differ
+    alone, both = (watch(paper_cut().cut, machine=machine).estimate.force[settled] for machine in (one, whole))
+    assert np.std(alone[:, 0] - both[:, place]) < 1e-4 * np.std(both[:, place])
 
 
 def measured(low_hz, high_hz, step_hz=5.0):
@@ -99,6 +103,22 @@ def test_a_measured_flange_gives_the_forces_of_its_modes(found):
     high = watch(paper_cut().cut, paper_cut().air, machine=measured(450.0, 4400.0))
     assert high.band[0] == 2.0 * np.pi * 450.0
     assert any("harmonics below 450 Hz are left out" in note for note in high.notes)
+
+
+@pytest.mark.slow
+def test_a_flange_that_holds_its_joint_is_refused(tmp_path, found):
+    """It tells the tip, and not the spindle's motion behind the joint, which is what the sensor sees."""
+    decoupled = read_flange_machine(decoupled_file(tmp_path / "FLANGE.csv"))
+    with pytest.raises(InputError, match=r"machine: found a flange that holds .* \(X, Y\), allowed is .*bare flange with its joint"):
+        watch(paper_cut().cut, paper_cut().air, machine=decoupled)
+    # with the joint of one axis alone, and a record of both
+    bare = measured(373.0, 4400.0)
+    with pytest.raises(InputError, match=r"\(Y\)"):
+        watch(paper_cut().cut, paper_cut().air, machine=replace(bare, joint={Dof.X: bare.joint}))
+    # by its file a bare flange with its joint is what it was
+    write_flange_machine(tmp_path / "BARE.csv", bare)
+    again = watch(paper_cut().cut, paper_cut().air, machine=read_flange_machine(tmp_path / "BARE.csv"))
+    assert np.all(relative_error(again.estimate.force, paper_cut().force, paper_cut().cut.rate) < 0.03)
 
 
 @pytest.mark.slow
