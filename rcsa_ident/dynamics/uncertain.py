@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -106,8 +107,9 @@ class UncertainReceptance(Receptance):
         """Return the same at a part of the frequencies: close where it changes from line to line, far apart where a quintic suffices."""
         if self.variation is None:
             return self
-        entries = self.values.reshape(self.omega.size, -1).T
-        return self.at_places(nodes_of([*entries[np.any(entries != 0.0, axis=1)], *self.variation.guides()]))
+        if isinstance(self.variation, Mixed) and self.variation.nodes is not None:
+            return self.at_places(self.variation.nodes)
+        return self.at_places(nodes_of([*curves_of(self.values), *self.variation.guides()]))
 
     def at_places(self, places: Places) -> UncertainReceptance:
         """Return the same at some of its frequencies."""
@@ -152,6 +154,43 @@ class _Part:
         return self.whole.guides()[:, self.places]
 
 
+@dataclass(frozen=True, eq=False)
+class AtNodes:
+    """A spread that many ask at the same places: it is worked out there once.
+
+    Parameters
+    ----------
+    whole : Spread
+    nodes : array of int, shape (k,), ascending
+        Places that suffice for draws (as `UncertainReceptance.thinned` has them).
+    """
+
+    whole: Spread
+    nodes: Places
+
+    @property
+    def covers(self) -> frozenset[int]:
+        """Rows that vary."""
+        return self.whole.covers
+
+    @cached_property
+    def _kept(self) -> tuple[Variation, ...]:
+        return self.whole.at(self.nodes)
+
+    def at(self, places: Places) -> tuple[Variation, ...]:
+        """Return the variations at some of the frequencies; those at nodes are kept."""
+        if np.array_equal(places, self.nodes):
+            return self._kept
+        own = np.searchsorted(self.nodes, places).clip(max=self.nodes.size - 1)
+        if not np.array_equal(self.nodes[own], places):
+            return self.whole.at(places)
+        return tuple(Variation(each.members, each.change[:, own]) for each in self._kept)
+
+    def guides(self) -> ComplexArray:
+        """Return the curves of the whole."""
+        return self.whole.guides()
+
+
 @dataclass(frozen=True, slots=True)
 class Mixed:
     """A spread between two others whose directions are the same ones: straight lines from the first to the second.
@@ -166,6 +205,13 @@ class Mixed:
     first: Spread
     second: Spread
     share: float
+
+    @property
+    def nodes(self) -> Places | None:
+        """Places that suffice for draws, where both ends have kept the same ones."""
+        if not (isinstance(self.first, AtNodes) and isinstance(self.second, AtNodes)):
+            return None
+        return self.first.nodes if np.array_equal(self.first.nodes, self.second.nodes) else None
 
     @property
     def covers(self) -> frozenset[int]:
@@ -187,6 +233,12 @@ def _weighted(weights: FloatArray, change: ComplexArray) -> ComplexArray:
     parts = np.ascontiguousarray(change).reshape(len(change), -1).view(float)
     found: ComplexArray = (weights @ parts).view(complex)
     return found.reshape(len(weights), *change.shape[1:])
+
+
+def curves_of(values: ComplexArray) -> list[ComplexArray]:
+    """Return the entries of a receptance that are not zero throughout, each a curve over frequency; shape (n, r, c)."""
+    entries = values.reshape(len(values), -1).T
+    return [*entries[np.any(entries != 0.0, axis=1)]]
 
 
 def nodes_of(curves: Sequence[ComplexArray]) -> Places:

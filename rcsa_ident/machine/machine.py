@@ -207,8 +207,8 @@ class Machine(TipSource, Drawn):
         sides = self.sides(self.lines() if omega is None else omega)
         assembly, turning = _assembly(tooling), self.turning
         tip = tip_over_sides(sides, assembly, stiffness_spread, turning)
-        if turning is not None:
-            tip = replace(tip, poles=partial(poles_of, assembly, sides[0].part.believed, float(tip.omega[-1])))
+        if len(sides) == 1:
+            tip = replace(tip, poles=partial(poles_of, assembly, sides[0].part.believed, float(tip.omega[-1]), turning))
         return tip if spread else replace(tip, variation=None)
 
     def check_behind_joint(self, axes: Sequence[Dof] | None = None) -> None:

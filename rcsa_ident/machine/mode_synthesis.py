@@ -24,15 +24,19 @@ FLANGE = (*plane("flange", Dof.X), *plane("flange", Dof.Y))
 BEYOND = 2.0
 
 
-def synthesised_poles(holder: TurningToolHolder, flange: TurningModes, joint: LumpedJoint | None) -> PoleResidue | None:
+def synthesised_poles(
+    holder: TurningToolHolder, flange: TurningModes, joint: LumpedJoint | None, turning: float | None
+) -> PoleResidue | None:
     """Return the tip's 2 x 2 receptance of a tool-holder on a machine as poles, or None where joint and residual hold rigidly.
 
     Parameters
     ----------
     holder : TurningToolHolder
     flange : TurningModes
-        Over translation and slope of the flange in X, then in Y; its speed is the tool-holder's, too.
+        Over translation and slope of the flange in X, then in Y.
     joint : LumpedJoint or None
+    turning : float or None [rad/s]
+        Spindle speed of the tool-holder's gyroscopic moments; None leaves them out.
 
     Notes
     -----
@@ -53,18 +57,19 @@ def synthesised_poles(holder: TurningToolHolder, flange: TurningModes, joint: Lu
         stiffness[own, own], loss[own, own], damping[own, own] = holder.stiffness.real, holder.stiffness.imag, holder.damping
         gap[2 * k : 2 * k + 2, own] = holder.ports[2:]
         tip[k, own] = holder.ports[0]
-    moments[planes[0], planes[1]], moments[planes[1], planes[0]] = -2.0 * holder.rotary, 2.0 * holder.rotary
+    across = 0.0 if turning is None else 2.0 * turning
+    moments[planes[0], planes[1]], moments[planes[1], planes[0]] = -across * holder.rotary, across * holder.rotary
     own = slice(2 * h, n)
-    stiffness[own, own], damping[own, own], moments[own, own] = flange.stiffness, flange.damping, flange.gyroscopic
+    stiffness[own, own], damping[own, own], moments[own, own] = flange.stiffness, flange.damping, flange.speed * flange.gyroscopic
     gap[:, own] = -flange.psi.T
     squares, shapes = scipy.linalg.eigh(stiffness + gap.T @ spring @ gap)
     natural = np.sqrt(squares)
     viscous = shapes.T @ (damping + gap.T @ damper @ gap) @ shapes + shapes.T @ loss @ shapes / np.sqrt(np.outer(natural, natural))
-    poles = gyroscopic_poles(natural, viscous, flange.speed * (shapes.T @ moments @ shapes), (tip @ shapes).T, np.zeros((2, 2)))
+    poles = gyroscopic_poles(natural, viscous, shapes.T @ moments @ shapes, (tip @ shapes).T, np.zeros((2, 2)))
     return _within(poles, BEYOND * holder.highest)
 
 
-def poles_of(assembly: ToolAssembly, believed: JointedFlange, highest: float) -> PoleResidue | None:
+def poles_of(assembly: ToolAssembly, believed: JointedFlange, highest: float, turning: float | None) -> PoleResidue | None:
     """Return the same of a flange and the joint in front of it, or None where it does not stand in modes.
 
     Parameters
@@ -74,11 +79,14 @@ def poles_of(assembly: ToolAssembly, believed: JointedFlange, highest: float) ->
         Of both bending planes.
     highest : float [rad/s]
         Up to which the tip is asked for.
+    turning : float or None [rad/s]
+        Spindle speed of the tool-holder's gyroscopic moments; None leaves them out.
     """
     flange = believed.flange
     if not isinstance(flange, TurningModes) or flange.coordinates != FLANGE:
         return None
-    return synthesised_poles(turning_tool_holder(assembly, highest, flange.speed), flange, believed.joint)
+    holder = turning_tool_holder(assembly, highest, 0.0 if turning is None else turning)
+    return synthesised_poles(holder, flange, believed.joint, turning)
 
 
 def _spring(flange: TurningModes, joint: LumpedJoint | None) -> tuple[FloatArray, FloatArray] | None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.dynamics.uncertain import Mixed, UncertainReceptance
+from rcsa_ident.dynamics.uncertain import AtNodes, Mixed, UncertainReceptance, curves_of, nodes_of
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.stability.tip_modes import TipModes
@@ -50,9 +50,13 @@ def tips_over_speed(
         if known is None:
             yield places, model.tip(tooling, omega, spread, stiffness_spread)
             continue
+        blocks = _blocks(own, known)
         tips = _ChangingTip(model, tooling, omega, own, known, spread, stiffness_spread)
-        for block in _blocks(own, known):
-            yield places[block], tips.at(own[block])
+        middles = [tips.middle(own[block]) for block in blocks]
+        if tips.coupled:
+            tips.share_nodes(middles)
+        for block, middle in zip(blocks, middles, strict=True):
+            yield places[block], tips.at(middle)
 
 
 def _blocks(speeds: FloatArray, known: tuple[float, float]) -> list[NDArray[np.intp]]:
@@ -76,6 +80,7 @@ class _ChangingTip:
     ) -> None:
         self.model, self.tooling, self.omega, self.known, self.stiffness_spread = model, tooling, omega, known, stiffness_spread
         self.anchors, self.tips = np.zeros(0), list[UncertainReceptance | TipModes]()
+        self.own = dict[float, UncertainReceptance | TipModes]()
         if spread:
             low, high = np.clip([speeds.min(), speeds.max()], *known)
             pieces = int(np.ceil(np.log(high / low) / np.log(STRAIGHT)))
@@ -85,10 +90,29 @@ class _ChangingTip:
     def _tip(self, speed: float, spread: bool) -> UncertainReceptance | TipModes:
         return self.model.at(speed).tip(self.tooling, self.omega, spread, self.stiffness_spread)
 
-    def at(self, speeds: FloatArray) -> UncertainReceptance | TipModes:
+    def middle(self, speeds: FloatArray) -> float:
+        """Return the middle of a block's speeds, as far as they are known."""
+        return float(np.mean(np.clip([speeds.min(), speeds.max()], *self.known)))
+
+    @property
+    def coupled(self) -> bool:
+        """Whether there is a spread, over planes that feel each other."""
+        known = [tip.values for tip in self.tips if isinstance(tip, UncertainReceptance) and tip.variation is not None]
+        return any(np.any(values[:, ~np.eye(values.shape[1], dtype=bool)]) for values in known)
+
+    def share_nodes(self, speeds: Sequence[float]) -> None:
+        """Let all blocks draw at the same frequencies: variations over both planes at once are too dear to be worked out for each."""
+        self.own = {speed: self._tip(speed, False) for speed in speeds}
+        anchors = [tip for tip in self.tips if isinstance(tip, UncertainReceptance) and tip.variation is not None]
+        curves = [curve for tip in self.own.values() if isinstance(tip, UncertainReceptance) for curve in curves_of(tip.values)]
+        curves += [curve for tip in anchors if tip.variation is not None for curve in tip.variation.guides()]
+        if len(anchors) == len(self.tips) and curves:
+            nodes = nodes_of(curves)
+            self.tips = [replace(tip, variation=AtNodes(tip.variation, nodes)) for tip in anchors if tip.variation is not None]
+
+    def at(self, speed: float) -> UncertainReceptance | TipModes:
         """Return the tip at the middle of a block's speeds."""
-        speed = float(np.mean(np.clip([speeds.min(), speeds.max()], *self.known)))
-        tip = self._tip(speed, False)
+        tip = self.own[speed] if speed in self.own else self._tip(speed, False)
         if not self.tips or isinstance(tip, TipModes):
             return tip
         # the directions are those of the covariance, the same at all speeds: their responses can be interpolated

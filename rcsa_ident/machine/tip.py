@@ -222,7 +222,8 @@ class TurningHolder(Holder):
 
     def tip(self, w: ComplexArray) -> ComplexArray:
         """Return C11 of the translations for W, shape (..., n, 4, 4) -> (..., n, 2, 2), at this holder's frequencies."""
-        found: ComplexArray = tips_of_planes(*self.all, np.ascontiguousarray(w.reshape(-1, *w.shape[-3:])))
+        # the kernel is compiled anew for read-only arrays: a copy is none
+        found: ComplexArray = tips_of_planes(*self.all, np.array(w.reshape(-1, *w.shape[-3:])))
         return found.reshape(*w.shape[:-2], 2, 2)
 
     def blocks(self, count: int) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:

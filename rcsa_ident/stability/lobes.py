@@ -13,7 +13,7 @@ from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.result import StabilityLobes
-from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes
+from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes, known_modes
 from rcsa_ident.stability.zero_order import ZeroOrder
 
 _ZERO_ORDER = ZeroOrder()
@@ -68,10 +68,12 @@ def stability_lobes(
     if isinstance(both, TipModes) or method.needs == "receptance":
         found = method.lobes(both, process, speeds, max_depth)
     else:
-        modes, error = fitted_modes(both)
+        known = known_modes(both)
+        modes, error = fitted_modes(both) if known is None else known
         found = method.lobes(modes, process, speeds, max_depth)
         share = f"{100.0 * error:.2g}" if error > 1e-4 else "less than 0.01"
-        told = f"the receptance was replaced by a fit with {modes.pole.size} modes (relative error {share} %)"
+        what = "a fit with" if known is None else "the assembly's own"
+        told = f"the receptance was replaced by {what} {modes.pole.size} modes (relative error {share} %)"
         found = replace(found, warnings=(*found.warnings, told))
     if draws < 2 or not isinstance(tip, UncertainReceptance) or not tip.complete:
         return found

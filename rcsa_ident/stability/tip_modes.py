@@ -147,15 +147,22 @@ def fitted_modes(tip: Receptance) -> tuple[TipModes, float]:
 
     Poles that the receptance knows without a fit are taken where they are near enough, else a rational function is fitted.
     """
-    known = tip.poles() if isinstance(tip, UncertainReceptance) and tip.poles is not None else None
-    if known is not None and np.all(known.pole.real < 0.0):
-        above = tip.omega > 0.0
-        values = tip.values[above]
-        error = float(np.linalg.norm(known.response(tip.omega[above]) - values) / np.linalg.norm(values))
-        if error <= NEAR_ENOUGH:
-            return TipModes.joined([known]), error
+    known = known_modes(tip)
+    if known is not None:
+        return known
     found, error = fitted_poles(tip.omega, tip.values, FIT_TOLERANCE, DAMPED_OUTSIDE)
     return TipModes.joined([found]), error
+
+
+def known_modes(tip: Receptance) -> tuple[TipModes, float] | None:
+    """Return the modes that a receptance knows without a fit and how far they are beside it; None where it knows none near enough."""
+    poles = tip.poles() if isinstance(tip, UncertainReceptance) and tip.poles is not None else None
+    if poles is None or not np.all(poles.pole.real < 0.0):
+        return None
+    above = tip.omega > 0.0
+    values = tip.values[above]
+    error = float(np.linalg.norm(poles.response(tip.omega[above]) - values) / np.linalg.norm(values))
+    return (TipModes.joined([poles]), error) if error <= NEAR_ENOUGH else None
 
 
 def require_modes(tip: Receptance | TipModes, method: str) -> TipModes:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
@@ -15,6 +16,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.dynamics.turning_modes import TurningModes
 from rcsa_ident.identification.data import IdentificationData, prepare
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
@@ -22,7 +24,9 @@ from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.parameters import AxisLayout
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.search import SearchSettings
+from rcsa_ident.machine.mode_synthesis import FLANGE
 from rcsa_ident.machine.spindle import Spindle
+from rcsa_ident.machine.turning_machine import TurningMachine
 from rcsa_ident.observer.force_model import RandomWalk, augmented
 from rcsa_ident.observer.kalman import kalman_filter
 from rcsa_ident.observer.transfer_function import SampledModes
@@ -121,6 +125,9 @@ def _tips() -> None:
     axis = MachineAxis(Spindle(posterior.machine(Dof.X)[0]), posterior.machine(Dof.X)[1], posterior)
     machine = IdentifiedMachine({Dof.X: axis}, (2000.0, 8000.0))
     assert machine.tip(_assembly()).thinned().spread.size
+    shapes, none = np.array([[0.1, 1.0, 0.0, 0.0], [0.0, 0.0, 0.1, 1.0]]), np.zeros((4, 4))
+    modes = TurningModes(np.array([5000.0, 5000.0]), 500.0 * np.eye(2), np.array([[0.0, -0.1], [0.1, 0.0]]), shapes, none, _SPEED, FLANGE)
+    TurningMachine(modes, (2000.0, 8000.0), (500.0, 1000.0), LumpedJoint(2e9, 5e6)).tip(_assembly())
 
 
 def _lobes_in_time() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.dynamics.uncertain import WIDEST, Mixed, UncertainReceptance, Variation
+from rcsa_ident.dynamics.uncertain import WIDEST, AtNodes, Mixed, UncertainReceptance, Variation
 
 ROWS = (Coordinate("tip", Dof.X), Coordinate("tip", Dof.Y), Coordinate("flange", Dof.X))
 OMEGA = 2.0 * np.pi * np.arange(100.0, 1000.0)
@@ -151,3 +151,36 @@ def test_where_a_rival_is_sharp_a_thinned_receptance_stands_close_too(place):
         gaps.append(np.diff(places)[np.searchsorted(places, place) - 1])
     assert gaps[1] == 1
     assert gaps[0] > 1
+
+
+@dataclass
+class Counted(Written):
+    """A spread that remembers how often it was asked."""
+
+    asked: int = 0
+
+    def at(self, places):
+        self.asked += 1
+        return super().at(places)
+
+
+def test_a_spread_at_nodes_is_worked_out_there_once():
+    tip, nodes = known(), np.arange(0, OMEGA.size, 7)
+    spreads = [Counted(known(seed).variation.blocks) for seed in (1, 2)]
+    ends = [AtNodes(each, nodes) for each in spreads]
+    tips = [UncertainReceptance(OMEGA, tip.values, ROWS, ROWS, Mixed(*ends, share)) for share in (0.0, 0.4, 1.0)]
+    for mixed, plain in zip(tips, [Mixed(*spreads, share) for share in (0.0, 0.4, 1.0)], strict=True):
+        thin = mixed.thinned()
+        np.testing.assert_array_equal(thin.omega, OMEGA[nodes])
+        expected = UncertainReceptance(OMEGA, tip.values, ROWS, ROWS, plain).spread
+        spreads[0].asked = spreads[1].asked = 0
+        np.testing.assert_array_equal(thin.spread, expected[:, nodes])
+        np.testing.assert_array_equal(mixed.at_places(nodes[3:9]).spread, expected[:, nodes[3:9]])
+        assert spreads[0].asked <= 1
+        # elsewhere it is asked as ever
+        np.testing.assert_array_equal(mixed.at_places(nodes[:5] + 2).spread, expected[:, nodes[:5] + 2])
+        assert mixed.complete
+    other = Mixed(ends[0], AtNodes(spreads[1], nodes[1:]), 0.5)
+    assert other.nodes is None
+    assert Mixed(spreads[0], ends[1], 0.5).nodes is None
+    np.testing.assert_array_equal(ends[0].guides(), spreads[0].guides())

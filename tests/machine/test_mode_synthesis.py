@@ -10,6 +10,7 @@ import pytest
 
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.turning_modes import TurningModes
+from rcsa_ident.machine.flange_machine import FlangeMachine
 from rcsa_ident.machine.flange_part import JointedFlange
 from rcsa_ident.machine.mode_synthesis import FLANGE, poles_of, synthesised_poles
 from rcsa_ident.machine.turning_machine import TurningMachine
@@ -83,13 +84,13 @@ def test_a_residual_alone_holds_the_tool_holder():
 
 def test_what_holds_rigidly_has_no_spring():
     holder = turning_tool_holder(tooling().assembly, OMEGA[-1], SPEED)
-    assert synthesised_poles(holder, few_modes(np.zeros((4, 4))), None) is None
-    assert synthesised_poles(holder, few_modes(np.diag([1e-10, 0.0, 1e-10, 0.0])), None) is None
+    assert synthesised_poles(holder, few_modes(np.zeros((4, 4))), None, SPEED) is None
+    assert synthesised_poles(holder, few_modes(np.diag([1e-10, 0.0, 1e-10, 0.0])), None, SPEED) is None
 
 
 def test_what_stands_in_no_modes_is_fitted():
     receptance = JointedFlange(turning_machine().modes.receptance(OMEGA), joint())
-    assert poles_of(tooling().assembly, receptance, OMEGA[-1]) is None
+    assert poles_of(tooling().assembly, receptance, OMEGA[-1], SPEED) is None
     omega = OMEGA[::6]
     tip = machine_of(few_modes(), joint()).tip(tooling(), omega, spread=False)
     fitted, error = fitted_modes(replace(tip, poles=lambda: None))
@@ -107,3 +108,14 @@ def test_a_softened_machine():
 def test_goes_to_other_processes():
     tip = machine_of(few_modes(), joint()).tip(tooling(), OMEGA, spread=False)
     assert np.array_equal(pickle.loads(pickle.dumps(tip)).poles().pole, tip.poles().pole)
+
+
+def test_planes_that_feel_each_other_without_turning():
+    """An oblique machine: its flange's modes have no moments, and the tool-holder none either."""
+    modes = replace(few_modes(), gyroscopic=np.zeros((14, 14)), speed=0.0)
+    machine = FlangeMachine((modes,), (1.0, float(OMEGA[-1])), joint())
+    tip = machine.tip(tooling(), OMEGA)
+    assert machine.turning is None
+    assert np.linalg.norm(tip.values[:, 0, 1]) > 0.01 * np.linalg.norm(tip.values[:, 0, 0])
+    assert share(tip.poles().response(OMEGA), tip.values) < 2e-3
+    np.testing.assert_allclose(tip.values, tip.values.transpose(0, 2, 1), rtol=1e-7)

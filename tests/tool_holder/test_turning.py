@@ -58,6 +58,13 @@ def test_full_equations(name, per_line):
         np.testing.assert_allclose(each, each.transpose(0, 2, 1), rtol=1e-9)
 
 
+@pytest.mark.parametrize("teeth", [1, 2])
+def test_first_lines_of_few_teeth(teeth):
+    """Spindle speed over frequency the same at all of them: the rotary inertia is doubled or trebled, gone or negative."""
+    found = turning_pair(ASSEMBLIES["contact"], BAND, 1.0 / teeth)
+    assert farthest(both_planes(*found), naive(ASSEMBLIES["contact"], BAND, BAND / teeth)) < 1e-7
+
+
 @pytest.mark.parametrize("speed", [3.0, 300.0, FASTEST])
 def test_poles_of_a_speed_and_solutions_agree(speed):
     holder = TurningToolHolder.of(ASSEMBLIES["contact"], BAND[-1], FASTEST)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -10,10 +10,13 @@ import pytest
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.dynamics.receptance import Receptance
+from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation
+from rcsa_ident.machine.mode_synthesis import FLANGE
+from rcsa_ident.machine.speed_dependence import BLOCK
 from rcsa_ident.machine.turning_machine import TurningMachine
 from rcsa_ident.machining_setup import CutSpec
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
-from rcsa_ident.stability.lobes import stability_lobes
+from rcsa_ident.stability.lobes import drawn_limits, stability_lobes
 from rcsa_ident.stability.multi_frequency import MultiFrequency
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.surface_error import surface_location_error
@@ -78,3 +81,40 @@ def test_maps_and_surfaces_feel_it(truth):
     straight = np.where(np.eye(2), tip.values, 0.0)
     other = surface_location_error(Receptance(tip.omega, straight, tip.rows, tip.cols), asked.process, SPEEDS[:1], 0.5 * truth[0])
     assert np.max(np.abs(other.error - expected.error)) > 0.01 * np.max(np.abs(expected.error))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Doubted(TurningMachine):
+    """A turning machine with a spread: each shape may be some shares larger or smaller."""
+
+    @property
+    def parts(self) -> tuple[FlangePart, ...]:
+        def doubt() -> Doubt:
+            rng, steps = np.random.default_rng(7), []
+            for _ in range(6):
+                change = 0.01 * self.modes.psi * rng.normal(size=self.modes.psi.shape)
+                ahead, behind = (replace(self.modes, psi=self.modes.psi + sign * change) for sign in (1.0, -1.0))
+                steps.append(Perturbation(JointedFlange(ahead, self.joint), JointedFlange(behind, self.joint), 0.5))
+            return Doubt(steps)
+
+        return (FlangePart(FLANGE, JointedFlange(self.modes, self.joint), doubt),)
+
+
+def test_bands_over_speed():
+    """All blocks draw at the same frequencies; each one's own ones tell the same, at the anchors but for the interpolation."""
+    own = turning_machine()
+    machine = Doubted(own.modes, own.known, own.speeds, own.joint)
+    speeds = RPM * np.linspace(9000.0, 20_000.0, 45)
+    found = replace(change(speeds=speeds, machine=machine), draws=8).limits()
+    assert found.drawn.shape == (8, 45)
+    for k in (0, 17, 44):
+        block = speeds[np.abs(np.log(speeds / speeds[k])) < BLOCK]
+        near = {}
+        for speed in (block.min(), block.max()):
+            tip = machine.at(float(speed)).tip(tooling(), machine.lines())
+            near[speed] = drawn_limits(tip, change().process, speeds[k : k + 1], 5e-3, 8)[:, 0]
+        low, high = (np.min(list(near.values()), axis=0), np.max(list(near.values()), axis=0))
+        size = np.std(found.drawn[:, k])
+        assert size > 0.002 * found.nominal[k]
+        assert np.all(found.drawn[:, k] > low - 0.1 * size)
+        assert np.all(found.drawn[:, k] < high + 0.1 * size)
