@@ -27,6 +27,8 @@ NOUNS = (
     "rcsa_ident.identification.parameters.AxisLayout",
     "rcsa_ident.identification.parameters.Layout",
     "rcsa_ident.identification.candidate.Candidate",
+    "rcsa_ident.identification.coupled.fit.CoupledSearch",
+    "rcsa_ident.identification.coupled.parameters.CoupledLayout",
     "rcsa_ident.identification.progress.Stage",
     "rcsa_ident.identification.progress.Step",
     "rcsa_ident.identification.joint_fit.AxisSearch",

@@ -16,6 +16,7 @@ from rcsa_ident.identification.parameters import JOINT, AxisLayout
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.result import AxisResult, Identification
 from rcsa_ident.identification.status import Status
+from rcsa_ident.io.both_planes import both_planes_from_json, both_planes_to_json
 from rcsa_ident.io.results import AXES, SCHEMA_VERSION, spindle_from_json, spindle_to_json
 from rcsa_ident.io.setups import sensor_of
 from rcsa_ident.io.validated_table import Table, describe
@@ -71,6 +72,7 @@ def identification_to_json(
         "coefficients": {str(each): _coefficient(each, *found) for each, found in identification.coefficients.items()},
         "band_hz": [to_hz(w) for w in identification.band],
         "axes": _axes_to_json(identification, deviations or {}),
+        **_both_planes(identification),
         "delays": _delays(identification, campaign),
     }
 
@@ -96,7 +98,13 @@ def speed_band_to_json(
         "reasons": list(identification.reasons),
         "notes": list(identification.notes),
         "axes": _axes_to_json(identification, deviations or {}),
+        **_both_planes(identification),
     }
+
+
+def _both_planes(identification: Identification) -> dict[str, Any]:
+    """The machine whose planes feel each other; nothing where they do not."""
+    return {} if identification.whole is None else {"both_planes": both_planes_to_json(identification.whole)}
 
 
 def _axes_to_json(identification: Identification, deviations: ModeDeviations) -> dict[str, Any]:
@@ -182,6 +190,7 @@ def machine_from_json(data: Mapping[str, Any], where: str) -> IdentifiedMachine:
         identified_workpiece=workpiece_of(top.table("workpiece")) if "workpiece" in top else None,
         sensors=tuple(sensor_of(name, table.data, where) for name, table in top.named_tables("sensors", default={}).items()),
         name=data["campaign"]["name"],
+        whole=both_planes_from_json(top.table("both_planes")) if "both_planes" in top else None,
     )
 
 

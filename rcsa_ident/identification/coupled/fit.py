@@ -103,7 +103,10 @@ def with_discs(theta: FloatArray, layout: CoupledLayout, discs: int, priors: Pri
 def fit_coupled(
     data: CoupledData, priors: Priors, searched: list[AxisSearch], report: Report, map: Map = map
 ) -> tuple[Solution, CoupledMisfit, Solution]:
-    """Return the solution of both planes together, its misfit, and what the evidence alone would have chosen.
+    """Return the solution of both planes together, its misfit, and a rival with one mode more.
+
+    A whole machine's modes reach across both planes: one more than the evidence asks for is worse as an answer, but how far it differs
+    belongs to what is not known.
 
     Parameters
     ----------
@@ -150,14 +153,11 @@ def fit_coupled(
     middle, half = data.base.speed_range
     if half > LEAST_SPEED_RANGE * middle:
         here = better(here, _start(data, here[0], softening=True))
-    chosen = here[0]
-    grown = chosen
-    for _ in range(2):
-        grown = grow_modes(grown, here[1], band, steps=COUPLED)
-    report(Stage.GROW, grown.cost, grown)
-    found, misfit = refine_and_learn_noise(misfit_of, grown.candidate.point, here[1].model_error, here[1].cut_weight, report)
+    found, misfit = refine_and_learn_noise(misfit_of, here[0].candidate.point, here[1].model_error, here[1].cut_weight, report)
     assert isinstance(misfit, CoupledMisfit)
-    return found, misfit, chosen
+    grown = grow_modes(found, misfit, band, steps=COUPLED)
+    report(Stage.GROW, grown.cost, grown)
+    return found, misfit, grown
 
 
 def _skew(candidate: Candidate) -> int:

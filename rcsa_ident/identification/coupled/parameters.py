@@ -209,6 +209,20 @@ def strict_triangle(order: int) -> tuple[np.ndarray, np.ndarray]:
     return rows, cols
 
 
+def parameter_names(layout: CoupledLayout) -> tuple[str, ...]:
+    """Return the names of the unknowns of a flange and the joint, in the vector's order; `layout` is that of a flange alone."""
+    m = layout.modes
+    directions = ("x_t", "lever*x_r", "y_t", "lever*y_r")
+    pairs = [(i, j) for i in range(m) for j in range(i + 1)]
+    names = [f"log natural_frequency_rad_s[{n}]" for n in range(m)]
+    names += [f"psi_{k}[{n}]" for n in range(m) for k in directions]
+    names += [f"log damping_factor[{i},{j}]" if i == j else f"damping_factor[{i},{j}]" for i, j in pairs]
+    names += [f"residual_factor[{i},{j}]" for i in range(DIRECTIONS) for j in range(i + 1)]
+    names += [f"softening[{i},{j}]" for i, j in pairs if layout.softening]
+    names += [f"disc_{k}_{side}[{n}]" for k in range(max(layout.skew, 0)) for side in ("a", "b") for n in range(m)]
+    return (*names, "log joint.k_t", "log joint.k_r", "log joint.c_t", "log joint.c_r")
+
+
 def unpack(part: FloatArray, layout: CoupledLayout) -> CoupledParameters:
     """Return the physics of the machine's own part of the vector, shape (tail,) or longer."""
     m = layout.modes
