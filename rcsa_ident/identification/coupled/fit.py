@@ -123,9 +123,6 @@ def fit_coupled(
     kinds = ((0, 0), (1, 1)) if data.turns else ((0, 0),)
     starts: list[CoupledSearch] = finite(map(perform, [CoupledStart(summed, priors, searched, *kind) for kind in kinds]))
     best = min(starts, key=lambda start: start.evidence)
-    if _skew(best.candidate) > 0:
-        starts = finite(map(perform, [CoupledStart(summed, priors, searched, 1, -1)]))
-        best = min(best, *starts, key=lambda start: start.evidence)
     omega = np.concatenate([a.omega for a in data.base.axes])
     band = float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))
 
@@ -134,6 +131,10 @@ def fit_coupled(
 
     weight = learned_noise(searched)[1]
     found, rough = refine_and_learn_noise(rough_of, best.candidate.point, (SHARES[-1], SHARES[-1]), weight, report, 1e-4)
+    if _layout(found).turning:
+        other = refine_and_learn_noise(rough_of, turned_round(found), rough.model_error, rough.cut_weight, report, 1e-4)
+        if evidence(*other) < evidence(found, rough):
+            found, rough = other
     found = exchange_modes(found, rough, band, report, rounds=2, steps=COUPLED)
 
     def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> CoupledMisfit:
@@ -160,9 +161,13 @@ def fit_coupled(
     return found, misfit, grown
 
 
-def _skew(candidate: Candidate) -> int:
-    assert isinstance(candidate.layout, CoupledLayout)
-    return candidate.layout.skew
+def turned_round(found: Solution) -> tuple[FloatArray, CoupledLayout, FloatArray]:
+    """Return where the search for the same machine begins whose spindle turns the other way: gyroscopic moments change their sign."""
+    layout = _layout(found)
+    theta = found.theta.copy()
+    discs = theta[layout.skews].reshape(layout.skew, 2, layout.modes)
+    discs[:, 0] *= -1.0
+    return theta, replace(layout, turning=-layout.turning), found.evaluation.nuisance
 
 
 def _layout(solution: Solution) -> CoupledLayout:
