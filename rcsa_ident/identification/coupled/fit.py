@@ -28,6 +28,9 @@ from rcsa_ident.scaleout import Map
 SHARES = (0.05, 0.01, 0.003)
 #: The first of them with gyroscopic coupling, which starts as weak as this share of its prior: at none it would have no gradient.
 WITH_SKEW, FIRST_SKEW = 0.01, 0.3
+#: Gain in evidence for which the spindle is believed to turn the other way: two valleys of one sense differ by up to half of it, and
+#: where gyroscopic moments are strong the wrong sense loses by thousands.
+OTHER_SENSE = 300.0
 #: Most discs whose slopes make the gyroscopic coupling.
 MOST_DISCS = 2
 
@@ -133,7 +136,7 @@ def fit_coupled(
     found, rough = refine_and_learn_noise(rough_of, best.candidate.point, (SHARES[-1], SHARES[-1]), weight, report, 1e-4)
     if _layout(found).turning:
         other = refine_and_learn_noise(rough_of, turned_round(found), rough.model_error, rough.cut_weight, report, 1e-4)
-        if evidence(*other) < evidence(found, rough):
+        if evidence(*other) < evidence(found, rough) - OTHER_SENSE:
             found, rough = other
     found = exchange_modes(found, rough, band, report, rounds=2, steps=COUPLED)
 
