@@ -80,10 +80,9 @@ class EvidenceSelection:
         if not_finite(data):
             return failed(data, seed, self.name)
         try:
-            searched = self._search(data, seed, map, progress)
+            searched, together = self._search(data, seed, map, progress)
             trace = [step for search in searched for step in search.trace]
             report = _report_to(BOTH, trace, progress)
-            together = self._together(data, searched, map)
             if together.coupled:
                 assert together.points is not None
                 assert together.coupling is not None
@@ -95,23 +94,28 @@ class EvidenceSelection:
         except (ArithmeticError, np.linalg.LinAlgError):
             return failed(data, seed, self.name)
 
-    def _search(self, data: IdentificationData, seed: int, map: Map, progress: Progress | None) -> list[AxisSearch]:
-        """Return the search of each axis, again from new starts until one has come to the same answer twice."""
+    def _search(self, data: IdentificationData, seed: int, map: Map, progress: Progress | None) -> tuple[list[AxisSearch], _Together]:
+        """Return the search of each axis, again from new starts until one has come to the same answer twice, and both together.
+
+        Planes that feel each other bend each other's answers: no further search of one of them alone would end that.
+        """
         sequence = np.random.SeedSequence(seed)
         summed = data.summed()
         parts = [summed.only(a.axis).with_smooth_errors(SMOOTH_ERROR) for a in data.axes]
         searched: list[AxisSearch] = []
-        for _ in range(ATTEMPTS):
+        for left in reversed(range(ATTEMPTS)):
             tasks = [SearchAxis(self, part, own, progress) for part, own in zip(parts, sequence.spawn(len(parts)), strict=True)]
             found = finite(map(perform, tasks))
             if len(found) == 2:
                 both = zip(parts, found, found[::-1], strict=True)
                 found = finite(map(perform, [SearchFromOtherAxis(self, part, own, other, progress) for part, own, other in both]))
             searched = [a.joined(b) for a, b in zip(searched, found, strict=True)] if searched else found
-            # planes that feel each other bend each other's answers: no further search of one of them alone would end that
-            if self.start is not None or any(s.confirmed for s in searched) or self._together(data, searched, map).coupled:
-                break
-        return searched
+            done = left == 0 or self.start is not None or any(s.confirmed for s in searched)
+            if done or couplable(data):
+                together = self._together(data, searched, map)
+                if done or together.coupled:
+                    break
+        return searched, together
 
     def _together(self, data: IdentificationData, searched: list[AxisSearch], map: Map) -> _Together:
         """Both axes' answers polished together, and what the lines say against planes that feel nothing of each other."""
@@ -119,11 +123,8 @@ class EvidenceSelection:
         first = first_starts(smooth, self.priors, searched, map)
         if not couplable(data):
             return _Together(smooth, first)
-        points = coupled_data(smooth)
+        points, best = coupled_data(smooth), first[0]
         misfit = CoupledMisfit(points, self.priors, *learned_noise(searched))
-        best = first[0]
-        if {axis.outputs for axis in smooth.axes} != {axis.outputs for axis in points.base.axes}:
-            return _Together(smooth, first)
         return _Together(smooth, first, points, coupling(best.theta, planes(best.layout), best.nuisance, misfit))
 
 

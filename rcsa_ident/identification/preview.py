@@ -8,6 +8,9 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.coupled.data import coupled_data
+from rcsa_ident.identification.coupled.misfit import CoupledMisfit
+from rcsa_ident.identification.coupled.parameters import CoupledLayout
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.evidence import SMOOTH_ERROR
 from rcsa_ident.identification.misfit import Misfit
@@ -46,7 +49,7 @@ class Preview:
         summed = data.summed()
         self.data = {str(a.axis): summed.only(a.axis).with_smooth_errors(SMOOTH_ERROR) for a in data.axes}
         self.data[BOTH] = data.with_smooth_errors(SMOOTH_ERROR)
-        self.misfits: dict[str, Misfit] = {}
+        self.misfits: dict[tuple[str, bool], Misfit] = {}
 
     def axes(self, step: Step) -> tuple[Dof, ...]:
         """Return the axes that a step is about; none where it has no candidate."""
@@ -56,10 +59,14 @@ class Preview:
         """Return the lines of one of these axes."""
         data, i = self.data[step.axis], self.axes(step).index(axis)
         assert step.candidate is not None
-        if step.axis not in self.misfits:
+        layout = step.candidate.layout
+        together = isinstance(layout, CoupledLayout)
+        if (step.axis, together) not in self.misfits:
             # what the model says of the lines depends on no noise
-            self.misfits[step.axis] = Misfit(data, Priors(), (1.0,) * len(data.axes))
-        models = self.misfits[step.axis].models(step.candidate.theta, step.candidate.layout)
+            anything = Priors(), (1.0,) * len(data.axes)
+            misfit = CoupledMisfit(coupled_data(data), *anything) if together else Misfit(data, *anything)
+            self.misfits[step.axis, together] = misfit
+        models = self.misfits[step.axis, together].models(step.candidate.theta, layout)
         part = data.axes[i]
         order = np.argsort(part.omega, kind="stable")
         return FittedLines(part.omega[order], part.measured[order], np.sum(models[i], axis=1)[order])

@@ -48,7 +48,7 @@ class CoupledData:
     @property
     def turns(self) -> bool:
         """Whether the tool-holders' gyroscopic moments are known."""
-        return bool(self.base.turning) or self.flange.shape[0] == 3
+        return self.flange.shape[0] == 3
 
     def summed(self) -> CoupledData:
         """Return the same with the flange's motion as the only output, and without the triggers of unknown tooth angle."""
@@ -56,8 +56,10 @@ class CoupledData:
 
 
 def couplable(data: IdentificationData) -> bool:
-    """Whether both planes can be fitted together: lines of X and Y, and both forces in each."""
-    return tuple(a.axis for a in data.axes) == (Dof.X, Dof.Y) and all(a.across.size == a.omega.size for a in data.axes)
+    """Whether both planes can be fitted together: lines of X and Y with as many outputs, and both forces in each."""
+    if tuple(a.axis for a in data.axes) != (Dof.X, Dof.Y) or len({a.outputs for a in data.axes}) > 1:
+        return False
+    return all(a.across.size == a.omega.size for a in data.axes)
 
 
 def coupled_data(data: IdentificationData) -> CoupledData:
@@ -68,8 +70,6 @@ def coupled_data(data: IdentificationData) -> CoupledData:
     data : IdentificationData
         For which `couplable` holds.
     """
-    if len({axis.outputs for axis in data.axes}) > 1:
-        data = data.summed()
     x, y = data.axes
     key = [(axis.cut * 2**20 + np.rint(axis.order).astype(np.int64)) for axis in data.axes]
     points = np.unique(np.concatenate(key))
