@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request, Response, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request, Response, expect, sync_playwright
 
 from api.client import Client
 from tests.fixtures import by_hand
@@ -48,6 +48,8 @@ def client(served: Served) -> Iterator[Client]:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """One for each file and no longer: its event loop runs in this thread, where other rooms' tests run loops of their own."""
+    # reached only where something is wrong, and long enough for a machine under load
+    expect.set_options(timeout=30_000)
     with sync_playwright() as playwright:
         found = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=list(_QUIET))
         yield found
