@@ -180,6 +180,7 @@ def recording(begin: float, end: float) -> bytes:
     return held.getvalue()
 
 
+@pytest.mark.slow
 def test_forces_with_the_sensors_of_the_query(client: Client, http, tmp_path):
     """The file holds the joint's compliance: the sensor seems to look at the tool-holder, and C31 is 5 % off."""
     write_flange_machine(tmp_path / "FLANGE.csv", flange_machine())

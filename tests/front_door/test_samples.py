@@ -38,6 +38,7 @@ def test_the_wheel_carries_what_a_checkout_has(tmp_path, monkeypatch):
         samples.sample_data()
 
 
+@pytest.mark.slow
 def test_a_campaign_on_the_spot(tmp_path, quick_truth):
     folder = tmp_path / "new" / "runs"
     with pytest.MonkeyPatch.context() as patch:
