@@ -27,7 +27,7 @@ forces = ri.estimate_forces(machine, tool, ri.read_recording("cut.h5", campaign.
 """
 
 
-@pytest.mark.slow
+@pytest.mark.slow(40)
 def test_as_it_stands(triggered):
     """No guard, from any folder; the result is the command's, byte for byte."""
     folder = triggered.folder.parents[1]

@@ -49,7 +49,7 @@ def test_lobes_from_modes():
     assert not lobes.warnings
 
 
-@pytest.mark.slow
+@pytest.mark.slow(15)
 def test_recordings_to_speed(tmp_path, monkeypatch, capsys):
     """A tool that never cut: the recommended cut is stable on the true machine, and not far from its limit."""
     monkeypatch.chdir(tmp_path)
