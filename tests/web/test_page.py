@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 import subprocess
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import TimeoutError, expect
 
 from api.client import Client
 from tests.fixtures import by_hand
@@ -49,6 +50,9 @@ def test_every_view_fits_every_width(opened, served: Served, shop: str, scheme, 
         for width in widths:
             page.set_viewport_size({"width": width, "height": 800})
             page.wait_for_timeout(120)
+            with suppress(TimeoutError):
+                # a chart is laid out again when it can be
+                page.wait_for_function(f"document.documentElement.scrollWidth <= innerWidth && !({_OUTSIDE})().length")
             assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), (address, width)
             assert page.evaluate(_OUTSIDE) == [], (address, width)
         assert page.locator("h1").count() == 1, address

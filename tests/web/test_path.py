@@ -86,7 +86,7 @@ def test_from_dropping_recordings_to_the_best_speed(opened, client: Client, tmp_
     expect(page.locator(".mark.busy")).to_be_visible()
     expect(page.get_by_role("img", name=re.compile("^Misfit over time: X"))).to_be_visible(timeout=60_000)
     expect(page.get_by_role("img", name=re.compile("^Measured points and model, X"))).to_be_visible(timeout=60_000)
-    expect(page.get_by_role("link", name="Change the tool")).to_be_visible(timeout=120_000)
+    expect(page.get_by_role("link", name="Change the tool")).to_be_visible(timeout=300_000)
     modes = page.locator("table", has=page.locator("caption", has_text="Modes in X")).locator("tbody tr")
     expect(modes.nth(2)).to_be_visible()
     assert all("±" in text for text in modes.all_inner_texts())
