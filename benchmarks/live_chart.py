@@ -48,11 +48,11 @@ def main(arguments: Sequence[str]) -> None:
     turning = turning_cut()
     duration = options.seconds + 25.0
     frames = np.concatenate([part for part, _ in turning.blocks(duration, ENTRY, 4096, WANDER, SAG)]).astype(np.float32)
-    with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as (port, _):
+    with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as (port, service):
         with Client(f"http://127.0.0.1:{port}") as client:
             machine = prepared(client)
         found: dict[str, Any] = {}
-        logger = threading.Thread(target=lambda: found.update(paced(port, machine, turning, frames)))
+        logger = threading.Thread(target=lambda: found.update(paced(port, service, machine, turning, frames)))
         logger.start()
         counted = watched(f"http://127.0.0.1:{port}", options.seconds, options.picture)
         logger.join()

@@ -38,13 +38,13 @@ def run(seconds: float = 60.0, beside: bool = True) -> list[dict[str, Any]]:
     turning = turning_cut()
     samples, true = (np.concatenate(parts) for parts in zip(*turning.blocks(seconds, ENTRY, 4096, WANDER, SAG), strict=True))
     frames = samples.astype(np.float32)
-    with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as (port, _):
+    with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as (port, service):
         url = f"http://127.0.0.1:{port}"
         with Client(url) as client:
             machine = prepared(client)
             jobs = begun(client, machine) if beside else []
             before = taken()
-            found = paced(port, machine, turning, frames)
+            found = paced(port, service, machine, turning, frames)
             found["taken"] = taken() - before
             states = [client.job(job).state for job in jobs]
             state = f"; identifications one after the other, now {', '.join(states)}" if jobs else ""
@@ -104,7 +104,7 @@ def hello(machine: str, rate: float, **further: Any) -> dict[str, Any]:
     } | further  # fmt: skip
 
 
-def paced(port: int, machine: str, turning: TurningCut, frames: np.ndarray) -> dict[str, Any]:
+def paced(port: int, service: int, machine: str, turning: TurningCut, frames: np.ndarray) -> dict[str, Any]:
     """Send each frame when its last sample would have been taken, and return forces, delays and counters."""
     sent, came = np.zeros(frames.shape[0]), np.zeros(frames.shape[0])
     force, statuses, end = np.full((frames.shape[0], 2), np.nan), list[dict[str, Any]](), dict[str, Any]()
@@ -126,7 +126,7 @@ def paced(port: int, machine: str, turning: TurningCut, frames: np.ndarray) -> d
 
         thread = threading.Thread(target=listen)
         thread.start()
-        before, begin = processes(), time.perf_counter()
+        before, begin = processes(service), time.perf_counter()
         for first in range(0, frames.shape[0], FRAME):
             part = frames[first : first + FRAME]
             due = begin + (first + part.shape[0]) / turning.rate
@@ -135,8 +135,8 @@ def paced(port: int, machine: str, turning: TurningCut, frames: np.ndarray) -> d
             sent[first : first + FRAME] = time.perf_counter()
         stream.end()
         thread.join()
-        wall, after = time.perf_counter() - begin, processes()
-    shares = {name: (after[name][0] - before[name][0]) / wall for name in after if name in before}
+        wall, after = time.perf_counter() - begin, processes(service)
+    shares = {name: (after[name].seconds - before[name].seconds) / wall for name in after if name in before}
     return {"force": force, "delay": came - sent, "caught_up": sent > ready[0] + 1.0, "end": end, "shares": shares, "statuses": statuses,
             "ready": ready[0] - begin}  # fmt: skip
 
@@ -197,10 +197,10 @@ def hour(seconds: float) -> None:
     lead, again = samples[: round(1.5 * turning.rate)], samples[round(1.5 * turning.rate) :]
     total, mark = round(seconds * turning.rate), 0.0
     answered, end = [0], dict[str, Any]()
-    with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as (port, _):
+    with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as (port, service):
         with Client(f"http://127.0.0.1:{port}") as client:
             machine = prepared(client)
-        print(f"before: {memory()}", flush=True)
+        print(f"before: {memory(service)}", flush=True)
         with ForceStream(f"ws://127.0.0.1:{port}", hello(machine, turning.rate)) as stream:
             moved = threading.Condition()
 
@@ -228,20 +228,20 @@ def hour(seconds: float) -> None:
                 with moved:
                     moved.wait_for(functools.partial(near, first), 120.0)
                 if first >= mark * turning.rate:
-                    print(f"{mark / 60.0:5.0f} min: {memory()}", flush=True)
+                    print(f"{mark / 60.0:5.0f} min: {memory(service)}", flush=True)
                     mark += 600.0
             stream.end()
             thread.join()
         wall = time.perf_counter() - begin
-        print(f"end: {memory()}")
+        print(f"end: {memory(service)}")
         print(
             f"{seconds:.0f} s of stream in {wall:.0f} s; samples {end['samples']} of {total}, lost {end['lost']}, dropped {end['dropped']}"
         )
 
 
-def memory() -> str:
+def memory(service: int) -> str:
     """Say how much memory the service takes."""
-    return ", ".join(f"{name} {size:.1f} MB" for name, (_, size) in sorted(processes().items()))
+    return ", ".join(f"{name} {spent.megabytes:.1f} MB" for name, spent in sorted(processes(service).items()))
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -40,15 +40,21 @@ def _compiled() -> bool:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what is slow by its fixtures; workers begin with files that have most of it, so that none of them is the tail."""
+    """Mark what is slow by its fixtures; workers begin with the files that take longest, so that none of them is the tail."""
     for item in items:
-        if _PROCESSES & set(getattr(item, "fixturenames", ())):
+        if _PROCESSES & set(getattr(item, "fixturenames", ())) and item.get_closest_marker("slow") is None:
             item.add_marker("slow")
     if hasattr(config, "workerinput"):
-        slow: dict[Path, int] = {}
+        seconds: dict[Path, float] = {}
         for item in items:
-            slow[item.path] = slow.get(item.path, 0) + (item.get_closest_marker("slow") is not None)
-        items.sort(key=lambda item: -slow[item.path])
+            seconds[item.path] = seconds.get(item.path, 0.0) + _seconds(item)
+        items.sort(key=lambda item: -seconds[item.path])
+
+
+def _seconds(item: pytest.Item) -> float:
+    """About what a test takes, as its marker says."""
+    slow = item.get_closest_marker("slow")
+    return 0.0 if slow is None else float(slow.args[0]) if slow.args else 2.0
 
 
 @pytest.hookimpl(wrapper=True)

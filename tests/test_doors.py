@@ -137,6 +137,7 @@ def test_advice_and_lobes_recommend_the_same_where_the_spindle_has_enough(comman
         assert point["axial_depth_mm"] == point["recommended_depth_mm"] < point["limit_depth_mm"]
 
 
+@pytest.mark.slow
 def test_console_and_report_show_these_numbers(folder, command, page):
     found = by_hand.identification()
     html = re.sub(r"\s+", " ", report_html(found, by_hand.campaign(folder), [], [page], {}, {}))

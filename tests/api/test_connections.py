@@ -88,6 +88,7 @@ def test_a_head_that_stops(port, head):
     assert time.monotonic() - start < 0.1 * PATIENCE
 
 
+@pytest.mark.slow
 def test_a_second_head_that_stops(port):
     answer = told(port, GET + b"\r\n" + GET)
     assert answer.count(b"HTTP/1.1 200") == 1
@@ -105,6 +106,7 @@ def test_requests_behind_each_other_are_all_answered(port):
     assert told(port, *parts).count(b"HTTP/1.1 200") == 61
 
 
+@pytest.mark.slow
 def test_an_answer_may_take_longer_than_a_head(store, tmp_path):
     async def slow(scope, receive, send):
         import asyncio
@@ -122,6 +124,7 @@ def test_an_answer_may_take_longer_than_a_head(store, tmp_path):
         assert told(port, GET + b"Connection: close\r\n\r\n").endswith(b"ok")
 
 
+@pytest.mark.slow
 def test_a_websocket_stays_open(store, tmp_path):
     from websockets.sync.client import connect
 

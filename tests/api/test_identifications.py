@@ -387,6 +387,7 @@ def test_counts_for_prometheus(client, store):
     assert 'rcsa_ident_job_seconds_sum{kind="lobes",state="done"} 4.0' in text
 
 
+@pytest.mark.slow
 def test_many_watch_at_the_cost_of_one(store):
     """A hundred streams of one job: the store is asked as often as for one."""
     machine = store.machines.add(Machine(new_id(), "local", "M", "", now())).id
@@ -437,6 +438,7 @@ def test_too_many_watchers_are_told_so(store):
         assert feeds.streams == 1
 
 
+@pytest.mark.slow
 def test_a_stream_ends_after_its_time_and_goes_on(store, tmp_path):
     machine = store.machines.add(Machine(new_id(), "local", "M", "", now())).id
     id = store.jobs.add(Job(new_id(), "local", "identification", machine, "c", "{}", "queued", now()), {}, 9).id

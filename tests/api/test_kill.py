@@ -25,14 +25,15 @@ from api.stores.sql import open_store
 from api.work.requests import LobeRequest, MachineText, ToolingSource
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.machining_setup import CutSpec
-from tests.api.identifying import uploaded
-from tests.api.in_process import POSTGRESQL, SQLITE, database
+from tests.api.identifying import carried, uploaded
+from tests.api.in_process import POSTGRESQL, SQLITE, database, embedded
+from tests.api.in_process import service as in_this_process
 from tests.fixtures import by_hand
 from tests.fixtures.service import command, example, serving
 from tests.fixtures.waiting import PATIENCE, until
 
 pytestmark = [
-    pytest.mark.slow,
+    pytest.mark.slow(20),
     pytest.mark.skipif(os.name != "posix" or not Path("/proc/self/stat").exists(), reason="processes are looked up in /proc"),
 ]
 
@@ -72,8 +73,8 @@ def after(client: Client, id: str, count: int) -> None:
 
 
 @contextmanager
-def started(folder: Path, url: str) -> Iterator[tuple[Client, subprocess.Popen]]:
-    settings = {"RCSA_IDENT_JOB_WORKERS": "1", "RCSA_IDENT_JOB_NICE": "0"} | (
+def started(folder: Path, url: str, count: int = 1) -> Iterator[tuple[Client, subprocess.Popen]]:
+    settings = {"RCSA_IDENT_JOB_WORKERS": str(count), "RCSA_IDENT_JOB_NICE": "0"} | (
         {} if url.startswith("sqlite") else {"RCSA_IDENT_DATABASE": url}
     )
     with serving(folder, **settings) as served, Client(served.url) as client:
@@ -81,19 +82,27 @@ def started(folder: Path, url: str) -> Iterator[tuple[Client, subprocess.Popen]]
         kill([*descendants(served.process.pid), served.process.pid])
 
 
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory) -> str:
+    """What an identification of the small campaign comes to in this process, where nothing disturbs it."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    store = embedded(folder)
+    with in_this_process(store, folder) as http:
+        client = Client(http=http)
+        job = client.identify_campaign(uploaded(client, client.make_machine("M").id), seed=7).id
+        carried(store, folder)
+        return client.result(job)
+
+
 @pytest.mark.parametrize("kind", [SQLITE, POSTGRESQL])
-def test_an_identification_survives_everything(request, tmp_path, kind):
+def test_an_identification_survives_everything(request, tmp_path, kind, expected):
     """One job meets the end of its worker, of the service, and of everything at once; each time at some moment of its search."""
     rng = random.Random(20261121)
     folder = tmp_path / "data"
     url = f"sqlite:///{folder / 'service.db'}" if kind == SQLITE else database(request, POSTGRESQL, tmp_path)
     with started(folder, url) as (client, service):
         machine = client.make_machine("M").id
-        campaign = uploaded(client, machine)
-        undisturbed = client.identify_campaign(campaign, seed=7)
-        assert client.wait(undisturbed.id, PATIENCE).state == "done"
-        expected = client.result(undisturbed.id)
-        job = client.identify_campaign(campaign, seed=7, apply=False).id
+        job = client.identify_campaign(uploaded(client, machine), seed=7).id
         store = open_store(url)
         after(client, job, rng.randrange(1, 12))
         (worker,) = workers(store)
@@ -104,7 +113,6 @@ def test_an_identification_survives_everything(request, tmp_path, kind):
         kill([service.pid])
     with started(folder, url) as (client, service):
         assert client.job(job).state == "running"
-        assert client.result(undisturbed.id) == expected
         after(client, job, rng.randrange(1, 4))
         kill([*workers(store), service.pid])
     with started(folder, url) as (client, _):
@@ -113,40 +121,42 @@ def test_an_identification_survives_everything(request, tmp_path, kind):
         assert client.result(job) == expected
         assert [kind for kind, _ in client.events(job)].count("end") == 1
         assert client.send("GET", f"/machines/{machine}/identification").text == expected
+    # what is done stays: everything was killed once more
+    assert store.jobs.text(job, "result") == expected
     store.close()
 
 
-@pytest.mark.parametrize(
-    "left",
-    [
-        # steps of another version, which have other names and come in another order
-        "UPDATE workflow_status SET application_version = '1' WHERE workflow_uuid = :job",
-        # the same steps, in words of another version
-        """UPDATE operation_outputs SET output = '"{\\"~table\\":[[\\"value\\",{\\"~Linearisation\\":{}}]]}"' WHERE workflow_uuid = :job""",
-    ],
-    ids=["other steps", "other texts"],
+#: What the version before may have left of a job that was running.
+LEFT = (
+    # its steps, which have other names and come in another order
+    "UPDATE workflow_status SET application_version = '1' WHERE workflow_uuid = :job",
+    # the same steps, in words of that version
+    """UPDATE operation_outputs SET output = '"{\\"~table\\":[[\\"value\\",{\\"~Linearisation\\":{}}]]}"' WHERE workflow_uuid = :job""",
 )
-def test_an_identification_survives_an_upgrade(tmp_path, left):
+
+
+def test_identifications_survive_an_upgrade(tmp_path, expected):
     """What the version before has left of a job that was running is of no use to this one: it starts over, and says so."""
     folder = tmp_path / "data"
     url = f"sqlite:///{folder / 'service.db'}"
-    with started(folder, url) as (client, service):
+    with started(folder, url, len(LEFT)) as (client, service):
         campaign = uploaded(client, client.make_machine("M").id)
-        job = client.identify_campaign(campaign, seed=7).id
         store = open_store(url)
-        until(lambda: (store.jobs.find(job).progress or "").startswith('{"stage": "search"'))
+        until(lambda: len(workers(store)) == len(LEFT))
+        ids = [client.identify_campaign(campaign, seed=7, apply=False).id for _ in LEFT]
+        until(lambda: all((store.jobs.find(id).progress or "").startswith('{"stage": "search"') for id in ids))
         kill([*workers(store), service.pid])
     tables = create_engine(f"sqlite:///{folder / 'jobs.db'}")
     with tables.begin() as connection:
-        assert connection.execute(text(left), {"job": job}).rowcount > 0
+        for id, left in zip(ids, LEFT, strict=True):
+            assert connection.execute(text(left), {"job": id}).rowcount > 0
     tables.dispose()
-    with started(folder, url) as (client, _):
-        found = client.wait(job, 120.0)
-        assert (found.state, found.problem) == ("done", None)
-        assert [data["text"] for kind, data in client.events(job) if kind == "note"] == [STARTS_OVER]
-        fresh = client.identify_campaign(campaign, seed=7, apply=False).id
-        assert client.wait(fresh, 120.0).state == "done"
-        assert client.result(job) == client.result(fresh)
+    with started(folder, url, len(LEFT)) as (client, _):
+        for id in ids:
+            found = client.wait(id, PATIENCE)
+            assert (found.state, found.problem) == ("done", None)
+            assert [data["text"] for kind, data in client.events(id) if kind == "note"] == [STARTS_OVER]
+            assert client.result(id) == expected
     store.close()
 
 
@@ -177,7 +187,7 @@ def test_several_workers_share_jobs_and_take_over(request, tmp_path, result):
     folder.mkdir()
     with working(folder, url, "first") as first, working(folder, url, "second"):
         until(lambda: len(workers(store)) == 2)
-        ids = [lobe_job(store, machine, result, 6, "multi-frequency") for _ in range(8)]
+        ids = [lobe_job(store, machine, result, 6, "multi-frequency") for _ in range(5)]
 
         def tokens(state):
             return {job.worker for job in map(store.jobs.find, ids) if job.state == state}

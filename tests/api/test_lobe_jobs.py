@@ -115,6 +115,7 @@ def test_the_client_waits_for_them(shop, store, tmp_path):
             thread.join()
 
 
+@pytest.mark.slow
 def test_cancelled_lobes_have_no_answer(shop, store):
     """The computation has no place to look up: its process ends, and nothing of it is kept."""
     client, id = shop

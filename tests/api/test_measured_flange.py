@@ -180,6 +180,7 @@ def recording(begin: float, end: float) -> bytes:
     return held.getvalue()
 
 
+@pytest.mark.slow
 def test_forces_with_the_sensors_of_the_query(client: Client, http, tmp_path):
     """The file holds the bare flange and the joint in front of it, behind which the sensor looks."""
     write_flange_machine(tmp_path / "FLANGE.csv", flange_machine())

@@ -146,7 +146,7 @@ def jobs(http, store, folder, machine, campaign, result) -> dict[str, dict[str, 
     return {"/v1/identifications": {"id": id, "campaign": campaign}, "/v1/lobes/": {"id": lobes}}
 
 
-@pytest.mark.slow
+@pytest.mark.slow(45)
 def test_the_api_keeps_to_its_description(tmp_path, result, fuzzing):
     """Whatever is sent: no 5xx, no undocumented status, type or body. With a fixed seed, and so many cases for each operation."""
     schemathesis, checks = fuzzing

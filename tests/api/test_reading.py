@@ -94,6 +94,7 @@ def ask(reader, call, *arguments):
     return asyncio.run(reader.run(call, *arguments))
 
 
+@pytest.mark.slow
 def test_answers_and_refusals_come_back(reader):
     assert ask(reader, os.getpid) != os.getpid()
     with pytest.raises(InputError) as refused:
@@ -129,6 +130,7 @@ def test_what_sleeps_is_ended_by_the_clock():
     found.stop()
 
 
+@pytest.mark.slow
 def test_what_is_allowed_is_counted_for_each_alone(reader):
     """Not together: the process lives on."""
     first = ask(reader, os.getpid)

@@ -19,7 +19,7 @@ from rcsa_ident.errors import InputError
 from tests.fixtures.postgres import postgres, postgres_server  # noqa: F401
 
 
-@pytest.fixture(params=["sqlite", "postgresql"])
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.slow)])
 def store(request, tmp_path):
     """Through the same statements."""
     url = f"sqlite:///{tmp_path / 'store.db'}" if request.param == "sqlite" else request.getfixturevalue("postgres")()

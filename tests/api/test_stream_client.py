@@ -13,7 +13,7 @@ from api.stream_client import Event, Forces, ForceStream, StreamRefused
 from tests.fixtures.force_stream import RATE, hello, result, signals, streamed, tooling
 from tests.fixtures.service import processes, serving
 from tests.fixtures.virtual_cut import relative_error
-from tests.fixtures.waiting import PATIENCE, until
+from tests.fixtures.waiting import PATIENCE, ended, until
 
 
 @pytest.fixture(scope="module")
@@ -78,12 +78,12 @@ def test_what_is_refused_is_told(served):
 @pytest.mark.slow
 def test_a_viewer_who_does_not_read_costs_no_memory(served):
     """More than the system holds for it: what it does not read makes way, and is counted; the logger notices nothing."""
-    _, port, id = served
+    process, port, id = served
     raw = np.tile(signals(2.0, 2.1), (10, 1))
     with ForceStream(f"ws://127.0.0.1:{port}", hello(id)) as stream:
         stream.send(raw)
         ready = next(m for m in stream.received() if isinstance(m, Event) and m.name == "ready").content
-        before, got = processes()["service"][1], 0
+        before, got = processes(process.pid)["service"].megabytes, 0
         with ForceStream(f"ws://127.0.0.1:{port}", {"watch": ready["session"], "format": "json"}) as viewer:
             assert next(iter(viewer.received())).name == "watching"
             for _ in range(23):
@@ -95,7 +95,7 @@ def test_a_viewer_who_does_not_read_costs_no_memory(served):
             stream.end()
             ends = [m.content for m in stream.received() if isinstance(m, Event) and m.name == "end"]
             # 4 MB of forces wait
-            assert processes()["service"][1] < before + 40.0
+            assert processes(process.pid)["service"].megabytes < before + 40.0
             seen = list(viewer.received())
     assert (ends[0]["samples"], ends[0]["unread"], ends[0]["dropped"]) == (24 * len(raw), 0, 0)
     end = next(m.content for m in seen if isinstance(m, Event) and m.name == "end")
@@ -109,6 +109,7 @@ def test_the_service_ends_with_its_streams(served):
     process, port, id = served
     with ForceStream(f"ws://127.0.0.1:{port}", hello(id)) as stream:
         assert next(iter(stream.received())).name == "opened"
+        streams = processes(process.pid)["streams"].pid
         start = time.monotonic()
         process.send_signal(signal.SIGTERM)
         with pytest.raises(StreamRefused) as caught:
@@ -116,4 +117,4 @@ def test_the_service_ends_with_its_streams(served):
         assert caught.value.code in (1001, 1012)
     assert process.wait(PATIENCE) is not None
     assert time.monotonic() - start < 60.0
-    until(lambda: "streams" not in processes())
+    until(lambda: ended(streams))

@@ -220,6 +220,7 @@ def test_a_viewer_sees_the_same_in_buckets(shop):
     assert http.get("/v1/forces/streams").json()["items"] == []
 
 
+@pytest.mark.slow
 def test_a_viewer_goes_and_the_stream_stays(shop):
     http, id = shop
     with http.websocket_connect(STREAM) as socket:
@@ -251,6 +252,7 @@ def test_only_so_many(tmp_path):
                 assert closed(more)[0] == 1013
 
 
+@pytest.mark.slow
 def test_who_sends_nothing_is_ended(tmp_path):
     with streaming(tmp_path, stream_idle_seconds=1.0) as (http, id), http.websocket_connect(STREAM) as socket:
         socket.send_json(hello(id))

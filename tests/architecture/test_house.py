@@ -91,7 +91,7 @@ def test_kernels_need_no_types():
     assert sorted(untyped) == [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in KERNELS]
 
 
-@pytest.mark.slow
+@pytest.mark.slow(15)
 def test_kernels_without_the_compiler():
     """The same tests, with the kernels as plain Python: no result rests on what the compiler lets pass."""
     tests = [str(file_of_tests(path)) for path in KERNELS]

@@ -95,6 +95,7 @@ def monitored(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_forces_with_the_sensors_of_a_campaign(monitored):
     """The file holds the bare flange and the joint in front of it, behind which the sensor looks."""
     files = (monitored / "FLANGE.csv", monitored / "T.toml", monitored / "cut.h5")

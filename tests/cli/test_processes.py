@@ -55,6 +55,7 @@ def test_results_come_in_the_order_of_the_tasks(two, count):
         assert list(alone.map(square, range(count))) == list(alone.map_many(square, range(count))) == wanted
 
 
+@pytest.mark.slow
 def test_the_main_process_works_too(two):
     assert os.getpid() in (found := set(two.map(own_process, range(40))))
     assert len(found) == 2
@@ -68,6 +69,7 @@ def test_an_error_comes_out_where_its_task_stands(two):
     assert list(two.map(square, [3])) == [9]
 
 
+@pytest.mark.slow
 def test_words_of_workers_and_of_this_process_arrive(two):
     heard = []
     with two.listening(lambda *word: heard.append((*word, threading.current_thread() is threading.main_thread()))) as progress:
@@ -223,6 +225,7 @@ def test_other_processes_of_a_script_are_left_alone():
         other.join()
 
 
+@pytest.mark.slow
 def test_helpers_compute_on_one_thread():
     before = dict(os.environ)
     with workers(2, early=()) as pool:

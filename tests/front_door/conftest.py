@@ -82,10 +82,13 @@ def triggered(tmp_path_factory) -> SimulatedCampaign:
     folder = tmp_path_factory.mktemp("shop")
     machine = read_machine(sample_data() / "hpm.toml")
     machine = replace(machine, sensors=replace(machine.sensors, trigger=True), truth_toolings=())
-    speeds = tuple(np.linspace(machine.plan.spindle_speeds[0], machine.plan.spindle_speeds[-1], 12).tolist())
-    made = simulate_campaign(replace(machine, plan=replace(machine.plan, spindle_speeds=speeds)), folder / "data" / "sample_runs")
+    speeds = tuple(np.linspace(machine.plan.spindle_speeds[0], machine.plan.spindle_speeds[-1], 8).tolist())
+    long = replace(machine, plan=replace(machine.plan, spindle_speeds=speeds[1:2]), toolings=(sample_toolings()["S3-PG25-long"],))
+    with pytest.MonkeyPatch.context() as patch:
+        # nobody looks at the true receptances
+        patch.setattr("rcsa_ident.workflows.simulate.TRUTH_FREQUENCIES", (100.0, 4500.0, 400.0))
+        made = simulate_campaign(replace(machine, plan=replace(machine.plan, spindle_speeds=speeds)), folder / "data" / "sample_runs")
+        alone = simulate_campaign(long, folder / "alone")
     (folder / "data" / "machines").symlink_to(sample_data(), target_is_directory=True)
-    long = replace(machine, plan=replace(machine.plan, spindle_speeds=speeds[5:6]), toolings=(sample_toolings()["S3-PG25-long"],))
-    alone = simulate_campaign(long, folder / "alone")
     next((alone.folder / "recordings").glob("*_cut.h5")).rename(folder / "cut.h5")
     return made

@@ -65,5 +65,6 @@ def test_asking_is_light():
     assert float(seconds) < 0.5
 
 
+@pytest.mark.slow
 def test_everything_at_once():
     assert run("from rcsa_ident import *; print(rpm(60.0) == 6.283185307179586, ZeroOrder().name)") == "True zero-order"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -37,9 +38,12 @@ def test_the_wheel_carries_what_a_checkout_has(tmp_path, monkeypatch):
         samples.sample_data()
 
 
+@pytest.mark.slow
 def test_a_campaign_on_the_spot(tmp_path, quick_truth):
-    folder = samples.make_sample_campaign(tmp_path / "new" / "runs", cuts=2)
-    campaign = ri.read_campaign(folder)
+    folder = tmp_path / "new" / "runs"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(samples, "make_sample_campaign", partial(samples.make_sample_campaign, cuts=2))
+        campaign = ri.sample_campaign(folder, processes=2)
     assert [cut.tooling for cut in campaign.cuts] == ["S1-ER32", "S2-PG25"]
     assert {path.name for path in folder.parent.iterdir()} == {"runs", "runs.truth"}
     assert {path.stem for path in (folder.parent / "runs.truth" / "tip").iterdir()} == set(samples.sample_toolings())

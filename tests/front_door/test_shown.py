@@ -69,6 +69,7 @@ def test_what_speaks_against_a_result_is_its_second_line(nouns):
     assert str(nouns.read).splitlines()[1] == nouns.read.reasons[0]
 
 
+@pytest.mark.slow
 def test_html_is_well_formed_and_has_no_script(nouns):
     for noun in every(nouns):
         page = noun._repr_html_()

@@ -156,6 +156,7 @@ def test_sample_toolings():
         ri.sample_tooling("S9")
 
 
+@pytest.mark.slow
 def test_a_sample_campaign_that_is_there_is_read(tmp_path):
     (tmp_path / "runs").symlink_to(SAMPLES, target_is_directory=True)
     assert len(ri.sample_campaign(tmp_path / "runs").cuts) == 80

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fixtures.paths import ROOT
+from tests.fixtures.campaign import part_of_the_sample_runs
+from tests.fixtures.paths import ROOT, SAMPLES
 
 EXAMPLES = ROOT / "docs" / "examples"
 
@@ -48,15 +49,18 @@ def test_lobes_from_modes():
     assert not lobes.warnings
 
 
-@pytest.mark.slow
+@pytest.mark.slow(15)
 def test_recordings_to_speed(tmp_path, monkeypatch, capsys):
     """A tool that never cut: the recommended cut is stable on the true machine, and not far from its limit."""
     monkeypatch.chdir(tmp_path)
+    # where recordings are, none are made: every third of the sample runs' cuts
+    (tmp_path / "sample_runs").mkdir()
+    part_of_the_sample_runs(tmp_path / "sample_runs", 3)
     ex = example("recordings_to_speed")
     assert ex.found.status == "converged"
     best = ex.advice.recommended[0]
     assert best.spindle_speed == pytest.approx(ex.ri.rpm(14_550), rel=0.01)
-    tip = ex.ri.read_tip(tmp_path / "sample_runs.truth" / "tip" / f"{ex.tool.name}.csv")
+    tip = ex.ri.read_tip(SAMPLES.with_suffix(".truth") / "tip" / f"{ex.tool.name}.csv")
     process = ex.ri.CutSpec().process(ex.tool.cutter, ex.campaign.workpiece)
     true = ex.ri.stability_lobes(tip, process, best.spindle_speed, max_depth=10e-3).limit_depth[0]
     assert 0.7 * true < best.depth < true

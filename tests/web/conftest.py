@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request, Response, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request, Response, expect, sync_playwright
 
 from api.client import Client
 from tests.fixtures import by_hand
@@ -35,7 +35,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     """One service for all; each test makes what it needs under names of its own."""
-    with serving(tmp_path_factory.mktemp("served"), RCSA_IDENT_JOB_WORKERS="1") as found:
+    with serving(tmp_path_factory.mktemp("served"), RCSA_IDENT_JOB_WORKERS="1", RCSA_IDENT_JOB_NICE="0") as found:
         yield found
 
 
@@ -48,6 +48,8 @@ def client(served: Served) -> Iterator[Client]:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """One for each file and no longer: its event loop runs in this thread, where other rooms' tests run loops of their own."""
+    # reached only where something is wrong, and long enough for a machine under load
+    expect.set_options(timeout=30_000)
     with sync_playwright() as playwright:
         found = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=list(_QUIET))
         yield found

@@ -21,6 +21,7 @@ from tests.workflows.in_process import BAND, MACHINES, RPM, modal_machine, softe
 OMEGA = 2.0 * np.pi * np.arange(300.0, 3800.0, 4.0)
 SPEED = 15000.0 * RPM
 PORTS = {Place.TIP: ("tip", "tip"), Place.CROSS: ("flange", "tip"), Place.SPINDLE: ("flange", "flange"), Place.FLANGE: ("flange", "flange")}
+ENDS = ("flange.x", "flange.y", "tip.x", "tip.y")
 
 
 @cache
@@ -29,11 +30,16 @@ def assembly():
 
 
 @cache
+def responses(bare, speed):
+    """Of the whole virtual machine at a speed, by its full equations: from all ends to all ends."""
+    ends = ENDS[:2] if bare else ENDS
+    return frequency_response(rotor(softening_spindle(), None if bare else assembly()), OMEGA, speed, inputs=ends, outputs=ends)
+
+
 def measured(place, axis, speed):
-    """Receptance of the whole virtual machine at a speed, by its full equations."""
-    model = rotor(softening_spindle(), None if place is Place.FLANGE else assembly())
-    row, col = PORTS[place]
-    return frequency_response(model, OMEGA, speed, inputs=(f"{col}.{axis}",), outputs=(f"{row}.{axis}",))[:, 0, 0]
+    """One receptance of them."""
+    row, col = (ENDS.index(f"{end}.{axis}") for end in PORTS[place])
+    return responses(place is Place.FLANGE, speed)[:, row, col]
 
 
 @pytest.mark.slow

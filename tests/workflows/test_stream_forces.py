@@ -96,6 +96,7 @@ def test_the_speed_is_told():
     assert without.drift(state) == pytest.approx(-1e-3, rel=0.01)
 
 
+@pytest.mark.slow
 def test_an_angle_that_is_not_told_is_said_and_left_alone():
     samples = streamed()[0]
     state = run(observer(), samples[:SECOND])[0]
