@@ -210,12 +210,12 @@ def show_comparison(answers: Sequence[Advice]) -> None:
     console().print(table)
 
 
-def show_peaks(rows: Mapping[Dof, tuple[float, float, float, float]]) -> None:
-    """Print the tip's most compliant frequency per axis: frequency [Hz], magnitude, lowest real part, 2 sigma at the peak [m/N]."""
+def show_peaks(rows: Mapping[str, tuple[float, float, float, float]]) -> None:
+    """Print the tip's most compliant frequency of each entry: frequency [Hz], magnitude, lowest real part, 2 sigma at the peak [m/N]."""
     table = Table("axis", "peak at Hz", "|C11| µm/N", "± 2 sigma", "lowest real part µm/N", title="tooltip", title_justify="left")
     for column in table.columns[1:]:
         column.justify = "right"
     for axis, (frequency, magnitude, lowest, band) in rows.items():
         width = f"{1e6 * band:.4f}" if band == band else ""
-        table.add_row(axis.upper(), f"{frequency:.0f}", f"{1e6 * magnitude:.4f}", width, f"{1e6 * lowest:.4f}")
+        table.add_row(axis, f"{frequency:.0f}", f"{1e6 * magnitude:.4f}", width, f"{1e6 * lowest:.4f}")
     console().print(table)

@@ -7,32 +7,45 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.dynamics.modal import directions
 from rcsa_ident.identification.coupled.parameters import CoupledLayout, parameter_names, unpack
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior, CoupledUnknowns
+from rcsa_ident.io.results import check_covariance, matrix_of
 from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.units import from_rpm, to_hz, to_rpm
 
 _MOST_MODES, _MOST_DISCS = 200, 10
 
 
-def both_planes_to_json(posterior: CoupledPosterior) -> dict[str, Any]:
-    """Return both planes as they stand in the file: modes with their directions to be read, unknowns and covariance to go on from."""
+def both_planes_to_json(posterior: CoupledPosterior, deviation: tuple[FloatArray, FloatArray] | None = None) -> dict[str, Any]:
+    """Return both planes as they stand in the file: modes with their directions to be read, unknowns and covariance to go on from.
+
+    Parameters
+    ----------
+    posterior : CoupledPosterior
+    deviation : (array, array), optional
+        Standard deviations of the natural frequencies [rad/s] and damping ratios of the machine that does not turn.
+    """
     best = posterior.best
     standing, machine = best.standing(), unpack(best.theta, best.layout)
     middle, half = posterior.speed_range
     residual = best.modes(middle).residual
+    modes: list[dict[str, Any]] = [
+        {
+            "natural_frequency_hz": float(to_hz(omega)),
+            "damping_ratio": float(zeta),
+            "direction_deg": float(np.degrees(direction)),
+            "phi": [[float(part.real), float(part.imag)] for part in phi],
+        }
+        for omega, zeta, direction, phi in zip(standing.omega_n, standing.zeta, directions(standing), standing.phi, strict=True)
+    ]
+    if deviation is not None:
+        for mode, omega_n, zeta in zip(modes, *(d.tolist() for d in deviation), strict=True):
+            mode |= {"natural_frequency_std_hz": to_hz(omega_n), "damping_ratio_std": zeta}
     return {
         "layout": _layout_to_json(best.layout),
         "speed_range_rpm": [to_rpm(middle - half), to_rpm(middle + half)],
-        "modes": [
-            {
-                "natural_frequency_hz": float(to_hz(omega)),
-                "damping_ratio": float(zeta),
-                "direction_deg": float(np.degrees(_direction(phi[[0, 2]]))),
-                "phi": [[float(part.real), float(part.imag)] for part in phi],
-            }
-            for omega, zeta, phi in zip(standing.omega_n, standing.zeta, standing.phi, strict=True)
-        ],
+        "modes": modes,
         "gyroscopic": machine.skew.tolist(),
         "residual_compliance": residual.tolist(),
         "unknowns": best.theta.tolist(),
@@ -50,22 +63,14 @@ def both_planes_from_json(table: Table) -> CoupledPosterior:
         If unknowns, layout and covariance do not belong together.
     """
     best = _unknowns(table)
-    matrix = np.array(table.table("covariance").data["matrix"], dtype=float)
-    if matrix.shape != (best.theta.size,) * 2:
-        table.refuse("covariance.matrix", f"{len(matrix)} rows", f"a row for each of the {best.theta.size} unknowns")
+    covariance = table.table("covariance")
+    matrix = matrix_of(covariance, "matrix", best.theta.size)
+    check_covariance(covariance, matrix)
     low, high = table.numbers("speed_range_rpm", 2, "rev/min")
     if not 0.0 <= low <= high:
         table.refuse("speed_range_rpm", f"{[low, high]}", "lowest and highest speed, 0 <= lowest <= highest [rev/min]")
     speed_range = float(from_rpm(0.5 * (low + high))), float(from_rpm(0.5 * (high - low)))
     return CoupledPosterior(best, matrix, speed_range, tuple(_unknowns(rival) for rival in table.tables("rivals")))
-
-
-def _direction(shape: np.ndarray) -> float:
-    """Angle from +X of the line along which a mode moves the flange, above -90 and up to 90 degrees [rad]."""
-    # the phase that makes the shape as real as it can be
-    turned: FloatArray = (shape * np.exp(-0.5j * np.angle(np.sum(shape**2)))).real
-    angle = float(np.arctan2(turned[1], turned[0]))
-    return angle - np.pi * np.ceil(angle / np.pi - 0.5)
 
 
 def _layout_to_json(layout: CoupledLayout) -> dict[str, Any]:
@@ -86,4 +91,6 @@ def _unknowns(table: Table) -> CoupledUnknowns:
     unknowns = np.array(table.numbers("unknowns", None))
     if unknowns.size != layout.size:
         table.refuse("unknowns", f"{unknowns.size} numbers", f"{layout.size}, as {layout.modes} modes and the joint have")
+    if layout.skew and not layout.turning:
+        own.refuse("turning", "0 with discs", "1 or -1: gyroscopic moments have a sense")
     return CoupledUnknowns(unknowns, layout)

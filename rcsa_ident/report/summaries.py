@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.force import REFERENCE_RUNOUT, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.measurement import Reading
@@ -253,8 +255,23 @@ def _planned(cut: PlannedCut) -> dict[str, Any]:
     }
 
 
+def entries_of(receptance: Receptance, coordinates: Sequence[Coordinate] | None = None) -> dict[str, tuple[Coordinate, Coordinate]]:
+    """Return motion and force of each direct receptance under its axis' name, then of each cross term that is not zero: XY is X by Y.
+
+    Parameters
+    ----------
+    receptance : Receptance
+    coordinates : sequence of Coordinate, optional
+        Translations, one for each axis; by default all rows.
+    """
+    known = receptance.rows if coordinates is None else tuple(coordinates)
+    found = {c.dof.upper(): (c, c) for c in known}
+    crossed = ((row, col) for row, col in permutations(known, 2) if np.any(receptance.between(str(row), str(col))))
+    return found | {f"{row.dof}{col.dof}".upper(): (row, col) for row, col in crossed}
+
+
 def frf_summary(receptance: UncertainReceptance, coordinates: Sequence[Coordinate]) -> dict[str, Any]:
-    """Return direct receptances over frequency, axis by axis, with standard deviations where there are some [m/N].
+    """Return receptances over frequency with standard deviations where there are some [m/N]: of each axis, and across where planes couple.
 
     Parameters
     ----------
@@ -268,15 +285,16 @@ def frf_summary(receptance: UncertainReceptance, coordinates: Sequence[Coordinat
         If a receptance is not finite.
     """
     deviation = receptance.deviation()
-    axes = {}
-    for coordinate in coordinates:
-        real, imaginary = deviation.get((coordinate, coordinate), (None, None))
-        values = receptance.between(str(coordinate), str(coordinate))
+    axes: dict[str, Any] = {}
+    cross: dict[str, Any] = {}
+    for name, (row, col) in entries_of(receptance, coordinates).items():
+        real, imaginary = deviation.get((row, col), (None, None))
+        values = receptance.between(str(row), str(col))
         parts = {"re": values.real, "im": values.imag, "re_std": real, "im_std": imaginary}
         if not all(part is None or np.all(np.isfinite(part)) for part in parts.values()):
             raise InputError("tooling", "a receptance that is not finite", "a tooling whose receptance is finite at every frequency")
-        axes[coordinate.dof.upper()] = {key: None if part is None else part.tolist() for key, part in parts.items()}
-    return {"frequency_hz": np.round(to_hz(receptance.omega), 9).tolist(), "axes": axes}
+        (axes if row == col else cross)[name] = {key: None if part is None else part.tolist() for key, part in parts.items()}
+    return {"frequency_hz": np.round(to_hz(receptance.omega), 9).tolist(), "axes": axes, "cross": cross}
 
 
 def finite(value: float | None, unit: float = 1.0) -> float | None:
