@@ -75,6 +75,7 @@ class WholeMode(Answer):
 class BothPlanesModes(Answer):
     """Modes of a machine whose X and Y feel each other."""
 
+    in_words: str = Field("", description="How strong, where, and of which kind.")
     modes: list[WholeMode]
     gyroscopic: bool = Field(description="Whether gyroscopic moments couple them: receptances then depend on the spindle speed.")
 
@@ -84,6 +85,7 @@ class BothPlanes(Answer):
 
     model_config = ConfigDict(extra="allow")
 
+    in_words: str = Field("", description="How strong the coupling is, where, and of which kind.")
     layout: dict[str, Any] = Field(description="Modes, softening, discs of gyroscopic moments, and the sense of rotation: 1, -1 or 0.")
     speed_range_rpm: list[float]
     modes: list[WholeMode]

@@ -81,7 +81,7 @@ def modes(text: str) -> dict[str, Any]:
     both = None
     if whole is not None:
         rows = [{key: mode.get(key) for key in _WHOLE_MODE} for mode in whole["modes"]]
-        both = {"modes": rows, "gyroscopic": whole["layout"]["turning"] != 0}
+        both = {"in_words": whole.get("in_words", ""), "modes": rows, "gyroscopic": whole["layout"]["turning"] != 0}
     return {key: data.get(key, []) for key in ("status", "reasons", "notes", "band_hz")} | {"axes": axes, "both_planes": both}
 
 

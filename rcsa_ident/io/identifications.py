@@ -108,7 +108,8 @@ def _both_planes(identification: Identification, deviations: ModeDeviations) -> 
     if identification.whole is None:
         return {}
     # both axes have the modes of the whole machine
-    return {"both_planes": both_planes_to_json(identification.whole, next(iter(deviations.values()), None))}
+    content = both_planes_to_json(identification.whole, next(iter(deviations.values()), None))
+    return {"both_planes": {"in_words": identification.coupling, **content}}
 
 
 def _axes_to_json(identification: Identification, deviations: ModeDeviations) -> dict[str, Any]:

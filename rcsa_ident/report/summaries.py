@@ -12,7 +12,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.force import REFERENCE_RUNOUT, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Coordinate
-from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.modal import ModalModel, directions
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
@@ -102,6 +102,55 @@ def mode_rows(modes: ModalModel, deviation: tuple[FloatArray, FloatArray] | None
             float(100.0 * modes.zeta[n]),
             complex(modes.phi[n, 0]),
             complex(modes.phi[n, 1]),
+            *deviations[n],
+        )
+        for n in order
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class WholeModeRow:
+    """One mode of a machine whose planes feel each other, its spindle at standstill.
+
+    Parameters
+    ----------
+    frequency_hz, damping_percent : float
+    direction_deg : float
+        Of the line along which it moves the flange, from +X towards +Y.
+    phi_t, phi_r : float [sqrt(s/kg)], [sqrt(s/(kg m^2))]
+        Size of its translation and of its slope, whatever their direction.
+    frequency_std_hz, damping_std_percent : float or None
+    """
+
+    frequency_hz: float
+    damping_percent: float
+    direction_deg: float
+    phi_t: float
+    phi_r: float
+    frequency_std_hz: float | None = None
+    damping_std_percent: float | None = None
+
+
+def whole_mode_rows(modes: ModalModel, deviation: tuple[FloatArray, FloatArray] | None = None) -> list[WholeModeRow]:
+    """Return a row for each mode of both planes, by frequency.
+
+    Parameters
+    ----------
+    modes : ModalModel
+        Translation and slope in X, then in Y.
+    deviation : (array, array), optional
+        As in `mode_rows`.
+    """
+    angles = np.degrees(directions(modes))
+    order = np.argsort(modes.omega_n)
+    deviations = [(None, None)] * order.size if deviation is None else [(to_hz(d), 100.0 * z) for d, z in zip(*deviation, strict=True)]
+    return [
+        WholeModeRow(
+            float(to_hz(modes.omega_n[n])),
+            float(100.0 * modes.zeta[n]),
+            float(angles[n]),
+            float(np.linalg.norm(modes.phi[n, [0, 2]])),
+            float(np.linalg.norm(modes.phi[n, [1, 3]])),
             *deviations[n],
         )
         for n in order
