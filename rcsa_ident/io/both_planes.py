@@ -8,13 +8,14 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.modal import directions
-from rcsa_ident.identification.coupled.parameters import CoupledLayout, parameter_names, unpack
+from rcsa_ident.identification.coupled.parameters import DIRECTIONS, CoupledLayout, parameter_names, unpack
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior, CoupledUnknowns
 from rcsa_ident.io.results import check_covariance, matrix_of
-from rcsa_ident.io.validated_table import Table, describe
+from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.units import from_rpm, to_hz, to_rpm
 
 _MOST_MODES, _MOST_DISCS = 200, 10
+_SHAPE = "four pairs of finite numbers: translation and slope in X, then in Y"
 
 
 def both_planes_to_json(posterior: CoupledPosterior, deviation: tuple[FloatArray, FloatArray] | None = None) -> dict[str, Any]:
@@ -63,6 +64,15 @@ def both_planes_from_json(table: Table) -> CoupledPosterior:
         If unknowns, layout and covariance do not belong together.
     """
     best = _unknowns(table)
+    for mode in table.tables("modes"):
+        mode.number("natural_frequency_hz", "Hz", above=0.0)
+        mode.number("damping_ratio", above=0.0, most=1.0)
+        mode.number("direction_deg", "deg")
+        phi = mode.value("phi", _SHAPE)
+        if not isinstance(phi, list) or len(phi) != DIRECTIONS or not all(_complex(part) for part in phi):
+            mode.refuse("phi", describe(phi), _SHAPE)
+    if "in_words" in table:
+        table.text("in_words")
     covariance = table.table("covariance")
     matrix = matrix_of(covariance, "matrix", best.theta.size)
     check_covariance(covariance, matrix)
@@ -71,6 +81,10 @@ def both_planes_from_json(table: Table) -> CoupledPosterior:
         table.refuse("speed_range_rpm", f"{[low, high]}", "lowest and highest speed, 0 <= lowest <= highest [rev/min]")
     speed_range = float(from_rpm(0.5 * (low + high))), float(from_rpm(0.5 * (high - low)))
     return CoupledPosterior(best, matrix, speed_range, tuple(_unknowns(rival) for rival in table.tables("rivals")))
+
+
+def _complex(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(as_number(part) is not None for part in value)
 
 
 def _layout_to_json(layout: CoupledLayout) -> dict[str, Any]:

@@ -76,6 +76,11 @@ def test_a_speed_band_has_its_own(tmp_path, path, turning):
         (("layout", "softening"), 1, "both_planes.layout.softening"),
         (("speed_range_rpm",), [3.0, 2.0], "both_planes.speed_range_rpm"),
         (("rivals",), [{"unknowns": [1.0]}], "both_planes.rivals[0].layout"),
+        (("modes",), [{}], "both_planes.modes[0].natural_frequency_hz"),
+        (("modes", 1, "direction_deg"), None, "both_planes.modes[1].direction_deg"),
+        (("modes", 1, "phi"), [[1.0, 2.0]], "both_planes.modes[1].phi"),
+        (("modes", 1, "phi"), [[1.0, 2.0]] * 3 + [[1.0, None]], "both_planes.modes[1].phi"),
+        (("in_words",), 3, "both_planes.in_words"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_named(path, where, value, words):
