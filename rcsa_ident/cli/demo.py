@@ -144,7 +144,8 @@ def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out
     from rcsa_ident.workflows.tool_change import ToolChange, advise, tooltip
 
     name, tooling = named
-    response = tooltip(machine, tooling).tip
+    asked = tooltip(machine, tooling)
+    response = asked.tip
     frequency = to_hz(response.omega)
     speeds = from_rpm(np.arange(SPEEDS[0], SPEEDS[1] + 0.5 * SPEEDS[2], SPEEDS[2]))
     change = ToolChange(machine, tooling, CutSpec(), speeds, MAX_DEPTH)
@@ -179,6 +180,7 @@ def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out
         None if machine.band is None else (to_hz(machine.band[0]), to_hz(machine.band[1])),
         f"half-immersion down-milling, feed +X, {tooling.cutter.teeth} teeth, {workpiece}{advice.lobes.method} method",
         advice.remarks,
+        None if asked.speed is None else to_rpm(asked.speed),
     )
 
 

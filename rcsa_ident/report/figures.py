@@ -226,19 +226,22 @@ def tooltip_frf(
                 unit = value / np.abs(value)
                 std_size = np.hypot(std_real * unit.real, std_imaginary * unit.imag)
                 low = np.maximum(size - 2.0 * std_size, 1e-3 * size)
-                top.fill_between(frequency, low, size + 2.0 * std_size, color=COLOURS[axis], alpha=0.3, lw=0, label="± 2 σ")
+                top.fill_between(
+                    frequency, low, size + 2.0 * std_size, color=COLOURS[axis], alpha=0.3, lw=0, label="± 2 σ" if len(axis) == 1 else None
+                )
                 bottom.fill_between(frequency, real - 2.0 * std_real, real + 2.0 * std_real, color=COLOURS[axis], alpha=0.3, lw=0)
-            top.plot(frequency, size, color=COLOURS[axis], label=f"{name} predicted" if len(axis) > 1 else "predicted")
+            top.plot(frequency, size, color=COLOURS[axis], label=name if len(axis) > 1 else "predicted")
             bottom.plot(frequency, real, color=COLOURS[axis])
             if truth is not None and axis in truth:
-                top.plot(frequency, 1e6 * np.abs(truth[axis]), "--", color=_TRUTH, lw=1.1, label="true")
+                top.plot(frequency, 1e6 * np.abs(truth[axis]), "--", color=_TRUTH, lw=1.1, label="true" if len(axis) == 1 else None)
                 bottom.plot(frequency, 1e6 * truth[axis].real, "--", color=_TRUTH, lw=1.1)
             top.set_yscale("log")
         for (top, bottom), name in zip(grid.T, columns, strict=True):
             for ax in (top, bottom):
-                _shade_outside(ax, frequency, band_hz)
+                _shade_outside(ax, frequency, band_hz, name != "across")
             top.set_title("motion across the force: tooltip" if name == "across" else f"{name}: tooltip")
-            top.legend(loc="lower left")  # receptances fall with frequency: that corner is free
+            # receptances fall with frequency: that corner is free, and what is across is smaller everywhere
+            top.legend(loc="upper right" if name == "across" else "lower left")
             bottom.set_xlabel("frequency [Hz]")
             bottom.set_xlim(frequency[0], frequency[-1])
         # the curves set the scale, not what is unknown outside the band
@@ -253,7 +256,7 @@ def tooltip_frf(
     return figure
 
 
-def _shade_outside(ax: Axes, frequency: FloatArray, band_hz: tuple[float, float] | None) -> None:
+def _shade_outside(ax: Axes, frequency: FloatArray, band_hz: tuple[float, float] | None, named: bool = True) -> None:
     for start, end in () if band_hz is None else ((frequency[0], band_hz[0]), (band_hz[1], frequency[-1])):
         if start < end:
-            ax.axvspan(start, end, color="#52606d", alpha=0.10, lw=0, label="outside the identified band")
+            ax.axvspan(start, end, color="#52606d", alpha=0.10, lw=0, label="outside the identified band" if named else None)

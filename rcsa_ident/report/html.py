@@ -52,6 +52,8 @@ class ToolingPage:
     conditions : str
         What the lobes hold for, in words.
     warnings : sequence of str
+    speed_rpm : float or None [rev/min]
+        Spindle speed that the tooltip FRF holds at; None where it does not change.
     """
 
     name: str
@@ -67,6 +69,7 @@ class ToolingPage:
     band_hz: tuple[float, float] | None = None
     conditions: str = ""
     warnings: Sequence[str] = ()
+    speed_rpm: float | None = None
 
 
 def report_html(
