@@ -119,7 +119,7 @@ def _method(method: Method | str, start: Result | IdentifiedMachine | None) -> M
     if start is not None:
         if method != "default":
             raise InputError("start", str(start), "the default method, which has a posterior")
-        return EvidenceSelection(start=(start if isinstance(start, IdentifiedMachine) else start.machine).posteriors())
+        return EvidenceSelection(start=(start if isinstance(start, IdentifiedMachine) else start.machine).starts())
     if isinstance(method, str):
         return PaperGeneticAlgorithm() if method == "paper" else EvidenceSelection()
     return method

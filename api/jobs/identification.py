@@ -17,7 +17,7 @@ from api.jobs.job_context import JobContext
 from api.stores.entities import digest_of
 from api.stores.jobs import Applied, Job, Outcome
 from api.work import tasks
-from api.work.machine_cache import posteriors
+from api.work.machine_cache import starts
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.evidence import EvidenceSelection
@@ -126,7 +126,7 @@ def _all(reading: Callable[[Cut], Reading], cuts: Iterable[Cut]) -> list[Reading
 def _method(name: str, start: str | None) -> Method:
     if name == "paper":
         return PaperGeneticAlgorithm()
-    return EvidenceSelection(start=None if start is None else posteriors(start))
+    return EvidenceSelection(start=None if start is None else starts(start))
 
 
 class _Remembering:

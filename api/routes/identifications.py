@@ -19,7 +19,7 @@ from api.schemas.machines import Identification, Modes
 from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.jobs import Job
 from api.work import tasks
-from api.work.machine_cache import posteriors
+from api.work.machine_cache import starts
 from rcsa_ident.errors import InputError
 
 router = APIRouter(prefix="/identifications", tags=["identifications"], route_class=Guarded)
@@ -50,7 +50,7 @@ def identify(body: NewIdentification, components: ThisService, caller: WhoAsks, 
         known = components.store.identifications.get(caller.group, campaign.machine)
         if known is None:
             raise InputError("start", "true for a machine without an identification", "a machine that has one")
-        posteriors(known.text)
+        starts(known.text)
         texts["start"] = known.text
     request = body.model_dump_json()
     job = Job(new_id(), caller.group, KIND, campaign.machine, campaign.id, request, "queued", now())

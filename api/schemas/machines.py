@@ -56,6 +56,44 @@ class Identification(Answer):
     workpiece: dict[str, Any]
     band_hz: list[float]
     axes: dict[str, Any]
+    both_planes: BothPlanes | None = Field(
+        None, description="Where X and Y feel each other: the machine; `axes` then hold each plane at standstill, without the other."
+    )
+
+
+class WholeMode(Answer):
+    """A mode of a machine whose X and Y feel each other, its spindle at standstill."""
+
+    natural_frequency_hz: float
+    natural_frequency_std_hz: float | None = None
+    damping_ratio: float
+    damping_ratio_std: float | None = None
+    direction_deg: float = Field(description="Of the line along which it moves the flange, from +X towards +Y, above -90 to 90.")
+    phi: list[list[float]] = Field(description="Real and imaginary part of translation and slope in X, then in Y.")
+
+
+class BothPlanesModes(Answer):
+    """Modes of a machine whose X and Y feel each other."""
+
+    in_words: str = Field("", description="How strong, where, and of which kind.")
+    modes: list[WholeMode]
+    gyroscopic: bool = Field(description="Whether gyroscopic moments couple them: receptances then depend on the spindle speed.")
+
+
+class BothPlanes(Answer):
+    """`both_planes` of RESULT.json; further keys are kept."""
+
+    model_config = ConfigDict(extra="allow")
+
+    in_words: str = Field("", description="How strong the coupling is, where, and of which kind.")
+    layout: dict[str, Any] = Field(description="Modes, softening, discs of gyroscopic moments, and the sense of rotation: 1, -1 or 0.")
+    speed_range_rpm: list[float]
+    modes: list[WholeMode]
+    gyroscopic: list[list[float]] = Field(description="G between the modes; empty where there is none.")
+    residual_compliance: list[list[float]]
+    unknowns: list[float]
+    rivals: list[dict[str, Any]]
+    covariance: dict[str, Any]
 
 
 class Mode(Answer):
@@ -85,6 +123,7 @@ class Modes(Answer):
     notes: list[str] = Field(description="What the data could not determine.")
     band_hz: list[float]
     axes: dict[str, AxisModes]
+    both_planes: BothPlanesModes | None = Field(None, description="Where X and Y feel each other: the modes of both together.")
 
 
 class Frf(Answer):
@@ -92,6 +131,8 @@ class Frf(Answer):
 
     frequency_hz: list[float]
     axes: dict[str, Curve]
+    cross: dict[str, Curve] = Field(default={}, description="Where planes feel each other: XY is the motion in X under a force in Y.")
+    spindle_speed_rpm: float | None = Field(None, description="At which they hold; null where they do not change with it.")
 
 
 class Curve(Answer):
@@ -104,4 +145,5 @@ class Curve(Answer):
 
 
 MachineAnswer.model_rebuild()
+Identification.model_rebuild()
 Frf.model_rebuild()

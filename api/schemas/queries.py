@@ -62,6 +62,8 @@ class TipAnswer(Answer):
     warnings: list[str]
     frequency_hz: list[float]
     axes: dict[str, Curve]
+    cross: dict[str, Curve] = Field(default={}, description="Where planes feel each other: XY is the motion in X under a force in Y.")
+    spindle_speed_rpm: float | None = Field(None, description="At which they hold; null where they do not change with it.")
 
 
 class Cut(Body):

@@ -12,7 +12,7 @@ from api.work.requests import MachineText
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.machine import IdentifiedMachine
-from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.identification.posterior import PlaneUnknowns, Posterior
 from rcsa_ident.io.flanges import flange_machine_of
 from rcsa_ident.io.identifications import machine_from_json
 from rcsa_ident.io.results import check_result
@@ -96,13 +96,13 @@ def read(text: str) -> Machine:
         return machine
     identified = machine_from_json(parsed(text), "")
     ends = np.array([from_hz(LOWEST), 0.5 * identified.band[1] + 1.0, identified.band[1]])
-    speeds = [None, *(0.5 * (low + high) for (low, high), _ in identified.speed_models)]
+    speeds = [None, *(0.5 * sum(model.speeds) for model in identified.speed_models)]
     if not all(_finite(identified.at(speed), ends) for speed in speeds):
         raise InputError("axes", "unknowns or modes without a finite receptance", "a machine that the reader of results can compute")
     return identified
 
 
-def posteriors(text: str) -> dict[Dof, Posterior]:
+def starts(text: str) -> dict[Dof, Posterior | PlaneUnknowns]:
     """Return what an identification may go on from, axis by axis.
 
     Raises
@@ -113,7 +113,7 @@ def posteriors(text: str) -> dict[Dof, Posterior]:
     if not is_result(text):
         raise InputError("start", "a measured flange", "a machine with an identification by the default method")
     try:
-        return machine_from_json(json.loads(text), "").posteriors()
+        return machine_from_json(json.loads(text), "").starts()
     except InputError as error:
         raise InputError("start", f"{error.field}: {error.found}", error.allowed) from None
 
@@ -135,11 +135,13 @@ def _limits(data: dict[str, Any]) -> None:
     bands = data.get("speed_bands") or []
     _at_most("speed_bands", bands, MOST_BANDS)
     for table in (data, *bands):
-        for name, axis in table["axes"].items():
+        named = {f"axes.{name}": axis for name, axis in table["axes"].items()}
+        named |= {"both_planes": table["both_planes"]} if isinstance(table.get("both_planes"), dict) else {}
+        for name, axis in named.items():
             for key, most in (("modes", MOST_MODES), ("unknowns", MOST_UNKNOWNS), ("rivals", MOST_RIVALS)):
                 value = axis.get(key) or []
                 if isinstance(value, list):
-                    _at_most(f"axes.{name}.{key}", value, most)
+                    _at_most(f"{name}.{key}", value, most)
 
 
 def _at_most(name: str, value: list[Any], most: int) -> None:

@@ -19,13 +19,14 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import write_tip_csv
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.report.summaries import advice_summary, frf_summary, lobes_curves, lobes_summary
-from rcsa_ident.units import from_hz, to_hz
+from rcsa_ident.units import from_hz, to_hz, to_rpm
 from rcsa_ident.workflows.tool_change import ToolChange, advise, spread_seconds
 from rcsa_ident.workflows.tool_change import tooltip as ask_tip
 
 MOST_LINES = 20_000
 
 _MODE = ("natural_frequency_hz", "natural_frequency_std_hz", "damping_ratio", "damping_ratio_std", "phi_t", "phi_r")
+_WHOLE_MODE = (*_MODE[:4], "direction_deg", "phi")
 _ALLOWED = "at most {:g} s (fewer of them, no bands, zero-order)"
 
 _machines = MachineCache(4)
@@ -76,7 +77,12 @@ def modes(text: str) -> dict[str, Any]:
     for name, axis in data["axes"].items():
         rows = [{key: mode.get(key) for key in _MODE} for mode in axis["modes"]]
         axes[name] = {"modes": rows, "joint": axis["joint"], "misfit_per_point": axis.get("misfit", {}).get("chi2_per_point")}
-    return {key: data.get(key, []) for key in ("status", "reasons", "notes", "band_hz")} | {"axes": axes}
+    whole = data.get("both_planes")
+    both = None
+    if whole is not None:
+        rows = [{key: mode.get(key) for key in _WHOLE_MODE} for mode in whole["modes"]]
+        both = {"in_words": whole.get("in_words", ""), "modes": rows, "gyroscopic": whole["layout"]["turning"] != 0}
+    return {key: data.get(key, []) for key in ("status", "reasons", "notes", "band_hz")} | {"axes": axes, "both_planes": both}
 
 
 def flange_frf(machine: MachineText, lines: tuple[float | None, float | None, float], work_seconds: float) -> dict[str, Any]:
@@ -85,7 +91,7 @@ def flange_frf(machine: MachineText, lines: tuple[float | None, float | None, fl
     omega = _lines(known, *lines)
     _affordable(spread_seconds(known, omega), f"{omega.size} frequencies", work_seconds)
     flange = known.receptance(omega)
-    return frf_summary(flange, [c for c in flange.rows if not c.dof.is_slope])
+    return frf_summary(flange, [c for c in flange.rows if not c.dof.is_slope]) | _speed(known.speed_answered())
 
 
 def tooltip(machine: MachineText, tooling: ToolingSource, request: TipRequest, csv: bool = False) -> Any:
@@ -98,11 +104,17 @@ def tooltip(machine: MachineText, tooling: ToolingSource, request: TipRequest, c
         _affordable(spread_seconds(known, omega), f"{omega.size} frequencies with bands", request.work_seconds)
     found = ask_tip(known, tool, omega, request.speed, request.bands, request.stiffness_spread)
     if not csv:
-        return {"tooling": tool.name, "warnings": list(found.remarks)} | frf_summary(found.tip, found.tip.rows)
+        told = {"tooling": tool.name, "warnings": list(found.remarks)} | _speed(found.speed)
+        return told | frf_summary(found.tip, found.tip.rows)
     with tempfile.TemporaryDirectory(prefix="rcsa-ident-") as folder:
         path = Path(folder) / "FRF.csv"
         write_tip_csv(path, found.tip)
         return path.read_text(encoding="utf-8")
+
+
+def _speed(speed: float | None) -> dict[str, float | None]:
+    """The spindle speed that receptances hold at."""
+    return {"spindle_speed_rpm": None if speed is None else to_rpm(speed, 6)}
 
 
 def lobes(machine: MachineText, tooling: ToolingSource, request: LobeRequest) -> dict[str, Any]:

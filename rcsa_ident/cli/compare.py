@@ -9,7 +9,7 @@ import typer
 
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, warn, writable
 from rcsa_ident.cli.lobes import ResultFile, ToolingFile
-from rcsa_ident.units import from_hz, from_rpm, to_hz
+from rcsa_ident.units import from_hz, from_rpm, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -75,10 +75,17 @@ def compare(
     if out is not None:
         assert machine.band is not None
         _draw(found, out, (to_hz(machine.band[0]), to_hz(machine.band[1])), real_imaginary)
+    there = machine.speed_answered(omega)
     if json_:
-        emit({"responses": [_row(each) for each in found], "seconds": stages.seconds, "out": None if out is None else str(out)})
+        rpm = None if there is None else to_rpm(there)
+        rows = [_row(each) for each in found]
+        emit({"responses": rows, "spindle_speed_rpm": rpm, "seconds": stages.seconds, "out": None if out is None else str(out)})
         return
     _show(found)
+    if there is not None:
+        say(f"identified at {to_rpm(there):.0f} rev/min{'' if omega is not None else ', the middle of the speeds that were cut'}")
+    if machine.coupled_planes:
+        say("X and Y of the machine feel each other: what comes back through the other plane is in the identified responses")
     for each in found:
         if not each.modes:
             warn(f"{_TITLES[each.place]}, {each.axis.upper()}: no mode in the identified band")

@@ -122,12 +122,15 @@ def _supports(path: Path) -> tuple[dict[Dof, Support], tuple[float, float]]:
         tell(known, path)
         # a flange without a joint of its own holds the joint's compliance already
         rigid = LumpedJoint(1e18, 1e18)
-        sides = {part.coordinates[0].dof: part.believed for part in known.parts}
+        sides = {c.dof: part.believed for part in known.parts for c in part.coordinates if not c.dof.is_slope}
         low, high = known.band
-        return {axis: Support(side.flange, side.joint or rigid) for axis, side in sides.items()}, (to_hz(low), to_hz(high))
+        return {axis: Support(side.flange, side.joint or rigid, axis) for axis, side in sides.items()}, (to_hz(low), to_hz(high))
     machine, data = read_identified(path)
     tell(machine, path)
-    return {axis: Support(part.spindle, part.joint) for axis, part in machine.identified.items()}, (data["band_hz"][0], data["band_hz"][1])
+    # planes that feel each other do so in a tap test, too, whose spindle does not turn
+    both = machine.standing if machine.coupled_planes else None
+    supports = {axis: Support(part.spindle if both is None else both, part.joint, axis) for axis, part in machine.identified.items()}
+    return supports, (data["band_hz"][0], data["band_hz"][1])
 
 
 def _remarks(found: ContactCalibration, taps: list[TapTest]) -> list[str]:

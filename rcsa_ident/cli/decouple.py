@@ -66,6 +66,11 @@ def decouple(
         identified = read_identified(beside)[0]
         tell(identified, beside)
         machine = identified.identified
+        if identified.coupled_planes:
+            warn(
+                f"{beside}: X and Y feel each other, and each is decoupled by itself: the flange that is found holds what came back "
+                "through the other plane with these tool-holders, to second order in the coupling; with others it is off by about as much"
+            )
     taps = _taps(tap, positive("--from", from_, "Hz"), math.inf if to is None else positive("--to", to, "Hz"))
     stages = Stages(quiet=json_)
     with stages.stage("decoupling"):

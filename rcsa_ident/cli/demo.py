@@ -139,11 +139,13 @@ def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out
     from rcsa_ident.machine.known_tip import measured_tip
     from rcsa_ident.machining_setup import CutSpec
     from rcsa_ident.report.html import ToolingPage
+    from rcsa_ident.report.summaries import entries_of
     from rcsa_ident.stability.lobes import stability_lobes
     from rcsa_ident.workflows.tool_change import ToolChange, advise, tooltip
 
     name, tooling = named
-    response = tooltip(machine, tooling).tip
+    asked = tooltip(machine, tooling)
+    response = asked.tip
     frequency = to_hz(response.omega)
     speeds = from_rpm(np.arange(SPEEDS[0], SPEEDS[1] + 0.5 * SPEEDS[2], SPEEDS[2]))
     change = ToolChange(machine, tooling, CutSpec(), speeds, MAX_DEPTH)
@@ -151,12 +153,15 @@ def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out
     safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
     write_tip_csv(out / f"FRF_{safe}.csv", response)
     write_lobes(out / f"LOBES_{safe}.csv", advice.lobes, recommended=advice.usable.stable)
-    tip = {c.dof.upper(): response.between(str(c), str(c)) for c in response.rows}
-    deviation = {row.dof.upper(): each for (row, col), each in response.deviation().items() if row == col}
+    entries, known = entries_of(response), response.deviation()
+    tip = {axis: response.between(str(row), str(col)) for axis, (row, col) in entries.items()}
+    deviation = {axis: known[pair] for axis, pair in entries.items() if pair in known}
     true, error, coverage = _truth(truth / "tip" / f"{name}.csv", frequency, tip, deviation)
     limit = None
-    if true is not None and len(true) == len(tip):
-        true_tip = measured_tip({Dof(axis.lower()): (frequency, value) for axis, value in true.items()})
+    if true is not None and all(axis in true for axis in tip):
+        curves = {(Dof(axis[0].lower()), Dof(axis[-1].lower())): (frequency, value) for axis, value in true.items()}
+        direct = {row: curve for (row, col), curve in curves.items() if row is col}
+        true_tip = measured_tip(direct, {pair: curve for pair, curve in curves.items() if pair[0] is not pair[1]})
         limit = stability_lobes(true_tip, change.process, speeds, MAX_DEPTH).limit_depth
     # a page needs no more than what an eye resolves
     shown = slice(None, None, 4)
@@ -175,6 +180,7 @@ def _page(machine: IdentifiedMachine, recorded: frozenset[str], truth: Path, out
         None if machine.band is None else (to_hz(machine.band[0]), to_hz(machine.band[1])),
         f"half-immersion down-milling, feed +X, {tooling.cutter.teeth} teeth, {workpiece}{advice.lobes.method} method",
         advice.remarks,
+        None if asked.speed is None else to_rpm(asked.speed),
     )
 
 
@@ -191,13 +197,18 @@ def _truth(
     curves = read_frf_csv(path)
     compared = np.arange(COMPARED[0], COMPARED[1] + 0.5 * COMPARED[2], COMPARED[2])
     true, error, coverage = {}, {}, {}
+    known = dict(curves.values)
+    for cross in ("XY", "YX"):
+        if f"{cross}_re" in curves.bands and f"{cross}_im" in curves.bands:
+            known[cross] = curves.bands[f"{cross}_re"] + 1j * curves.bands[f"{cross}_im"]
     for axis, value in tip.items():
-        if axis not in curves.values:
+        # what is across is measured by the direct motion under the same force
+        if axis not in known or axis[-1] not in known:
             continue
-        true[axis] = np.interp(frequency, curves.frequency, curves.values[axis])
-        there = np.interp(compared, curves.frequency, curves.values[axis])
+        true[axis] = np.interp(frequency, curves.frequency, known[axis])
+        there, direct = (np.interp(compared, curves.frequency, known[each]) for each in (axis, axis[-1]))
         difference = np.interp(compared, frequency, value) - there
-        error[axis] = float(np.linalg.norm(difference) / np.linalg.norm(there))
+        error[axis] = float(np.linalg.norm(difference) / np.linalg.norm(direct))
         if axis in deviation:
             real, imaginary = (np.interp(compared, frequency, std) for std in deviation[axis])
             inside = np.concatenate([np.abs(difference.real) <= 2.0 * real, np.abs(difference.imag) <= 2.0 * imaginary])

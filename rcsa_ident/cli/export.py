@@ -16,7 +16,8 @@ from rcsa_ident.cli.results import read_identified, tell
 from rcsa_ident.errors import InputError
 
 if TYPE_CHECKING:
-    pass
+    from rcsa_ident.dynamics.modal import ModalModel
+    from rcsa_ident.identification.machine import IdentifiedMachine
 
 
 class Format(StrEnum):
@@ -76,11 +77,11 @@ def export(
     omega = None if speed is None else units.from_rpm(positive("--speed", speed, "rev/min"))
     machine, data = read_identified(result)
     tell(machine, result)
-    here = machine.at(omega)
-    axes = here.identified
+    here, speed_there = machine.at(omega), machine.speed_answered(omega)
+    at_speed = "" if speed_there is None else f" at {units.to_rpm(speed_there):.0f} rev/min"
     if what is Part.modes:
-        exports.write_modes(out, {axis.upper(): part.at(axis, omega)[0] for axis, part in axes.items()}, to is Format.json)
-        written = f"modes of {len(axes)} axes"
+        modes, written = _modes(here)
+        exports.write_modes(out, modes, to is Format.json)
     else:
         band = data["band_hz"]
         low, high = math.ceil(band[0]) if from_hz is None else from_hz, band[1] if to_hz is None else to_hz
@@ -90,12 +91,13 @@ def export(
         grid = units.from_hz(frequency)
         if tooling is not None:
             setup = read_tooling(tooling)
-            title = f"{data['campaign']['name']}, {setup.name}"
+            title = f"{data['campaign']['name']}, {setup.name}{at_speed}"
             tip = here.tip(setup, grid, spread=False)
-            found = {c.dof.upper(): tip.block((c,)) for c in tip.rows}
+            found = {"XY": tip} if here.coupled_planes else {c.dof.upper(): tip.block((c,)) for c in tip.rows}
         else:
-            title = f"{data['campaign']['name']}, flange"
-            found = {axis.upper(): here.receptance(grid, (axis,)) for axis in axes}
+            title = f"{data['campaign']['name']}, flange{at_speed}"
+            each = {axis.upper(): (axis,) for axis in here.axes}
+            found = {name: here.receptance(grid, own) for name, own in ({"XY": None} if here.coupled_planes else each).items()}
         if to is Format.csv:
             exports.write_receptances_csv(out, found)
         elif to is Format.json:
@@ -104,8 +106,19 @@ def export(
             exports.write_receptances_hdf5(out, found, title)
         else:
             exports.write_receptances_uff(out, found, title, to is Format.uff_binary)
-        written = f"{what} FRFs at {frequency.size} frequencies"
+        written = f"{what} FRFs{at_speed} at {frequency.size} frequencies"
     if json_:
-        emit({"what": str(what), "format": str(to), "out": str(out)})
+        rpm = None if speed_there is None else units.to_rpm(speed_there)
+        emit({"what": str(what), "format": str(to), "spindle_speed_rpm": rpm, "out": str(out)})
         return
     say(f"written: {out} ({written})")
+
+
+def _modes(machine: IdentifiedMachine) -> tuple[dict[str, ModalModel], str]:
+    """The modes of each axis, or of both planes where they feel each other, and which ones they are."""
+    if not machine.coupled_planes:
+        axes = machine.identified
+        return {axis.upper(): part.at(axis, machine.speed)[0] for axis, part in axes.items()}, f"modes of {len(axes)} axes"
+    if machine.turning is not None:
+        warn("modes of the spindle at standstill: the gyroscopic moments of one that turns have no place in a list of modes")
+    return {"XY": machine.standing}, "modes of both planes together"

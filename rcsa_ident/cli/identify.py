@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from rcsa_ident.arrays import FloatArray
     from rcsa_ident.dynamics.coordinates import Dof
     from rcsa_ident.identification.method import Method as IdentificationMethod
-    from rcsa_ident.identification.posterior import Posterior
+    from rcsa_ident.identification.posterior import PlaneUnknowns, Posterior
     from rcsa_ident.identification.result import Identification
     from rcsa_ident.machining_setup import Campaign
     from rcsa_ident.signals.measurement import Reading
@@ -155,8 +155,8 @@ def read_and_judge(folder: Path, pool: Workers, stages: Stages) -> tuple[Campaig
     return campaign, readings
 
 
-def read_start(path: Path) -> Mapping[Dof, Posterior]:
-    """Return the posteriors of an earlier answer.
+def read_start(path: Path) -> Mapping[Dof, Posterior | PlaneUnknowns]:
+    """Return what an earlier answer gives to start from.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def read_start(path: Path) -> Mapping[Dof, Posterior]:
     from rcsa_ident.io.results import read_result
 
     try:
-        return machine_from_json(read_result(path), str(path)).posteriors()
+        return machine_from_json(read_result(path), str(path)).starts()
     except InputError as error:
         raise error if error.where else error.at(str(path)) from None
 
@@ -179,7 +179,7 @@ def search(
     seed: int,
     pool: Workers,
     stages: Stages,
-    start: Mapping[Dof, Posterior] | None = None,
+    start: Mapping[Dof, Posterior | PlaneUnknowns] | None = None,
 ) -> Identification:
     """Return the identification by the method of that name; the default one may start from an earlier answer."""
     from rcsa_ident.workflows import identify as workflow
@@ -204,9 +204,9 @@ def search_bands(
     from rcsa_ident.identification.evidence import EvidenceSelection
     from rcsa_ident.workflows.speed_bands import speed_bands
 
-    start = {axis: part.posterior for axis, part in whole.axes.items() if part.posterior is not None}
-    if count == 1 or not start:
+    if count == 1 or not whole.axes:
         return []
+    start = whole.machine.starts()
     with stages.stage("speed bands"):
         return speed_bands(campaign, readings, count, EvidenceSelection(start=start), seed, pool.map)
 

@@ -14,13 +14,13 @@ from rcsa_ident.cli.conditions import change_of, cut_of, share_of, subjects_of
 from rcsa_ident.cli.options import Bands, CutOptions, SpeedOptions, StiffnessSpread, TipOptions, takes_groups
 from rcsa_ident.cli.results import read_machine
 from rcsa_ident.errors import InputError
-from rcsa_ident.units import from_hz, from_rpm, inclusive, to_hz
+from rcsa_ident.units import from_hz, from_rpm, inclusive, to_hz, to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from rcsa_ident.arrays import FloatArray
-    from rcsa_ident.dynamics.coordinates import Coordinate, Dof
+    from rcsa_ident.dynamics.coordinates import Coordinate
     from rcsa_ident.dynamics.uncertain import UncertainReceptance
 
     Deviation = Mapping[tuple[Coordinate, Coordinate], tuple[FloatArray, FloatArray]]
@@ -48,7 +48,10 @@ def tooltip(
     speed: Annotated[
         float | None,
         typer.Option(
-            help="Spindle speed, rev/min, for a machine that changes with it; default: the middle of the campaign's.", show_default=False
+            "--speed",
+            "--speed-rpm",
+            help="Spindle speed, rev/min, for a machine that changes with it; default: the middle of the campaign's.",
+            show_default=False,
         ),
     ] = None,
     bands: Bands = True,
@@ -76,12 +79,17 @@ def tooltip(
     write_tip_csv(out, found.tip)
     peaks = peaks_of(frequency, found.tip, deviation)
     if json_:
-        summary = {"frequencies": len(frequency), "peaks": {a.upper(): asdict(p) for a, (p, _) in peaks.items()}}
+        summary = {"frequencies": len(frequency), "peaks": {name: asdict(p) for name, (p, _) in peaks.items()}}
+        summary |= {"spindle_speed_rpm": None if found.speed is None else to_rpm(found.speed)}
         emit(summary | {"warnings": list(found.remarks), "seconds": stages.seconds, "out": str(out)})
         return
     from rcsa_ident.cli.tables import show_peaks
 
-    show_peaks({a: (p.frequency_hz, p.magnitude, p.lowest_real_part, band) for a, (p, band) in peaks.items()})
+    show_peaks({name: (p.frequency_hz, p.magnitude, p.lowest_real_part, band) for name, (p, band) in peaks.items()})
+    if found.speed is not None:
+        say(f"at {to_rpm(found.speed):.0f} rev/min{'' if spindle_speed is not None else ', the middle of the speeds that were cut'}")
+    if "XY" in peaks:
+        say("XY: motion in X under a force in Y; YX the other way")
     for remark in found.remarks:
         warn(remark)
     say(f"written: {out} ({len(frequency)} frequencies, {stages.seconds['tooltip']:.2f} s)")
@@ -188,20 +196,20 @@ def check_plot(path: Path | None) -> None:
     writable(path, "--plot")
 
 
-def peaks_of(frequency: FloatArray, tip: UncertainReceptance, deviation: Deviation) -> dict[Dof, Any]:
-    """Return, per axis, the peak and two standard deviations of the magnitude there (NaN without bands)."""
+def peaks_of(frequency: FloatArray, tip: UncertainReceptance, deviation: Deviation) -> dict[str, Any]:
+    """Return the peak of each axis, and of each cross term that is there, with two standard deviations of its magnitude (NaN without)."""
     import numpy as np
 
-    from rcsa_ident.report.summaries import peak_row
+    from rcsa_ident.report.summaries import entries_of, peak_row
 
     peaks = {}
-    for coordinate in tip.rows:
-        values = tip.between(str(coordinate), str(coordinate))
+    for name, (row, col) in entries_of(tip).items():
+        values = tip.between(str(row), str(col))
         k = int(np.argmax(np.abs(values)))
         band = math.nan
-        if (coordinate, coordinate) in deviation:
-            real, imaginary = (part[k] for part in deviation[coordinate, coordinate])
+        if (row, col) in deviation:
+            real, imaginary = (part[k] for part in deviation[row, col])
             unit = values[k] / abs(values[k])
             band = 2.0 * math.hypot(real * unit.real, imaginary * unit.imag)
-        peaks[coordinate.dof] = (peak_row(frequency, values), band)
+        peaks[name] = (peak_row(frequency, values), band)
     return peaks

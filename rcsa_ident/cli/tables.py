@@ -11,7 +11,7 @@ from rich.table import Table
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import Identification
-from rcsa_ident.report.summaries import RecordingRow, coefficient_rows, mode_rows, two_digits
+from rcsa_ident.report.summaries import ModeRow, RecordingRow, WholeModeRow, coefficient_rows, mode_rows, two_digits, whole_mode_rows
 from rcsa_ident.stability.advice import Advice, PlannedCut, SpeedWindow
 from rcsa_ident.stability.tested_cuts import Tally
 from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
@@ -55,24 +55,18 @@ def show_identification(found: Identification, deviations: Mapping[Dof, tuple[Fl
     out.print(f"status [bold {colour}]{found.status}[/], method {found.method}, seed {found.seed}, {len(found.cut_ids)} cuts used")
     for reason in found.reasons:
         out.print(f"  [{colour}]{escape(reason)}[/]", soft_wrap=True)
-    for axis, part in found.axes.items():
-        table = Table(
-            "f_n Hz", "±", "zeta %", "±", "|phi_t| 1e-3", "|phi_r| 1e-3", title=f"modes at the flange, {axis.upper()}", title_justify="left"
+    if found.whole is not None:
+        out.print(escape(found.coupling), soft_wrap=True)
+        whole = whole_mode_rows(found.whole.best.standing(), next(iter(deviations.values()), None))
+        out.print(
+            _modes("modes at the flange, X and Y together, spindle at standstill", whole, [f"{round(r.direction_deg)}" for r in whole])
         )
-        for column in table.columns:
-            column.justify = "right"
-        for row in mode_rows(part.modes, deviations.get(axis)):
-            table.add_row(
-                f"{row.frequency_hz:.1f}",
-                "" if row.frequency_std_hz is None else two_digits(row.frequency_std_hz),
-                f"{row.damping_percent:.2f}",
-                "" if row.damping_std_percent is None else two_digits(row.damping_std_percent),
-                f"{1e3 * abs(row.phi_t):.3f}",
-                f"{1e3 * abs(row.phi_r):.2f}",
-            )
-        out.print(table)
+    for axis, part in found.axes.items():
+        if found.whole is None:
+            out.print(_modes(f"modes at the flange, {axis.upper()}", mode_rows(part.modes, deviations.get(axis))))
         misfit = ", ".join(f"{escape(name)} {value:.2f}" for name, value in part.per_tooling.items())
-        out.print(f"  chi²/point {part.chi2_per_point:.2f} ({misfit}), unexplained share of a line {100 * part.model_error:.2f} %")
+        name = "" if found.whole is None else f"{axis.upper()}: "
+        out.print(f"  {name}chi²/point {part.chi2_per_point:.2f} ({misfit}), unexplained share of a line {100 * part.model_error:.2f} %")
     if found.axes:
         joint = next(iter(found.axes.values())).joint
         out.print(
@@ -82,7 +76,28 @@ def show_identification(found: Identification, deviations: Mapping[Dof, tuple[Fl
     for each in coefficient_rows(found.coefficients):
         out.print(f"{escape(each.name)}: {two_digits(each.std, each.value)} ± {two_digits(each.std)} {each.unit}")
     for note in found.notes:
+        if note == found.coupling:
+            continue
         out.print(f"note: {escape(note)}", soft_wrap=True)
+
+
+def _modes(title: str, rows: Sequence[ModeRow | WholeModeRow], direction: Sequence[str] | None = None) -> Table:
+    """Modes with their standard deviations, and their directions where both planes have them together."""
+    across = [] if direction is None else ["direction deg"]
+    table = Table("f_n Hz", "±", "zeta %", "±", *across, "|phi_t| 1e-3", "|phi_r| 1e-3", title=title, title_justify="left")
+    for column in table.columns:
+        column.justify = "right"
+    for i, row in enumerate(rows):
+        table.add_row(
+            f"{row.frequency_hz:.1f}",
+            "" if row.frequency_std_hz is None else two_digits(row.frequency_std_hz),
+            f"{row.damping_percent:.2f}",
+            "" if row.damping_std_percent is None else two_digits(row.damping_std_percent),
+            *([] if direction is None else [direction[i]]),
+            f"{1e3 * abs(row.phi_t):.3f}",
+            f"{1e3 * abs(row.phi_r):.2f}",
+        )
+    return table
 
 
 def show_lobes(advice: Advice) -> None:
@@ -210,12 +225,12 @@ def show_comparison(answers: Sequence[Advice]) -> None:
     console().print(table)
 
 
-def show_peaks(rows: Mapping[Dof, tuple[float, float, float, float]]) -> None:
-    """Print the tip's most compliant frequency per axis: frequency [Hz], magnitude, lowest real part, 2 sigma at the peak [m/N]."""
+def show_peaks(rows: Mapping[str, tuple[float, float, float, float]]) -> None:
+    """Print the tip's most compliant frequency of each entry: frequency [Hz], magnitude, lowest real part, 2 sigma at the peak [m/N]."""
     table = Table("axis", "peak at Hz", "|C11| µm/N", "± 2 sigma", "lowest real part µm/N", title="tooltip", title_justify="left")
     for column in table.columns[1:]:
         column.justify = "right"
     for axis, (frequency, magnitude, lowest, band) in rows.items():
         width = f"{1e6 * band:.4f}" if band == band else ""
-        table.add_row(axis.upper(), f"{frequency:.0f}", f"{1e6 * magnitude:.4f}", width, f"{1e6 * lowest:.4f}")
+        table.add_row(axis, f"{frequency:.0f}", f"{1e6 * magnitude:.4f}", width, f"{1e6 * lowest:.4f}")
     console().print(table)

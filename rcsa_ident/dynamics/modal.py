@@ -10,7 +10,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics._kernels import pole_sum
-from rcsa_ident.dynamics.coordinates import Coordinate
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.poles import PoleResidue, frequencies, pair_sum
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
@@ -215,3 +215,16 @@ def _free_motions(omega_n: FloatArray, damping: FloatArray) -> tuple[ComplexArra
     q = right[:m]
     norm = np.einsum("ik,ik->k", q, 2.0 * values * q + damping @ q)
     return values.astype(complex), q.astype(complex), norm.astype(complex)
+
+
+def directions(modes: ModalModel) -> FloatArray:
+    """Return the angles from +X of the lines along which modes of both planes move, above -90 and up to 90 degrees, shape (m,) [rad].
+
+    A mode that moves round an ellipse has the direction of its longer axis.
+    """
+    x, y = (modes.phi[:, [c.dof for c in modes.coordinates].index(axis)] for axis in (Dof.X, Dof.Y))
+    # the phase that makes a shape as real as it can be
+    turn = np.exp(-0.5j * np.angle(x**2 + y**2))
+    angle = np.arctan2((y * turn).real, (x * turn).real)
+    found: FloatArray = angle - np.pi * np.ceil(angle / np.pi - 0.5)
+    return found

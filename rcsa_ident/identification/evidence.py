@@ -23,7 +23,7 @@ from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import GIVE_UP_SOON, Report, cut_weights, drop_modes, exchange_modes, model_error
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, planes, unpack
-from rcsa_ident.identification.posterior import Posterior
+from rcsa_ident.identification.posterior import PlaneUnknowns, Posterior
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import BOTH, Progress, Stage, Step
 from rcsa_ident.identification.result import Identification
@@ -49,7 +49,7 @@ class EvidenceSelection:
         Model errors of the stages before the data's own: they smooth the landscape.
     candidates : int
         Members of the population that are refined and compared.
-    start : mapping of Dof to Posterior, optional
+    start : mapping of Dof to Posterior or PlaneUnknowns, optional
         An earlier answer of the same machine: with it nothing is explored, its modes are refined with the new cuts.
     """
 
@@ -57,7 +57,7 @@ class EvidenceSelection:
     search: SearchSettings = field(default_factory=SearchSettings)
     coarse: tuple[float, float] = (0.3, 0.05)
     candidates: int = 3
-    start: Mapping[Dof, Posterior] | None = None
+    start: Mapping[Dof, Posterior | PlaneUnknowns] | None = None
 
     @property
     def name(self) -> str:

@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.turning_modes import TurningModes
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
-from rcsa_ident.identification.posterior import MachineAxis, Posterior
+from rcsa_ident.identification.posterior import MachineAxis, PlaneUnknowns, Posterior
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.flange_part import FlangePart
 from rcsa_ident.machine.machine import Machine
@@ -24,8 +25,32 @@ from rcsa_ident.machining_setup import Workpiece
 from rcsa_ident.signals.recording import Sensor
 from rcsa_ident.units import to_hz
 
-#: Unknowns times frequencies up to which the machine's side of the coupling is kept: 100 bytes each.
-MOST_KEPT = 1_000_000
+#: Unknowns times frequencies up to which the machine's side of the coupling is kept: 100 bytes each, 512 where planes feel each other.
+MOST_KEPT, MOST_KEPT_OF_BOTH = 1_000_000, 200_000
+
+
+class SpeedModel(NamedTuple):
+    """What the cuts of a single range of spindle speeds say for themselves.
+
+    Parameters
+    ----------
+    speeds : (float, float) [rad/s]
+        Lowest and highest.
+    axes : mapping of Dof to MachineAxis
+    whole : CoupledPosterior or None
+        As in `IdentifiedMachine`.
+    """
+
+    speeds: tuple[float, float]
+    axes: Mapping[Dof, MachineAxis]
+    whole: CoupledPosterior | None = None
+
+    @property
+    def unknowns(self) -> int:
+        """Directions of the posterior."""
+        if self.whole is not None:
+            return self.whole.best.theta.size
+        return sum(0 if part.posterior is None else part.posterior.theta.size for part in self.axes.values())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,8 +63,8 @@ class IdentifiedMachine(Machine):
         From all cuts.
     identified_band : (float, float) [rad/s]
         Lowest and highest identified line.
-    speed_models : tuple of ((float, float), mapping of Dof to MachineAxis)
-        Lowest and highest spindle speed [rad/s] of single ranges, each with what its cuts say for themselves.
+    speed_models : tuple of SpeedModel
+        Single ranges of spindle speed, each with what its cuts say for themselves.
     speed : float or None [rad/s]
         At which it stands; None is the middle of the campaign's speeds.
     status : Status
@@ -57,7 +82,7 @@ class IdentifiedMachine(Machine):
 
     identified: Mapping[Dof, MachineAxis]
     identified_band: tuple[float, float]
-    speed_models: tuple[tuple[tuple[float, float], Mapping[Dof, MachineAxis]], ...] = ()
+    speed_models: tuple[SpeedModel, ...] = ()
     speed: float | None = None
     status: Status = Status.CONVERGED
     reasons: tuple[str, ...] = ()
@@ -73,6 +98,24 @@ class IdentifiedMachine(Machine):
         if self.whole is not None:
             return (self.whole.part(self.speed),)
         return tuple(part.part(axis, self.speed) for axis, part in self.identified.items())
+
+    @property
+    def coupled_planes(self) -> bool:
+        """Whether X and Y feel each other."""
+        return self.whole is not None
+
+    @property
+    def standing(self) -> ModalModel:
+        """Modes of both planes that feel each other, of the spindle that does not turn; softened as at the speed at which it stands.
+
+        Raises
+        ------
+        InputError
+            If the planes do not feel each other: each has its own.
+        """
+        if self.whole is None:
+            raise InputError("both_planes", "planes that do not feel each other", "a machine whose planes do")
+        return self.whole.best.standing(self.whole.relative(self.speed))
 
     @property
     def band(self) -> tuple[float, float]:
@@ -99,16 +142,13 @@ class IdentifiedMachine(Machine):
     @property
     def speed_range(self) -> tuple[float, float] | None:
         """Lowest and highest spindle speed [rad/s] between which it is known how it changes; None where it does not change."""
-        known = [each for each in (self.softening_range, *(speeds for speeds, _ in self.speed_models)) if each is not None]
+        known = [each for each in (self.softening_range, *(model.speeds for model in self.speed_models)) if each is not None]
         return (min(low for low, _ in known), max(high for _, high in known)) if known else None
 
     @property
     def unknowns(self) -> int:
         """Directions of the posterior of all axes, of the model that has most of them."""
-        if self.whole is not None:
-            return self.whole.best.theta.size
-        models = (self.identified, *(axes for _, axes in self.speed_models))
-        return max(sum(0 if part.posterior is None else part.posterior.theta.size for part in each.values()) for each in models)
+        return max(model.unknowns for model in (SpeedModel((0.0, 0.0), self.identified, self.whole), *self.speed_models))
 
     @property
     def prepared(self) -> bool:
@@ -126,13 +166,16 @@ class IdentifiedMachine(Machine):
         return () if self.status is Status.CONVERGED else (f"the identification is {self.status}: {'; '.join(self.reasons)}",)
 
     def posteriors(self) -> dict[Dof, Posterior]:
-        """Return what a further identification may start from, axis by axis.
+        """Return what is known of each axis by itself.
 
         Raises
         ------
         InputError
-            An axis has none, as after the published method.
+            An axis has none, as after the published method, or both planes feel each other.
         """
+        if self.whole is not None:
+            allowed = "a machine whose planes do not feel each other: what is known of this one belongs to both planes together"
+            raise InputError("both_planes", "X and Y that feel each other", allowed)
         found = {axis: part.posterior for axis, part in self.identified.items() if part.posterior is not None}
         for axis in self.identified:
             if axis not in found:
@@ -140,12 +183,28 @@ class IdentifiedMachine(Machine):
                 raise InputError(f"axes.{axis.upper()}", "no covariance", allowed)
         return found
 
+    def starts(self) -> dict[Dof, Posterior | PlaneUnknowns]:
+        """Return what a further identification may start from, axis by axis; of planes that feel each other, the modes that move each.
+
+        Raises
+        ------
+        InputError
+            An axis has no unknowns, as after the published method.
+        """
+        if self.whole is not None:
+            return {axis: self.whole.best.seen_along(axis) for axis in self.identified}
+        return dict(self.posteriors())
+
     def at(self, speed: float | None) -> IdentifiedMachine:
         """Return the machine at a spindle speed [rad/s]; the nearest model answers, and outside its speeds it stays as it is there."""
         if speed is None:
             return self
         model = self._model(speed)
         return model if model.softening_range is None else replace(model, speed=speed, kept_sides=())
+
+    def speed_answered(self, speed: float | None = None) -> float | None:
+        """Return the spindle speed [rad/s] of what `at(speed)` answers; None where it does not change."""
+        return super().speed_answered(self.speed if speed is None else speed)
 
     def models(self, speeds: FloatArray) -> list[tuple[IdentifiedMachine, NDArray[np.intp]]]:
         """Return each model that answers at some of the speeds [rad/s], and the places of those."""
@@ -174,7 +233,8 @@ class IdentifiedMachine(Machine):
         if self.prepared or (self.kept_sides and not spread):
             return self
         omega = self.lines()
-        if self.speed_range is not None or self.unknowns * omega.size > MOST_KEPT:
+        most = MOST_KEPT if self.whole is None else MOST_KEPT_OF_BOTH
+        if self.speed_range is not None or self.unknowns * omega.size > most:
             return self
         sides = self.sides(omega)
         return replace(self, kept_sides=tuple(side.kept() for side in sides) if spread else sides)
@@ -184,17 +244,20 @@ class IdentifiedMachine(Machine):
         return {name: value for name, value in self.__dict__.items() if name != "parts"} | {"kept_sides": ()}
 
     def _number(self, speed: float) -> int:
-        ranges = [speeds for speeds, _ in self.speed_models]
+        ranges = [model.speeds for model in self.speed_models]
         return min(range(len(ranges)), key=lambda k: max(ranges[k][0] - speed, speed - ranges[k][1], 0.0))
 
     def _single(self, number: int) -> IdentifiedMachine:
-        return replace(self, identified=self.speed_models[number][1], speed_models=(), kept_sides=(), whole=None)
+        own = self.speed_models[number]
+        return replace(self, identified=own.axes, whole=own.whole, speed_models=(), kept_sides=())
 
     def _model(self, speed: float) -> IdentifiedMachine:
         return self._single(self._number(speed)) if self.speed_models else self
 
     def __str__(self) -> str:
         modes = [f"{axis.upper()} {part.spindle.modes.omega_n.size} modes" for axis, part in self.identified.items()]
+        if self.whole is not None:
+            modes = [f"X and Y together {self.whole.best.layout.modes} modes"]
         low, high = (to_hz(w) for w in self.identified_band)
         changes = "" if self.speed_range is None else ", changes with speed"
         return f"{self.name or 'machine'}: {', '.join(modes)}, {low:.0f} to {high:.0f} Hz, {self.status}{changes}"

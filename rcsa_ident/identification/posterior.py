@@ -21,6 +21,26 @@ LONGEST_STEP = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class PlaneUnknowns:
+    """Unknowns of one axis' flange and of the joint, as a search starts from them.
+
+    Parameters
+    ----------
+    theta : array, shape (p,)
+    layout : AxisLayout
+        Without fixture.
+    """
+
+    theta: FloatArray
+    layout: AxisLayout
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "theta", frozen(self.theta))
+        if self.theta.size != self.layout.size + JOINT:
+            raise InputError("unknowns", self.theta.size, f"{self.layout.size + JOINT} for {self.layout.modes} modes and a joint")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Posterior:
     """Unknowns of one axis' flange and of the joint with their covariance.
 

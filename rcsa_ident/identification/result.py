@@ -150,6 +150,11 @@ class Identification(Shown):
         return float(min(w.min() for w in omega)), float(max(w.max() for w in omega))
 
     @property
+    def coupling(self) -> str:
+        """How X and Y feel each other, in words; empty where they do not."""
+        return next((note for note in self.notes if says([note], IdentificationCode.PLANES_COUPLED)), "")
+
+    @property
     def machine(self) -> IdentifiedMachine:
         """The machine that was found: it takes any tooling.
 

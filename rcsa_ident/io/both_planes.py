@@ -7,32 +7,46 @@ from typing import Any
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.identification.coupled.parameters import CoupledLayout, parameter_names, unpack
+from rcsa_ident.dynamics.modal import directions
+from rcsa_ident.identification.coupled.parameters import DIRECTIONS, CoupledLayout, parameter_names, unpack
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior, CoupledUnknowns
-from rcsa_ident.io.validated_table import Table, describe
+from rcsa_ident.io.results import check_covariance, matrix_of
+from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.units import from_rpm, to_hz, to_rpm
 
 _MOST_MODES, _MOST_DISCS = 200, 10
+_SHAPE = "four pairs of finite numbers: translation and slope in X, then in Y"
 
 
-def both_planes_to_json(posterior: CoupledPosterior) -> dict[str, Any]:
-    """Return both planes as they stand in the file: modes with their directions to be read, unknowns and covariance to go on from."""
+def both_planes_to_json(posterior: CoupledPosterior, deviation: tuple[FloatArray, FloatArray] | None = None) -> dict[str, Any]:
+    """Return both planes as they stand in the file: modes with their directions to be read, unknowns and covariance to go on from.
+
+    Parameters
+    ----------
+    posterior : CoupledPosterior
+    deviation : (array, array), optional
+        Standard deviations of the natural frequencies [rad/s] and damping ratios of the machine that does not turn.
+    """
     best = posterior.best
     standing, machine = best.standing(), unpack(best.theta, best.layout)
     middle, half = posterior.speed_range
     residual = best.modes(middle).residual
+    modes: list[dict[str, Any]] = [
+        {
+            "natural_frequency_hz": float(to_hz(omega)),
+            "damping_ratio": float(zeta),
+            "direction_deg": float(np.degrees(direction)),
+            "phi": [[float(part.real), float(part.imag)] for part in phi],
+        }
+        for omega, zeta, direction, phi in zip(standing.omega_n, standing.zeta, directions(standing), standing.phi, strict=True)
+    ]
+    if deviation is not None:
+        for mode, omega_n, zeta in zip(modes, *(d.tolist() for d in deviation), strict=True):
+            mode |= {"natural_frequency_std_hz": to_hz(omega_n), "damping_ratio_std": zeta}
     return {
         "layout": _layout_to_json(best.layout),
         "speed_range_rpm": [to_rpm(middle - half), to_rpm(middle + half)],
-        "modes": [
-            {
-                "natural_frequency_hz": float(to_hz(omega)),
-                "damping_ratio": float(zeta),
-                "direction_deg": float(np.degrees(_direction(phi[[0, 2]]))),
-                "phi": [[float(part.real), float(part.imag)] for part in phi],
-            }
-            for omega, zeta, phi in zip(standing.omega_n, standing.zeta, standing.phi, strict=True)
-        ],
+        "modes": modes,
         "gyroscopic": machine.skew.tolist(),
         "residual_compliance": residual.tolist(),
         "unknowns": best.theta.tolist(),
@@ -50,9 +64,18 @@ def both_planes_from_json(table: Table) -> CoupledPosterior:
         If unknowns, layout and covariance do not belong together.
     """
     best = _unknowns(table)
-    matrix = np.array(table.table("covariance").data["matrix"], dtype=float)
-    if matrix.shape != (best.theta.size,) * 2:
-        table.refuse("covariance.matrix", f"{len(matrix)} rows", f"a row for each of the {best.theta.size} unknowns")
+    for mode in table.tables("modes"):
+        mode.number("natural_frequency_hz", "Hz", above=0.0)
+        mode.number("damping_ratio", above=0.0, most=1.0)
+        mode.number("direction_deg", "deg")
+        phi = mode.value("phi", _SHAPE)
+        if not isinstance(phi, list) or len(phi) != DIRECTIONS or not all(_complex(part) for part in phi):
+            mode.refuse("phi", describe(phi), _SHAPE)
+    if "in_words" in table:
+        table.text("in_words")
+    covariance = table.table("covariance")
+    matrix = matrix_of(covariance, "matrix", best.theta.size)
+    check_covariance(covariance, matrix)
     low, high = table.numbers("speed_range_rpm", 2, "rev/min")
     if not 0.0 <= low <= high:
         table.refuse("speed_range_rpm", f"{[low, high]}", "lowest and highest speed, 0 <= lowest <= highest [rev/min]")
@@ -60,12 +83,8 @@ def both_planes_from_json(table: Table) -> CoupledPosterior:
     return CoupledPosterior(best, matrix, speed_range, tuple(_unknowns(rival) for rival in table.tables("rivals")))
 
 
-def _direction(shape: np.ndarray) -> float:
-    """Angle from +X of the line along which a mode moves the flange, above -90 and up to 90 degrees [rad]."""
-    # the phase that makes the shape as real as it can be
-    turned: FloatArray = (shape * np.exp(-0.5j * np.angle(np.sum(shape**2)))).real
-    angle = float(np.arctan2(turned[1], turned[0]))
-    return angle - np.pi * np.ceil(angle / np.pi - 0.5)
+def _complex(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(as_number(part) is not None for part in value)
 
 
 def _layout_to_json(layout: CoupledLayout) -> dict[str, Any]:
@@ -86,4 +105,6 @@ def _unknowns(table: Table) -> CoupledUnknowns:
     unknowns = np.array(table.numbers("unknowns", None))
     if unknowns.size != layout.size:
         table.refuse("unknowns", f"{unknowns.size} numbers", f"{layout.size}, as {layout.modes} modes and the joint have")
+    if layout.skew and not layout.turning:
+        own.refuse("turning", "0 with discs", "1 or -1: gyroscopic moments have a sense")
     return CoupledUnknowns(unknowns, layout)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
@@ -89,16 +89,24 @@ def write_frf_csv(
 
 
 def write_tip_csv(path: str | Path, tip: UncertainReceptance) -> None:
-    """Write the receptances of a tip: the direct ones, with standard deviations and cross terms in further columns where there are some."""
+    """Write the receptances of a tip: the direct ones, with standard deviations and cross terms in further columns where there are some.
+
+    ``XY`` is the motion in X under a force in Y.
+    """
+    deviation = tip.deviation()
+
+    def spread(name: str, row: Coordinate, col: Coordinate) -> dict[str, ArrayLike]:
+        real, imaginary = deviation.get((row, col), (None, None))
+        return {} if real is None or imaginary is None else {f"{name}_re_std": real, f"{name}_im_std": imaginary}
+
     columns: dict[str, ArrayLike] = {}
-    for (row, col), (real, imaginary) in tip.deviation().items():
-        if row == col:
-            columns |= {f"{row.dof.upper()}_re_std": real, f"{row.dof.upper()}_im_std": imaginary}
+    for row in tip.rows:
+        columns |= spread(row.dof.upper(), row, row)
     for row, col in permutations(tip.rows, 2):
         cross = tip.between(str(row), str(col))
         if np.any(cross):
             name = f"{row.dof}{col.dof}".upper()
-            columns |= {f"{name}_re": cross.real, f"{name}_im": cross.imag}
+            columns |= {f"{name}_re": cross.real, f"{name}_im": cross.imag} | spread(name, row, col)
     curves = {c.dof.upper(): tip.between(str(c), str(c)) for c in tip.rows}
     # rad/s and back leaves a last digit that nobody asked for
     write_frf_csv(path, np.round(to_hz(tip.omega), 9), curves, columns)

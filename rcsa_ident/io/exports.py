@@ -7,12 +7,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.modal import ModalModel, directions
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.curves import write_frf_csv
+from rcsa_ident.io.curves import AXES, write_frf_csv
 from rcsa_ident.io.files import replacing, write_text
 from rcsa_ident.io.uff import DISPLACEMENT, EXCITATION_FORCE, FRF, UffAxis, UffFunction, write_uff
 from rcsa_ident.units import to_hz
@@ -31,7 +33,7 @@ def write_receptances_uff(path: str | Path, receptances: Mapping[str, Receptance
     Parameters
     ----------
     path : path
-    receptances : mapping of axis (X or Y) to Receptance
+    receptances : mapping of axis (X or Y, or both as XY) to Receptance
     title : str
         Written into each header.
     binary : bool
@@ -60,13 +62,17 @@ def _place(coordinate: Coordinate) -> tuple[int, int]:
 
 
 def named_entries(receptances: Mapping[str, Receptance]) -> dict[str, ComplexArray]:
-    """Return every entry by its name: ``X`` for motion per force, ``X_tM``, ``X_rF``, ``X_rM`` for those with a slope or a moment."""
+    """Return every entry by its name: ``X`` for motion per force, ``X_tM``, ``X_rF``, ``X_rM`` for those with a slope or a moment.
+
+    Where both planes are one receptance, ``XY`` is the motion in X under a force in Y.
+    """
     found: dict[str, ComplexArray] = {}
-    for axis, receptance in receptances.items():
+    for receptance in receptances.values():
         for i, row in enumerate(receptance.rows):
             for j, col in enumerate(receptance.cols):
+                axes = "".join(dict.fromkeys((row.dof.plane.upper(), col.dof.plane.upper())))
                 kind = _KIND[row.dof.is_slope] + _LOAD[col.dof.is_slope]
-                found[axis if kind == "tF" else f"{axis}_{kind}"] = receptance.values[:, i, j]
+                found[axes if kind == "tF" else f"{axes}_{kind}"] = receptance.values[:, i, j]
     return found
 
 
@@ -76,17 +82,18 @@ def write_receptances_csv(path: str | Path, receptances: Mapping[str, Receptance
     Parameters
     ----------
     path : path
-    receptances : mapping of axis (X or Y) to Receptance
+    receptances : mapping of axis (X or Y, or both as XY) to Receptance
     further : mapping of column name to array, shape (n,), optional
         Columns behind them.
     """
     entries = named_entries(receptances)
     frequency = to_hz(next(iter(receptances.values())).omega)
-    rest = {name: values for name, values in entries.items() if name not in receptances}
+    direct = [axis for axis in AXES if axis in entries]
+    rest = {name: values for name, values in entries.items() if name not in direct}
     columns = {
         f"{name}_{part}": getattr(values, which) for name, values in rest.items() for part, which in (("re", "real"), ("im", "imag"))
     }
-    write_frf_csv(path, frequency, {axis: entries[axis] for axis in receptances}, {**columns, **(further or {})})
+    write_frf_csv(path, frequency, {axis: entries[axis] for axis in direct}, {**columns, **(further or {})})
 
 
 def write_receptances_json(path: str | Path, receptances: Mapping[str, Receptance], title: str) -> None:
@@ -95,7 +102,7 @@ def write_receptances_json(path: str | Path, receptances: Mapping[str, Receptanc
     Parameters
     ----------
     path : path
-    receptances : mapping of axis (X or Y) to Receptance
+    receptances : mapping of axis (X or Y, or both as XY) to Receptance
     title : str
     """
     frequency = to_hz(next(iter(receptances.values())).omega)
@@ -113,7 +120,7 @@ def write_receptances_hdf5(path: str | Path, receptances: Mapping[str, Receptanc
     Parameters
     ----------
     path : path
-    receptances : mapping of axis (X or Y) to Receptance
+    receptances : mapping of axis (X or Y, or both as XY) to Receptance
     title : str
     """
     import h5py
@@ -127,21 +134,28 @@ def write_receptances_hdf5(path: str | Path, receptances: Mapping[str, Receptanc
 
 
 def mode_records(axes: Mapping[str, ModalModel]) -> list[dict[str, Any]]:
-    """Return the modes of each axis with their shapes at all coordinates."""
+    """Return the modes of each axis with their shapes at all coordinates; those of both planes together with their directions."""
     return [
         {
             "axis": axis,
             "natural_frequency_hz": to_hz(float(omega)),
             "damping_ratio": float(zeta),
+            **({} if direction is None else {"direction_deg": float(np.degrees(direction))}),
             **{
-                f"phi_{_KIND[c.dof.is_slope]}_{part}": float(getattr(value, which))
+                f"phi_{'' if direction is None else c.dof.plane + '_'}{_KIND[c.dof.is_slope]}_{part}": float(getattr(value, which))
                 for c, value in zip(model.coordinates, shape, strict=True)
                 for part, which in (("re", "real"), ("im", "imag"))
             },
         }
         for axis, model in axes.items()
-        for omega, zeta, shape in zip(model.omega_n, model.zeta, model.phi, strict=True)
+        for omega, zeta, shape, direction in zip(model.omega_n, model.zeta, model.phi, _directions(model), strict=True)
     ]
+
+
+def _directions(model: ModalModel) -> Sequence[float | None]:
+    """Direction of each mode of both planes; None for those of one [rad]."""
+    both = {c.dof.plane for c in model.coordinates} == {Dof.X, Dof.Y}
+    return directions(model).tolist() if both else [None] * model.omega_n.size
 
 
 def write_modes(path: str | Path, axes: Mapping[str, ModalModel], as_json: bool) -> None:
@@ -150,7 +164,7 @@ def write_modes(path: str | Path, axes: Mapping[str, ModalModel], as_json: bool)
     Parameters
     ----------
     path : path
-    axes : mapping of axis (X or Y) to ModalModel
+    axes : mapping of axis (X or Y, or both as XY) to ModalModel
     as_json : bool
         JSON, else CSV.
     """

@@ -11,7 +11,8 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.force import REFERENCE_RUNOUT, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.identification.machine import IdentifiedMachine
+from rcsa_ident.identification.coupled.posterior import CoupledPosterior
+from rcsa_ident.identification.machine import IdentifiedMachine, SpeedModel
 from rcsa_ident.identification.parameters import JOINT, AxisLayout
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.result import AxisResult, Identification
@@ -72,7 +73,7 @@ def identification_to_json(
         "coefficients": {str(each): _coefficient(each, *found) for each, found in identification.coefficients.items()},
         "band_hz": [to_hz(w) for w in identification.band],
         "axes": _axes_to_json(identification, deviations or {}),
-        **_both_planes(identification),
+        **_both_planes(identification, deviations or {}),
         "delays": _delays(identification, campaign),
     }
 
@@ -98,13 +99,17 @@ def speed_band_to_json(
         "reasons": list(identification.reasons),
         "notes": list(identification.notes),
         "axes": _axes_to_json(identification, deviations or {}),
-        **_both_planes(identification),
+        **_both_planes(identification, deviations or {}),
     }
 
 
-def _both_planes(identification: Identification) -> dict[str, Any]:
+def _both_planes(identification: Identification, deviations: ModeDeviations) -> dict[str, Any]:
     """The machine whose planes feel each other; nothing where they do not."""
-    return {} if identification.whole is None else {"both_planes": both_planes_to_json(identification.whole)}
+    if identification.whole is None:
+        return {}
+    # both axes have the modes of the whole machine
+    content = both_planes_to_json(identification.whole, next(iter(deviations.values()), None))
+    return {"both_planes": {"in_words": identification.coupling, **content}}
 
 
 def _axes_to_json(identification: Identification, deviations: ModeDeviations) -> dict[str, Any]:
@@ -190,16 +195,21 @@ def machine_from_json(data: Mapping[str, Any], where: str) -> IdentifiedMachine:
         identified_workpiece=workpiece_of(top.table("workpiece")) if "workpiece" in top else None,
         sensors=tuple(sensor_of(name, table.data, where) for name, table in top.named_tables("sensors", default={}).items()),
         name=data["campaign"]["name"],
-        whole=both_planes_from_json(top.table("both_planes")) if "both_planes" in top else None,
+        whole=_whole(top),
     )
 
 
-def _speed_models(top: Table) -> Iterator[tuple[tuple[float, float], dict[Dof, MachineAxis]]]:
-    """Lowest and highest speed [rad/s] and the machine of each range of speeds; none where the file has none."""
+def _whole(table: Table) -> CoupledPosterior | None:
+    """Both planes where they feel each other."""
+    return both_planes_from_json(table.table("both_planes")) if "both_planes" in table else None
+
+
+def _speed_models(top: Table) -> Iterator[SpeedModel]:
+    """The machine of each range of speeds; none where the file has none."""
     for table in top.tables("speed_bands") if top.data.get("speed_bands") else []:
         low, high = table.numbers("speed_range_rpm", 2, "rev/min")
         if table.table("axes").data:
-            yield (low / to_rpm(1.0), high / to_rpm(1.0)), _axes(table)
+            yield SpeedModel((low / to_rpm(1.0), high / to_rpm(1.0)), _axes(table), _whole(table))
 
 
 def _axes(table: Table) -> dict[Dof, MachineAxis]:

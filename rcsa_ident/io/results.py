@@ -70,7 +70,7 @@ def spindle_from_json(data: Any, axis: Dof, where: str, path: str = "") -> tuple
     frequency = [mode.number("natural_frequency_hz", "Hz", above=0.0) for mode in modes]
     zeta = [mode.number("damping_ratio", "", above=0.0, most=1.0) for mode in modes]
     phi = [[complex(*mode.numbers(key, 2)) for key in ("phi_t", "phi_r")] for mode in modes]
-    residual = _matrix(table, "residual_compliance", 2)
+    residual = matrix_of(table, "residual_compliance", 2)
     joint = table.table("joint")
     values = [joint.number(key, above=0.0) if key.endswith("stiffness") else joint.number(key, least=0.0) for key in _JOINT]
     model = ModalModel(from_hz(np.array(frequency)), np.array(zeta), np.array(phi), residual, plane("flange", axis))
@@ -195,10 +195,7 @@ def _check_statistics(axis: Table) -> None:
     if "covariance" in axis:
         covariance = axis.table("covariance")
         names = _texts(covariance, "parameters")
-        matrix = _matrix(covariance, "matrix", len(names))
-        size = np.sqrt(np.abs(np.diag(matrix)))
-        if np.any(np.diag(matrix) < 0.0) or np.any(np.abs(matrix - matrix.T) > 1e-6 * np.outer(size, size)):
-            covariance.refuse("matrix", "one that is not symmetric or has a variance below 0", "a covariance matrix")
+        check_covariance(covariance, matrix_of(covariance, "matrix", len(names)))
     if "misfit" in axis:
         misfit = axis.table("misfit")
         misfit.number("chi2_per_point", least=0.0)
@@ -214,8 +211,15 @@ def _texts(table: Table, key: str) -> list[str]:
     return value
 
 
-def _matrix(table: Table, key: str, size: int) -> FloatArray:
-    """A square matrix of finite numbers."""
+def check_covariance(table: Table, matrix: FloatArray) -> None:
+    """Refuse a table's ``matrix`` that is none of variances and covariances."""
+    size = np.sqrt(np.abs(np.diag(matrix)))
+    if np.any(np.diag(matrix) < 0.0) or np.any(np.abs(matrix - matrix.T) > 1e-6 * np.outer(size, size)):
+        table.refuse("matrix", "one that is not symmetric or has a variance below 0", "a covariance matrix")
+
+
+def matrix_of(table: Table, key: str, size: int) -> FloatArray:
+    """Return a square matrix of finite numbers."""
     allowed = f"{size} rows of {size} finite numbers"
     value = table.value(key, allowed)
     if not isinstance(value, list) or len(value) != size or not all(isinstance(row, list) and len(row) == size for row in value):

@@ -54,6 +54,11 @@ class TipSource(Shown, ABC):
         return 0
 
     @property
+    def coupled_planes(self) -> bool:
+        """Whether X and Y feel each other, as far as that is known."""
+        return False
+
+    @property
     def prepared(self) -> bool:
         """Whether a further tooling costs milliseconds, its spread included."""
         return True
@@ -72,6 +77,11 @@ class TipSource(Shown, ABC):
         """Return what answers at a spindle speed [rad/s], by default at the middle of the speeds that it is known at."""
         del speed
         return self
+
+    def speed_answered(self, speed: float | None = None) -> float | None:
+        """Return the spindle speed [rad/s] of what `at(speed)` answers, by default the middle one; None where it does not change."""
+        known = self.speed_range
+        return None if known is None else 0.5 * (known[0] + known[1]) if speed is None else speed
 
     def models(self, speeds: FloatArray) -> Sequence[tuple[TipSource, NDArray[np.intp]]]:
         """Return each model that answers at some of the speeds [rad/s], and the places of those."""
@@ -116,6 +126,11 @@ class Machine(TipSource, Drawn):
         The moments couple the planes: a machine that turns is one part, with translation and slope of X and of Y.
         """
         return None
+
+    @property
+    def coupled_planes(self) -> bool:
+        """Whether X and Y feel each other."""
+        return any(len({c.dof.plane for c in part.coordinates}) > 1 for part in self.parts)
 
     @property
     def lowest(self) -> float:

@@ -72,6 +72,10 @@ class TurningMachine(Machine):
         """Return the machine at a spindle speed [rad/s], by default as it stands; beyond its speeds it is that of the nearest one."""
         return self if speed is None else replace(self, modes=self.modes.at(float(np.clip(speed, *self.speeds))))
 
+    def speed_answered(self, speed: float | None = None) -> float:
+        """Return the spindle speed [rad/s] of what `at(speed)` answers."""
+        return self.at(speed).modes.speed
+
     def __str__(self) -> str:
         low, high = (to_hz(w) for w in self.known)
         slow, fast = (to_rpm(w) for w in self.speeds)

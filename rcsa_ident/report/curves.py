@@ -13,6 +13,7 @@ from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.report.figures import _STYLE, COLOURS, _grid, _without_jumps, tooltip_frf
 from rcsa_ident.report.lobes import _CURVES
+from rcsa_ident.report.summaries import entries_of
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.units import to_hz
@@ -30,7 +31,7 @@ Deviation = dict[tuple[Coordinate, Coordinate], tuple[FloatArray, FloatArray]]
 
 
 def tip_figure(tip: Receptance, band: tuple[float, float] | None = None) -> Figure:
-    """The tooltip FRFs of both directions, with two standard deviations where a spread is known.
+    """The tooltip FRFs of both directions and those across, with two standard deviations where a spread is known.
 
     Parameters
     ----------
@@ -39,11 +40,11 @@ def tip_figure(tip: Receptance, band: tuple[float, float] | None = None) -> Figu
         In which the machine is known; outside is shaded.
     """
     tip = _thinned(tip)
-    deviation = _deviation(tip)
+    deviation, entries = _deviation(tip), entries_of(tip)
     return tooltip_frf(
         to_hz(tip.omega),
-        {c.dof.upper(): tip.between(str(c), str(c)) for c in tip.rows},
-        {row.dof.upper(): each for (row, col), each in deviation.items() if row == col},
+        {name: tip.between(str(row), str(col)) for name, (row, col) in entries.items()},
+        {name: deviation[pair] for name, pair in entries.items() if pair in deviation},
         band_hz=None if band is None else (to_hz(band[0]), to_hz(band[1])),
     )
 

@@ -23,7 +23,9 @@ from rcsa_ident.identification.result import AxisResult, Identification
 from rcsa_ident.units import to_hz
 
 #: Distinct for colour-blind readers, too (Okabe & Ito), and dark enough on white.
-COLOURS = {"X": "#0072B2", "Y": "#C8501A"}
+COLOURS = {"X": "#0072B2", "Y": "#C8501A", "XY": "#009E73", "YX": "#AA4499"}
+#: Share of the largest value below which curves across the planes, which pass through zero, are cut off.
+_LEAST_SHOWN = 3e-4
 STAGES = {
     Stage.SEARCH: ("genetic search", "#9aa5b1"),
     Stage.REFINE: ("refined candidates", "#0072B2"),
@@ -196,54 +198,65 @@ def tooltip_frf(
     truth: Mapping[str, ComplexArray] | None = None,
     band_hz: tuple[float, float] | None = None,
 ) -> Figure:
-    """Tooltip receptance C11, magnitude and real part, a column for each axis, with 2 standard deviations.
+    """Tooltip receptance C11, magnitude and real part, a column for each axis and one for what is across, with 2 standard deviations.
 
     Parameters
     ----------
     frequency : array, shape (n,) [Hz]
-    tip : mapping of X or Y to complex array, shape (n,) [m/N]
-    deviation : mapping of X or Y to (real, imaginary) standard deviations [m/N]
-    truth : mapping of X or Y to complex array, shape (n,) [m/N]
+    tip : mapping of X, Y, XY (motion in X under a force in Y) or YX to complex array, shape (n,) [m/N]
+    deviation : mapping of the same names to (real, imaginary) standard deviations [m/N]
+    truth : mapping of the same names to complex array, shape (n,) [m/N]
         The true one, where it is known.
     band_hz : (low, high) [Hz]
         Band that was identified; what lies outside is shaded.
     """
-    figure, grid = _grid(2, len(tip), 4.8, (1.3, 1.0))
+    columns = list(dict.fromkeys("across" if len(name) > 1 else name for name in tip))
+    alike = "XY" in tip and "YX" in tip and np.allclose(tip["XY"], tip["YX"], rtol=0.0, atol=1e-6 * float(np.max(np.abs(tip["XY"]))))
+    figure, grid = _grid(2, len(columns), 4.8, (1.3, 1.0))
     with mpl.rc_context(_STYLE):
-        for column, (axis, value) in enumerate(tip.items()):
+        for axis, value in tip.items():
+            if axis == "YX" and alike:
+                continue
+            column = columns.index("across" if len(axis) > 1 else axis)
             top, bottom = grid[:, column]
+            name = "XY = YX" if alike and axis == "XY" else axis
             size, real = 1e6 * np.abs(value), 1e6 * value.real
             if axis in deviation:
                 std_real, std_imaginary = (1e6 * d for d in deviation[axis])
                 unit = value / np.abs(value)
                 std_size = np.hypot(std_real * unit.real, std_imaginary * unit.imag)
                 low = np.maximum(size - 2.0 * std_size, 1e-3 * size)
-                top.fill_between(frequency, low, size + 2.0 * std_size, color=COLOURS[axis], alpha=0.3, lw=0, label="± 2 σ")
+                top.fill_between(
+                    frequency, low, size + 2.0 * std_size, color=COLOURS[axis], alpha=0.3, lw=0, label="± 2 σ" if len(axis) == 1 else None
+                )
                 bottom.fill_between(frequency, real - 2.0 * std_real, real + 2.0 * std_real, color=COLOURS[axis], alpha=0.3, lw=0)
-            top.plot(frequency, size, color=COLOURS[axis], label="predicted")
+            top.plot(frequency, size, color=COLOURS[axis], label=name if len(axis) > 1 else "predicted")
             bottom.plot(frequency, real, color=COLOURS[axis])
             if truth is not None and axis in truth:
-                top.plot(frequency, 1e6 * np.abs(truth[axis]), "--", color=_TRUTH, lw=1.1, label="true")
+                top.plot(frequency, 1e6 * np.abs(truth[axis]), "--", color=_TRUTH, lw=1.1, label="true" if len(axis) == 1 else None)
                 bottom.plot(frequency, 1e6 * truth[axis].real, "--", color=_TRUTH, lw=1.1)
             top.set_yscale("log")
+        for (top, bottom), name in zip(grid.T, columns, strict=True):
             for ax in (top, bottom):
-                _shade_outside(ax, frequency, band_hz)
-            top.set_title(f"{axis}: tooltip")
-            top.legend(loc="lower left")  # receptances fall with frequency: that corner is free
+                _shade_outside(ax, frequency, band_hz, name != "across")
+            top.set_title("motion across the force: tooltip" if name == "across" else f"{name}: tooltip")
+            # receptances fall with frequency: that corner is free, and what is across is smaller everywhere
+            top.legend(loc="upper right" if name == "across" else "lower left")
             bottom.set_xlabel("frequency [Hz]")
             bottom.set_xlim(frequency[0], frequency[-1])
         # the curves set the scale, not what is unknown outside the band
         all_sizes = 1e6 * np.abs(np.concatenate(list(tip.values())))
         all_real = 1e6 * np.concatenate(list(tip.values())).real
         reach = 0.08 * float(np.ptp(all_real))
-        grid[0, 0].set_ylim(0.5 * float(np.min(all_sizes)), 2.0 * float(np.max(all_sizes)))
+        least = max(0.5 * float(np.min(all_sizes)), _LEAST_SHOWN * float(np.max(all_sizes)) * ("across" in columns))
+        grid[0, 0].set_ylim(least, 2.0 * float(np.max(all_sizes)))
         grid[1, 0].set_ylim(float(np.min(all_real)) - reach, float(np.max(all_real)) + reach)
         grid[0, 0].set_ylabel("|C11|  [µm/N]")
         grid[1, 0].set_ylabel("real part [µm/N]")
     return figure
 
 
-def _shade_outside(ax: Axes, frequency: FloatArray, band_hz: tuple[float, float] | None) -> None:
+def _shade_outside(ax: Axes, frequency: FloatArray, band_hz: tuple[float, float] | None, named: bool = True) -> None:
     for start, end in () if band_hz is None else ((frequency[0], band_hz[0]), (band_hz[1], frequency[-1])):
         if start < end:
-            ax.axvspan(start, end, color="#52606d", alpha=0.10, lw=0, label="outside the identified band")
+            ax.axvspan(start, end, color="#52606d", alpha=0.10, lw=0, label="outside the identified band" if named else None)

@@ -11,12 +11,13 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.coupled.posterior import CoupledPosterior
 from rcsa_ident.identification.parameters import JOINT
 from rcsa_ident.identification.result import AxisResult, Identification
 from rcsa_ident.machining_setup import Campaign
 from rcsa_ident.report import figures
 from rcsa_ident.report.lobes import stability_figure
-from rcsa_ident.report.summaries import coefficient_rows, lobes_summary, mode_rows, peak_row, recording_rows, two_digits
+from rcsa_ident.report.summaries import coefficient_rows, lobes_summary, mode_rows, peak_row, recording_rows, two_digits, whole_mode_rows
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.advice import Advice
 from rcsa_ident.units import to_hz
@@ -36,12 +37,12 @@ class ToolingPage:
     recorded : bool
         Whether the campaign has cuts with it.
     frequency : array, shape (n,) [Hz]
-    tip : mapping of X or Y to complex array, shape (n,) [m/N]
-    deviation : mapping of X or Y to (real, imaginary) standard deviations [m/N]
-    truth : mapping of X or Y to complex array, shape (n,) [m/N], or None
-    error : mapping of X or Y to float [-]
-        Relative difference to the truth, where it is known.
-    coverage : mapping of X or Y to float [-]
+    tip : mapping of X, Y, XY (motion in X under a force in Y) or YX to complex array, shape (n,) [m/N]
+    deviation : mapping of the same names to (real, imaginary) standard deviations [m/N]
+    truth : mapping of the same names to complex array, shape (n,) [m/N], or None
+    error : mapping of the same names to float [-]
+        Difference to the truth over the norm of the direct FRF, where it is known.
+    coverage : mapping of the same names to float [-]
         Share of the true values (real and imaginary parts) within 2 standard deviations.
     advice : Advice or None
         Stability limits, and what is recommended within them.
@@ -51,6 +52,8 @@ class ToolingPage:
     conditions : str
         What the lobes hold for, in words.
     warnings : sequence of str
+    speed_rpm : float or None [rev/min]
+        Spindle speed that the tooltip FRF holds at; None where it does not change.
     """
 
     name: str
@@ -66,6 +69,7 @@ class ToolingPage:
     band_hz: tuple[float, float] | None = None
     conditions: str = ""
     warnings: Sequence[str] = ()
+    speed_rpm: float | None = None
 
 
 def report_html(
@@ -110,10 +114,13 @@ def report_html(
             _axis(axis.upper(), part, [tooling_of[c] for c in found.cut_ids], (deviations or {}).get(axis))
             for axis, part in found.axes.items()
         ],
+        both=None if found.whole is None else _both(found, deviations),
+        notes=[note for note in found.notes if note != found.coupling],
         scales=coefficient_rows(found.coefficients),
         has_std=bool(deviations),
-        softening=any(part.posterior is not None and part.posterior.layout.softening for part in found.axes.values()),
-        joint=_joint(next(iter(found.axes.values()))) if found.axes else [],
+        softening=any(part.posterior is not None and part.posterior.layout.softening for part in found.axes.values())
+        or (found.whole is not None and found.whole.best.layout.softening),
+        joint=_joint(next(iter(found.axes.values())), found.whole) if found.axes else [],
         untold=UNTOLD,
         convergence=figures.svg(figures.convergence(found), "search") if found.axes and found.trace else "",
         evaluations=len(found.trace),
@@ -142,7 +149,15 @@ def _axis(name: str, part: AxisResult, tooling: Sequence[str], deviation: tuple[
     }
 
 
-def _joint(part: AxisResult) -> list[dict[str, Any]]:
+def _both(found: Identification, deviations: Mapping[Dof, tuple[FloatArray, FloatArray]] | None) -> dict[str, Any]:
+    """Both planes as one machine."""
+    assert found.whole is not None
+    standing = found.whole.best.standing()
+    rows = whole_mode_rows(standing, next(iter((deviations or {}).values()), None))
+    return {"words": found.coupling, "modes": rows, "residual": standing.residual.tolist(), "turns": found.whole.turns}
+
+
+def _joint(part: AxisResult, whole: CoupledPosterior | None) -> list[dict[str, Any]]:
     """The joint's values with the range of 95 %, from the logarithms at the end of the covariance."""
     joint = part.joint
     values = (
@@ -151,7 +166,7 @@ def _joint(part: AxisResult) -> list[dict[str, Any]]:
         ("translational damping c_t", joint.translational_damping, "N s/m"),
         ("rotational damping c_r", joint.rotational_damping, "N m s/rad"),
     )
-    posterior = part.posterior
+    posterior = part.posterior if whole is None else whole
     deviation = [None] * 4 if posterior is None else np.sqrt(np.maximum(np.diag(posterior.covariance)[-JOINT:], 0.0)).tolist()
     return [
         {"name": name, "value": value, "unit": unit, "std": std, "range": None if std is None else _range(value, std)}

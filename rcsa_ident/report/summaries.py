@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.force import REFERENCE_RUNOUT, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Coordinate
-from rcsa_ident.dynamics.modal import ModalModel
+from rcsa_ident.dynamics.modal import ModalModel, directions
+from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.measurement import Reading
@@ -100,6 +102,55 @@ def mode_rows(modes: ModalModel, deviation: tuple[FloatArray, FloatArray] | None
             float(100.0 * modes.zeta[n]),
             complex(modes.phi[n, 0]),
             complex(modes.phi[n, 1]),
+            *deviations[n],
+        )
+        for n in order
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class WholeModeRow:
+    """One mode of a machine whose planes feel each other, its spindle at standstill.
+
+    Parameters
+    ----------
+    frequency_hz, damping_percent : float
+    direction_deg : float
+        Of the line along which it moves the flange, from +X towards +Y.
+    phi_t, phi_r : float [sqrt(s/kg)], [sqrt(s/(kg m^2))]
+        Size of its translation and of its slope, whatever their direction.
+    frequency_std_hz, damping_std_percent : float or None
+    """
+
+    frequency_hz: float
+    damping_percent: float
+    direction_deg: float
+    phi_t: float
+    phi_r: float
+    frequency_std_hz: float | None = None
+    damping_std_percent: float | None = None
+
+
+def whole_mode_rows(modes: ModalModel, deviation: tuple[FloatArray, FloatArray] | None = None) -> list[WholeModeRow]:
+    """Return a row for each mode of both planes, by frequency.
+
+    Parameters
+    ----------
+    modes : ModalModel
+        Translation and slope in X, then in Y.
+    deviation : (array, array), optional
+        As in `mode_rows`.
+    """
+    angles = np.degrees(directions(modes))
+    order = np.argsort(modes.omega_n)
+    deviations = [(None, None)] * order.size if deviation is None else [(to_hz(d), 100.0 * z) for d, z in zip(*deviation, strict=True)]
+    return [
+        WholeModeRow(
+            float(to_hz(modes.omega_n[n])),
+            float(100.0 * modes.zeta[n]),
+            float(angles[n]),
+            float(np.linalg.norm(modes.phi[n, [0, 2]])),
+            float(np.linalg.norm(modes.phi[n, [1, 3]])),
             *deviations[n],
         )
         for n in order
@@ -253,8 +304,23 @@ def _planned(cut: PlannedCut) -> dict[str, Any]:
     }
 
 
+def entries_of(receptance: Receptance, coordinates: Sequence[Coordinate] | None = None) -> dict[str, tuple[Coordinate, Coordinate]]:
+    """Return motion and force of each direct receptance under its axis' name, then of each cross term that is not zero: XY is X by Y.
+
+    Parameters
+    ----------
+    receptance : Receptance
+    coordinates : sequence of Coordinate, optional
+        Translations, one for each axis; by default all rows.
+    """
+    known = receptance.rows if coordinates is None else tuple(coordinates)
+    found = {c.dof.upper(): (c, c) for c in known}
+    crossed = ((row, col) for row, col in permutations(known, 2) if np.any(receptance.between(str(row), str(col))))
+    return found | {f"{row.dof}{col.dof}".upper(): (row, col) for row, col in crossed}
+
+
 def frf_summary(receptance: UncertainReceptance, coordinates: Sequence[Coordinate]) -> dict[str, Any]:
-    """Return direct receptances over frequency, axis by axis, with standard deviations where there are some [m/N].
+    """Return receptances over frequency with standard deviations where there are some [m/N]: of each axis, and across where planes couple.
 
     Parameters
     ----------
@@ -268,15 +334,16 @@ def frf_summary(receptance: UncertainReceptance, coordinates: Sequence[Coordinat
         If a receptance is not finite.
     """
     deviation = receptance.deviation()
-    axes = {}
-    for coordinate in coordinates:
-        real, imaginary = deviation.get((coordinate, coordinate), (None, None))
-        values = receptance.between(str(coordinate), str(coordinate))
+    axes: dict[str, Any] = {}
+    cross: dict[str, Any] = {}
+    for name, (row, col) in entries_of(receptance, coordinates).items():
+        real, imaginary = deviation.get((row, col), (None, None))
+        values = receptance.between(str(row), str(col))
         parts = {"re": values.real, "im": values.imag, "re_std": real, "im_std": imaginary}
         if not all(part is None or np.all(np.isfinite(part)) for part in parts.values()):
             raise InputError("tooling", "a receptance that is not finite", "a tooling whose receptance is finite at every frequency")
-        axes[coordinate.dof.upper()] = {key: None if part is None else part.tolist() for key, part in parts.items()}
-    return {"frequency_hz": np.round(to_hz(receptance.omega), 9).tolist(), "axes": axes}
+        (axes if row == col else cross)[name] = {key: None if part is None else part.tolist() for key, part in parts.items()}
+    return {"frequency_hz": np.round(to_hz(receptance.omega), 9).tolist(), "axes": axes, "cross": cross}
 
 
 def finite(value: float | None, unit: float = 1.0) -> float | None:

@@ -11,6 +11,7 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.coupling.rcsa import couple
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance, Substructure
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.tool_holder.geometry import BeamSegment, Contact, ToolAssembly
@@ -29,10 +30,20 @@ _STEP = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class Support:
-    """A known machine that the assembly was clamped in."""
+    """A known machine that the assembly was clamped in.
+
+    Parameters
+    ----------
+    flange : Substructure
+        One bending plane, or both where they feel each other.
+    joint : LumpedJoint
+    axis : Dof or None
+        Along which was tapped; None is the plane's own.
+    """
 
     flange: Substructure
     joint: LumpedJoint
+    axis: Dof | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,17 +193,13 @@ def tap_model(tap: TapTest, contact: Contact, modulus: float = 1.0) -> ComplexAr
     assembly = replace(
         tap.assembly, tool=_scaled(tap.assembly.tool, modulus), holder=_scaled(tap.assembly.holder, modulus), contact=contact
     )
-    free = tool_holder_receptance(assembly, tap.omega)
     if tap.support is None:
-        return _translation(free, tap.row, tap.col)
-    axis = next(c.dof for c in tap.support.flange.coordinates if not c.dof.is_slope)
-    if axis != free.rows[0].dof:
-        free = tool_holder_receptance(assembly, tap.omega, axis)
-    return _translation(couple(free, tap.support.flange.receptance(tap.omega), tap.support.joint), tap.row, tap.col)
-
-
-def _translation(receptance: Receptance, row: str, col: str) -> ComplexArray:
-    return receptance[row, col][:, 0, 0]
+        return tool_holder_receptance(assembly, tap.omega)[tap.row, tap.col][:, 0, 0]
+    planes = [c.dof for c in tap.support.flange.coordinates if not c.dof.is_slope]
+    axis = planes[0] if tap.support.axis is None else tap.support.axis
+    free = Receptance.block_diagonal([tool_holder_receptance(assembly, tap.omega, each) for each in planes])
+    found = couple(free, tap.support.flange.receptance(tap.omega), tap.support.joint)
+    return found.between(f"{tap.row}.{axis}", f"{tap.col}.{axis}")
 
 
 def _scaled(segments: tuple[BeamSegment, ...], factor: float) -> tuple[BeamSegment, ...]:

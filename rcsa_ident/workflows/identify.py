@@ -101,27 +101,40 @@ def of_campaign(found: Identification, campaign: Campaign) -> Identification:
 def mode_deviations(found: Identification) -> dict[Dof, tuple[FloatArray, FloatArray]]:
     """Return the standard deviations of natural frequencies [rad/s] and damping ratios of the axes that have a posterior.
 
-    Linear propagation, sqrt(diag(J C J^T)), of the unknowns' covariance C; shape (m,) each, in the order of the axis' modes.
+    Linear propagation, sqrt(diag(J C J^T)), of the unknowns' covariance C; shape (m,) each, in the order of the axis' modes. Planes that
+    feel each other have the same modes, those of the whole machine that does not turn.
     """
-    return {axis: _mode_deviation(axis, part.posterior) for axis, part in found.axes.items() if part.posterior is not None}
+    if found.whole is not None:
+        whole = found.whole
+        return dict.fromkeys(
+            found.axes, _mode_deviation(whole.best.theta, whole.covariance, lambda theta: replace(whole.best, theta=theta).standing().pole)
+        )
+    known = {axis: part.posterior for axis, part in found.axes.items() if part.posterior is not None}
+    return {axis: _mode_deviation(each.theta, each.covariance, partial(_poles, axis, each)) for axis, each in known.items()}
 
 
-def _mode_deviation(axis: Dof, posterior: Posterior) -> tuple[FloatArray, FloatArray]:
-    pole = posterior.machine(axis)[0].pole
+def _poles(axis: Dof, posterior: Posterior, theta: FloatArray) -> ComplexArray:
+    return posterior.machine(axis, theta)[0].pole
+
+
+def _mode_deviation(
+    theta: FloatArray, covariance: FloatArray, poles_of: Callable[[FloatArray], ComplexArray]
+) -> tuple[FloatArray, FloatArray]:
+    pole = poles_of(theta)
     size = np.abs(pole)
 
     def poles(step: FloatArray) -> ComplexArray:
-        moved = posterior.machine(axis, posterior.theta + step)[0].pole
+        moved = poles_of(theta + step)
         # modes that stand close may change places: each goes on from where it was
         return moved[np.argmin(np.abs(moved[None, :] - pole[:, None]), axis=1)]
 
-    slope = np.array([(poles(step) - poles(-step)) / (2.0 * _STEP) for step in _STEP * np.eye(posterior.theta.size)])
+    slope = np.array([(poles(step) - poles(-step)) / (2.0 * _STEP) for step in _STEP * np.eye(theta.size)])
     frequency = (slope * pole.conj()).real / size
     # zeta = -Re(pole) / |pole|
     damping = (frequency * pole.real / size - slope.real) / size
 
     def deviation(jacobian: FloatArray) -> FloatArray:
-        return np.sqrt(np.maximum(np.einsum("pm,pq,qm->m", jacobian, posterior.covariance, jacobian), 0.0))
+        return np.sqrt(np.maximum(np.einsum("pm,pq,qm->m", jacobian, covariance, jacobian), 0.0))
 
     return deviation(frequency), deviation(damping)
 

@@ -263,6 +263,9 @@ def line_noise(measurements: Sequence[CutMeasurement]) -> float:
 def _check(
     machine: IdentifiedMachine, toolings: Sequence[Tooling], targets: Sequence[Tooling], count: int, band_hz: tuple[float, float]
 ) -> None:
+    if machine.coupled_planes:
+        allowed = "a machine whose planes do not feel each other: what is known of this one belongs to both together"
+        raise InputError("both_planes", "X and Y that feel each other", allowed)
     for axis, part in machine.identified.items():
         if part.posterior is None:
             raise InputError(f"axis {axis.upper()}", "no covariance", "an identification with a posterior")

@@ -32,8 +32,8 @@ from rcsa_ident.units import to_hz, to_rpm
 
 #: How far beyond the identified band receptances are computed where a method fits modes to them: those above it are the tool's own.
 BEYOND = 1.5
-#: Seconds for a line and an unknown of the posterior, and further seconds for a speed with bands.
-_SPREAD_SECONDS, _BAND_SECONDS = 1e-6, 2e-4
+#: Seconds for a line and an unknown of the posterior, those of planes that feel each other, and further seconds for a speed with bands.
+_SPREAD_SECONDS, _SPREAD_SECONDS_OF_BOTH, _BAND_SECONDS = 1e-6, 9e-6, 2e-4
 #: Unequal pitch costs the zero-order method so many times as much; a machine that changes with speed so many further seconds.
 _PITCH_FACTOR, _CHANGING_SECONDS = 30.0, 4.0
 _UNLIMITED = SpindleDrive.flat(None, None, None)
@@ -49,11 +49,14 @@ class TipAnswer:
     tip : UncertainReceptance
     remarks : tuple of str
         What the user should know.
+    speed : float or None [rad/s]
+        Spindle speed that it holds at; None where it does not change.
     """
 
     tooling: Tooling
     tip: UncertainReceptance
     remarks: tuple[str, ...]
+    speed: float | None = None
 
 
 def tooltip(
@@ -72,7 +75,7 @@ def tooltip(
     tooling : Tooling
     omega : array, shape (n,) [rad/s], default the machine's `lines`
     speed : float or None [rad/s]
-        Spindle speed, for a machine that changes with it.
+        Spindle speed, for a machine that changes with it; by default the middle of the speeds that it is known at.
     spread : bool
         With what the records leave open.
     stiffness_spread : float
@@ -86,7 +89,7 @@ def tooltip(
     if machine.band is not None and tip.omega.max() > 1.001 * machine.band[1]:
         top = to_hz(machine.band[1])
         remarks.append(f"the machine is known up to {top:.0f} Hz; above that the receptance is extrapolated")
-    return TipAnswer(tooling, tip, tuple(remarks))
+    return TipAnswer(tooling, tip, tuple(remarks), machine.speed_answered(speed))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -258,7 +261,7 @@ def surface_of(change: ToolChange, depth: float) -> SurfaceError:
 
 def spread_seconds(machine: TipSource, omega: FloatArray) -> float:
     """Return about how long the spread of a tip at some frequencies takes where nothing is worked out before [s]."""
-    return _SPREAD_SECONDS * machine.unknowns * omega.size
+    return (_SPREAD_SECONDS_OF_BOTH if machine.coupled_planes else _SPREAD_SECONDS) * machine.unknowns * omega.size
 
 
 def _outside_band(lobes: StabilityLobes, band: tuple[float, float]) -> str | None:

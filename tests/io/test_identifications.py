@@ -160,7 +160,7 @@ def test_speed_bands_come_back_with_their_edges(tmp_path, path, found):
     data["speed_bands"] = [speed_band_to_json(speeds, found) for speeds in edges]
     write_result(path, data)
     read = machine_from_json(read_result(path), str(path)).speed_models
-    for (speeds, machine), wanted in zip(read, edges, strict=True):
+    for (speeds, machine, _), wanted in zip(read, edges, strict=True):
         assert speeds == pytest.approx(wanted, rel=1e-14)
         np.testing.assert_array_equal(machine[Dof.Y].posterior.theta, found.axes[Dof.Y].posterior.theta)
 

@@ -145,6 +145,26 @@ function wrapped(curve, part) {
   return { y, band };
 }
 
+/** Share of the largest value below which curves across the directions are cut off. */
+const LEAST_ACROSS = 3e-4;
+
+/** What is felt across: XY is the motion in X under a force in Y; one curve where both ways are the same. */
+export function across(answer) {
+  const { XY, YX } = answer.cross ?? {};
+  if (!XY || !YX) return Object.entries(answer.cross ?? {});
+  const most = Math.max(...XY.re.map((re, k) => Math.hypot(re, XY.im[k])));
+  const apart = Math.max(...XY.re.map((re, k) => Math.hypot(re - YX.re[k], XY.im[k] - YX.im[k])));
+  return apart <= 1e-6 * most ? [["XY = YX", XY]] : [["XY", XY], ["YX", YX]];
+}
+
+/** The curves that are asked for, each with its place among all. */
+function curves(answer, shown, one) {
+  const direct = Object.entries(answer.axes).map(([name, curve], k) => ({ name, curve, k, dash: "solid" }));
+  const cross = across(answer).map(([name, curve], k) => ({ name, curve, k: direct.length + k, dash: "dash" }));
+  if (shown === "across") return cross;
+  return shown === "both" ? [...direct, ...(one ? cross : [])] : direct.filter((each) => each.name === shown);
+}
+
 /** FRFs: answers of /tooltip or of a machine's flange, as [{name, frequency_hz, axes}]. */
 export function frfFigure(answers, { parts, shown }) {
   const data = [];
@@ -152,10 +172,9 @@ export function frfFigure(answers, { parts, shown }) {
   const log = parts === "polar";
   const [upper, lower] = log ? ["magnitude", "phase"] : ["real", "imaginary"];
   answers.forEach((answer, i) => {
-    Object.entries(answer.axes).forEach(([name, curve], k) => {
-      if (shown !== "both" && shown !== name) return;
+    curves(answer, shown, answers.length === 1).forEach(({ name, curve, k, dash: own }) => {
       const series = answers.length === 1 ? seriesOf(k) : seriesOf(i);
-      const dash = answers.length === 1 ? "solid" : DASHES[k];
+      const dash = answers.length === 1 ? own : DASHES[k];
       const label = safe(answers.length === 1 ? name : `${answer.tooling} ${name}`);
       for (const [part, yaxis] of [
         [upper, "y"],
@@ -185,6 +204,10 @@ export function frfFigure(answers, { parts, shown }) {
       }
     });
   });
+  // what is felt across passes through zero: its depth there is nobody's question
+  const crossed = answers.some((answer) => across(answer).length) && shown !== "across";
+  const sizes = answers.flatMap((answer) => Object.values(answer.axes).flatMap((c) => c.re.map((re, k) => Math.hypot(re, c.im[k]) * times)));
+  const most = crossed ? sizes.reduce((a, b) => Math.max(a, b), 0) : 0;
   const u = unit("receptance");
   const layout = {
     hovermode: "x unified",
@@ -193,6 +216,7 @@ export function frfFigure(answers, { parts, shown }) {
       domain: [log ? 0.38 : 0.53, 1],
       type: log ? "log" : "linear",
       dtick: log ? 1 : undefined,
+      ...(log && most > 0 ? { range: [Math.log10(LEAST_ACROSS * most), Math.log10(2 * most)] } : {}),
       exponentformat: "none",
     }),
     yaxis2: axis(log ? "Phase [°]" : `Imag. [${u}]`, {

@@ -15,13 +15,15 @@ from rcsa_ident.dynamics.turning_modes import TurningModes
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.coupled.parameters import CoupledLayout, unpack
 from rcsa_ident.identification.data import LEVER
-from rcsa_ident.identification.parameters import JOINT, joint_of
-from rcsa_ident.identification.posterior import LONGEST_STEP
+from rcsa_ident.identification.parameters import JOINT, AxisLayout, joint_of, lower_factor, pack, simple_axis
+from rcsa_ident.identification.posterior import LONGEST_STEP, PlaneUnknowns
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation
 
 #: Directions of the flange in the order of the unknowns.
 FLANGE: tuple[Coordinate, ...] = (*plane("flange", Dof.X), *plane("flange", Dof.Y))
 _SI = np.array([1.0, 1.0 / LEVER, 1.0, 1.0 / LEVER])
+#: Least share of a mode's squared shape that lies in a plane whose search starts with it.
+OWN_SHARE = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,11 +58,25 @@ class CoupledUnknowns:
         residual = machine.residual @ machine.residual.T * np.outer(_SI, _SI)
         return TurningModes(machine.omega_n, machine.factor @ machine.factor.T, skew, machine.psi * _SI, residual, sense * speed, FLANGE)
 
-    def standing(self) -> ModalModel:
-        """Return the modes of the machine that does not turn, in both planes, at the middle of the campaign's speeds else."""
-        machine = unpack(self.theta, self.layout)
+    def standing(self, x: float = 0.0) -> ModalModel:
+        """Return the modes of the machine that does not turn, in both planes; its stiffness is that at relative speed x, by default the
+        one at the middle of the campaign's speeds.
+        """
+        machine = unpack(self.theta, self.layout).at(x)
         residual = machine.residual @ machine.residual.T * np.outer(_SI, _SI)
         return damped_modes(machine.omega_n, machine.factor @ machine.factor.T, machine.psi * _SI, residual, FLANGE)
+
+    def seen_along(self, axis: Dof) -> PlaneUnknowns:
+        """Return the modes that move one plane, as if it felt nothing of the other: where its own search may start."""
+        machine = unpack(self.theta, self.layout)
+        own = slice(0, 2) if axis is Dof.X else slice(2, 4)
+        share = np.sum(machine.psi[:, own] ** 2, axis=1) / np.maximum(np.sum(machine.psi**2, axis=1), 1e-300)
+        kept = np.flatnonzero(share >= OWN_SHARE)
+        if not kept.size:
+            kept = np.array([int(np.argmax(share))])
+        factor, residual = lower_factor(machine.factor[kept]), lower_factor(machine.residual[own])
+        alone = simple_axis(machine.omega_n[kept], machine.psi[kept, own], factor, residual)
+        return PlaneUnknowns(np.concatenate([pack(alone), self.theta[-JOINT:]]), AxisLayout(kept.size))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,10 +114,13 @@ class CoupledPosterior:
 
         Outside the campaign's speeds the stiffness is that of the nearest of them; gyroscopic moments go on with the speed.
         """
+        speed = self.speed_range[0] if speed is None else speed
+        return JointedFlange(unknowns.modes(speed, self.relative(speed)), unknowns.joint)
+
+    def relative(self, speed: float | None) -> float:
+        """Return a spindle speed [rad/s], by default the campaign's middle one, as -1 at its lowest and 1 at its highest, no further."""
         middle, half = self.speed_range
-        speed = middle if speed is None else speed
-        x = 0.0 if half == 0.0 else float(np.clip((speed - middle) / half, -1.0, 1.0))
-        return JointedFlange(unknowns.modes(speed, x), unknowns.joint)
+        return 0.0 if speed is None or half == 0.0 else float(np.clip((speed - middle) / half, -1.0, 1.0))
 
     def part(self, speed: float | None) -> FlangePart:
         """Return both planes as one part of the flange, with what is not known of it, at a spindle speed [rad/s]."""

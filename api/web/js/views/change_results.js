@@ -2,7 +2,7 @@
 import { send } from "../api.js";
 import { add, card, choices, fill, h, note, save, table, whisper } from "../dom.js";
 import { chart, legend, SERIES } from "../charts.js";
-import { frfFigure, lobeFigure, removalPer } from "../figures.js";
+import { across, frfFigure, lobeFigure, removalPer } from "../figures.js";
 import { failed, quantity } from "../forms.js";
 import { testedCuts, testedLegend, toldRight } from "../tested.js";
 import { plain, q, u } from "../units.js";
@@ -152,8 +152,14 @@ function frfCard(found, body) {
   draw();
   const axes = Object.keys(found.tips[0].axes);
   const one = found.tips.length === 1;
+  const crossed = across(found.tips[0]).map(([name]) => name);
+  const rpm = found.tips[0].spindle_speed_rpm;
+  if (shown === "across" && !crossed.length) shown = "both";
   const keys = one
-    ? axes.map((name, k) => ({ name: `${name} direction`, series: SERIES[k] }))
+    ? [
+        ...axes.map((name, k) => ({ name: `${name} direction`, series: SERIES[k] })),
+        ...crossed.map((name, k) => ({ name, series: SERIES[axes.length + k], dash: "dash" })),
+      ]
     : [
         ...found.tips.map((t, i) => ({ name: t.tooling, series: SERIES[i % SERIES.length] })),
         ...axes.map((name, k) => ({ name, series: "s6", dash: k ? "dash" : "solid" })),
@@ -196,7 +202,7 @@ function frfCard(found, body) {
         },
       ),
       axes.length > 1
-        ? choices("Directions", [["both", "X and Y"], ...axes.map((a) => [a, a])], shown, (value) => {
+        ? choices("Directions", [["both", "X and Y"], ...axes.map((a) => [a, a]), ...(crossed.length ? [["across", "Across"]] : [])], shown, (value) => {
             shown = value;
             draw();
           })
@@ -204,7 +210,13 @@ function frfCard(found, body) {
     ),
     legend(keys),
     picture,
-    h("p", { class: "small soft" }, "Shaded: 95 % band."),
+    h(
+      "p",
+      { class: "small soft" },
+      "Shaded: 95 % band.",
+      crossed.length ? " XY: motion in X under a force in Y." : null,
+      rpm ? ` At ${plain(rpm)} rev/min, the middle of the speeds that were cut: it changes with the speed, and the lobes take each speed's own.` : null,
+    ),
     place,
   );
 }

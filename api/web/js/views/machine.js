@@ -2,11 +2,12 @@
 import { get, getText, Problem, send } from "../api.js";
 import { add, card, empty, fill, h, head, link, mark, note, save } from "../dom.js";
 import { chart, legend, SERIES } from "../charts.js";
-import { frfFigure } from "../figures.js";
+import { across, frfFigure } from "../figures.js";
 import { confirmed, failed } from "../forms.js";
 import { go, to } from "../router.js";
 import { allMachines } from "../state.js";
-import { modesCards, notes } from "./modes.js";
+import { plain } from "../units.js";
+import { coupling, modesCards, notes } from "./modes.js";
 
 const JSON_TYPE = "application/json";
 const CSV = "text/csv";
@@ -53,9 +54,14 @@ export async function view({ id }, _query, place) {
     known.reasons.length
       ? note(known.status === "failed" ? "bad" : "doubt", h("strong", null, `The identification is ${known.status}`), ...known.reasons)
       : null,
+    modes && coupling(modes),
   );
   if (known.axes.length) {
     const picture = chart("The spindle's receptance at its flange", "frf");
+    const told = h("p", { class: "small soft" });
+    const keys = h("div");
+    const direct = known.axes.map((axis, k) => ({ name: `${axis} direction`, series: SERIES[k] }));
+    fill(keys, legend(direct));
     add(
       place,
       h(
@@ -68,7 +74,7 @@ export async function view({ id }, _query, place) {
           card(
             "Receptance at the flange",
             null,
-            legend(known.axes.map((axis, k) => ({ name: `${axis} direction`, series: SERIES[k] }))),
+            keys,
             picture,
             h(
               "p",
@@ -77,6 +83,7 @@ export async function view({ id }, _query, place) {
                 ? "Machine and spindle alone, without a tool-holder. Shaded: 95 % band."
                 : "Machine and spindle alone, as they were measured: taken for exact.",
             ),
+            told,
           ),
           modes && notes(modes),
         ),
@@ -85,7 +92,17 @@ export async function view({ id }, _query, place) {
     // nothing is known of a measurement beyond its ends
     const first = measured ? "" : `?from_hz=${Math.max(50, known.band_hz[0] * 0.5)}`;
     get(`machines/${id}/identification/frf${first}`)
-      .then((frf) => picture.draw(() => frfFigure([{ ...frf, tooling: machine.name }], { parts: "polar", shown: "both" })))
+      .then((frf) => {
+        const crossed = across(frf).map(([name], k) => ({ name, series: SERIES[direct.length + k], dash: "dash" }));
+        if (crossed.length) fill(keys, legend([...direct, ...crossed]));
+        const rpm = frf.spindle_speed_rpm;
+        fill(
+          told,
+          crossed.length ? "XY: motion in X under a force in Y. " : null,
+          rpm ? `At ${plain(rpm)} rev/min, the middle of the speeds that were cut: it changes with the speed.` : null,
+        );
+        return picture.draw(() => frfFigure([{ ...frf, tooling: machine.name }], { parts: "polar", shown: "both" }));
+      })
       .catch((error) => fill(picture, note("bad", error.message)));
   }
   const file = measured ? "FLANGE.csv" : "RESULT.json";

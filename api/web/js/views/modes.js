@@ -7,7 +7,8 @@ const size = (pair) => Math.hypot(...pair);
 
 /** A number with its standard deviation, both cut where the deviation says that digits end. */
 export function withSpread(value, spread, times = 1) {
-  if (spread === null || spread === undefined) return significant(value * times, 4);
+  // a mode at critical damping stays there: that is no number of a hundred digits
+  if (spread === null || spread === undefined || spread * times < 1e-6) return significant(value * times, 4);
   const place = spread > 0 ? Math.max(0, 1 - Math.floor(Math.log10(spread * times))) : 3;
   const digits = Math.min(place, 6);
   return h(
@@ -18,41 +19,74 @@ export function withSpread(value, spread, times = 1) {
   );
 }
 
-/** A card for each axis. */
+/** How X and Y feel each other, where they do. */
+export function coupling(modes) {
+  const words = modes.both_planes?.in_words;
+  return words ? note("", `${words}.`) : null;
+}
+
+const outside = (rows, band) =>
+  rows.some(({ mode }) => !within(mode, band))
+    ? h("p", { class: "small soft" }, `Outside: not in the band that the cuts excited, ${plain(band[0])} to ${plain(band[1])} Hz.`)
+    : null;
+
+const misfit = (found) => (found.misfit_per_point === null ? "" : significant(found.misfit_per_point, 3));
+
+/** The card of both directions, where they feel each other. */
+function togetherCard(modes) {
+  const rows = modes.both_planes.modes.map((mode, i) => ({ mode, i }));
+  const axes = Object.entries(modes.axes);
+  const told = axes.filter(([, found]) => misfit(found)).map(([axis, found]) => `${axis} ${misfit(found)}`);
+  return card(
+    "Modes, X and Y together",
+    told.length ? h("span", { class: "soft small" }, `misfit per point ${told.join(", ")}`) : null,
+    table("Modes of both directions", [...columns(modes.band_hz), DIRECTION], rows, {
+      row: ({ mode }) => ({ class: within(mode, modes.band_hz) ? null : "soft" }),
+    }),
+    outside(rows, modes.band_hz),
+    h(
+      "p",
+      { class: "small soft" },
+      "Direction: of the line along which a mode moves the flange, from +X towards +Y. The spindle at standstill",
+      modes.both_planes.gyroscopic ? "; gyroscopic moments, which grow with its speed, are in everything that is computed with the machine." : ".",
+    ),
+    joint(axes[0][1].joint),
+  );
+}
+
+const DIRECTION = { name: "Direction", unit: "°", number: true, cell: ({ mode }) => plain(mode.direction_deg) };
+
+const sizeOf = (translation) => ({
+  name: "Translation",
+  unit: "10⁻³ √(s/kg)",
+  number: true,
+  cell: ({ mode }) => significant(translation(mode) * 1e3, 3),
+});
+
+const columns = (band) => [
+  {
+    name: "Mode",
+    cell: (r) => [String(r.i + 1), within(r.mode, band) ? null : h("span", { class: "soft small" }, " outside")],
+  },
+  { name: "Frequency", unit: "Hz", number: true, cell: ({ mode }) => withSpread(mode.natural_frequency_hz, mode.natural_frequency_std_hz) },
+  { name: "Damping", unit: "%", number: true, cell: ({ mode }) => withSpread(mode.damping_ratio, mode.damping_ratio_std, 100) },
+];
+
+/** A card for each axis, or one for both where they feel each other. */
 export function modesCards(modes) {
+  if (modes.both_planes) return [togetherCard(modes)];
   const cards = Object.entries(modes.axes).map(([axis, found]) => {
     const rows = found.modes.map((mode, i) => ({ mode, i }));
     return card(
       `Modes, ${axis} direction`,
-      found.misfit_per_point === null
-        ? null
-        : h("span", { class: "soft small" }, `misfit per point ${significant(found.misfit_per_point, 3)}`),
+      misfit(found) ? h("span", { class: "soft small" }, `misfit per point ${misfit(found)}`) : null,
       table(
         `Modes in ${axis}`,
-        [
-          {
-            name: "Mode",
-            cell: (r) => [String(r.i + 1), within(r.mode, modes.band_hz) ? null : h("span", { class: "soft small" }, " outside")],
-          },
-          {
-            name: "Frequency",
-            unit: "Hz",
-            number: true,
-            cell: ({ mode }) => withSpread(mode.natural_frequency_hz, mode.natural_frequency_std_hz),
-          },
-          { name: "Damping", unit: "%", number: true, cell: ({ mode }) => withSpread(mode.damping_ratio, mode.damping_ratio_std, 100) },
-          { name: "Translation", unit: "10⁻³ √(s/kg)", number: true, cell: ({ mode }) => significant(size(mode.phi_t) * 1e3, 3) },
-        ],
+        [...columns(modes.band_hz), sizeOf((mode) => size(mode.phi_t))],
         rows,
         { row: ({ mode }) => ({ class: within(mode, modes.band_hz) ? null : "soft" }) },
       ),
-      rows.some(({ mode }) => !within(mode, modes.band_hz))
-        ? h(
-            "p",
-            { class: "small soft" },
-            `Outside: not in the band that the cuts excited, ${plain(modes.band_hz[0])} to ${plain(modes.band_hz[1])} Hz.`,
-          )
-        : null,
+      outside(rows, modes.band_hz),
       joint(found.joint),
     );
   });
@@ -89,16 +123,17 @@ function joint(values) {
 
 /** What could not be told is as much of an answer as what could. */
 export function notes(modes) {
-  if (!modes.notes.length) return null;
+  const told = modes.notes.filter((each) => each !== modes.both_planes?.in_words);
+  if (!told.length) return null;
   return card(
     "What the cuts could not tell",
-    mark("idle", `${modes.notes.length}`),
+    mark("idle", `${told.length}`),
     note(
       "",
       h(
         "ul",
         null,
-        modes.notes.map((each) => h("li", null, each)),
+        told.map((each) => h("li", null, each)),
       ),
     ),
   );
