@@ -111,13 +111,16 @@ class CoupledFilter:
             With a fixed lag, the delay by it taken out; a long one stands for the smoother.
         """
         a, seen, rows, gain = self._steady()
+        closed, predicted = a - gain @ seen @ a, seen @ a
+        # from its own poles: solving for each frequency takes seconds and hundreds of megabytes
+        pole, shapes = np.linalg.eig(closed)
+        entering = np.linalg.solve(shapes, gain)
         turn = np.asarray(omega, dtype=float)[:, None] * self.model.step
-        back = np.exp(-1j * turn)[:, :, None]
-        closed = a - gain @ seen @ a
-        states = np.linalg.solve(np.eye(len(a)) - back * closed, np.broadcast_to(gain, (back.shape[0], *gain.shape)))
-        force: ComplexArray = rows @ states
+        back = np.exp(-1j * turn)
+        states = 1.0 / (1.0 - back * pole)
+        force: ComplexArray = ((rows @ shapes) * states[:, None]) @ entering
         if lag:
-            innovation = np.eye(len(seen)) - back * (seen @ a @ states)
+            innovation = np.eye(len(seen)) - back[:, :, None] * (((predicted @ shapes) * states[:, None]) @ entering)
             ahead = np.exp(1j * turn * np.arange(1.0, lag + 1.0))
             force = force + np.tensordot(ahead, self.lag_weights(lag), axes=1) @ innovation
         return force

@@ -109,6 +109,10 @@ def test_compensated_with_the_machine_it_is_flat_at_the_orders():
         assert low < 410.0
         assert high > 4000.0
         assert abs(response.delay_at_lines) * oblique_cut().cut.rate < 0.1
+    together, omega = found().observer.together, 2.0 * np.pi * np.array([390.0, 400.0, 1234.0, 4100.0])
+    assert together is not None
+    solved = together.state_space().response(omega)[:, :2]
+    np.testing.assert_allclose(together.response(omega), solved, atol=1e-7 * np.abs(solved).max())
     with pytest.raises(InputError, match="both axes at once"):
         observer_response(found().observer.axes[0], np.ones(1), np.ones(1))
     alone = replace(found().observer, together=None)
