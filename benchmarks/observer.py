@@ -2,6 +2,9 @@
 
 The case is that of [inprocess]: half-immersion down-milling at 12 000 rev/min, 2 teeth, 1 mm deep, 0.15 mm a tooth, here on the
 sample machine of `data/machines/hpm.toml`. The observer knows the machine as `rcsa-ident identify data/sample_runs` found it, not as it is.
+
+And the same cut on a machine whose axes feel each other (oblique by 10 degrees and gyroscopic), which the observer knows as it is: one
+filter for both forces beside one for each axis, which leaves the cross terms out.
 """
 
 from __future__ import annotations
@@ -26,6 +29,7 @@ from rcsa_ident.observer._kernels import kalman_steps
 from rcsa_ident.observer.kalman import KalmanFilter
 from rcsa_ident.observer.tuning import ObserverMethod, PaperWalk, Resonators
 from rcsa_ident.workflows.estimate_forces import MonitoredCut, observe
+from tests.fixtures.oblique_cut import measured_flange, oblique_cut, oblique_machine
 from tests.fixtures.virtual_cut import AXES, BAND_HZ, CASE, VirtualCut, relative_error, true_response, virtual_cut
 
 DATA = Path(__file__).resolve().parent.parent / "data"
@@ -141,7 +145,31 @@ def force_rows(machine: IdentifiedMachine, cut: VirtualCut) -> list[dict[str, An
     return rows
 
 
+def coupled_rows() -> list[dict[str, Any]]:
+    """Errors with and without the cross terms, and what a step costs."""
+    rows: list[dict[str, Any]] = []
+    cut = oblique_cut()
+    for smooth in (False, True):
+        errors = []
+        for machine in (oblique_machine(), measured_flange(cross=False)):
+            found = observe(machine, cut.tooling.assembly, 2, cut.cut, cut.air, CASE.spindle_speed, Resonators(), None, smooth)
+            errors.append(relative_error(found.estimate.force, cut.force, cut.cut.rate))
+            together = found.observer.together
+            if together is not None and not smooth:
+                measured, state = 1e-8 * np.random.default_rng(1).normal(size=(10240, 2)), together.init()
+                seconds = best_of(partial(together.run, state, measured)) / measured.shape[0]
+                gap, acceleration = cut.cut.samples[:1024, :2], cut.cut.samples[:1024, 2:4]
+                whole = best_of(partial(found.observer.run, found.observer.init(), gap, acceleration)) / gap.shape[0]
+                states, order = int(np.sum(together.model.live)), found.observer.axes[0].transfer.order
+                text = f"{1e6 * whole:.3f} us with run-out and both sensors; C31 of order {order}"
+                rows.append(row(f"observer of both axes, {states} states: a step of both in steady state", seconds * 1e6, None, "us", text))
+        (own, other), kind = errors, "smoothed" if smooth else "causal"
+        text = f"X {own[0]:.4f} Y {own[1]:.4f}; without cross terms X {other[0]:.4f} Y {other[1]:.4f}"
+        rows.append(row(f"rms error over rms force, axes that feel each other, {kind}", float(own.max()), float(other.max()), "-", text))
+    return rows
+
+
 def run() -> list[dict[str, Any]]:
-    """Identify the sample machine, cut on it at a speed of its own, and look at both observers."""
+    """Identify the sample machine, cut on it at a speed of its own, and look at both observers; then at axes that feel each other."""
     result = os.environ.get("RCSA_IDENT_OBSERVER_RESULT")
-    return force_rows(identified(Path(result) if result else None), virtual_cut())
+    return [*force_rows(identified(Path(result) if result else None), virtual_cut()), *coupled_rows()]

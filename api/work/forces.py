@@ -89,7 +89,7 @@ def forces(machine: MachineText, tooling: ToolingSource, question: ForceQuestion
     cut, air = source()
     found = observed(known, tool, cut, air, question.speed, question.method, question.smooth)
     estimate, level = found.estimate, None
-    settled = min(max(each.kalman.gain.shape[0] for each in found.observer.axes), estimate.force.shape[0] // 2)
+    settled = min(found.observer.settling, estimate.force.shape[0] // 2)
     if question.idle is not None:
         estimate, level = restore_mean_force(estimate, question.idle, settled)
     if csv is not None:

@@ -116,7 +116,7 @@ def forces(
             raise error if error.where else error.at(str(result if error.field == "machine" else recording)) from None
     level = None
     if idle_percent is not None:
-        settled = max(each.kalman.gain.shape[0] for each in found.observer.axes)
+        settled = found.observer.settling
         raised, level = restore_mean_force(found.estimate, idle_percent / 100.0, min(settled, found.estimate.force.shape[0] // 2))
         found = replace(found, estimate=raised)
     estimate = found.estimate

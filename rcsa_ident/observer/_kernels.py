@@ -124,3 +124,96 @@ def lagged_force(weight, innovation, force):
             more += weight[j] * innovation[k + 1 + j]
         result[k] = force[k] + more
     return result
+
+
+@numba.njit(cache=True, fastmath=True)
+def coupled_steps(decay, inputs, observed, ends, through, gain, first, measured, state, result):
+    """As `kalman_steps`, of several forces that feel each other and as many measurements; the plant's modes are shared.
+
+    inputs: shape (c, 2, plants), what each force adds to the plant's modes; observed: shape (c, 2, m); ends: shape (c + 1,), where
+    the plant's modes end and then each force's; through: shape (c, c) [measurement, force]; gain: shape (s, c, 2, m); measured:
+    shape (n, c); result: shape (n, 3, c).
+    """
+    m, count, plants = decay.shape[1], ends.size - 1, ends[0]
+    last = gain.shape[0] - 1
+    force, innovation = np.zeros(count), np.empty(count)
+    for c in range(count):
+        for i in range(ends[c], ends[c + 1]):
+            force[c] += state[0, i]
+    for k in range(measured.shape[0]):
+        now = gain[min(first + k, last)]
+        for i in range(m):
+            re, im = state[0, i], state[1, i]
+            state[0, i] = decay[0, i] * re - decay[1, i] * im
+            state[1, i] = decay[0, i] * im + decay[1, i] * re
+        for c in range(count):
+            for i in range(plants):
+                state[0, i] += inputs[c, 0, i] * force[c]
+                state[1, i] += inputs[c, 1, i] * force[c]
+        for c in range(count):
+            force[c] = 0.0
+            for i in range(ends[c], ends[c + 1]):
+                force[c] += state[0, i]
+        for c in range(count):
+            y = 0.0
+            for i in range(plants):
+                y += observed[c, 0, i] * state[0, i] + observed[c, 1, i] * state[1, i]
+            for i in range(ends[count], m):
+                y += observed[c, 0, i] * state[0, i] + observed[c, 1, i] * state[1, i]
+            for j in range(count):
+                y += through[c, j] * force[j]
+            innovation[c] = measured[k, c] - y
+            result[k, 2, c] = innovation[c]
+        for c in range(count):
+            for i in range(m):
+                state[0, i] += now[c, 0, i] * innovation[c]
+                state[1, i] += now[c, 1, i] * innovation[c]
+        for c in range(count):
+            force[c] = 0.0
+            for i in range(ends[c], ends[c + 1]):
+                force[c] += state[0, i]
+            result[k, 0, c] = force[c]
+            result[k, 1, c] = state[0, ends[c]]
+
+
+@numba.njit(cache=True, fastmath=True)
+def coupled_smoothed(decay, inputs, observed, ends, through, gain, row, weighed, force):
+    """As `smoothed_force`, of the forces that `coupled_steps` gives, shape (n, c).
+
+    row: covariance of each force with the state after each correction, shape (s, c, 2, m); weighed: the innovations times the
+    inverse of their covariance, shape (n, c); force: of the forward filter, shape (n, c).
+    """
+    m, count, plants = decay.shape[1], ends.size - 1, ends[0]
+    last = gain.shape[0] - 1
+    result = np.empty(force.shape)
+    adjoint, back, entering = np.zeros((2, m)), np.empty(count), np.empty(count)
+    for k in range(force.shape[0] - 1, -1, -1):
+        j = min(k, last)
+        for c in range(count):
+            correction, shared = 0.0, 0.0
+            for i in range(m):
+                correction += row[j, c, 0, i] * adjoint[0, i] + row[j, c, 1, i] * adjoint[1, i]
+                shared += gain[j, c, 0, i] * adjoint[0, i] + gain[j, c, 1, i] * adjoint[1, i]
+            result[k, c] = force[k, c] - correction
+            back[c] = weighed[k, c] + shared
+        # through the correction of this sample
+        for c in range(count):
+            for i in range(m):
+                adjoint[0, i] -= observed[c, 0, i] * back[c]
+                adjoint[1, i] -= observed[c, 1, i] * back[c]
+            for f in range(count):
+                for i in range(ends[f], ends[f + 1]):
+                    adjoint[0, i] -= through[c, f] * back[c]
+        # and through the prediction from the one before
+        for c in range(count):
+            entering[c] = 0.0
+            for i in range(plants):
+                entering[c] += inputs[c, 0, i] * adjoint[0, i] + inputs[c, 1, i] * adjoint[1, i]
+        for i in range(m):
+            re, im = adjoint[0, i], adjoint[1, i]
+            adjoint[0, i] = decay[0, i] * re + decay[1, i] * im
+            adjoint[1, i] = decay[0, i] * im - decay[1, i] * re
+        for c in range(count):
+            for i in range(ends[c], ends[c + 1]):
+                adjoint[0, i] += entering[c]
+    return result

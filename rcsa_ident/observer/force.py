@@ -11,13 +11,10 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.observer.force_model import ForceModel, augmented
-from rcsa_ident.observer.kalman import FilterState, KalmanFilter, kalman_filter
-from rcsa_ident.observer.transfer_function import CORNER, SampledModes, TransferFunction, acceleration_filter, high_pass
+from rcsa_ident.observer.coupled_filter import CoupledFilter
+from rcsa_ident.observer.kalman import FilterState, KalmanFilter
+from rcsa_ident.observer.transfer_function import SampledModes, TransferFunction
 from rcsa_ident.shown import Saved
-
-#: What a spindle order below the band may change in a second, in displacement [m]: run-out that is not believed.
-_ORDER_WANDER = 1e-7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +73,8 @@ class AxisObserver:
         Corner frequency of the high-pass that gap and fixture's motion share.
     gap_filter, acceleration_filter : SampledModes
         The latter None without an accelerometer: the gap is then taken for the flange's motion.
-    kalman : KalmanFilter
+    kalman : KalmanFilter or None
+        None where the axes feel each other: one filter then serves all of them.
     run_out : RunOut or None
         Taken out of the signals where it is known.
     """
@@ -86,7 +84,7 @@ class AxisObserver:
     corner: float
     gap_filter: SampledModes
     acceleration_filter: SampledModes | None
-    kalman: KalmanFilter
+    kalman: KalmanFilter | None
     run_out: RunOut | None = None
 
     def to_control(self) -> Any:
@@ -97,6 +95,10 @@ class AxisObserver:
         """
         import control
 
+        if self.kalman is None:
+            raise InputError(
+                "observer", f"{self.axis.upper()}, which feels the other axis", "`ForceObserver.to_control`: both axes at once"
+            )
         filters = [each.state_space().to_control() for each in (self.gap_filter, self.acceleration_filter) if each is not None]
         added = control.ss([], [], [], np.ones((1, len(filters))), self.transfer.step)
         whole = self.kalman.state_space().to_control() * added * control.append(*filters)
@@ -105,12 +107,12 @@ class AxisObserver:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisState:
-    """Where one axis of a stream stands: the first gap sample (its mean is not observable), both filters, the Kalman filter."""
+    """Where one axis of a stream stands: the first gap sample (its mean is not observable), both filters, its own Kalman filter."""
 
     offset: float
     gap: FloatArray
     acceleration: FloatArray
-    filter: FilterState
+    filter: FilterState | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,10 +124,13 @@ class ObserverState:
     count : int
         Samples seen.
     axes : tuple of AxisState
+    together : FilterState or None
+        Of the filter that serves all axes.
     """
 
     count: int
     axes: tuple[AxisState, ...]
+    together: FilterState | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -188,22 +193,55 @@ class ForceObserver:
     Parameters
     ----------
     axes : tuple of AxisObserver
+    together : CoupledFilter or None
+        Of axes that feel each other, in their order; None where each has a filter of its own.
     """
 
     axes: tuple[AxisObserver, ...]
+    together: CoupledFilter | None = None
 
     @property
     def step_time(self) -> float:
         """Time between samples [s]."""
         return self.axes[0].transfer.step
 
+    @property
+    def settling(self) -> int:
+        """Samples from the first after which all gains are steady."""
+        filters = [self.together, *(each.kalman for each in self.axes)]
+        return max(each.gain.shape[0] for each in filters if each is not None)
+
     def init(self) -> ObserverState:
         """Return the state before the first sample."""
         states = []
         for each in self.axes:
             shaken = np.zeros((2, 0)) if each.acceleration_filter is None else each.acceleration_filter.init()
-            states.append(AxisState(np.nan, each.gap_filter.init(), shaken, each.kalman.init()))
-        return ObserverState(0, tuple(states))
+            states.append(AxisState(np.nan, each.gap_filter.init(), shaken, None if each.kalman is None else each.kalman.init()))
+        return ObserverState(0, tuple(states), None if self.together is None else self.together.init())
+
+    def to_control(self) -> Any:
+        """Return the observer in the steady state as python-control's sampled ``StateSpace``, all axes at once.
+
+        Inputs are ``gap_x`` [m] and, with an accelerometer, ``acceleration_x`` [m/s^2], and so on for each axis, run-out taken out of all;
+        outputs ``force_x`` [N] and ``innovation_x`` [m] of each axis.
+        """
+        import control
+
+        names = [each.axis for each in self.axes]
+        outputs = [f"{kind}_{name}" for kind in ("force", "innovation") for name in names]
+        if self.together is None:
+            parts = [each.to_control() for each in self.axes]
+            inputs = [f"{kind}_{name}" for name, part in zip(names, parts, strict=True) for kind in part.input_labels]
+            whole = control.append(*parts)
+            order = [*range(0, whole.noutputs, 2), *range(1, whole.noutputs, 2)]
+            return control.ss(whole[order, :], inputs=inputs, outputs=outputs)
+        filters, inputs = [], []
+        for each in self.axes:
+            own = [one.state_space().to_control() for one in (each.gap_filter, each.acceleration_filter) if one is not None]
+            filters.append(control.ss([], [], [], np.ones((1, len(own))), self.step_time) * control.append(*own))
+            inputs += [f"{kind}_{each.axis}" for kind in ("gap", "acceleration")[: len(own)]]
+        whole = self.together.state_space().to_control() * control.append(*filters)
+        return control.ss(whole, inputs=inputs, outputs=outputs)
 
     def step(self, state: ObserverState, gap: FloatArray, acceleration: FloatArray | None = None) -> tuple[ObserverState, ForceBlock]:
         """Return the state and the estimates after one sample of each axis.
@@ -235,16 +273,25 @@ class ForceObserver:
             raise InputError("samples", np.shape(gap), f"one column for each of {len(self.axes)} axes, accelerations alike")
         if not np.all(np.isfinite(gap)) or (acceleration is not None and not np.all(np.isfinite(acceleration))):
             raise InputError("samples", "a lost sample", "finite numbers")
-        states, results = [], []
+        states, shown, results = [], [], []
         for i, each in enumerate(self.axes):
             after, measured = _displacement(
                 each, state.axes[i], state.count, gap[:, i], None if acceleration is None else acceleration[:, i]
             )
-            filter_state, result = each.kalman.predict(after.filter, measured.size) if lost else each.kalman.run(after.filter, measured)
-            states.append(replace(after, filter=filter_state))
-            results.append(result)
-        joined = np.stack(results, axis=1) if gap.shape[0] else np.zeros((0, len(self.axes), 3))
-        return ObserverState(state.count + gap.shape[0], tuple(states)), ForceBlock(*(joined[:, :, c] for c in range(3)))
+            if each.kalman is not None and after.filter is not None:
+                filter_state, result = each.kalman.predict(after.filter, measured.size) if lost else each.kalman.run(after.filter, measured)
+                after = replace(after, filter=filter_state)
+                results.append(result)
+            states.append(after)
+            shown.append(measured)
+        together, count = state.together, gap.shape[0]
+        if self.together is not None and together is not None:
+            both = np.stack(shown, axis=1)
+            together, found = self.together.predict(together, count) if lost else self.together.run(together, both)
+            joined = found.transpose(0, 2, 1)
+        else:
+            joined = np.stack(results, axis=1) if count else np.zeros((0, len(self.axes), 3))
+        return ObserverState(state.count + count, tuple(states), together), ForceBlock(*(joined[:, :, c] for c in range(3)))
 
     def bridge(self, state: ObserverState, gap: FloatArray, acceleration: FloatArray | None = None) -> tuple[ObserverState, ForceBlock]:
         """Return the state after samples that were lost, and what was to be expected at them.
@@ -274,12 +321,20 @@ class ForceObserver:
         block = self.run(self.init(), gap, acceleration)[1]
         n = block.force.shape[0]
         force, deviation, consistency = np.array(block.force), np.empty_like(block.force), np.ones(len(self.axes))
-        for i, each in enumerate(self.axes):
+        if self.together is not None:
             if smooth:
-                force[:, i] = each.kalman.smooth(np.stack([block.force[:, i], block.walking[:, i], block.innovation[:, i]], axis=1))
-            settled = block.innovation[min(each.kalman.gain.shape[0] - 1, n // 2) :, i]
-            consistency[i] = _scatter(settled, each)
-            deviation[:, i] = each.kalman.standard_deviation(n, smooth) * max(consistency[i], 1.0)
+                force = self.together.smooth(np.stack([block.force, block.walking, block.innovation], axis=1))
+            deviation = self.together.standard_deviation(n, smooth)
+        for i, each in enumerate(self.axes):
+            settling, variance = self.settling, None if self.together is None else float(self.together.variance[-1, i, i])
+            if each.kalman is not None:
+                settling, variance = each.kalman.gain.shape[0], float(each.kalman.variance[-1])
+                if smooth:
+                    force[:, i] = each.kalman.smooth(np.stack([block.force[:, i], block.walking[:, i], block.innovation[:, i]], axis=1))
+                deviation[:, i] = each.kalman.standard_deviation(n, smooth)
+            assert variance is not None
+            consistency[i] = _scatter(block.innovation[min(settling - 1, n // 2) :, i], each.transfer, variance)
+        deviation = deviation * np.maximum(consistency, 1.0)
         return ForceEstimate(tuple(each.axis for each in self.axes), self.step_time, frozen(force), frozen(deviation), frozen(consistency))
 
 
@@ -310,68 +365,6 @@ def restore_mean_force(estimate: ForceEstimate, idle: float, first: int = 0) -> 
     return replace(estimate, force=frozen(estimate.force + np.array(levels))), frozen(levels)
 
 
-def axis_observer(
-    axis: Dof,
-    transfer: TransferFunction,
-    force: ForceModel,
-    noise: float,
-    *,
-    acceleration_noise: float = 0.0,
-    accelerometer: bool = True,
-    sensor_ratio: tuple[FloatArray, ComplexArray] | None = None,
-    run_out: RunOut | None = None,
-    spindle_speed: float = 0.0,
-    unmodelled: float = 0.0,
-    longest_settling: int | None = None,
-) -> AxisObserver:
-    """Return one axis of an observer.
-
-    Parameters
-    ----------
-    axis : Dof
-    transfer : TransferFunction
-    force : ForceModel
-        `RandomWalk` or `TeethResonators`.
-    noise : float [m]
-        Standard deviation of a displacement sample.
-    acceleration_noise : float [m/s^2]
-        Standard deviation of an acceleration sample; 0: as if the integrated acceleration were without noise, as in [inprocess].
-    accelerometer : bool
-        Whether the fixture's acceleration is measured.
-    sensor_ratio : (omega, ratio), optional
-        Response of the displacement sensor over the accelerometer's.
-    run_out : RunOut, optional
-        Taken out of the signals.
-    spindle_speed : float [rad/s]
-        Orders of this speed below the band are taken for disturbance; with 0 there are none.
-    unmodelled : float [N]
-        Process noise: standard deviation of a force sample that the force model cannot follow.
-    longest_settling : int, optional
-        Steps of full covariance at most; by default as in `kalman_filter`.
-    """
-    step, band = transfer.step, transfer.band
-    corner = CORNER * band[0]
-    passing = None
-    if accelerometer:
-        omega, ratio = (None, None) if sensor_ratio is None else sensor_ratio
-        passing = acceleration_filter(corner, step, band, ratio, omega)
-    below = spindle_speed * np.arange(1.0, np.ceil(band[0] / spindle_speed - 1e-9)) if spindle_speed > 0.0 else np.zeros(0)
-    # orders under the high-pass's corner are gone already
-    below = below[below > corner]
-    model = augmented(
-        transfer.behind_high_pass(corner),
-        force,
-        noise,
-        unmodelled=unmodelled,
-        acceleration=passing,
-        acceleration_noise=acceleration_noise,
-        disturbance=below,
-        disturbance_intensity=_ORDER_WANDER,
-    )
-    kalman = kalman_filter(model) if longest_settling is None else kalman_filter(model, longest_settling)
-    return AxisObserver(axis, transfer, corner, high_pass(corner, step), passing, kalman, run_out)
-
-
 def force_observer(axes: Sequence[AxisObserver]) -> ForceObserver:
     """Return the observer of some axes, all sampled alike."""
     if not axes or len({each.transfer.step for each in axes}) > 1:
@@ -379,17 +372,17 @@ def force_observer(axes: Sequence[AxisObserver]) -> ForceObserver:
     return ForceObserver(tuple(axes))
 
 
-def _scatter(innovation: FloatArray, observer: AxisObserver) -> float:
+def _scatter(innovation: FloatArray, transfer: TransferFunction, variance: float) -> float:
     """Standard deviation of innovations in the observer's band over that of white noise of the filter's own variance."""
     n = innovation.size
-    frequency = np.fft.rfftfreq(n, observer.transfer.step) * 2.0 * np.pi if n else np.zeros(0)
-    inside = (frequency >= observer.transfer.band[0]) & (frequency <= observer.transfer.band[1])
+    frequency = np.fft.rfftfreq(n, transfer.step) * 2.0 * np.pi if n else np.zeros(0)
+    inside = (frequency >= transfer.band[0]) & (frequency <= transfer.band[1])
     if not inside.any():
         return 1.0
     # a taper keeps the lines above the band where they are
     taper = np.hanning(n + 2)[1:-1]
     power = np.abs(np.fft.rfft(innovation * taper)[inside]) ** 2
-    return float(np.sqrt(np.mean(power) / (np.sum(taper**2) * observer.kalman.variance[-1])))
+    return float(np.sqrt(np.mean(power) / (np.sum(taper**2) * variance)))
 
 
 def _displacement(

@@ -240,7 +240,7 @@ def kalman_filter(model: AugmentedModel, longest_settling: int = LONGEST_SETTLIN
 
 
 def riccati(a: FloatArray, seen: FloatArray, q: FloatArray) -> FloatArray:
-    """Return the steady covariance before the correction, for one measurement of unit noise, by structure-preserving doubling.
+    """Return the steady covariance before the correction, for measurements of unit noise, by structure-preserving doubling.
 
     Each step covers twice the samples of the last [chu2004]. Oscillators without damping have poles on the unit
     circle, where the ordered Schur form of the usual solution loses its order.
@@ -248,11 +248,12 @@ def riccati(a: FloatArray, seen: FloatArray, q: FloatArray) -> FloatArray:
     Parameters
     ----------
     a, q : arrays, shape (n, n)
-    seen : array, shape (n,)
+    seen : array, shape (n,) or (p, n)
     """
     size = 1.0 / np.maximum(np.sqrt(np.diag(q)), 1e-3 * np.sqrt(np.max(np.diag(q))))
     # in units of what each state gains in a step, so that none is lost beside another
-    transition, known, covariance = (a * size[:, None] / size).T, np.outer(seen / size, seen / size), q * np.outer(size, size)
+    rows = np.atleast_2d(seen) / size
+    transition, known, covariance = (a * size[:, None] / size).T, rows.T @ rows, q * np.outer(size, size)
     for _ in range(60):
         through = np.linalg.solve(np.eye(size.size) + known @ covariance, np.hstack([transition, known]))
         inner, outer = through[:, : size.size], through[:, size.size :]

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
-from rcsa_ident.observer.force import AxisObserver
+from rcsa_ident.errors import InputError
+from rcsa_ident.observer.force import AxisObserver, ForceObserver
 
 #: Deviation of the compensated response [dB] that a usable band allows.
 FLAT = 1.0
@@ -109,6 +110,8 @@ def observer_response(
     smoothed : bool
         The estimate given all samples, instead of those before.
     """
+    if observer.kalman is None:
+        raise InputError("observer", f"{observer.axis.upper()}, which feels the other axis", "`coupled_response`: both axes at once")
     line = frozen(line)
     lag = _FAR if smoothed else 0
     values = [
@@ -117,3 +120,41 @@ def observer_response(
     ]
     (own, there), (own_line, there_line) = values
     return ObserverFRF(frozen(omega), own, own * there, line, own_line * there_line)
+
+
+def coupled_response(
+    observer: ForceObserver,
+    omega: FloatArray,
+    machine: ComplexArray,
+    line: FloatArray,
+    machine_at_line: ComplexArray,
+    smoothed: bool = False,
+) -> tuple[ObserverFRF, ...]:
+    """Return the responses of an observer whose axes feel each other, and their products with the machine's, an axis each.
+
+    Each is the estimate of a force over that force, the other one being none: what the observer takes of one for the other is not in it.
+
+    Parameters
+    ----------
+    observer : ForceObserver
+        With one filter for all axes.
+    omega : array, shape (n,) [rad/s]
+    machine : complex array, shape (n, c, c) [m/N]
+        Response from tip forces (columns) to the flange's displacements as the sensors show them.
+    line, machine_at_line : arrays, shape (j,) [rad/s], (j, c, c) [m/N]
+        Frequencies of the force's lines, and the machine's response there.
+    smoothed : bool
+        The estimate given all samples, instead of those before.
+    """
+    together = observer.together
+    if together is None:
+        raise InputError("observer", "a filter for each axis", "`observer_response`: an axis at a time")
+    lag = _FAR if smoothed else 0
+
+    def own(w: FloatArray, there: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        passed = np.stack([each.gap_filter.response(w) for each in observer.axes], axis=1)
+        found = together.response(w, lag) * passed[:, None, :]
+        return np.diagonal(found, axis1=1, axis2=2), np.diagonal(found @ there, axis1=1, axis2=2)
+
+    (found, compensated), (_, at_line) = own(np.asarray(omega, dtype=float), machine), own(np.asarray(line, dtype=float), machine_at_line)
+    return tuple(ObserverFRF(frozen(omega), found[:, i], compensated[:, i], frozen(line), at_line[:, i]) for i in range(len(observer.axes)))

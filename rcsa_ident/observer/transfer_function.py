@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.dynamics.poles import PoleResidue
@@ -112,7 +113,7 @@ class TransferFunction:
         corner : float [rad/s]
             Corner frequency of `high_pass`.
         """
-        poles, rho = _high_pass_pole(corner, self.step)
+        poles, rho = high_pass_pole(corner, self.step)
         pole, residue = self.fit.pole, self.fit.residue[:, 0, 0]
         passed = residue * pole**2 / ((pole - poles) * (pole - poles.conjugate()))
         there = np.sum(residue / (poles - pole) + residue.conj() / (poles - pole.conj()))
@@ -158,11 +159,7 @@ def transfer_function(
         If the band lies outside the frequencies or above what the sampling rate can hold.
     """
     omega, low, high = np.asarray(omega, dtype=float), *band
-    keep = omega <= HIGHEST * 2.0 * np.pi / step
-    inside = keep & (omega >= low) & (omega <= high)
-    if not low < high or np.sum(inside) < 8:
-        found = f"{low / (2 * np.pi):.0f} to {high / (2 * np.pi):.0f} Hz at {1.0 / step:.0f} samples a second"
-        raise InputError("band", found, "a band that holds frequencies of the receptance below 0.45 of the sampling rate")
+    keep, inside = fitted_range(omega, step, band)
     values = np.asarray(receptance, dtype=complex) * (1.0 if sensor is None else sensor)
     weight = np.where(inside, 1.0, OUTSIDE)
     fit = rational_fit(
@@ -172,12 +169,29 @@ def transfer_function(
     return TransferFunction(fit, step, (low, high), float(np.max(np.abs(20.0 * np.log10(np.abs(ratio))))))
 
 
+def fitted_range(omega: FloatArray, step: float, band: tuple[float, float]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which frequencies [rad/s] a fit looks at, and which of them have to be good, shape (n,) each.
+
+    Raises
+    ------
+    InputError
+        If the band lies outside the frequencies or above what the sampling rate can hold.
+    """
+    low, high = band
+    keep = omega <= HIGHEST * 2.0 * np.pi / step
+    inside = keep & (omega >= low) & (omega <= high)
+    if not low < high or np.sum(inside) < 8:
+        found = f"{low / (2 * np.pi):.0f} to {high / (2 * np.pi):.0f} Hz at {1.0 / step:.0f} samples a second"
+        raise InputError("band", found, "a band that holds frequencies of the receptance below 0.45 of the sampling rate")
+    return keep, inside
+
+
 def high_pass(corner: float, step: float) -> SampledModes:
     """Return a second-order Butterworth high-pass: what gap and fixture pass before they are added.
 
     Below its corner the sum is not known: the accelerometer does not see it, and the gap sensor drifts.
     """
-    pole, rho = _high_pass_pole(corner, step)
+    pole, rho = high_pass_pole(corner, step)
     return _bilinear(np.array([pole]), np.array([rho]), 1.0, step)
 
 
@@ -208,7 +222,7 @@ def acceleration_filter(
     return _bilinear(fit.pole, fit.residue[:, 0, 0], float(fit.constant[0, 0]), step)
 
 
-def _high_pass_pole(corner: float, step: float) -> tuple[complex, complex]:
+def high_pass_pole(corner: float, step: float) -> tuple[complex, complex]:
     """Upper pole of s^2 / (s^2 + sqrt(2) c s + c^2) and its residue; c is the warped corner."""
     c = float(warped(np.array(corner), step))
     pole = c * complex(-1.0, 1.0) / np.sqrt(2.0)

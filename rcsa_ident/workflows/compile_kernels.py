@@ -15,6 +15,7 @@ from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import normal_modes
+from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.turning_modes import TurningModes
 from rcsa_ident.identification.data import IdentificationData, prepare
@@ -27,6 +28,8 @@ from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.machine.mode_synthesis import FLANGE
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machine.turning_machine import TurningMachine
+from rcsa_ident.observer.coupled_filter import coupled_filter
+from rcsa_ident.observer.coupled_model import AxisNoise, coupled_model
 from rcsa_ident.observer.force_model import RandomWalk, augmented
 from rcsa_ident.observer.kalman import kalman_filter
 from rcsa_ident.observer.transfer_function import SampledModes
@@ -142,6 +145,10 @@ def _observer() -> None:
     measured = plant.run(plant.init(), np.zeros(8))[1]
     kalman.smooth(kalman.run(kalman.init(), measured)[1])
     kalman.run_lagged(kalman.init(), measured, kalman.lag_weights(2))
+    # and of axes that feel each other
+    both = PoleResidue(plant.decay, np.array([[1e-8], [1e-9]]) + 0.0j, np.array([[1.0 + 0.0j, 0.1 + 0.0j]]), np.zeros((2, 2)))
+    coupled = coupled_filter(coupled_model(both, [AxisNoise(RandomWalk(10.0, 100.0), 1e-8)] * 2, 1e-4), 2)
+    coupled.smooth(coupled.run(coupled.init(), np.stack([measured, measured], axis=1))[1])
 
 
 def _virtual_machine() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,9 +15,12 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, Unsteady
 from rcsa_ident.machine.machine import Machine
-from rcsa_ident.observer.force import AxisObserver, ForceEstimate, ForceObserver, RunOut, axis_observer, force_observer
-from rcsa_ident.observer.response import ObserverFRF, observer_response
-from rcsa_ident.observer.transfer_function import HIGHEST, transfer_function
+from rcsa_ident.observer.coupled_model import coupled_transfer
+from rcsa_ident.observer.design import AxisSettings, axis_observer, coupled_observer
+from rcsa_ident.observer.force import ForceEstimate, ForceObserver, RunOut, force_observer
+from rcsa_ident.observer.force_model import ForceModel
+from rcsa_ident.observer.response import ObserverFRF, coupled_response, observer_response
+from rcsa_ident.observer.transfer_function import HIGHEST, TransferFunction, transfer_function
 from rcsa_ident.observer.tuning import ObserverMethod, Resonators, Tuning, harmonics
 from rcsa_ident.observer.wear import WearIndicators, wear_indicators
 from rcsa_ident.shown import Drawn
@@ -149,15 +152,30 @@ def observe(
     here = machine.at(speed)
     coupled = here.coupled(assembly, omega, axes)
     tuning = {axis: Tuning(_noise(steady, i), bandwidth or band[1], _response_time(method, speed)) for i, axis in enumerate(axes)}
-    observers = []
-    for i, axis in enumerate(axes):
-        observers.append(_axis(steady, axis, i, omega, _cross(coupled, axis), band, tuning[axis], method, speed, teeth, run_out))
-    observer = force_observer(observers)
+    together = _feel_each_other(here, axes)
+    if not together:
+        _unseen(here, coupled, axes, omega, band, notes)
+    groups = [axes] if together else [(axis,) for axis in axes]
+    cross = [_cross(coupled, group) for group in groups]
+    shown = [np.stack([_gap_response(cut, axis, omega) for axis in group], axis=1) for group in groups]
+
+    def settings(transfer: TransferFunction, i: int) -> AxisSettings:
+        force = method.force_model(tuning[axes[i]], transfer, speed, teeth)
+        return _settings(steady, axes[i], i, omega, force, tuning[axes[i]].noise_floor, method, speed, run_out)
+
+    if together:
+        both = coupled_transfer(omega, cross[0], 1.0 / cut.rate, band, shown[0])
+        observer = coupled_observer([settings(both.direct(i), i) for i in range(len(axes))], both)
+    else:
+        single = [transfer_function(omega, c[:, 0, 0], 1.0 / cut.rate, band, s[:, 0]) for c, s in zip(cross, shown, strict=True)]
+        observer = force_observer([axis_observer(settings(transfer, i), transfer) for i, transfer in enumerate(single)])
     estimate = observer.observe(*_signals(cut, axes), smooth=smooth)
     if not method.colours_noise:
         estimate = replace(estimate, force=_above(estimate.force, band[0], estimate.step))
-    errors = {axis: _model_error(here, axis, assembly, estimate, i, band, speed) for i, axis in enumerate(axes)}
-    response = {each.axis: _response(each, steady, omega, _cross(coupled, each.axis), speed, smooth) for each in observers}
+    errors: dict[Dof, float] = {}
+    for group in groups:
+        errors |= _model_error(here, group, assembly, estimate, band, speed)
+    response = _responses(observer, omega, cross, cut, speed, smooth)
     return MonitoredCut(
         _widened(estimate, [errors[axis] for axis in axes]),
         observer,
@@ -268,25 +286,26 @@ def _response_time(method: ObserverMethod, speed: float) -> float:
     return float(method.response_turns * 2.0 * np.pi / speed)
 
 
-def _axis(
+def _gap_response(recording: Recording, axis: Dof, omega: FloatArray) -> ComplexArray:
+    """Frequency response of an axis' displacement sensor, shape (n,)."""
+    shown = recording.channel(Quantity.DISPLACEMENT, axis)
+    assert shown is not None
+    return shown[0].response(omega)
+
+
+def _settings(
     steady: SteadyRecord,
     axis: Dof,
     column: int,
     omega: FloatArray,
-    cross: ComplexArray,
-    band: tuple[float, float],
-    tuning: Tuning,
+    force: ForceModel,
+    noise: float,
     method: ObserverMethod,
     speed: float,
-    teeth: int,
     run_out: tuple[FloatArray, ComplexArray] | None,
-) -> AxisObserver:
-    """The observer of one axis."""
-    recording = steady.recording
-    shown, fixture = recording.channel(Quantity.DISPLACEMENT, axis), recording.channel(Quantity.ACCELERATION, axis)
-    assert shown is not None
-    gap_response = shown[0].response(omega)
-    transfer = transfer_function(omega, cross, 1.0 / recording.rate, band, gap_response)
+) -> AxisSettings:
+    """What the record says of one axis."""
+    fixture = steady.recording.channel(Quantity.ACCELERATION, axis)
     kinds = _kinds(steady)
     place = None if fixture is None else kinds.index((Quantity.ACCELERATION, axis))
     turned = None
@@ -294,29 +313,43 @@ def _axis(
         order, lines = run_out
         turned = RunOut(speed, order, lines[:, column], np.zeros(order.size) if place is None else lines[:, place])
     colours = method.colours_noise
-    return axis_observer(
+    return AxisSettings(
         axis,
-        transfer,
-        method.force_model(tuning, transfer, speed, teeth),
-        tuning.noise_floor,
+        force,
+        noise,
         acceleration_noise=_noise(steady, place) if place is not None and colours else 0.0,
         accelerometer=place is not None,
-        sensor_ratio=None if fixture is None else (omega, gap_response / fixture[0].response(omega)),
+        sensor_ratio=None if fixture is None else (omega, _gap_response(steady.recording, axis, omega) / fixture[0].response(omega)),
         run_out=turned,
         spindle_speed=speed if colours else 0.0,
     )
 
 
-def _response(
-    observer: AxisObserver, steady: SteadyRecord, omega: FloatArray, cross: ComplexArray, speed: float, smooth: bool
-) -> ObserverFRF:
-    """The observer's responses, compensated with the identified machine."""
-    shown = steady.recording.channel(Quantity.DISPLACEMENT, observer.axis)
-    assert shown is not None
-    lines = harmonics(speed, 1, observer.transfer.band)
-    at_line = np.interp(lines, omega, cross.real) + 1j * np.interp(lines, omega, cross.imag)
-    machine, machine_at_line = cross * shown[0].response(omega), at_line * shown[0].response(lines)
-    return observer_response(observer, omega, machine, lines, machine_at_line, smoothed=smooth)
+def _responses(
+    observer: ForceObserver, omega: FloatArray, cross: list[ComplexArray], recording: Recording, speed: float, smooth: bool
+) -> dict[Dof, ObserverFRF]:
+    """The observer's responses, compensated with the identified machine; `cross` is C31 of the axes that share a filter."""
+    lines = harmonics(speed, 1, observer.axes[0].transfer.band)
+
+    def seen(values: ComplexArray, axes: Sequence[Dof], w: FloatArray) -> ComplexArray:
+        return values * np.stack([_gap_response(recording, axis, w) for axis in axes], axis=1)[:, :, None]
+
+    def at_lines(values: ComplexArray) -> ComplexArray:
+        found = np.empty((lines.size, *values.shape[1:]), dtype=complex)
+        for place in np.ndindex(values.shape[1:]):
+            one = values[:, *place]
+            found[:, *place] = np.interp(lines, omega, one.real) + 1j * np.interp(lines, omega, one.imag)
+        return found
+
+    axes = [each.axis for each in observer.axes]
+    if observer.together is not None:
+        machine, machine_at_line = seen(cross[0], axes, omega), seen(at_lines(cross[0]), axes, lines)
+        return dict(zip(axes, coupled_response(observer, omega, machine, lines, machine_at_line, smooth), strict=True))
+    found = {}
+    for each, values in zip(observer.axes, cross, strict=True):
+        machine, machine_at_line = seen(values, [each.axis], omega), seen(at_lines(values), [each.axis], lines)
+        found[each.axis] = observer_response(each, omega, machine[:, 0, 0], lines, machine_at_line[:, 0, 0], smoothed=smooth)
+    return found
 
 
 def _signals(recording: Recording, axes: tuple[Dof, ...]) -> tuple[FloatArray, FloatArray | None]:
@@ -330,28 +363,61 @@ def _signals(recording: Recording, axes: tuple[Dof, ...]) -> tuple[FloatArray, F
     return np.stack(gap, axis=1), np.stack(acceleration, axis=1)
 
 
-def _cross(coupled: Receptance, axis: Dof) -> ComplexArray:
-    """C31: the spindle's motion over a force at the tip, along one axis, shape (n,) [m/N]."""
-    return coupled.between(f"{SPINDLE}.{axis}", f"tip.{axis}")
+def _cross(coupled: Receptance, axes: Sequence[Dof]) -> ComplexArray:
+    """C31: the spindle's motions (rows) over forces at the tip (columns), shape (n, a, a) [m/N]."""
+    columns = [np.stack([coupled.between(f"{SPINDLE}.{row}", f"tip.{axis}") for row in axes], axis=1) for axis in axes]
+    return np.stack(columns, axis=2)
+
+
+def _feel_each_other(machine: Machine, axes: tuple[Dof, ...]) -> bool:
+    """Whether a force along one of the axes moves the machine along another."""
+    return len(axes) > 1 and any(set(axes) <= {c.dof for c in part.coordinates} for part in machine.parts)
+
+
+def _unseen(
+    machine: Machine, coupled: Receptance, axes: tuple[Dof, ...], omega: FloatArray, band: tuple[float, float], notes: list[str]
+) -> None:
+    """Say what an axis feels of one that nobody measures: its force is taken for one along the axis itself."""
+    inside = (omega >= band[0]) & (omega <= band[1])
+    for axis in axes:
+        part = next(part for part in machine.parts if any(c.dof is axis for c in part.coordinates))
+        for other in (c.dof for c in part.coordinates if not c.dof.is_slope and c.dof not in axes):
+            own, felt = (np.linalg.norm(coupled.between(f"{SPINDLE}.{axis}", f"tip.{of}")[inside]) for of in (axis, other))
+            name, its = axis.upper(), other.upper()
+            notes.append(
+                f"{name} and {its} feel each other, and {its} has no displacement sensor: a force in {its} moves the spindle in {name} by "
+                f"{100.0 * felt / own:.0f} % of what one in {name} does, and is taken for a force in {name}"
+            )
 
 
 def _model_error(
-    machine: Machine, axis: Dof, assembly: ToolAssembly, estimate: ForceEstimate, column: int, band: tuple[float, float], speed: float
-) -> float:
-    """Standard deviation of the force that is left by what is not known of the machine [N]: the force's lines, each with its C31's."""
-    rate, force = 1.0 / estimate.step, estimate.force[:, column : column + 1]
+    machine: Machine, axes: tuple[Dof, ...], assembly: ToolAssembly, estimate: ForceEstimate, band: tuple[float, float], speed: float
+) -> dict[Dof, float]:
+    """Standard deviation of the forces that is left by what is not known of the machine [N]: the forces' lines, each with its C31's.
+
+    Axes that feel each other share the error, dF = C31^-1 dC31 F, with the entries of C31 taken as independent.
+    """
+    columns = [estimate.axes.index(axis) for axis in axes]
     # the second half: a live estimate has settled by then
-    amplitude = line_spectrum(force[force.size // 2 :], rate, speed, to_hz(band[1])).amplitude[:, 0]
-    order = np.arange(amplitude.size)
+    force = estimate.force[estimate.force.shape[0] // 2 :, columns]
+    amplitude = line_spectrum(force, 1.0 / estimate.step, speed, to_hz(band[1])).amplitude
+    order = np.arange(amplitude.shape[0])
     order = order[(order * speed >= band[0]) & (order * speed <= band[1])]
     power = np.abs(amplitude[order]) ** 2
-    coupled = machine.coupled(assembly, order * speed, (axis,))
-    entry = Coordinate(SPINDLE, axis), Coordinate("tip", axis)
-    known = coupled.deviation().get(entry)
-    if known is None:
-        return 0.0
-    relative = (known[0] ** 2 + known[1] ** 2) / np.abs(_cross(coupled, axis)) ** 2
-    return float(np.sqrt(0.5 * np.sum(power * relative)))
+    coupled = machine.coupled(assembly, order * speed, axes)
+    deviation = coupled.deviation()
+    if (Coordinate(SPINDLE, axes[0]), Coordinate("tip", axes[0])) not in deviation:
+        return dict.fromkeys(axes, 0.0)
+    squares = {entry: known[0] ** 2 + known[1] ** 2 for entry, known in deviation.items()}
+    entries = [[(Coordinate(SPINDLE, row), Coordinate("tip", axis)) for axis in axes] for row in axes]
+    cross = _cross(coupled, axes)
+    # an inverse over which to divide: an axis that stands alone has its own entry's
+    size = np.abs(cross) ** 2 if len(axes) == 1 else 1.0 / np.abs(np.linalg.inv(cross)) ** 2
+    found = {}
+    for f, axis in enumerate(axes):
+        parts = [power[:, j] * (squares[entry] / size[:, f, i]) for i, row in enumerate(entries) for j, entry in enumerate(row)]
+        found[axis] = float(np.sqrt(0.5 * np.sum(sum(parts))))
+    return found
 
 
 def _above(force: FloatArray, low: float, step: float) -> FloatArray:
@@ -380,6 +446,6 @@ def wear_of(found: MonitoredCut, cutter: Cutter, conditions: CuttingConditions) 
     """
     estimate = found.estimate
     columns = [estimate.axes.index(axis) for axis in (Dof.X, Dof.Y)]
-    settled = min(max(each.kalman.gain.shape[0] for each in found.observer.axes), estimate.force.shape[0] // 2)
+    settled = min(found.observer.settling, estimate.force.shape[0] // 2)
     own = replace(conditions, spindle_speed=found.spindle_speed)
     return wear_indicators(estimate.force[:, columns], estimate.step, cutter, own, found.band, first=settled)

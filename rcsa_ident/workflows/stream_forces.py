@@ -8,7 +8,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.errors import InputError
-from rcsa_ident.observer.force import ForceBlock, ForceObserver, ObserverState, RunOut, force_observer
+from rcsa_ident.observer.force import ForceBlock, ForceObserver, ObserverState, RunOut
 from rcsa_ident.signals.alignment import align
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import line_spectrum
@@ -245,4 +245,5 @@ def live_observer(found: MonitoredCut, recording: Recording, follow: bool = True
     reference = AngleReference(found.spindle_speed, line, found.teeth if run_out else 1)
     if not (run_out and follow):
         return LiveObserver(found.observer, reference)
-    return LiveObserver(force_observer([replace(each, run_out=None) for each in axes]), reference, run_out)
+    bare = replace(found.observer, axes=tuple(replace(each, run_out=None) for each in axes))
+    return LiveObserver(bare, reference, run_out)

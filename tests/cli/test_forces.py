@@ -16,6 +16,7 @@ from rcsa_ident.io.forces import read_forces_csv, sensors_of_result, write_force
 from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.io.results import read_result, write_result
 from tests.fixtures.flange_machine import BAND, flange_keys, paper_cut
+from tests.fixtures.oblique_cut import oblique_cut, oblique_machine
 from tests.fixtures.paths import TOOLINGS
 from tests.fixtures.virtual_cut import relative_error
 
@@ -160,3 +161,23 @@ def test_sensors_of_a_result(folder):
     assert sensors[2].sensitivity == pytest.approx(1.1094e-3)
     with pytest.raises(InputError, match="sensors"):
         sensors_of_result({"sensors": {}}, "r")
+
+
+@pytest.mark.slow
+def test_axes_that_feel_each_other(folder, tmp_path, monkeypatch):
+    """Forces of both; with one axis' sensors alone it says what it takes for that axis' force. The machine is known, not identified."""
+    sensors = oblique_cut().cut.sensors
+    monkeypatch.setattr("rcsa_ident.cli.results.read_machine", lambda _: oblique_machine())
+    monkeypatch.setattr("rcsa_ident.cli.forces._sensors", lambda *_: sensors)
+    for name, recording in (("cut.h5", oblique_cut().cut), ("air.h5", oblique_cut().air)):
+        channels = {s.name: recording.samples[:, i] * s.sensitivity for i, s in enumerate(recording.sensors)}
+        write_hdf5(tmp_path / name, recording.rate, channels)
+    asked = (folder / "RESULT.json", folder / "T.toml", tmp_path / "cut.h5", "--out", tmp_path / "F.csv", "--speed-rpm", 12000)
+    data = json.loads(run(*asked, "--air", tmp_path / "air.h5", "--json", "--idle-percent", 40, "--plot", tmp_path / "F.png").stdout)
+    assert data["axes"]["X"]["rms_n"] == pytest.approx(np.std(oblique_cut().force[:, 0]), rel=0.05)
+    assert data["axes"]["X"]["order"] == data["axes"]["Y"]["order"]
+    assert not any("feel each other" in text for text in data["warnings"])
+    monkeypatch.setattr("rcsa_ident.cli.forces._sensors", lambda *_: sensors[::2])
+    alone = run(*asked, "--air", tmp_path / "air.h5")
+    assert "X and Y feel each other, and Y has no displacement sensor" in alone.stderr
+    assert "Y: rms" not in alone.stdout

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rcsa_ident.observer._kernels import kalman_steps, lagged_force, modal_filter, smoothed_force
+from rcsa_ident.observer._kernels import coupled_smoothed, coupled_steps, kalman_steps, lagged_force, modal_filter, smoothed_force
 
 PLANTS, FORCES, NOISES, SAMPLES, SETTLING = 3, 2, 2, 60, 4
 
@@ -97,3 +97,67 @@ def test_modal_filter():
     found = modal_filter(*(np.stack([v.real, v.imag]) for v in (decay, gain)), 0.25, signal, state)
     np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12)
     np.testing.assert_allclose(state[0] + 1j * state[1], x, rtol=1e-10)
+
+
+@pytest.fixture
+def coupled():
+    """Two forces with two and one modes, two measurements that both see the plant; dense matrices of the same."""
+    rng = np.random.default_rng(11)
+    ends = np.array([PLANTS, PLANTS + 2, PLANTS + 3])
+    m = ends[-1] + NOISES
+    decay = rng.uniform(0.5, 0.9, m) * np.exp(1j * rng.uniform(0.1, 2.0, m))
+    inputs, observed, through = rng.normal(size=(2, 2, PLANTS)), rng.normal(size=(2, 2, m)), rng.normal(size=(2, 2))
+    observed[:, :, PLANTS : ends[-1]] = 0.0
+    gain, row = 0.03 * rng.normal(size=(SETTLING, 2, 2, m)), rng.normal(size=(SETTLING, 2, 2, m))
+    a, forces = np.zeros((2 * m, 2 * m)), np.zeros((2, 2 * m))
+    for k, z in enumerate(decay):
+        a[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = [[z.real, -z.imag], [z.imag, z.real]]
+    for c in range(2):
+        forces[c, 2 * ends[c] : 2 * ends[c + 1] : 2] = 1.0
+        a[: 2 * PLANTS] += np.outer(inputs[c].T.ravel(), forces[c])
+    seen = observed.transpose(0, 2, 1).reshape(2, -1) + through @ forces
+    arrays = (np.stack([decay.real, decay.imag]), inputs, observed, ends, through)
+    return arrays, gain, row, (a, seen, forces), rng.normal(size=(SAMPLES, 2))
+
+
+def coupled_twin(gain, dense, ends, measured):
+    a, seen, forces = dense
+    x, result = np.zeros(len(a)), []
+    for k, z in enumerate(measured):
+        x = a @ x
+        innovation = z - seen @ x
+        x = x + gain[min(k, len(gain) - 1)].transpose(2, 1, 0).reshape(-1, 2) @ innovation
+        result.append((forces @ x, x[2 * ends[:2]], innovation))
+    return np.array(result), x
+
+
+def test_coupled_steps(coupled):
+    arrays, gain, _, dense, measured = coupled
+    expected, last = coupled_twin(gain, dense, arrays[3], measured)
+    state, result = np.zeros((2, arrays[0].shape[1])), np.empty((SAMPLES, 3, 2))
+    coupled_steps(*arrays, gain, 0, measured, state, result)
+    np.testing.assert_allclose(result, expected, rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(state.T.ravel(), last, rtol=1e-9, atol=1e-11)
+    # in two blocks, the second knows how many steps went before
+    state, parts = np.zeros_like(state), []
+    for first, end in ((0, 2), (2, SAMPLES)):
+        part = np.empty((end - first, 3, 2))
+        coupled_steps(*arrays, gain, first, measured[first:end], state, part)
+        parts.append(part)
+    np.testing.assert_array_equal(np.concatenate(parts), result)
+
+
+def test_coupled_smoothed(coupled):
+    """The backward recursion with full matrices; the innovations come weighed already."""
+    arrays, gain, row, dense, measured = coupled
+    a, seen, _ = dense
+    result, _ = coupled_twin(gain, dense, arrays[3], measured)
+    weighed = result[:, 2] @ np.array([[0.7, 0.1], [0.1, 0.5]])
+    adjoint, expected = np.zeros(len(a)), np.empty((SAMPLES, 2))
+    for k in range(SAMPLES - 1, -1, -1):
+        j = min(k, SETTLING - 1)
+        expected[k] = result[k, 0] - row[j].transpose(0, 2, 1).reshape(2, -1) @ adjoint
+        kept = np.eye(len(a)) - gain[j].transpose(2, 1, 0).reshape(-1, 2) @ seen
+        adjoint = a.T @ (kept.T @ adjoint - seen.T @ weighed[k])
+    found = coupled_smoothed(*arrays, gain, row, weighed, np.ascontiguousarray(result[:, 0]))
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-10)

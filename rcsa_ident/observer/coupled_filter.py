@@ -1,0 +1,229 @@
+"""The Kalman filter [kalman1960] of axes that feel each other: shared states, a force and a measurement for each axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
+from rcsa_ident.dynamics.state_space import StateSpace
+from rcsa_ident.observer._kernels import coupled_smoothed, coupled_steps
+from rcsa_ident.observer.coupled_model import CoupledModel
+from rcsa_ident.observer.kalman import LONGEST_SETTLING, SETTLED, FilterState, riccati
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoupledFilter:
+    """Gains of all axes: a settling phase of full covariance, then the steady state.
+
+    Parameters
+    ----------
+    model : CoupledModel
+    gain : array, shape (s, c, 2, m)
+        Of each measurement; the last is the steady one.
+    variance : array, shape (s, c, c) [m^2]
+        Covariance of the innovations.
+    row : array, shape (s, c, 2, m)
+        Covariance of each force with the state after the correction.
+    force_variance : array, shape (s, c) [N^2]
+        Variance of each force after the correction.
+    """
+
+    model: CoupledModel
+    gain: FloatArray
+    variance: FloatArray
+    row: FloatArray
+    force_variance: FloatArray
+
+    def init(self) -> FilterState:
+        """Return the state before the first sample."""
+        return FilterState(0, np.zeros((2, self.model.decay.size)), np.zeros((0, 3)))
+
+    def run(self, state: FilterState, measured: FloatArray) -> tuple[FilterState, FloatArray]:
+        """Return the state after a block, and forces [N], their walking parts [N] and innovations [m] at its samples, shape (n, 3, c).
+
+        Parameters
+        ----------
+        state : FilterState
+        measured : array, shape (n, c) [m]
+        """
+        return self._scan(state, self.gain, state.count, np.ascontiguousarray(measured, dtype=float))
+
+    def predict(self, state: FilterState, count: int) -> tuple[FilterState, FloatArray]:
+        """Return the state after samples that nobody has measured, and the same at them as `run`, innovations 0, shape (n, 3, c)."""
+        # innovations that correct nothing
+        still = np.zeros((1, *self.gain.shape[1:]))
+        after, result = self._scan(state, frozen(still), 0, np.zeros((count, self.model.noise.size)))
+        result[:, 2] = 0.0
+        return after, result
+
+    def smooth(self, result: FloatArray) -> FloatArray:
+        """Return the forces given the whole record, shape (n, c) [N]; `result` is that of `run` from the first sample on.
+
+        As `KalmanFilter.smooth`.
+        """
+        place = np.minimum(np.arange(result.shape[0]), self.gain.shape[0] - 1)
+        weighed = np.einsum("nij,nj->ni", np.linalg.inv(self.variance)[place], result[:, 2])
+        return coupled_smoothed(*self._arrays(), self.gain, self.row, np.ascontiguousarray(weighed), np.ascontiguousarray(result[:, 0]))
+
+    def lag_weights(self, lag: int, at: int | None = None) -> FloatArray:
+        """Return what each later innovation adds to the forces of a sample, shape (lag, c, c) [N/m]: later sample, force, innovation.
+
+        Parameters
+        ----------
+        lag : int
+            Number of later innovations.
+        at : int, optional
+            Number of the sample in the settling phase; by default one of the steady state.
+        """
+        shown, inverse = self._ahead(lag, at)
+        return shown @ inverse
+
+    def standard_deviation(self, count: int, smoothed: bool = False, longest: int = 4096) -> FloatArray:
+        """Return the forces' standard deviations at `count` samples from the first, given those before or all, shape (count, c) [N].
+
+        Parameters
+        ----------
+        count : int
+        smoothed : bool
+            Given all samples; else given those before.
+        longest : int
+            How far a sample looks ahead.
+        """
+        last = self.gain.shape[0] - 1
+        variance = self.force_variance[np.minimum(np.arange(count), last)]
+        if smoothed:
+            told = np.concatenate([np.zeros((1, self.model.noise.size)), np.cumsum(self._told(min(longest, count)), axis=0)])
+            gained = told[np.minimum(np.arange(count)[::-1], told.shape[0] - 1)]
+            for k in range(min(last, count)):
+                gained[k] = np.sum(self._told(min(longest, count - 1 - k), k), axis=0)
+            variance = variance - gained
+        return np.sqrt(np.maximum(variance, 0.0))
+
+    def response(self, omega: FloatArray, lag: int = 0) -> ComplexArray:
+        """Return the observer's frequency response in the steady state, measured displacements to forces, shape (n, c, c) [N/m].
+
+        Parameters
+        ----------
+        omega : array, shape (n,) [rad/s]
+        lag : int
+            With a fixed lag, the delay by it taken out; a long one stands for the smoother.
+        """
+        a, seen, rows, gain = self._steady()
+        closed, predicted = a - gain @ seen @ a, seen @ a
+        # from its own poles: solving for each frequency takes seconds and hundreds of megabytes
+        pole, shapes = np.linalg.eig(closed)
+        entering = np.linalg.solve(shapes, gain)
+        turn = np.asarray(omega, dtype=float)[:, None] * self.model.step
+        back = np.exp(-1j * turn)
+        states = 1.0 / (1.0 - back * pole)
+        force: ComplexArray = ((rows @ shapes) * states[:, None]) @ entering
+        if lag:
+            innovation = np.eye(len(seen)) - back[:, :, None] * (((predicted @ shapes) * states[:, None]) @ entering)
+            ahead = np.exp(1j * turn * np.arange(1.0, lag + 1.0))
+            force = force + np.tensordot(ahead, self.lag_weights(lag), axes=1) @ innovation
+        return force
+
+    def state_space(self) -> StateSpace:
+        """Return the filter in the steady state: measured displacements [m] in, forces [N] and then innovations [m] out."""
+        a, seen, rows, gain = self._steady()
+        closed = a - gain @ seen @ a
+        outputs, direct = np.vstack([rows @ closed, -(seen @ a)]), np.vstack([rows @ gain, np.eye(len(seen))])
+        return StateSpace(closed, gain, outputs, direct, self.model.step)
+
+    def _scan(self, state: FilterState, gain: FloatArray, first: int, measured: FloatArray) -> tuple[FilterState, FloatArray]:
+        modes, result = np.array(state.modes), np.empty((measured.shape[0], 3, self.model.noise.size))
+        coupled_steps(*self._arrays(), gain, first, measured, modes, result)
+        return FilterState(state.count + measured.shape[0], modes, state.waiting), result
+
+    def _ahead(self, lag: int, at: int | None) -> tuple[FloatArray, FloatArray]:
+        """How later innovations covary with the forces of a sample [m N], and the inverses of their covariances; (lag, c, c) each."""
+        last = self.gain.shape[0] - 1
+        at = last if at is None else min(at, last)
+        count = self.model.noise.size
+        shown = np.empty((lag, count, count))
+        for f in range(count):
+            state = FilterState(0, -np.array(self.row[at, f]), np.zeros((0, 3)))
+            shown[:, f] = self._scan(state, self.gain, at + 1, np.zeros((lag, count)))[1][:, 2]
+        return shown, np.linalg.inv(self.variance)[np.minimum(at + 1 + np.arange(lag), last)]
+
+    def _told(self, lag: int, at: int | None = None) -> FloatArray:
+        """By how much each later innovation lessens the variance of each force of a sample, shape (lag, c) [N^2]."""
+        shown, inverse = self._ahead(lag, at)
+        return np.sum((shown @ inverse) * shown, axis=2)
+
+    def _steady(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """A, H, the forces' rows and the gains (n, c) of the live real states, in metres and newtons."""
+        a, seen, rows, _ = self.model.matrices()
+        gain = self.gain[-1].transpose(2, 1, 0).reshape(-1, self.model.noise.size)[self.model.live]
+        return a, seen * self.model.noise[:, None], rows, gain
+
+    def _arrays(self) -> tuple[FloatArray, FloatArray, FloatArray, np.ndarray, FloatArray]:
+        model = self.model
+        decay, inputs = (np.stack([each.real, each.imag]) for each in (model.decay, model.inputs.T))
+        observed = np.stack([model.observed.real, -model.observed.imag], axis=1)
+        return decay, np.ascontiguousarray(inputs.transpose(1, 0, 2)), observed, np.array(model.ends), model.through
+
+
+def coupled_filter(model: CoupledModel, longest_settling: int = LONGEST_SETTLING) -> CoupledFilter:
+    """Return the filter's gains: steady ones from the Riccati equation, before them those of the full covariance.
+
+    Parameters
+    ----------
+    model : CoupledModel
+    longest_settling : int
+        Steps of full covariance at most; they end where the gain is steady. 0 starts with the steady gain.
+
+    Raises
+    ------
+    InputError
+        If the Riccati equation has no stabilising solution: a force mode that no measurement shows.
+    """
+    a, seen, rows, q = model.matrices()
+    steady = riccati(a, seen, q)
+    gain, variance, covariance = _corrected(steady, seen)
+    parts = [*_settling(model, steady, longest_settling), (gain, variance, covariance @ rows.T)]
+    live, places, count = model.live, model.decay.size, model.noise.size
+
+    def spread(columns: list[FloatArray]) -> FloatArray:
+        full = np.zeros((len(columns), count, 2 * places))
+        full[:, :, live] = np.transpose(columns, (0, 2, 1))
+        return frozen(full.reshape(-1, count, places, 2).transpose(0, 1, 3, 2))
+
+    across = [each for _, _, each in parts]
+    return CoupledFilter(
+        model,
+        gain=spread([gain / model.noise for gain, _, _ in parts]),
+        variance=frozen(np.array([variance for _, variance, _ in parts]) * np.outer(model.noise, model.noise)),
+        row=spread(across),
+        force_variance=frozen([np.einsum("fn,nf->f", rows, each) for each in across]),
+    )
+
+
+def _corrected(predicted: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Gains (n, c), innovation covariance and covariance after the correction, in units of the measurements' noise."""
+    shown = predicted @ seen.T
+    variance = seen @ shown + np.eye(len(seen))
+    gain = np.linalg.solve(variance, shown.T).T
+    keep = np.eye(len(predicted)) - gain @ seen
+    return gain, variance, keep @ predicted @ keep.T + gain @ gain.T
+
+
+def _settling(model: CoupledModel, steady: FloatArray, longest: int) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+    """The first steps' gains, innovation covariances and the forces' covariance with the states, from filterpy's full covariance."""
+    from filterpy.kalman import KalmanFilter as FullFilter
+
+    a, seen, rows, q = model.matrices()
+    target = _corrected(steady, seen)[0]
+    full = FullFilter(dim_x=a.shape[0], dim_z=len(seen))
+    full.F, full.H, full.Q, full.R, full.P = a, seen, q, np.eye(len(seen)), model.first_covariance()
+    found, none = [], np.zeros(len(seen))
+    for _ in range(longest):
+        full.predict()
+        full.update(none)
+        gain = full.K.copy()
+        if np.linalg.norm(gain - target) <= SETTLED * np.linalg.norm(target):
+            break
+        found.append((gain, full.S.copy(), full.P @ rows.T))
+    return found
