@@ -80,7 +80,8 @@ def both_planes_from_json(table: Table) -> CoupledPosterior:
     if not 0.0 <= low <= high:
         table.refuse("speed_range_rpm", f"{[low, high]}", "lowest and highest speed, 0 <= lowest <= highest [rev/min]")
     speed_range = float(from_rpm(0.5 * (low + high))), float(from_rpm(0.5 * (high - low)))
-    return CoupledPosterior(best, matrix, speed_range, tuple(_unknowns(rival) for rival in table.tables("rivals")))
+    rivals = [] if table.data.get("rivals") == [] else table.tables("rivals")
+    return CoupledPosterior(best, matrix, speed_range, tuple(_unknowns(rival) for rival in rivals))
 
 
 def _complex(value: Any) -> bool:

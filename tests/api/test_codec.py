@@ -20,6 +20,8 @@ from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.process import ProcessDamping
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.candidate import Candidate
+from rcsa_ident.identification.coupled.fit import CoupledSearch
+from rcsa_ident.identification.coupled.parameters import EVERY_PAIR, CoupledLayout
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.parameters import AxisLayout, Layout
 from rcsa_ident.identification.progress import Stage, Step
@@ -100,6 +102,16 @@ def test_what_a_search_has_come_to():
     candidate = Candidate(rng.standard_normal(layout.size), layout, rng.standard_normal((5, 2)), 1.0 / 3.0, turned)
     steps = [Step("x", Stage.SEARCH, np.inf, 5), Step("both", Stage.MODES, -1.0, 4)]
     value = AxisSearch([candidate, candidate], [-2.5, np.nan], 5e-4, np.ones(5), steps)
+    assert same(value, decode(encode(value)))
+
+
+@pytest.mark.parametrize("skew", [0, 2, EVERY_PAIR])
+def test_what_a_search_of_both_planes_has_come_to(skew):
+    """A killed job goes on from what its starts of both planes had found, to the last bit."""
+    rng = np.random.default_rng(2)
+    layout = CoupledLayout(4, fixture=True, softening=True, skew=skew, turning=-1, coefficients=3, clampings=2)
+    candidate = Candidate(rng.standard_normal(layout.size), layout, rng.standard_normal((5, 2)), 0.1, rng.standard_normal((2, 2)))
+    value = [CoupledSearch(candidate, -1.0 / 3.0)]
     assert same(value, decode(encode(value)))
 
 

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import copy
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rcsa_ident.errors import InputError
+from rcsa_ident.identification.coupled.parameters import CoupledLayout
+from rcsa_ident.identification.coupled.posterior import CoupledUnknowns
 from rcsa_ident.io.identifications import identification_to_json, machine_from_json, speed_band_to_json
-from rcsa_ident.io.results import read_result, write_result
+from rcsa_ident.io.results import plain, read_result, write_result
 from rcsa_ident.workflows.identify import mode_deviations
 from tests.fixtures import by_hand, coupled_by_hand
+from tests.identification.coupled.models import coupled_vector
 
 OMEGA = 2.0 * np.pi * np.linspace(300.0, 3000.0, 50)
 
@@ -101,3 +105,29 @@ def test_a_covariance_is_one(path):
     broken["both_planes"]["covariance"]["matrix"][0][0] = -1.0
     with pytest.raises(InputError, match="variance below 0"):
         machine_from_json(broken, "R.json")
+
+
+def test_one_without_rivals_comes_back(tmp_path):
+    found = coupled_by_hand.identification(1)
+    found = replace(found, whole=replace(found.whole, rivals=()))
+    data = json.loads(json.dumps(plain(identification_to_json(found, by_hand.campaign(tmp_path), []))))
+    assert machine_from_json(data, "R.json").whole.rivals == ()
+
+
+def test_rivals_of_any_number_of_modes_and_discs(tmp_path):
+    layouts = CoupledLayout(2), CoupledLayout(5, softening=True, skew=2, turning=1), CoupledLayout(3, skew=1, turning=-1)
+    rivals = tuple(CoupledUnknowns(coupled_vector(layout), layout) for layout in layouts)
+    found = coupled_by_hand.identification(1)
+    found = replace(found, whole=replace(found.whole, rivals=rivals))
+    data = json.loads(json.dumps(plain(identification_to_json(found, by_hand.campaign(tmp_path), []))))
+    for read, wrote in zip(machine_from_json(data, "R.json").whole.rivals, rivals, strict=True):
+        assert read.layout == wrote.layout
+        np.testing.assert_array_equal(read.theta, wrote.theta)
+
+
+@pytest.mark.parametrize("key", ["layout", "unknowns", "covariance", "speed_range_rpm", "rivals", "modes"])
+def test_what_is_missing_is_named(path, key):
+    data = json.loads(path.read_text(encoding="utf-8"))
+    del data["both_planes"][key]
+    with pytest.raises(InputError, match=rf"R\.json: both_planes\.{key}: found nothing, allowed is"):
+        machine_from_json(data, "R.json")

@@ -220,6 +220,7 @@ def parameter_names(layout: CoupledLayout) -> tuple[str, ...]:
     names += [f"residual_factor[{i},{j}]" for i in range(DIRECTIONS) for j in range(i + 1)]
     names += [f"softening[{i},{j}]" for i, j in pairs if layout.softening]
     names += [f"disc_{k}_{side}[{n}]" for k in range(max(layout.skew, 0)) for side in ("a", "b") for n in range(m)]
+    names += [f"gyroscopic[{i},{j}]" for i in range(m) for j in range(i + 1, m) if layout.skew == EVERY_PAIR]
     return (*names, "log joint.k_t", "log joint.k_r", "log joint.c_t", "log joint.c_r")
 
 
