@@ -38,10 +38,10 @@ def told_across(omega: FloatArray, force: ComplexArray) -> tuple[FloatArray, Flo
         return np.zeros(0), np.zeros(0)
     number = np.floor(np.log(omega / omega.min()) / np.log(BAND)).astype(int)
     bands = np.unique(number)
-    least = [np.linalg.svd(unit[number == b], compute_uv=False) for b in bands]
-    found = np.array(
-        [values[-1] / np.sqrt(np.sum(number == b)) if values.size == 2 else 0.0 for b, values in zip(bands, least, strict=True)]
-    )
+    found = np.zeros(bands.size)
+    for k, b in enumerate(bands):
+        values = np.linalg.svd(unit[number == b], compute_uv=False)
+        found[k] = values[-1] / np.sqrt(np.sum(number == b)) if values.size == 2 else 0.0
     return omega.min() * BAND ** (bands + 0.5), found
 
 
@@ -60,6 +60,11 @@ def gain_across(one: Sequence[tuple[FloatArray, ComplexArray]], other: Sequence[
 
 def _mean_told(lines: Sequence[tuple[FloatArray, ComplexArray]]) -> float:
     return float(np.mean(told_across(np.concatenate([omega for omega, _ in lines]), np.concatenate([force for _, force in lines]))[1]))
+
+
+def turned(lines: Sequence[tuple[FloatArray, ComplexArray]]) -> list[tuple[FloatArray, ComplexArray]]:
+    """Return the lines of the same cuts fed at right angles: from +X to +Y."""
+    return [(omega, np.stack([-force[:, 1], force[:, 0]], axis=1)) for omega, force in lines]
 
 
 def lines_of(
