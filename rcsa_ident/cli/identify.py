@@ -53,18 +53,22 @@ class Method(StrEnum):
 def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask = None, json_: Json = False) -> None:
     """Read everything and give a verdict on every recording; nothing is identified."""
     from rcsa_ident.report.summaries import recording_rows
+    from rcsa_ident.workflows.coverage import left_open
 
     stages = Stages(quiet=json_)
     with workers_or_cluster(processes, dask) as pool:
         campaign, readings = read_and_judge(campaign_dir, pool, stages)
-    rows = recording_rows(readings)
+    rows, open_ = recording_rows(readings), left_open(campaign, readings)
     usable = sum(row.usable for row in rows)
     if json_:
-        emit({"campaign": campaign.name, "cuts": len(rows), "usable": usable, "recordings": [asdict(row) for row in rows]})
+        told = {"campaign": campaign.name, "cuts": len(rows), "usable": usable, "left_open": list(open_)}
+        emit(told | {"recordings": [asdict(row) for row in rows]})
     else:
         from rcsa_ident.cli.tables import show_recordings
 
         show_recordings(rows)
+        for sentence in open_:
+            say(f"note: {sentence}")
         say(f"{usable} of {len(rows)} recordings usable, {stages.seconds['recordings']:.1f} s")
     if not usable:
         raise typer.Exit(BAD_INPUT)

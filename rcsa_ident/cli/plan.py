@@ -61,7 +61,13 @@ def plan(
         float | None, typer.Option(help="Entry angle from the normal direction, instead of --immersion.", show_default=False)
     ] = None,
     exit_deg: Annotated[float | None, typer.Option(help="Exit angle.", show_default=False)] = None,
-    feed_direction: Annotated[str, typer.Option(help="+X -X +Y -Y, or degrees from +X.")] = "+X",
+    feed_direction: Annotated[
+        str | None,
+        typer.Option(
+            help="+X -X +Y -Y, or degrees from +X; default: +X, and +Y in turn where that pushes the tools in further directions.",
+            show_default=False,
+        ),
+    ] = None,
     feed_per_tooth_mm: Annotated[float, typer.Option(help="Feed per tooth, mm.")] = 0.1,
     margin: Annotated[float, typer.Option(help="Least ratio of the stability limit to the depth.")] = 1.5,
     from_: Annotated[
@@ -81,7 +87,7 @@ def plan(
     from rcsa_ident.cli.results import read_identified, tell
     from rcsa_ident.io.files import write_text
     from rcsa_ident.io.setups import read_tooling
-    from rcsa_ident.workflows.plan import CutConstraints, plan_cuts
+    from rcsa_ident.workflows.plan import CutConstraints, alternating, plan_cuts
 
     writable(out)
     machine, data = read_identified(result)
@@ -92,16 +98,19 @@ def plan(
         _depths(depths_mm),
         positive("--feed-per-tooth-mm", feed_per_tooth_mm, "mm") * 1e-3,
         engagement(immersion, strategy, entry_deg, exit_deg),
-        feed_angle(feed_direction),
+        feed_angle("+X" if feed_direction is None else feed_direction),
         margin,
     )
     low, high = data["band_hz"]
     stages = Stages(quiet=json_)
     with stages.stage("plan"):
         noise = positive("--noise-nm", noise_nm, "nm") * 1e-9 if campaign is None else _noise_of(campaign)
+        cut_with = [read_tooling(path) for path in toolings]
+        if feed_direction is None:
+            allowed = alternating(allowed, cut_with, _coefficients(data, str(result)))
         planned = plan_cuts(
             machine,
-            [read_tooling(path) for path in toolings],
+            cut_with,
             [read_tooling(path) for path in target],
             allowed,
             _coefficients(data, str(result)),
@@ -171,7 +180,8 @@ def _depths(text: str) -> tuple[float, ...]:
 
 def _speeds(machine: IdentifiedMachine, lowest: float | None, highest: float | None) -> tuple[float, float]:
     """The speeds asked for, those of the campaign where nothing is said [rad/s]."""
-    middle, half = next((p.posterior.speed_range for p in machine.identified.values() if p.posterior is not None), (0.0, 0.0))
+    each = [machine.whole, *(part.posterior for part in machine.identified.values())]
+    middle, half = next((known.speed_range for known in each if known is not None), (0.0, 0.0))
     found = []
     for name, given, known in (("--speed-from", lowest, middle - half), ("--speed-to", highest, middle + half)):
         if given is None and known <= 0.0:
@@ -233,6 +243,7 @@ def _row(name: str, cut: PlannedCut) -> dict[str, Any]:
         "tooling": cut.tooling,
         "spindle_speed_rpm": float(f"{to_rpm(c.spindle_speed):.9g}"),
         "axial_depth_mm": float(f"{c.axial_depth * 1e3:.9g}"),
+        "feed_direction": json.loads(_direction(c.feed_angle)),
         "limit_depth_mm": cut.limit_depth * 1e3,
     }
 
@@ -262,13 +273,21 @@ def _show(planned: PlannedCuts) -> None:
     from rich.table import Table
 
     names = [f"{escape(name)}\n± %" for name in planned.targets]
-    table = Table("", "tooling", "spindle speed\nrev/min", "depth\nmm", "stable up to\nmm", *names, title="cuts", title_justify="left")
+    table = Table(
+        "", "tooling", "spindle speed\nrev/min", "depth\nmm", "feed", "stable up to\nmm", *names, title="cuts", title_justify="left"
+    )
     for column in (*table.columns[:1], *table.columns[2:]):
         column.justify = "right"
-    table.add_row("", "before", "", "", "", *(f"{100.0 * v:.3f}" for v in planned.band[0]))
+    table.add_row("", "before", "", "", "", "", *(f"{100.0 * v:.3f}" for v in planned.band[0]))
     for i, (cut, after) in enumerate(zip(planned.cuts, planned.band[1:], strict=True), start=1):
         c, limit = cut.conditions, f"{cut.limit_depth * 1e3:.2f}" if math.isfinite(cut.limit_depth) else "more"
-        numbers = (f"{to_rpm(c.spindle_speed):.0f}", f"{c.axial_depth * 1e3:g}", limit, *(f"{100.0 * v:.3f}" for v in after))
+        numbers = (
+            f"{to_rpm(c.spindle_speed):.0f}",
+            f"{c.axial_depth * 1e3:g}",
+            _direction(c.feed_angle).strip('"'),
+            limit,
+            *(f"{100.0 * v:.3f}" for v in after),
+        )
         table.add_row(str(i), escape(cut.tooling), *numbers)
     out = Console(highlight=False)
     out.print(table)

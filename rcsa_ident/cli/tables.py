@@ -58,9 +58,8 @@ def show_identification(found: Identification, deviations: Mapping[Dof, tuple[Fl
     if found.whole is not None:
         out.print(escape(found.coupling), soft_wrap=True)
         whole = whole_mode_rows(found.whole.best.standing(), next(iter(deviations.values()), None))
-        out.print(
-            _modes("modes at the flange, X and Y together, spindle at standstill", whole, [f"{round(r.direction_deg)}" for r in whole])
-        )
+        angles = [f"{round(row.direction_deg)}" for row in whole]
+        out.print(_modes("modes at the flange, X and Y together, spindle at standstill", whole, angles))
     for axis, part in found.axes.items():
         if found.whole is None:
             out.print(_modes(f"modes at the flange, {axis.upper()}", mode_rows(part.modes, deviations.get(axis))))

@@ -19,6 +19,8 @@ from rcsa_ident.cutting.force import force_and_slope
 
 #: Ratio of the ends of a band of frequencies in which a machine is taken for the same.
 BAND = 1.35
+#: Least force of a line [N].
+LEAST_FORCE = 1e-3
 #: What a second set of cuts gains at least to be worth another set-up: ratio of mean smallest singular values.
 WORTH = 1.2
 
@@ -33,15 +35,17 @@ def told_across(omega: FloatArray, force: ComplexArray) -> tuple[FloatArray, Flo
         Of each line along X and Y, up to a phase; bands with one line alone tell nothing across it.
     """
     size = np.linalg.norm(force, axis=1)
-    omega, unit = omega[size > 0.0], force[size > 0.0] / size[size > 0.0, None]
+    # what rounding leaves of a constant force is no line
+    pushed = size > LEAST_FORCE
+    omega, unit = omega[pushed], force[pushed] / size[pushed, None]
     if not omega.size:
         return np.zeros(0), np.zeros(0)
     number = np.floor(np.log(omega / omega.min()) / np.log(BAND)).astype(int)
     bands = np.unique(number)
-    least = [np.linalg.svd(unit[number == b], compute_uv=False) for b in bands]
-    found = np.array(
-        [values[-1] / np.sqrt(np.sum(number == b)) if values.size == 2 else 0.0 for b, values in zip(bands, least, strict=True)]
-    )
+    found = np.zeros(bands.size)
+    for k, b in enumerate(bands):
+        values = np.linalg.svd(unit[number == b], compute_uv=False)
+        found[k] = values[-1] / np.sqrt(np.sum(number == b)) if values.size == 2 else 0.0
     return omega.min() * BAND ** (bands + 0.5), found
 
 
@@ -59,7 +63,13 @@ def gain_across(one: Sequence[tuple[FloatArray, ComplexArray]], other: Sequence[
 
 
 def _mean_told(lines: Sequence[tuple[FloatArray, ComplexArray]]) -> float:
-    return float(np.mean(told_across(np.concatenate([omega for omega, _ in lines]), np.concatenate([force for _, force in lines]))[1]))
+    told = told_across(np.concatenate([omega for omega, _ in lines]), np.concatenate([force for _, force in lines]))[1]
+    return float(np.mean(told)) if told.size else 0.0
+
+
+def turned(lines: Sequence[tuple[FloatArray, ComplexArray]]) -> list[tuple[FloatArray, ComplexArray]]:
+    """Return the lines of the same cuts fed at right angles: from +X to +Y."""
+    return [(omega, np.stack([-force[:, 1], force[:, 0]], axis=1)) for omega, force in lines]
 
 
 def lines_of(

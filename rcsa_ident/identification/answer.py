@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.cutting.force_directions import WORTH, gain_across, turned
 from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.identification.coupled.data import CoupledData
@@ -34,6 +35,8 @@ from rcsa_ident.remarks import Remark
 WIDER, WIDER_TOGETHER = 1.4, 1.7
 #: Share of the largest motion above which it is told how much of it the other axis' force makes.
 LARGE = 0.3
+#: Said of a campaign whose cuts push the tool in like directions.
+ANOTHER_FEED = "all cuts push the tool in like directions: cuts fed along Y beside those along X would about halve the uncertainty"
 
 
 class Fit(ABC):
@@ -233,7 +236,16 @@ class CoupledFit(Fit):
         reasons = diagnose(self.data, self.solution, self.misfit, bands)
         natural = {"X and Y": np.exp(self.solution.theta[: layout.modes])}
         found = remarks(self.data, self.solution, self.misfit, self.covariance, natural)
-        return reasons, [Remark(IdentificationCode.PLANES_COUPLED, self._in_words(value)), *found]
+        told = [Remark(IdentificationCode.PLANES_COUPLED, self._in_words(value))]
+        if self._gain_of_another_feed() > WORTH:
+            told.append(Remark(IdentificationCode.ONE_FEED, ANOTHER_FEED))
+        return reasons, [*told, *found]
+
+    def _gain_of_another_feed(self) -> float:
+        """How much better both planes would be told apart if half of the cuts were fed at right angles."""
+        points = self.points
+        lines = [(points.omega[own], points.force[own]) for own in (np.flatnonzero(points.speed == s) for s in np.unique(points.speed))]
+        return gain_across(lines, turned(lines))
 
     def _contribution(self, machine: JointedFlange) -> ComplexArray:
         """What a tip of the cut toolings feels of the machine, A12 (A22 + W)^-1 A21, shape (p, 2, 2)."""

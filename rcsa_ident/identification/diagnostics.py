@@ -8,6 +8,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.cutting.force import ForceTerm
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.joint_fit import AxisSearch
@@ -163,6 +164,8 @@ def remarks(
     def note(code: IdentificationCode, sentence: str) -> None:
         notes.append(Remark(code, sentence))
 
+    if len(data.axes) == 1:
+        note(IdentificationCode.ONE_AXIS, one_axis(data.axes[0].axis))
     layout, priors = solution.layout, misfit.priors
     deviation = np.sqrt(np.diag(covariance))
     for name, std in zip(_JOINT, deviation[layout.joint], strict=True):
@@ -195,6 +198,15 @@ def remarks(
         words = f"cuts that contradict the others and were given less weight: {_named(data, bad, misfit)}"
         note(IdentificationCode.CUTS_WEIGHTED_DOWN, words)
     return notes
+
+
+def one_axis(axis: Dof) -> str:
+    """Return what a campaign that has recorded one axis cannot know."""
+    own, other = ("X", "Y") if axis is Dof.X else ("Y", "X")
+    return (
+        f"only {own} was recorded: whether X and Y feel each other cannot be told, and where they do, what the force in {other} "
+        f"does in {own} is taken for the machine's own; nothing is known of the tool's motion in {other}: limits and FRFs take it for rigid"
+    )
 
 
 def _named(data: IdentificationData, bad: np.ndarray, misfit: Misfit) -> str:

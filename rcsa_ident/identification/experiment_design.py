@@ -231,7 +231,8 @@ def expected_cut(
             still = np.zeros((int(kept.sum()), 1), dtype=complex)
             variance = (noise / size[kept, i][:, None]) ** 2
             own = order[kept]
-            lines[axis] = AxisLines(own, own * spindle_speed, still, still, variance, np.ones(own.size), force[kept, i], slope[kept, i])
+            both = force[kept, i], slope[kept, i], force[kept, 1 - i], slope[kept, 1 - i]
+            lines[axis] = AxisLines(own, own * spindle_speed, still, still, variance, np.ones(own.size), *both)
     return CutMeasurement(cut_id, tooling, spindle_speed, lines, 0.0)
 
 
@@ -272,11 +273,11 @@ def information(data: IdentificationData, posteriors: Mapping[Dof, Posterior], m
         for k in range(cuts):
             own = columns[edges[k] : edges[k + 1]]
             parts[k] += [own.real, own.imag]
-    return tuple(_without_delay(np.concatenate(each)) if each else np.zeros((0, size)) for each in parts)
+    return tuple(without_delay(np.concatenate(each)) if each else np.zeros((0, size)) for each in parts)
 
 
-def _without_delay(rows: FloatArray) -> FloatArray:
-    """Rows (r, d + 1) without their last column and what runs along it: the Schur complement of one unknown, (r, d)."""
+def without_delay(rows: FloatArray) -> FloatArray:
+    """Return rows (r, d + 1) without their last column and what runs along it: the Schur complement of one unknown, (r, d)."""
     delay = rows[:, -1]
     length = float(delay @ delay)
     return rows[:, :-1] - np.outer(delay, delay @ rows[:, :-1]) / length if length > 0.0 else rows[:, :-1]

@@ -121,6 +121,10 @@ class Misfit:
         linear = self._linearise(layout, answers, residual, nuisance, prior) if normal else None
         return Evaluation(residual.cost, nuisance, tuple(models), residual, linear)
 
+    def root_weight(self, axis: int) -> FloatArray:
+        """Return one over the standard deviation of each line of an axis, shape (n o,) [N/m]."""
+        return np.sqrt(self._axes[axis].weight)
+
     def models(self, theta: FloatArray, layout: Unknowns) -> tuple[ComplexArray, ...]:
         """Return the model's cross FRFs on the lines of each axis, shapes (n, o) [m/N]; no delay and no noise is in them."""
         return tuple(answer.model for answer in self._answers(theta, layout, False))

@@ -45,6 +45,8 @@ class IdentificationCode(StrEnum):
     MODES_OUTSIDE_BAND = "modes-outside-band"
     COEFFICIENT_UNKNOWN = "coefficient-unknown"
     PLANES_COUPLED = "planes-coupled"
+    ONE_AXIS = "one-axis"
+    ONE_FEED = "one-feed-direction"
     CUTS_WEIGHTED_DOWN = "cuts-weighted-down"
 
 

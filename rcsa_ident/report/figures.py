@@ -226,9 +226,8 @@ def tooltip_frf(
                 unit = value / np.abs(value)
                 std_size = np.hypot(std_real * unit.real, std_imaginary * unit.imag)
                 low = np.maximum(size - 2.0 * std_size, 1e-3 * size)
-                top.fill_between(
-                    frequency, low, size + 2.0 * std_size, color=COLOURS[axis], alpha=0.3, lw=0, label="± 2 σ" if len(axis) == 1 else None
-                )
+                band = "± 2 σ" if len(axis) == 1 else None
+                top.fill_between(frequency, low, size + 2.0 * std_size, color=COLOURS[axis], alpha=0.3, lw=0, label=band)
                 bottom.fill_between(frequency, real - 2.0 * std_real, real + 2.0 * std_real, color=COLOURS[axis], alpha=0.3, lw=0)
             top.plot(frequency, size, color=COLOURS[axis], label=name if len(axis) > 1 else "predicted")
             bottom.plot(frequency, real, color=COLOURS[axis])

@@ -3,50 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
-from rcsa_ident.cutting.force import force_and_slope
+from rcsa_ident.cutting.force_directions import WORTH, gain_across, lines_of, turned
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.identification.data import prepare
-from rcsa_ident.identification.evidence import SMOOTH_ERROR
 from rcsa_ident.identification.experiment_design import (
     CandidateCuts,
     Goal,
     MeanVariance,
-    compressed,
     deviations,
     exchanged,
-    expected_cut,
     greedy,
-    harmonics,
-    information,
-    tip_changes,
-    unknowns,
 )
 from rcsa_ident.identification.machine import IdentifiedMachine
-from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.machine.machine import STIFFNESS_SPREAD
+from rcsa_ident.machine.speed_dependence import tips_over_speed
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.signals.measurement import MAX_FREQUENCY, CutMeasurement
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod
 from rcsa_ident.stability.zero_order import ZeroOrder
-from rcsa_ident.tool_holder.geometry import stiffened
-from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.units import from_rpm, to_rpm
+from rcsa_ident.workflows.prospects import SPACING, apart, together
 
-#: Two cuts of one tooling differ by at least this share of their speed; a programmed speed is met within as much.
-SPACING = 0.01
-#: Frequencies at which the wanted tooltip is judged, and those of the receptances behind the lobes [Hz]: lowest, step.
-JUDGED = 160
+#: Frequencies of the receptances behind the lobes [Hz]: lowest, step.
 LOBE_FREQUENCIES = (100.0, 2.0)
 
 
@@ -63,6 +49,8 @@ class CutConstraints:
     feed_per_tooth : float [m]
     engagement : Engagement
     feed_angle : float [rad]
+    second_feed : float or None [rad]
+        Direction of the feed of other cuts: what is felt across the planes is then told better. None: all go along `feed_angle`.
     margin : float [-]
         The stability limit is at least so many times the depth, at the speed and `SPACING` around it.
     method : StabilityMethod
@@ -76,6 +64,7 @@ class CutConstraints:
     feed_angle: float = 0.0
     margin: float = 1.5
     method: StabilityMethod = field(default_factory=ZeroOrder)
+    second_feed: float | None = None
 
     def __post_init__(self) -> None:
         positive("lowest speed", self.lowest, "rad/s")
@@ -88,6 +77,11 @@ class CutConstraints:
             positive("depth", depth, "m")
         if not 1.0 <= self.margin < np.inf:
             raise InputError("margin", self.margin, "a finite number, 1 or more")
+
+    @property
+    def feeds(self) -> tuple[float, ...]:
+        """Directions of the feed [rad]."""
+        return (self.feed_angle,) if self.second_feed is None else (self.feed_angle, self.second_feed)
 
     @property
     def speeds(self) -> FloatArray:
@@ -222,12 +216,13 @@ def plan_cuts(
     """
     _check(machine, toolings, targets, count, band_hz)
     goal = MeanVariance() if goal is None else goal
-    posteriors = {axis: part.posterior for axis, part in machine.identified.items() if part.posterior is not None}
     candidates, unstable, deepest = _candidates(machine, toolings, allowed, coefficients)
     if not candidates:
         found = f"none of {unstable} stable with a margin of {allowed.margin:g} (the deepest stable one would be {1e3 * deepest:.3g} mm)"
         raise InputError("cuts", found, "depths, speeds and toolings of which at least one is")
-    prospects = _prospects(candidates, posteriors, toolings, targets, coefficients, noise, model_error, band_hz)
+    made = [(cut.tooling, cut.conditions) for cut in candidates]
+    asked = machine, made, toolings, targets, coefficients, noise, model_error, band_hz
+    prospects = together(*asked) if machine.coupled_planes else apart(*asked)
     order = greedy(prospects, count, goal)
     warnings = []
     if len(order) < count:
@@ -252,6 +247,22 @@ def plan_cuts(
     )
 
 
+def alternating(allowed: CutConstraints, toolings: Sequence[Tooling], coefficients: CuttingCoefficients) -> CutConstraints:
+    """Return the constraints with a feed at right angles beside the first one, where that pushes the tools in further directions."""
+    lines = [
+        lines_of(
+            tooling.cutter,
+            CuttingConditions(speed, max(allowed.depths), allowed.feed_per_tooth, allowed.engagement, allowed.feed_angle),
+            coefficients,
+            2.0 * np.pi * MAX_FREQUENCY,
+        )
+        for tooling in toolings
+        for speed in allowed.speeds.tolist()
+    ]
+    worth = gain_across(lines, turned(lines)) > WORTH
+    return replace(allowed, second_feed=allowed.feed_angle + 0.5 * np.pi) if worth else allowed
+
+
 def line_noise(measurements: Sequence[CutMeasurement]) -> float:
     """Return the standard deviation of a displacement line's real and imaginary part in some cuts: the median over all lines [m]."""
     each = [np.sqrt(np.sum(lines.variance, axis=1)) * np.abs(lines.force) for m in measurements for lines in m.axes.values()]
@@ -263,11 +274,8 @@ def line_noise(measurements: Sequence[CutMeasurement]) -> float:
 def _check(
     machine: IdentifiedMachine, toolings: Sequence[Tooling], targets: Sequence[Tooling], count: int, band_hz: tuple[float, float]
 ) -> None:
-    if machine.coupled_planes:
-        allowed = "a machine whose planes do not feel each other: what is known of this one belongs to both together"
-        raise InputError("both_planes", "X and Y that feel each other", allowed)
     for axis, part in machine.identified.items():
-        if part.posterior is None:
+        if part.posterior is None and not machine.coupled_planes:
             raise InputError(f"axis {axis.upper()}", "no covariance", "an identification with a posterior")
     for name, given in (("toolings", toolings), ("targets", targets)):
         if not given:
@@ -294,72 +302,27 @@ def _candidates(
         seen = speeds[speeds * tooling.cutter.teeth <= 2.0 * np.pi * MAX_FREQUENCY]
         if not seen.size:
             continue
-        process = MillingProcess(tooling.cutter, coefficients, allowed.engagement, allowed.feed_angle)
-        tip, deepest_asked = machine.tip(tooling, omega, spread=False), 2.0 * allowed.margin * max(allowed.depths)
-        lobes = stability_lobes(tip, process, np.outer(around, seen).ravel(), deepest_asked, allowed.method)
-        limits = lobes.limit_depth.reshape(around.size, -1).min(axis=0)
-        deepest = max(deepest, float(limits.max()) / allowed.margin)
-        for speed, limit in zip(seen.tolist(), limits.tolist(), strict=True):
-            for depth in allowed.depths:
-                if allowed.margin * depth > limit:
-                    unstable += 1
-                    continue
-                chosen = CuttingConditions(speed, depth, allowed.feed_per_tooth, allowed.engagement, allowed.feed_angle)
-                cuts.append(PlannedCut(tooling.name, chosen, limit))
+        # without anything known across the planes nothing weighs one feed against the other: they take turns
+        feeds = len(allowed.feeds)
+        turns = [seen] * feeds if machine.coupled_planes else [seen[k::feeds] for k in range(feeds)]
+        for feed, own in zip(allowed.feeds, turns, strict=True):
+            if not own.size:
+                continue
+            process = MillingProcess(tooling.cutter, coefficients, allowed.engagement, feed)
+            asked, deepest_asked = np.outer(around, own).ravel(), 2.0 * allowed.margin * max(allowed.depths)
+            limits = np.empty(asked.size)
+            for places, tip in tips_over_speed(machine, tooling, omega, asked, spread=False):
+                limits[places] = stability_lobes(tip, process, asked[places], deepest_asked, allowed.method).limit_depth
+            limits = limits.reshape(around.size, -1).min(axis=0)
+            deepest = max(deepest, float(limits.max()) / allowed.margin)
+            for speed, limit in zip(own.tolist(), limits.tolist(), strict=True):
+                for depth in allowed.depths:
+                    if allowed.margin * depth > limit:
+                        unstable += 1
+                        continue
+                    chosen = CuttingConditions(speed, depth, allowed.feed_per_tooth, allowed.engagement, feed)
+                    cuts.append(PlannedCut(tooling.name, chosen, limit))
     return cuts, unstable, deepest
-
-
-def _prospects(
-    candidates: Sequence[PlannedCut],
-    posteriors: Mapping[Dof, Posterior],
-    toolings: Sequence[Tooling],
-    targets: Sequence[Tooling],
-    coefficients: CuttingCoefficients,
-    noise: float,
-    model_error: Mapping[Dof, float],
-    band_hz: tuple[float, float],
-) -> CandidateCuts:
-    """What the candidates would tell, and what of it matters to the targets' tooltips."""
-    named, axes = {t.name: t for t in toolings}, list(posteriors)
-    forces, cuts = {}, []
-    lowest = min(c.conditions.spindle_speed for c in candidates)
-    for k, cut in enumerate(candidates):
-        cutter, speed = named[cut.tooling].cutter, cut.conditions.spindle_speed
-        alike = cut.tooling, cut.conditions.axial_depth
-        if alike not in forces:
-            forces[alike] = force_and_slope(cutter, cut.conditions, coefficients, harmonics(cutter.teeth, lowest))
-        cuts.append(expected_cut(f"{k}", cut.tooling, speed, cutter.teeth, *forces[alike], noise, axes))
-    receptances = {name: partial(tool_holder_receptance, t.assembly) for name, t in named.items()}
-    edges = [coefficients.edge_spread if edge > 0.0 else 0.0 for edge in (coefficients.tangential_edge, coefficients.radial_edge)]
-    spreads = (coefficients.tangential_spread, coefficients.ratio_spread, *edges)
-    data = prepare(cuts, receptances, {name: t.cutter.teeth for name, t in named.items()}, spreads).with_smooth_errors(SMOOTH_ERROR)
-    rows = tuple(compressed(each) for each in information(data, posteriors, model_error))
-    size = rows[0].shape[1]
-    omega = 2.0 * np.pi * np.linspace(*band_hz, JUDGED)
-    starts, first = {}, 0
-    for each in data.axes:
-        starts[each.axis] = first
-        first += unknowns(posteriors[each.axis])
-    wanted, floor = [], []
-    for target in targets:
-        exact, stiffer = (tool_holder_receptance(a, omega) for a in (target.assembly, stiffened(target.assembly, STIFFNESS_SPREAD)))
-        weights, least = np.zeros((size, len(axes), 2 * JUDGED)), 0.0
-        for i, (axis, posterior) in enumerate(posteriors.items()):
-            value, change = tip_changes(posterior, exact)
-            norm = float(np.linalg.norm(value)) * np.sqrt(len(axes))
-            weights[starts[axis] : starts[axis] + change.shape[1], i] = np.vstack([change.real, change.imag]).T / norm
-            least += (float(np.linalg.norm(tip_changes(posterior, stiffer)[0] - value)) / norm) ** 2
-        wanted.append(weights.reshape(size, -1))
-        floor.append(least)
-    return CandidateCuts(rows, tuple(wanted), tuple(floor), _apart(candidates))
-
-
-def _apart(candidates: Sequence[PlannedCut]) -> np.ndarray:
-    """True for two cuts of one tooling whose speeds are nearly the same, shape (k, k)."""
-    speed = np.array([c.conditions.spindle_speed for c in candidates])
-    tooling = np.array([c.tooling for c in candidates])
-    ratio = np.abs(np.log(speed[:, None] / speed[None, :]))
-    return (tooling[:, None] == tooling[None, :]) & (ratio < np.log1p(SPACING) * (1.0 - 1e-6))
 
 
 def _shortest(prospects: CandidateCuts, order: list[int], goal: Goal, wanted: float) -> list[int]:

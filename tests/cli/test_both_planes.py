@@ -126,10 +126,14 @@ def test_a_hammer_test_beside_it_says_so(tmp_path, result, machine, turning):
     assert told["spindle_speed_rpm"] == (pytest.approx(MIDDLE) if turning else None)
 
 
-def test_a_plan_for_it_does_not_take_the_planes_apart(tmp_path, result):
+def test_a_plan_for_it_alternates_the_feed(tmp_path, result):
     common = ("--toolings", tmp_path / "T1.toml", "--target", tmp_path / "T1.toml", "--out", tmp_path / "P.toml")
-    told = run("plan", result, *common, "--speed-from", 6000, "--speed-to", 13000, code=2)
-    assert "both_planes" in told.stderr
+    speeds = ("--speed-from", 7000, "--speed-to", 13000, "--depths-mm", 0.2, "--margin", 1, "--cuts", 4)
+    both = answer_of("plan", result, *common, *speeds)
+    assert {cut["feed_direction"] for cut in both["cuts"]} == {"+X", "+Y"}
+    one = answer_of("plan", result, *common, *speeds, "--feed-direction", "+X")
+    assert {cut["feed_direction"] for cut in one["cuts"]} == {"+X"}
+    assert both["cuts"][-1]["band_percent"]["T1"] < one["cuts"][-1]["band_percent"]["T1"]
 
 
 def test_the_console_tells_one_table_of_modes(capsys, monkeypatch, turning):

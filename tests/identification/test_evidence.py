@@ -299,6 +299,7 @@ def test_one_tooling_is_not_enough(shop):
     assert found.status is Status.SUSPECT
     assert says(found.reasons, IdentificationCode.ONE_TOOLING)
     assert list(found.axes) == [Dof.X]
+    assert says(found.notes, IdentificationCode.ONE_AXIS)
 
 
 def test_few_cuts_are_named(shop, campaign):

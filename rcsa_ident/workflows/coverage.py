@@ -1,0 +1,36 @@
+"""What a campaign's cuts leave open before anything is identified: axes that were not recorded, directions that nobody pushed in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rcsa_ident.cutting.force_directions import WORTH, gain_across, lines_of, turned
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.answer import ANOTHER_FEED
+from rcsa_ident.identification.diagnostics import one_axis
+from rcsa_ident.machining_setup import Campaign
+from rcsa_ident.signals.measurement import MAX_FREQUENCY, Reading
+from rcsa_ident.units import from_hz
+
+
+def left_open(campaign: Campaign, readings: Sequence[Reading]) -> tuple[str, ...]:
+    """Return what the usable cuts cannot tell of planes that feel each other, in words.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    readings : sequence of Reading
+        Of its cuts, with their verdicts.
+    """
+    usable = {each.cut_id: each.measurement for each in readings if each.measurement is not None}
+    axes = {axis for measurement in usable.values() for axis in measurement.axes}
+    if len(axes) == 1:
+        return (one_axis(Dof(next(iter(axes)))),)
+    lines = [
+        lines_of(campaign.toolings[cut.tooling].cutter, cut.conditions, campaign.workpiece.coefficients, from_hz(MAX_FREQUENCY))
+        for cut in campaign.cuts
+        if cut.id in usable
+    ]
+    if not lines or gain_across(lines, turned(lines)) <= WORTH:
+        return ()
+    return (f"should X and Y of the machine feel each other: {ANOTHER_FEED}",)
