@@ -1,7 +1,7 @@
 """The whole method on lines of the virtual machine, whose spindle is not of the form that is fitted."""
 
 import pickle
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def off(found, data, delays):
 
 def trimmed(cut, axis, count):
     lines = cut.axes[axis]
-    return replace(cut, axes={**cut.axes, axis: replace(lines, **{f.name: getattr(lines, f.name)[:count] for f in fields(lines)})})
+    return replace(cut, axes={**cut.axes, axis: lines.of(np.arange(count))})
 
 
 @pytest.fixture(scope="module")
