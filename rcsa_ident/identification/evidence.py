@@ -13,7 +13,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.answer import CoupledFit, Fit, PlaneFit
 from rcsa_ident.identification.candidate import Candidate
 from rcsa_ident.identification.coupled.data import CoupledData, couplable, coupled_data
-from rcsa_ident.identification.coupled.fit import fit_coupled
+from rcsa_ident.identification.coupled.fit import CoupledSearch, coupled_starts, fit_coupled
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
 from rcsa_ident.identification.coupled.score import Coupling, coupling
 from rcsa_ident.identification.data import IdentificationData
@@ -86,7 +86,7 @@ class EvidenceSelection:
             if together.coupled:
                 assert together.points is not None
                 assert together.coupling is not None
-                found = fit_coupled(together.points, self.priors, searched, report, map)
+                found = fit_coupled(together.points, self.priors, searched, together.starts[0], report)
                 fitted: Fit = CoupledFit(data, together.points, together.coupling, *found)
             else:
                 fitted = PlaneFit(data, searched, *fit_jointly(together.data, self.priors, searched, together.first, report))
@@ -125,7 +125,8 @@ class EvidenceSelection:
             return _Together(smooth, first)
         points, best = coupled_data(smooth), first[0]
         misfit = CoupledMisfit(points, self.priors, *learned_noise(searched))
-        return _Together(smooth, first, points, coupling(best.theta, planes(best.layout), best.nuisance, misfit))
+        felt = coupling(best.theta, planes(best.layout), best.nuisance, misfit)
+        return _Together(smooth, first, points, felt, coupled_starts(points, self.priors, searched, map) if felt.found else [])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,10 +137,11 @@ class _Together:
     first: list[Candidate]
     points: CoupledData | None = None
     coupling: Coupling | None = None
+    starts: list[CoupledSearch] = field(default_factory=list)
 
     @property
     def coupled(self) -> bool:
-        return self.coupling is not None and self.coupling.found
+        return bool(self.starts)
 
 
 def _report_to(axis: str, trace: list[Step], progress: Progress | None) -> Report:

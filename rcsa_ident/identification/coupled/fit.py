@@ -18,7 +18,7 @@ from rcsa_ident.identification.joint_fit import LEAST_SPEED_RANGE, AxisSearch, l
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import Report, evidence, exchange_modes, grow_modes
-from rcsa_ident.identification.parameters import Layout, planes
+from rcsa_ident.identification.parameters import Layout, Unknowns, planes
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import Stage
 from rcsa_ident.identification.task import Phase, finite, perform
@@ -52,7 +52,7 @@ class CoupledSearch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoupledStart:
-    """A polish of both planes together from what each has found for itself; it answers with a `CoupledSearch`.
+    """A polish of both planes from what each has found for itself, as one machine or still as two; it answers with a `CoupledSearch`.
 
     Parameters
     ----------
@@ -63,28 +63,32 @@ class CoupledStart:
         Of X and of Y.
     skew, turning : int
         As in `CoupledLayout`.
+    together : bool
+        Whether they are one machine; as two they are the measure for it, with the same lines and weights.
     """
 
     phase: ClassVar[Phase] = Phase.COUPLED
     data: CoupledData
     priors: Priors
     searched: list[AxisSearch]
-    skew: int
-    turning: int
+    skew: int = 0
+    turning: int = 0
+    together: bool = True
 
     def run(self) -> CoupledSearch:
         """Refine from coarse to fine."""
         theta, layout, nuisance = self._start()
         weight = learned_noise(self.searched)[1]
         for share in SHARES:
-            if share == WITH_SKEW and self.skew:
+            if share == WITH_SKEW and isinstance(layout, CoupledLayout) and self.skew:
                 theta, layout = with_discs(theta, layout, self.skew, self.priors)
-            misfit = CoupledMisfit(self.data, self.priors, (share, share), weight)
+            noise = self.priors, (share, share), weight
+            misfit = CoupledMisfit(self.data, *noise) if self.together else Misfit(self.data.base, *noise)
             found = refine(misfit, theta, layout, nuisance, 60, grid=32 if share >= WITH_SKEW else 0, tolerance=1e-3)
             theta, nuisance = found.theta, found.evaluation.nuisance
         return CoupledSearch(found.candidate, evidence(found, misfit))
 
-    def _start(self) -> tuple[FloatArray, CoupledLayout, FloatArray]:
+    def _start(self) -> tuple[FloatArray, Unknowns, FloatArray]:
         best = [s.candidates[0] for s in self.searched]
         named, coefficients = len(self.data.base.coefficients), len(self.data.base.coefficient_spread)
         force = np.zeros(coefficients)
@@ -92,7 +96,8 @@ class CoupledStart:
         joint = np.mean([c.theta[c.layout.joint] for c in best], axis=0)
         theta = np.concatenate([*(c.theta[c.layout.axis(0)] for c in best), joint, force])
         layout = Layout(tuple(planes(c.layout).axes[0] for c in best), coefficients)
-        return *coupled_start(theta, layout, turning=self.turning), best[0].nuisance
+        start = coupled_start(theta, layout, turning=self.turning) if self.together else (theta, layout)
+        return *start, best[0].nuisance
 
 
 def with_discs(theta: FloatArray, layout: CoupledLayout, discs: int, priors: Priors) -> tuple[FloatArray, CoupledLayout]:
@@ -103,8 +108,31 @@ def with_discs(theta: FloatArray, layout: CoupledLayout, discs: int, priors: Pri
     return np.concatenate([theta[: layout.tail], new, theta[layout.tail :]]), wider
 
 
+def coupled_starts(data: CoupledData, priors: Priors, searched: list[AxisSearch], map: Map = map) -> list[CoupledSearch]:
+    """Return where both planes have come to as one machine, best first; nothing where the evidence prefers two.
+
+    The score test alone is not enough: few cuts, or an answer that has not settled, leave something that any further unknown takes.
+
+    Parameters
+    ----------
+    data : CoupledData
+    priors : Priors
+    searched : list of AxisSearch
+        Of X and of Y, each as if it did not feel the other.
+    map : callable
+        The builtin, or a pool's.
+    """
+    summed = data.summed()
+    tasks = [CoupledStart(summed, priors, searched, together=False), CoupledStart(summed, priors, searched)]
+    if data.turns:
+        tasks.append(CoupledStart(summed, priors, searched, 1, 1))
+    apart, *starts = finite(map(perform, tasks))
+    starts.sort(key=lambda start: start.evidence)
+    return starts if starts[0].evidence < apart.evidence else []
+
+
 def fit_coupled(
-    data: CoupledData, priors: Priors, searched: list[AxisSearch], report: Report, map: Map = map
+    data: CoupledData, priors: Priors, searched: list[AxisSearch], best: CoupledSearch, report: Report
 ) -> tuple[Solution, CoupledMisfit, Solution]:
     """Return the solution of both planes together, its misfit, and a rival with one mode more.
 
@@ -118,14 +146,11 @@ def fit_coupled(
     priors : Priors
     searched : list of AxisSearch
         Of X and of Y, each as if it did not feel the other.
+    best : CoupledSearch
+        Where it begins: the first of `coupled_starts`.
     report : callable of (stage, cost, solution)
-    map : callable
-        The builtin, or a pool's.
     """
     summed = data.summed()
-    kinds = ((0, 0), (1, 1)) if data.turns else ((0, 0),)
-    starts: list[CoupledSearch] = finite(map(perform, [CoupledStart(summed, priors, searched, *kind) for kind in kinds]))
-    best = min(starts, key=lambda start: start.evidence)
     omega = np.concatenate([a.omega for a in data.base.axes])
     band = float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))
 
