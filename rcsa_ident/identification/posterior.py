@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -101,20 +103,13 @@ class Posterior:
 
     def doubt(self, axis: Dof, speed: float | None = None) -> Doubt:
         """Return the machines a step to both sides along each of the covariance's own axes, and the rivals, at a speed [rad/s]."""
-        values, vectors = np.linalg.eigh(self.covariance)
-        steps = []
-        for size, direction in zip(np.sqrt(np.maximum(values, 0.0)), vectors.T, strict=True):
-            # stiff directions take a full deviation, loose ones a step that stays linear
-            step = min(size, LONGEST_STEP)
-            if step > 0.0:
-                ahead, behind = (self.candidate(axis, self.theta + sign * step * direction, speed) for sign in (1.0, -1.0))
-                steps.append(Perturbation(ahead, behind, size / (2.0 * step)))
-        return Doubt(tuple(steps), tuple(self.candidate(axis, rival, speed) for rival in self.rivals))
+        steps = steps_along(self.theta, self.covariance, lambda theta: self.candidate(axis, theta, speed))
+        return Doubt(steps, tuple(self.candidate(axis, rival, speed) for rival in self.rivals))
 
     def part(self, axis: Dof, speed: float | None = None) -> FlangePart:
         """Return the axis as a part of the flange, with what is not known of it, at a spindle speed [rad/s]."""
         believed = self.candidate(axis, speed=speed)
-        return FlangePart(plane("flange", axis), believed, _OpenQuestion(self, axis, speed))
+        return FlangePart(plane("flange", axis), believed, OpenQuestion(self, (axis, speed)))
 
     def candidate(self, axis: Dof, theta: FloatArray | None = None, speed: float | None = None) -> JointedFlange:
         """Return `machine` as what stands behind the flange."""
@@ -122,23 +117,61 @@ class Posterior:
         return JointedFlange(modes, joint)
 
 
-@dataclass(frozen=True, eq=False)
-class _OpenQuestion:
-    """What a posterior leaves open, worked out when it is asked for; another process works it out for itself."""
+def steps_along(theta: FloatArray, covariance: FloatArray, candidate: Callable[[FloatArray], JointedFlange]) -> tuple[Perturbation, ...]:
+    """Return the machines a step to both sides along each of a covariance's own axes.
 
-    posterior: Posterior
-    axis: Dof
-    speed: float | None
+    Parameters
+    ----------
+    theta : array, shape (p,)
+        The most probable unknowns.
+    covariance : array, shape (p, p)
+    candidate : callable
+        Unknowns to what stands behind the flange.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    steps = []
+    for size, direction in zip(np.sqrt(np.maximum(values, 0.0)), vectors.T, strict=True):
+        # stiff directions take a full deviation, loose ones a step that stays linear
+        step = min(size, LONGEST_STEP)
+        if step > 0.0:
+            ahead, behind = (candidate(theta + sign * step * direction) for sign in (1.0, -1.0))
+            steps.append(Perturbation(ahead, behind, size / (2.0 * step)))
+    return tuple(steps)
+
+
+class Doubtful(Protocol):
+    """Whoever can tell what is not known of a machine."""
+
+    def doubt(self, *question: Any) -> Doubt:
+        """Return it for a bending plane, a spindle speed, or both."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class OpenQuestion:
+    """What a posterior leaves open, worked out when it is asked for; another process works it out for itself.
+
+    Parameters
+    ----------
+    posterior : Doubtful
+    question : tuple
+        What its `doubt` is asked.
+    """
+
+    posterior: Doubtful
+    question: tuple[Any, ...]
 
     @cached_property
     def answer(self) -> Doubt:
-        return self.posterior.doubt(self.axis, self.speed)
+        """The answer, kept."""
+        return self.posterior.doubt(*self.question)
 
     def __call__(self) -> Doubt:
+        """Return the answer."""
         return self.answer
 
-    def __reduce__(self) -> tuple[type[_OpenQuestion], tuple[Posterior, Dof, float | None]]:
-        return type(self), (self.posterior, self.axis, self.speed)
+    def __reduce__(self) -> tuple[type[OpenQuestion], tuple[Doubtful, tuple[Any, ...]]]:
+        return type(self), (self.posterior, self.question)
 
 
 @dataclass(frozen=True, slots=True)

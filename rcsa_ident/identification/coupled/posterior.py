@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -16,8 +15,8 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.identification.coupled.parameters import CoupledLayout, unpack
 from rcsa_ident.identification.data import LEVER
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, joint_of, lower_factor, pack, simple_axis
-from rcsa_ident.identification.posterior import LONGEST_STEP, PlaneUnknowns
-from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange, Perturbation
+from rcsa_ident.identification.posterior import OpenQuestion, PlaneUnknowns, steps_along
+from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange
 
 #: Directions of the flange in the order of the unknowns.
 FLANGE: tuple[Coordinate, ...] = (*plane("flange", Dof.X), *plane("flange", Dof.Y))
@@ -124,35 +123,9 @@ class CoupledPosterior:
 
     def part(self, speed: float | None) -> FlangePart:
         """Return both planes as one part of the flange, with what is not known of it, at a spindle speed [rad/s]."""
-        return FlangePart(FLANGE, self.candidate(self.best, speed), _OpenQuestion(self, speed))
+        return FlangePart(FLANGE, self.candidate(self.best, speed), OpenQuestion(self, (speed,)))
 
     def doubt(self, speed: float | None) -> Doubt:
         """Return the machines a step to both sides along each of the covariance's own axes, and the rivals."""
-        values, vectors = np.linalg.eigh(self.covariance)
-        steps = []
-        for size, direction in zip(np.sqrt(np.maximum(values, 0.0)), vectors.T, strict=True):
-            # stiff directions take a full deviation, loose ones a step that stays linear
-            step = min(size, LONGEST_STEP)
-            if step > 0.0:
-                moved = (replace(self.best, theta=self.best.theta + sign * step * direction) for sign in (1.0, -1.0))
-                ahead, behind = (self.candidate(each, speed) for each in moved)
-                steps.append(Perturbation(ahead, behind, size / (2.0 * step)))
-        return Doubt(tuple(steps), tuple(self.candidate(rival, speed) for rival in self.rivals))
-
-
-@dataclass(frozen=True, eq=False)
-class _OpenQuestion:
-    """What a posterior leaves open, worked out when it is asked for; another process works it out for itself."""
-
-    posterior: CoupledPosterior
-    speed: float | None
-
-    @cached_property
-    def answer(self) -> Doubt:
-        return self.posterior.doubt(self.speed)
-
-    def __call__(self) -> Doubt:
-        return self.answer
-
-    def __reduce__(self) -> tuple[type[_OpenQuestion], tuple[CoupledPosterior, float | None]]:
-        return type(self), (self.posterior, self.speed)
+        steps = steps_along(self.best.theta, self.covariance, lambda theta: self.candidate(replace(self.best, theta=theta), speed))
+        return Doubt(steps, tuple(self.candidate(rival, speed) for rival in self.rivals))
