@@ -47,7 +47,7 @@ from api.stores.sql import open_store
 from api.streams.hub import Hub, StreamLimits
 from api.streams.process import Host, StreamProcess
 from api.work.pool import Pool, Work
-from rcsa_ident import __version__
+from rcsa_ident.version import __version__
 
 V1 = "/v1"
 _ABOUT = """Tooltip FRFs and stability lobes of any tooling on machines that were identified from ordinary stable cuts.

@@ -19,8 +19,8 @@ from typing import Any, BinaryIO
 from api.backups.members import BLOCK, ENGINE, FILES, FORMAT, MANIFEST, STORE, Account, copy, disk, sync
 from api.files import NORMALISED, UPLOADS, Files
 from api.stores.sql import open_store
-from rcsa_ident import __version__
 from rcsa_ident.errors import InputError
+from rcsa_ident.version import __version__
 
 _STAGING = ".backup-"
 
