@@ -113,7 +113,8 @@ def test_better_known_forces_narrow_the_band(tmp_path):
     found = []
     for std in (0.05, 1e-4):
         known = {name: {"scale": 1.0, "std": std} for name in ("tangential coefficient", "radial ratio")}
-        summary = json.loads(run(result_in(tmp_path, coefficients=known), *options(tmp_path, "--cuts", 2, "--feed-direction", "+X", "--json")).stdout)
+        asked = options(tmp_path, "--cuts", 2, "--feed-direction", "+X", "--json")
+        summary = json.loads(run(result_in(tmp_path, coefficients=known), *asked).stdout)
         found.append(summary["cuts"][-1]["band_percent"]["S4-shrink"])
     assert found[1] < found[0]
 
