@@ -21,7 +21,7 @@ from rcsa_ident.identification.diagnostics import failed, not_finite
 from rcsa_ident.identification.joint_fit import AxisSearch, axis_search, first_starts, fit_jointly, learned_noise
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.model_order import GIVE_UP_SOON, Report, cut_weights, drop_modes, exchange_modes, model_error
+from rcsa_ident.identification.model_order import GIVE_UP_SOON, Report, cut_weights, drop_modes, evidence, exchange_modes, model_error
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, planes, unpack
 from rcsa_ident.identification.posterior import PlaneUnknowns, Posterior
 from rcsa_ident.identification.priors import Priors
@@ -83,13 +83,15 @@ class EvidenceSelection:
             searched, together = self._search(data, seed, map, progress)
             trace = [step for search in searched for step in search.trace]
             report = _report_to(BOTH, trace, progress)
+            apart = fit_jointly(together.data, self.priors, searched, together.first, report)
+            fitted: Fit = PlaneFit(data, searched, *apart)
             if together.coupled:
                 assert together.points is not None
                 assert together.coupling is not None
                 found = fit_coupled(together.points, self.priors, searched, together.starts[0], report)
-                fitted: Fit = CoupledFit(data, together.points, together.coupling, *found)
-            else:
-                fitted = PlaneFit(data, searched, *fit_jointly(together.data, self.priors, searched, together.first, report))
+                # what a start leaves unexplained may be a wrong valley of one plane, which its own last fit still leaves
+                if evidence(found[0], found[1]) < evidence(apart[0], apart[1]):
+                    fitted = CoupledFit(data, together.points, together.coupling, *found)
             return replace(fitted.answer(seed, self.name), trace=tuple(trace))
         except (ArithmeticError, np.linalg.LinAlgError):
             return failed(data, seed, self.name)
@@ -97,25 +99,22 @@ class EvidenceSelection:
     def _search(self, data: IdentificationData, seed: int, map: Map, progress: Progress | None) -> tuple[list[AxisSearch], _Together]:
         """Return the search of each axis, again from new starts until one has come to the same answer twice, and both together.
 
-        Planes that feel each other bend each other's answers: no further search of one of them alone would end that.
+        Only then it is asked whether the planes feel each other: a search that has ended in a wrong valley leaves as much unexplained.
         """
         sequence = np.random.SeedSequence(seed)
         summed = data.summed()
         parts = [summed.only(a.axis).with_smooth_errors(SMOOTH_ERROR) for a in data.axes]
         searched: list[AxisSearch] = []
-        for left in reversed(range(ATTEMPTS)):
+        for _ in range(ATTEMPTS):
             tasks = [SearchAxis(self, part, own, progress) for part, own in zip(parts, sequence.spawn(len(parts)), strict=True)]
             found = finite(map(perform, tasks))
             if len(found) == 2:
                 both = zip(parts, found, found[::-1], strict=True)
                 found = finite(map(perform, [SearchFromOtherAxis(self, part, own, other, progress) for part, own, other in both]))
             searched = [a.joined(b) for a, b in zip(searched, found, strict=True)] if searched else found
-            done = left == 0 or self.start is not None or any(s.confirmed for s in searched)
-            if done or couplable(data):
-                together = self._together(data, searched, map)
-                if done or together.coupled:
-                    break
-        return searched, together
+            if self.start is not None or any(s.confirmed for s in searched):
+                break
+        return searched, self._together(data, searched, map)
 
     def _together(self, data: IdentificationData, searched: list[AxisSearch], map: Map) -> _Together:
         """Both axes' answers polished together, and what the lines say against planes that feel nothing of each other."""
