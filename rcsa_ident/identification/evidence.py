@@ -89,7 +89,7 @@ class EvidenceSelection:
                 assert together.points is not None
                 assert together.coupling is not None
                 found = fit_coupled(together.points, self.priors, searched, together.starts[0], report)
-                # what a start leaves unexplained may be a wrong valley of one plane, which its own last fit still leaves
+                # what seems to be felt across may be a wrong valley of one plane's search, which its own last fit gets out of
                 if evidence(found[0], found[1]) < evidence(apart[0], apart[1]):
                     fitted = CoupledFit(data, together.points, together.coupling, *found)
             return replace(fitted.answer(seed, self.name), trace=tuple(trace))
