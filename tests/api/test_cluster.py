@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from api.jobs.cluster import over_cluster
+from api.jobs.cluster import log, over_cluster
 from api.settings import from_environment
 from rcsa_ident.errors import InputError
 from tests.fixtures import scaleout_tasks as tasks
@@ -39,7 +39,9 @@ def test_without_a_cluster_it_is_done_here(monkeypatch, caplog):
     monkeypatch.setattr("api.jobs.cluster.cluster_map", lambda address: away(address, 0.3))
     found = list(over_cluster("tcp://127.0.0.1:1")(tasks.late, [5.0, 4.0]))
     assert found == [(5.0, os.getpid()), (4.0, os.getpid())]
-    assert [record.getMessage() for record in caplog.records] == ["the cluster cannot be reached: the tasks are done here"]
+    # a client of another test's cluster may still be saying goodbye in this process
+    said = [record.getMessage() for record in caplog.records if record.name == log.name]
+    assert said == ["the cluster cannot be reached: the tasks are done here"]
 
 
 def away(address, timeout):
