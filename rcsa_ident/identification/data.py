@@ -19,6 +19,8 @@ from rcsa_ident.signals.measurement import CutMeasurement
 LEVER = 0.1
 #: Standard deviation of a clamping's run-out, in units of the cutting model's reference.
 RUNOUT_SPREAD = 3.0
+#: Half the range of the spindle speeds, over their middle, below which nothing is asked about a change with speed.
+LEAST_SPEED_RANGE = 0.05
 
 
 #: Frequencies [rad/s] and the spindle's speed over each, shape (n,) both, to the free receptances of a turning tool-holder for x + i y
@@ -191,6 +193,12 @@ class IdentificationData:
         """Middle of the spindle speeds and half their range [rad/s]; the latter 0 where nothing can change with speed."""
         low, high = float(np.min(self.spindle_speed)), float(np.max(self.spindle_speed))
         return 0.5 * (low + high), 0.5 * (high - low)
+
+    @property
+    def speed_changes(self) -> bool:
+        """Whether the spindle speeds differ by enough to ask what changes with them."""
+        middle, half = self.speed_range
+        return half > LEAST_SPEED_RANGE * middle
 
     @property
     def relative_speed(self) -> FloatArray:

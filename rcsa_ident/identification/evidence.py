@@ -11,14 +11,13 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.answer import CoupledFit, Fit, PlaneFit
-from rcsa_ident.identification.candidate import Candidate
-from rcsa_ident.identification.coupled.data import CoupledData, couplable, coupled_data
-from rcsa_ident.identification.coupled.fit import CoupledSearch, coupled_starts, fit_coupled
+from rcsa_ident.identification.coupled.data import couplable, coupled_data
+from rcsa_ident.identification.coupled.fit import coupled_starts, fit_coupled
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
-from rcsa_ident.identification.coupled.score import Coupling, coupling
+from rcsa_ident.identification.coupled.score import coupling
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.diagnostics import failed, not_finite
-from rcsa_ident.identification.joint_fit import AxisSearch, axis_search, first_starts, fit_jointly, learned_noise
+from rcsa_ident.identification.joint_fit import AxisSearch, axis_search, first_starts, fit_jointly, grow_jointly
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import GIVE_UP_SOON, Report, cut_weights, drop_modes, evidence, exchange_modes, model_error
@@ -80,27 +79,15 @@ class EvidenceSelection:
         if not_finite(data):
             return failed(data, seed, self.name)
         try:
-            searched, together = self._search(data, seed, map, progress)
+            searched = self._search(data, seed, map, progress)
             trace = [step for search in searched for step in search.trace]
-            report = _report_to(BOTH, trace, progress)
-            apart = fit_jointly(together.data, self.priors, searched, together.first, report)
-            fitted: Fit = PlaneFit(data, searched, *apart)
-            if together.coupled:
-                assert together.points is not None
-                assert together.coupling is not None
-                found = fit_coupled(together.points, self.priors, searched, together.starts[0], report)
-                # what seems to be felt across may be a wrong valley of one plane's search, which its own last fit gets out of
-                if evidence(found[0], found[1]) < evidence(apart[0], apart[1]):
-                    fitted = CoupledFit(data, together.points, together.coupling, *found)
+            fitted = self._fit(data, searched, map, _report_to(BOTH, trace, progress))
             return replace(fitted.answer(seed, self.name), trace=tuple(trace))
         except (ArithmeticError, np.linalg.LinAlgError):
             return failed(data, seed, self.name)
 
-    def _search(self, data: IdentificationData, seed: int, map: Map, progress: Progress | None) -> tuple[list[AxisSearch], _Together]:
-        """Return the search of each axis, again from new starts until one has come to the same answer twice, and both together.
-
-        Only then it is asked whether the planes feel each other: a search that has ended in a wrong valley leaves as much unexplained.
-        """
+    def _search(self, data: IdentificationData, seed: int, map: Map, progress: Progress | None) -> list[AxisSearch]:
+        """Return the search of each axis, again from new starts until one has come to the same answer twice."""
         sequence = np.random.SeedSequence(seed)
         summed = data.summed()
         parts = [summed.only(a.axis).with_smooth_errors(SMOOTH_ERROR) for a in data.axes]
@@ -114,33 +101,25 @@ class EvidenceSelection:
             searched = [a.joined(b) for a, b in zip(searched, found, strict=True)] if searched else found
             if self.start is not None or any(s.confirmed for s in searched):
                 break
-        return searched, self._together(data, searched, map)
+        return searched
 
-    def _together(self, data: IdentificationData, searched: list[AxisSearch], map: Map) -> _Together:
-        """Both axes' answers polished together, and what the lines say against planes that feel nothing of each other."""
+    def _fit(self, data: IdentificationData, searched: list[AxisSearch], map: Map, report: Report) -> Fit:
+        """Return the fit of both axes: apart, or together where they feel each other.
+
+        That is asked only where both have been fitted apart as well as they can be: a stiffness that changes with speed, or a search that
+        has ended in a wrong valley, looks like something felt across until then. The evidence has the last word.
+        """
         smooth = data.with_smooth_errors(SMOOTH_ERROR)
-        first = first_starts(smooth, self.priors, searched, map)
-        if not couplable(data):
-            return _Together(smooth, first)
-        points, best = coupled_data(smooth), first[0]
-        misfit = CoupledMisfit(points, self.priors, *learned_noise(searched))
-        felt = coupling(best.theta, planes(best.layout), best.nuisance, misfit)
-        return _Together(smooth, first, points, felt, coupled_starts(points, self.priors, searched, map) if felt.found else [])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Together:
-    """Where the fit of both axes begins: first polishes, best first, and how much the planes feel each other, where that can be told."""
-
-    data: IdentificationData
-    first: list[Candidate]
-    points: CoupledData | None = None
-    coupling: Coupling | None = None
-    starts: list[CoupledSearch] = field(default_factory=list)
-
-    @property
-    def coupled(self) -> bool:
-        return bool(self.starts)
+        apart, misfit = fit_jointly(smooth, self.priors, searched, first_starts(smooth, self.priors, searched, map), report)
+        if couplable(data):
+            points, noise = coupled_data(smooth), (misfit.model_error, misfit.cut_weight)
+            felt = coupling(apart.theta, planes(apart.layout), apart.evaluation.nuisance, CoupledMisfit(points, self.priors, *noise))
+            if felt.found:
+                starts = coupled_starts(points, self.priors, searched, apart, misfit.cut_weight, map)
+                found = fit_coupled(points, self.priors, starts[0], misfit.cut_weight, report)
+                if evidence(found[0], found[1]) < evidence(apart, misfit):
+                    return CoupledFit(data, points, felt, *found)
+        return PlaneFit(data, searched, *grow_jointly(smooth, self.priors, apart, misfit, report))
 
 
 def _report_to(axis: str, trace: list[Step], progress: Progress | None) -> Report:

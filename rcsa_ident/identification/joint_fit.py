@@ -20,8 +20,6 @@ from rcsa_ident.identification.progress import Stage, Step
 from rcsa_ident.identification.task import Phase, finite, perform
 from rcsa_ident.scaleout import Map
 
-#: Relative range of speeds below which nothing is asked about a change with speed.
-LEAST_SPEED_RANGE = 0.05
 #: Modes per axis beyond what the evidence asks for.
 GROWN = 1
 #: Least model error of a first polish of both axes together, and whose joint and force it starts from (None is their mean).
@@ -82,8 +80,8 @@ def first_starts(data: IdentificationData, priors: Priors, searched: list[AxisSe
 
 def fit_jointly(
     data: IdentificationData, priors: Priors, searched: list[AxisSearch], first: list[Candidate], report: Report
-) -> tuple[Solution, Misfit, Solution]:
-    """Return the solution of all axes together, the misfit whose minimum it is, and what the evidence alone would have chosen.
+) -> tuple[Solution, Misfit]:
+    """Return the solution of all axes together, with as many modes as the evidence asks for, and its misfit.
 
     Parameters
     ----------
@@ -102,20 +100,45 @@ def fit_jointly(
 
     start = _from_several_starts(data, priors, searched, first).point
     found, misfit = refine_and_learn_noise(misfit_of, start, *learned_noise(searched), report)
-    middle, half = data.speed_range
-    if half > LEAST_SPEED_RANGE * middle:
+    if data.speed_changes:
         with_softening = _start(data, found, True)
         moving, other = refine_and_learn_noise(misfit_of, with_softening, misfit.model_error, misfit.cut_weight, report)
         if evidence(moving, other) < evidence(found, misfit):
             found, misfit = moving, other
-    omega = np.concatenate([a.omega for a in data.axes])
-    band = float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))
-    found = exchange_modes(found, misfit, band, report, rounds=2)
-    chosen = found
+    return exchange_modes(found, misfit, _band(data), report, rounds=2), misfit
+
+
+def grow_jointly(
+    data: IdentificationData, priors: Priors, chosen: Solution, misfit: Misfit, report: Report
+) -> tuple[Solution, Misfit, Solution]:
+    """Return the solution with more modes than the evidence asks for, the misfit whose minimum it is, and what the evidence has chosen.
+
+    Parameters
+    ----------
+    data : IdentificationData
+        As in `fit_jointly`.
+    priors : Priors
+    chosen : Solution
+        From `fit_jointly`.
+    misfit : Misfit
+        Its misfit.
+    report : callable of (stage, cost, solution)
+    """
+
+    def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> Misfit:
+        return Misfit(data, priors, shares, weight)
+
+    found = chosen
     for _ in range(GROWN):
-        found = grow_modes(found, misfit, band)
+        found = grow_modes(found, misfit, _band(data))
         report(Stage.GROW, found.cost, found)
     return *refine_and_learn_noise(misfit_of, found.candidate.point, misfit.model_error, misfit.cut_weight, report), chosen
+
+
+def _band(data: IdentificationData) -> tuple[float, float]:
+    """Lowest and highest line [Hz]."""
+    omega = np.concatenate([a.omega for a in data.axes])
+    return float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))
 
 
 def _from_several_starts(data: IdentificationData, priors: Priors, searched: list[AxisSearch], first: list[Candidate]) -> Candidate:

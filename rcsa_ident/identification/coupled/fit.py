@@ -14,11 +14,13 @@ from rcsa_ident.identification.coupled.misfit import CoupledMisfit
 from rcsa_ident.identification.coupled.modes import COUPLED
 from rcsa_ident.identification.coupled.parameters import CoupledLayout, pack, unpack
 from rcsa_ident.identification.coupled.score import coupled_start
-from rcsa_ident.identification.joint_fit import LEAST_SPEED_RANGE, AxisSearch, learned_noise, refine_and_learn_noise, tooth_angles
+from rcsa_ident.identification.joint_fit import AxisSearch, refine_and_learn_noise, tooth_angles
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.model_order import Report, evidence, exchange_modes, grow_modes
+from rcsa_ident.identification.model_order import Report, drop_modes, evidence, exchange_modes, grow_modes
 from rcsa_ident.identification.parameters import Layout, Unknowns, planes
+from rcsa_ident.identification.parameters import pack as plane_pack
+from rcsa_ident.identification.parameters import unpack as plane_unpack
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import Stage
 from rcsa_ident.identification.task import Phase, finite, perform
@@ -31,8 +33,13 @@ WITH_SKEW, FIRST_SKEW = 0.01, 0.3
 #: Gain in evidence for which the spindle is believed to turn the other way: two valleys of one sense differ by up to half of it, and
 #: where gyroscopic moments are strong the wrong sense loses by thousands.
 OTHER_SENSE = 300.0
-#: Most discs whose slopes make the gyroscopic coupling.
-MOST_DISCS = 2
+#: Discs whose slopes make the gyroscopic coupling: where each starts from, and what the last fit has.
+DISCS = 2
+#: Polishes before the last one stop where two steps in a row lower the cost by less than this share, the last one at this.
+ROUGHLY, WELL = 1e-3, 1e-4
+
+#: Unknowns of both planes side by side, their layout, and the cuts' delays and angles.
+Apart = tuple[FloatArray, Layout, FloatArray]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,52 +59,46 @@ class CoupledSearch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoupledStart:
-    """A polish of both planes from what each has found for itself, as one machine or still as two; it answers with a `CoupledSearch`.
+    """A polish of both planes as one machine, from what they have come to as two; it answers with a `CoupledSearch`.
 
     Parameters
     ----------
     data : CoupledData
         With the flange's motion as the only output.
     priors : Priors
-    searched : list of AxisSearch
-        Of X and of Y.
-    skew, turning : int
-        As in `CoupledLayout`.
-    together : bool
-        Whether they are one machine; as two they are the measure for it, with the same lines and weights.
+    apart : (array, Layout, array)
+        Where it begins: unknowns of planes without fixture and tooth angles, their layout, the cuts' delays and angles.
+    weight : array, shape (k,)
+        Factor on each cut's weights.
+    turning : int
+        As in `CoupledLayout`; where it is not 0 there is gyroscopic coupling.
+    softening : bool
+        Whether the stiffness changes with the spindle's speed.
     """
 
     phase: ClassVar[Phase] = Phase.COUPLED
     data: CoupledData
     priors: Priors
-    searched: list[AxisSearch]
-    skew: int = 0
-    turning: int = 0
-    together: bool = True
+    apart: Apart
+    weight: FloatArray
+    turning: int
+    softening: bool
 
     def run(self) -> CoupledSearch:
         """Refine from coarse to fine."""
-        theta, layout, nuisance = self._start()
-        weight = learned_noise(self.searched)[1]
+        theta, planes_layout, nuisance = self.apart
+        theta, layout = coupled_start(theta, planes_layout, turning=self.turning)
+        if layout.softening and not self.softening:
+            theta, layout = with_softening(theta, layout, False)
         for share in SHARES:
-            if share == WITH_SKEW and isinstance(layout, CoupledLayout) and self.skew:
-                theta, layout = with_discs(theta, layout, self.skew, self.priors)
-            noise = self.priors, (share, share), weight
-            misfit = CoupledMisfit(self.data, *noise) if self.together else Misfit(self.data.base, *noise)
-            found = refine(misfit, theta, layout, nuisance, 60, grid=32 if share >= WITH_SKEW else 0, tolerance=1e-3)
+            if share == WITH_SKEW:
+                if self.turning:
+                    theta, layout = with_discs(theta, layout, 1, self.priors)
+                theta, layout = with_softening(theta, layout, self.softening)
+            misfit = CoupledMisfit(self.data, self.priors, (share, share), self.weight)
+            found = refine(misfit, theta, layout, nuisance, 60, grid=32 if share >= WITH_SKEW else 0, tolerance=ROUGHLY)
             theta, nuisance = found.theta, found.evaluation.nuisance
         return CoupledSearch(found.candidate, evidence(found, misfit))
-
-    def _start(self) -> tuple[FloatArray, Unknowns, FloatArray]:
-        best = [s.candidates[0] for s in self.searched]
-        named, coefficients = len(self.data.base.coefficients), len(self.data.base.coefficient_spread)
-        force = np.zeros(coefficients)
-        force[:named] = np.mean([c.theta[c.layout.force][:named] for c in best], axis=0)
-        joint = np.mean([c.theta[c.layout.joint] for c in best], axis=0)
-        theta = np.concatenate([*(c.theta[c.layout.axis(0)] for c in best), joint, force])
-        layout = Layout(tuple(planes(c.layout).axes[0] for c in best), coefficients)
-        start = coupled_start(theta, layout, turning=self.turning) if self.together else (theta, layout)
-        return *start, best[0].nuisance
 
 
 def with_discs(theta: FloatArray, layout: CoupledLayout, discs: int, priors: Priors) -> tuple[FloatArray, CoupledLayout]:
@@ -108,31 +109,69 @@ def with_discs(theta: FloatArray, layout: CoupledLayout, discs: int, priors: Pri
     return np.concatenate([theta[: layout.tail], new, theta[layout.tail :]]), wider
 
 
-def coupled_starts(data: CoupledData, priors: Priors, searched: list[AxisSearch], map: Map = map) -> list[CoupledSearch]:
-    """Return where both planes have come to as one machine, best first; nothing where the evidence prefers two.
+def with_softening(theta: FloatArray, layout: CoupledLayout, softening: bool) -> tuple[FloatArray, CoupledLayout]:
+    """Return a vector with a stiffness that changes with speed, by nothing so far, or without; the same where it is so already."""
+    if layout.softening == softening:
+        return theta, layout
+    other = replace(layout, softening=softening)
+    discs = theta[layout.skews].reshape(layout.skew, 2, layout.modes)
+    return np.concatenate([pack(unpack(theta, layout), other, discs), theta[layout.tail :]]), other
 
-    The score test alone is not enough: few cuts, or an answer that has not settled, leave something that any further unknown takes.
+
+def coupled_starts(
+    data: CoupledData, priors: Priors, searched: list[AxisSearch], apart: Solution, weight: FloatArray, map: Map = map
+) -> list[CoupledSearch]:
+    """Return where both planes come to as one machine, best first, from different starts.
+
+    Each plane's own search has bent its modes to explain the other one's forces; the fit of both apart has one joint, but has bent them
+    further. What changes with speed may be the stiffness, or gyroscopic moments alone.
 
     Parameters
     ----------
     data : CoupledData
     priors : Priors
     searched : list of AxisSearch
-        Of X and of Y, each as if it did not feel the other.
+        Of X and of Y.
+    apart : Solution
+        Of both planes as if they did not feel each other.
+    weight : array, shape (k,)
+        Factor on each cut's weights there.
     map : callable
         The builtin, or a pool's.
     """
     summed = data.summed()
-    tasks = [CoupledStart(summed, priors, searched, together=False), CoupledStart(summed, priors, searched)]
-    if data.turns:
-        tasks.append(CoupledStart(summed, priors, searched, 1, 1))
-    apart, *starts = finite(map(perform, tasks))
-    starts.sort(key=lambda start: start.evidence)
-    return starts if starts[0].evidence < apart.evidence else []
+    of_searches, of_fit = _side_by_side(summed, searched), _flange_alone(apart)
+    turning = int(data.turns)
+    kinds = [(of_searches, turning, False), (of_fit, turning, False)]
+    if data.base.speed_changes:
+        kinds.append((of_searches, turning, True))
+    if turning:
+        kinds.append((of_searches, 0, False))
+    found = finite(map(perform, [CoupledStart(summed, priors, start, weight, turning, softening) for start, turning, softening in kinds]))
+    return sorted(found, key=lambda start: start.evidence)
+
+
+def _side_by_side(data: CoupledData, searched: list[AxisSearch]) -> Apart:
+    """Both searches' answers, with the mean of their joints and forces."""
+    best = [s.candidates[0] for s in searched]
+    named, coefficients = len(data.base.coefficients), len(data.base.coefficient_spread)
+    force = np.zeros(coefficients)
+    force[:named] = np.mean([c.theta[c.layout.force][:named] for c in best], axis=0)
+    joint = np.mean([c.theta[c.layout.joint] for c in best], axis=0)
+    layout = Layout(tuple(planes(c.layout).axes[0] for c in best), coefficients)
+    return np.concatenate([*(c.theta[c.layout.axis(0)] for c in best), joint, force]), layout, best[0].nuisance
+
+
+def _flange_alone(apart: Solution) -> Apart:
+    """The fit of both planes without fixture and tooth angles."""
+    old, theta = planes(apart.layout), apart.theta
+    layout = Layout(tuple(replace(axis, fixture=False) for axis in old.axes), old.coefficients)
+    parts = [plane_pack(plane_unpack(theta[old.axis(i)], old.axes[i]), axis) for i, axis in enumerate(layout.axes)]
+    return np.concatenate([*parts, theta[old.joint], theta[old.force]]), layout, apart.evaluation.nuisance
 
 
 def fit_coupled(
-    data: CoupledData, priors: Priors, searched: list[AxisSearch], best: CoupledSearch, report: Report
+    data: CoupledData, priors: Priors, best: CoupledSearch, weight: FloatArray, report: Report
 ) -> tuple[Solution, CoupledMisfit, Solution]:
     """Return the solution of both planes together, its misfit, and a rival with one mode more.
 
@@ -144,10 +183,10 @@ def fit_coupled(
     data : CoupledData
         With both outputs where they were recorded.
     priors : Priors
-    searched : list of AxisSearch
-        Of X and of Y, each as if it did not feel the other.
     best : CoupledSearch
         Where it begins: the first of `coupled_starts`.
+    weight : array, shape (k,)
+        Factor on each cut's weights to begin with.
     report : callable of (stage, cost, solution)
     """
     summed = data.summed()
@@ -157,36 +196,36 @@ def fit_coupled(
     def rough_of(shares: tuple[float, ...], weight: FloatArray) -> CoupledMisfit:
         return CoupledMisfit(summed, priors, shares, weight)
 
-    weight = learned_noise(searched)[1]
-    found, rough = refine_and_learn_noise(rough_of, best.candidate.point, (SHARES[-1], SHARES[-1]), weight, report, 1e-4)
-    if _layout(found).turning:
-        other = refine_and_learn_noise(rough_of, turned_round(found), rough.model_error, rough.cut_weight, report, 1e-4)
-        if evidence(*other) < evidence(found, rough) - OTHER_SENSE:
-            found, rough = other
-    found = exchange_modes(found, rough, band, report, rounds=2, steps=COUPLED)
-
     def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> CoupledMisfit:
         return CoupledMisfit(data, priors, shares, weight)
 
-    def better(here: tuple[Solution, Misfit], start: tuple[FloatArray, CoupledLayout, FloatArray]) -> tuple[Solution, Misfit]:
-        there = refine_and_learn_noise(misfit_of, start, here[1].model_error, here[1].cut_weight, report, 1e-4)
-        return there if evidence(*there) < evidence(*here) else here
+    def learned(
+        start: tuple[FloatArray, Unknowns, FloatArray], misfit: Misfit, tolerance: float = ROUGHLY
+    ) -> tuple[Solution, CoupledMisfit]:
+        found, last = refine_and_learn_noise(misfit_of, start, misfit.model_error, misfit.cut_weight, report, tolerance)
+        assert isinstance(last, CoupledMisfit)
+        return found, last
 
-    here = refine_and_learn_noise(misfit_of, _start(data, found), rough.model_error, rough.cut_weight, report, 1e-4)
-    while 0 < _layout(here[0]).skew < MOST_DISCS:
+    found, rough = refine_and_learn_noise(rough_of, best.candidate.point, (SHARES[-1], SHARES[-1]), weight, report, ROUGHLY)
+    if _layout(found).turning:
+        other = refine(rough, *turned_round(found), 60, tolerance=ROUGHLY)
+        if evidence(other, rough) < evidence(found, rough) - OTHER_SENSE:
+            found = other
+    found = exchange_modes(drop_modes(found, rough, steps=COUPLED), rough, band, report, rounds=1, steps=COUPLED)
+    here = learned(_with_all_outputs(data, found, priors), rough)
+    if data.base.speed_changes:
         layout = _layout(here[0])
-        there = better(here, (*with_discs(here[0].theta, layout, layout.skew + 1, priors), here[0].evaluation.nuisance))
-        if there is here:
-            break
-        here = there
-    middle, half = data.base.speed_range
-    if half > LEAST_SPEED_RANGE * middle:
-        here = better(here, _start(data, here[0], softening=True))
-    found, misfit = refine_and_learn_noise(misfit_of, here[0].candidate.point, here[1].model_error, here[1].cut_weight, report)
-    assert isinstance(misfit, CoupledMisfit)
-    grown = grow_modes(found, misfit, band, steps=COUPLED)
-    report(Stage.GROW, grown.cost, grown)
-    return found, misfit, grown
+        other_kind = with_softening(here[0].theta, layout, not layout.softening)
+        there = learned((*other_kind, here[0].evaluation.nuisance), here[1])
+        here = there if evidence(*there) < evidence(*here) else here
+    here = learned(here[0].candidate.point, here[1], WELL)
+    while True:
+        # all outputs may show a mode that the flange's own motion does not
+        grown = grow_modes(*here, band, steps=COUPLED)
+        report(Stage.GROW, grown.cost, grown)
+        if evidence(grown, here[1]) >= evidence(*here) - 1.0:
+            return *here, grown
+        here = learned(grown.candidate.point, here[1], WELL)
 
 
 def turned_round(found: Solution) -> tuple[FloatArray, CoupledLayout, FloatArray]:
@@ -203,13 +242,14 @@ def _layout(solution: Solution) -> CoupledLayout:
     return solution.layout
 
 
-def _start(data: CoupledData, found: Solution, softening: bool = False) -> tuple[FloatArray, CoupledLayout, FloatArray]:
-    """Return a vector with all that the data may tell, from one with less: what is new starts at nothing."""
-    old = _layout(found)
-    layout = replace(old, fixture=data.base.axes[0].outputs == 2, softening=softening, clampings=data.base.clampings)
-    discs = found.theta[old.skews].reshape(old.skew, 2, old.modes)
-    nuisance, angles = found.evaluation.nuisance, found.theta[old.clamping]
+def _with_all_outputs(data: CoupledData, found: Solution, priors: Priors) -> tuple[FloatArray, CoupledLayout, FloatArray]:
+    """Return a vector with all that the data may tell, from one of the flange's motion alone: what is new starts at nothing."""
+    old, theta, nuisance = _layout(found), found.theta, found.evaluation.nuisance
+    angles = theta[old.clamping]
+    if old.skew:
+        theta, old = with_discs(theta, old, DISCS, priors)
+    layout = replace(old, fixture=data.base.axes[0].outputs == 2, clampings=data.base.clampings)
     if not old.clampings and layout.clampings:
         angles, nuisance = tooth_angles(data.base, nuisance)
-    machine = pack(unpack(found.theta, old), layout, discs)
-    return np.concatenate([machine, found.theta[old.joint], found.theta[old.force], angles]), layout, nuisance
+    machine = pack(unpack(theta, old), layout, theta[old.skews].reshape(old.skew, 2, old.modes))
+    return np.concatenate([machine, theta[old.joint], theta[old.force], angles]), layout, nuisance
