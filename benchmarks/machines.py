@@ -32,6 +32,13 @@ COUPLED = tuple(range(201, 211))
 COUPLED_DEVELOPMENT = (301, 302, 303)
 #: Housing and bearings of a coupled machine are turned by at most so much [deg].
 TURNED = 20.0
+#: The sample machine with coupled planes: angle of the housing and of each bearing [deg], gyroscopic or not, and what Y's springs and
+#: dampers are of those in the file: as X's and Y's are in it, turning both does little.
+TURNED_SAMPLE: dict[str, tuple[float, tuple[float, ...], bool, float]] = {
+    **{f"oblique-{angle}": (angle, (angle,) * 3, False, 0.6) for angle in (2, 5, 10, 30)},
+    "gyroscopic": (0.0, (0.0,) * 3, True, 1.0),
+    "turned": (14.0, (-17.0, -4.0, 11.0), True, 1.0),
+}
 #: What tells the campaigns of one machine apart: trigger or none, and the factor on the noise of gap and accelerometer.
 CONDITIONS = {"trigger": (True, 1.0), "no-trigger": (False, 1.0), "noise-x3": (False, 3.0)}
 #: Toolings that cut, and those that never do: one in a holder that cut, one in another.
@@ -137,12 +144,34 @@ def drawn(name: str) -> tuple[int, bool] | None:
 
 def is_coupled(name: str) -> bool:
     """Return whether the name is that of a coupled machine."""
-    return (drawn(name) or (0, False))[1]
+    return name in TURNED_SAMPLE or (drawn(name) or (0, False))[1]
+
+
+def turned_sample(path: Path, name: str) -> MachineFile:
+    """Return the sample machine of a file with the planes of one of `TURNED_SAMPLE`."""
+    housing_angle, bearing_angles, gyroscopic, share = TURNED_SAMPLE[name]
+    machine = read_machine(path)
+
+    def softer(values: tuple[float, float]) -> tuple[float, float]:
+        return values[0], share * values[1]
+
+    old = machine.spindle
+    names = ("stiffness", "damping", "tilting_stiffness", "tilting_damping")
+    housing = replace(old.housing, angle=np.deg2rad(housing_angle), **{each: softer(getattr(old.housing, each)) for each in names})
+    bearings = tuple(
+        replace(b, angle=np.deg2rad(angle), **{each: softer(getattr(b, each)) for each in names[:2]})
+        for b, angle in zip(old.bearings, bearing_angles, strict=True)
+    )
+    return replace(machine, name=name, spindle=replace(old, housing=housing, bearings=bearings, gyroscopic=gyroscopic))
 
 
 def named(names: Sequence[str]) -> list[str]:
-    """Return the machines' names; ``drawn`` and ``coupled`` stand for the ten of either kind."""
-    groups = {"drawn": [str(seed) for seed in EVALUATION], "coupled": [f"{_COUPLED}{seed}" for seed in COUPLED]}
+    """Return the machines' names; ``drawn`` and ``coupled`` stand for the ten of either kind, ``turned-sample`` for those."""
+    groups = {
+        "drawn": [str(seed) for seed in EVALUATION],
+        "coupled": [f"{_COUPLED}{seed}" for seed in COUPLED],
+        "turned-sample": list(TURNED_SAMPLE),
+    }
     return [each for name in names for each in groups.get(name, [name])]
 
 

@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.comparison import compared, compared_at_speeds
-from benchmarks.machines import CONDITIONS, drawn, is_coupled, named, random_machine, under
+from benchmarks.machines import CONDITIONS, TURNED_SAMPLE, drawn, is_coupled, named, random_machine, turned_sample, under
 from benchmarks.page import DOCS, append_row, draw_study, read_rows, write_block, write_rows
 from benchmarks.study_table import coupled_table, line, table
 from rcsa_ident.identification.data import IdentificationData
@@ -77,6 +77,8 @@ def run_of(row: dict[str, Any]) -> Run:
 def machine_of(scratch: Path, name: str) -> MachineFile:
     """Return a machine of the study; a drawn one is written first."""
     chosen = drawn(name)
+    if name in TURNED_SAMPLE:
+        return turned_sample(MACHINES / "hpm.toml", name)
     if chosen is None:
         return read_machine(MACHINES / f"{name}.toml")
     folder = scratch / name / "machine"
@@ -206,7 +208,8 @@ def main(arguments: Sequence[str]) -> None:
         "--machines",
         nargs="+",
         default=["drawn", INSIDE],
-        help="drawn or coupled, for the ten of either kind; seeds; coupled-SEED; names in data/machines (default: drawn table2)",
+        help="drawn or coupled, for the ten of either kind; turned-sample, for the sample machine with coupled planes; seeds; "
+        "coupled-SEED; names in data/machines (default: drawn table2)",
     )
     parser.add_argument("--conditions", nargs="+", choices=tuple(CONDITIONS), default=tuple(CONDITIONS))
     parser.add_argument("--methods", nargs="+", choices=tuple(METHODS), default=tuple(METHODS))

@@ -201,6 +201,12 @@ class IdentificationData:
         return half > LEAST_SPEED_RANGE * middle
 
     @property
+    def band_hz(self) -> tuple[float, float]:
+        """Lowest and highest line of all axes [Hz]."""
+        omega = np.concatenate([axis.omega for axis in self.axes])
+        return float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))
+
+    @property
     def relative_speed(self) -> FloatArray:
         """Spindle speed of each cut, from -1 at the lowest to 1 at the highest, shape (k,) [-]."""
         middle, half = self.speed_range

@@ -116,7 +116,7 @@ class EvidenceSelection:
             felt = coupling(apart.theta, planes(apart.layout), apart.evaluation.nuisance, CoupledMisfit(points, self.priors, *noise))
             if felt.found:
                 starts = coupled_starts(points, self.priors, searched, apart, misfit.cut_weight, map)
-                found = fit_coupled(points, self.priors, starts[0], misfit.cut_weight, report)
+                found = fit_coupled(points, self.priors, starts[0], report)
                 if evidence(found[0], found[1]) < evidence(apart, misfit):
                     return CoupledFit(data, points, felt, *found)
         return PlaneFit(data, searched, *grow_jointly(smooth, self.priors, apart, misfit, report))

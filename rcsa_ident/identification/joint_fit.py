@@ -105,7 +105,7 @@ def fit_jointly(
         moving, other = refine_and_learn_noise(misfit_of, with_softening, misfit.model_error, misfit.cut_weight, report)
         if evidence(moving, other) < evidence(found, misfit):
             found, misfit = moving, other
-    return exchange_modes(found, misfit, _band(data), report, rounds=2), misfit
+    return exchange_modes(found, misfit, data.band_hz, report, rounds=2), misfit
 
 
 def grow_jointly(
@@ -130,15 +130,9 @@ def grow_jointly(
 
     found = chosen
     for _ in range(GROWN):
-        found = grow_modes(found, misfit, _band(data))
+        found = grow_modes(found, misfit, data.band_hz)
         report(Stage.GROW, found.cost, found)
     return *refine_and_learn_noise(misfit_of, found.candidate.point, misfit.model_error, misfit.cut_weight, report), chosen
-
-
-def _band(data: IdentificationData) -> tuple[float, float]:
-    """Lowest and highest line [Hz]."""
-    omega = np.concatenate([a.omega for a in data.axes])
-    return float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))
 
 
 def _from_several_starts(data: IdentificationData, priors: Priors, searched: list[AxisSearch], first: list[Candidate]) -> Candidate:

@@ -111,7 +111,7 @@ def test_what_a_search_of_both_planes_has_come_to(skew):
     rng = np.random.default_rng(2)
     layout = CoupledLayout(4, fixture=True, softening=True, skew=skew, turning=-1, coefficients=3, clampings=2)
     candidate = Candidate(rng.standard_normal(layout.size), layout, rng.standard_normal((5, 2)), 0.1, rng.standard_normal((2, 2)))
-    value = [CoupledSearch(candidate, -1.0 / 3.0)]
+    value = [CoupledSearch(candidate, -1.0 / 3.0, (0.003, 5e-4), np.array([1.0, 0.1]))]
     assert same(value, decode(encode(value)))
 
 

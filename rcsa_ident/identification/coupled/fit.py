@@ -16,7 +16,6 @@ from rcsa_ident.identification.coupled.parameters import CoupledLayout, pack, un
 from rcsa_ident.identification.coupled.score import coupled_start
 from rcsa_ident.identification.joint_fit import AxisSearch, refine_and_learn_noise, tooth_angles
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
-from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import Report, drop_modes, evidence, exchange_modes, grow_modes
 from rcsa_ident.identification.parameters import Layout, Unknowns, planes
 from rcsa_ident.identification.parameters import pack as plane_pack
@@ -35,6 +34,8 @@ WITH_SKEW, FIRST_SKEW = 0.01, 0.3
 OTHER_SENSE = 300.0
 #: Discs whose slopes make the gyroscopic coupling: where each starts from, and what the last fit has.
 DISCS = 2
+#: Starts that go on.
+WALKED = 2
 #: Polishes before the last one stop where two steps in a row lower the cost by less than this share, the last one at this.
 ROUGHLY, WELL = 1e-3, 1e-4
 
@@ -50,11 +51,17 @@ class CoupledSearch:
     ----------
     candidate : Candidate
     evidence : float [-]
-        Minus twice the log evidence at the finest of `SHARES`.
+        Minus twice the log evidence.
+    model_error : tuple of float [-]
+        Share of each axis' lines that counts as unexplained.
+    cut_weight : array, shape (k,)
+        Factor on the weights of each cut's lines.
     """
 
     candidate: Candidate
     evidence: float
+    model_error: tuple[float, ...]
+    cut_weight: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +105,45 @@ class CoupledStart:
             misfit = CoupledMisfit(self.data, self.priors, (share, share), self.weight)
             found = refine(misfit, theta, layout, nuisance, 60, grid=32 if share >= WITH_SKEW else 0, tolerance=ROUGHLY)
             theta, nuisance = found.theta, found.evaluation.nuisance
-        return CoupledSearch(found.candidate, evidence(found, misfit))
+        return CoupledSearch(found.candidate, evidence(found, misfit), misfit.model_error, self.weight)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoupledWalk:
+    """The way of a start to its own noise, its sense of rotation and as many modes as the evidence asks for; it answers as a start does.
+
+    Parameters
+    ----------
+    data : CoupledData
+        With the flange's motion as the only output.
+    priors : Priors
+    start : CoupledSearch
+    """
+
+    phase: ClassVar[Phase] = Phase.COUPLED
+    data: CoupledData
+    priors: Priors
+    start: CoupledSearch
+
+    def run(self) -> CoupledSearch:
+        """Polish, turn round, drop and exchange modes."""
+
+        def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> CoupledMisfit:
+            return CoupledMisfit(self.data, self.priors, shares, weight)
+
+        start = self.start
+        found, misfit = refine_and_learn_noise(misfit_of, start.candidate.point, start.model_error, start.cut_weight, _unheard, ROUGHLY)
+        if _layout(found.layout).turning:
+            other = refine(misfit, *turned_round(found), 60, tolerance=ROUGHLY)
+            if evidence(other, misfit) < evidence(found, misfit) - OTHER_SENSE:
+                found = other
+        found = drop_modes(found, misfit, steps=COUPLED)
+        found = exchange_modes(found, misfit, self.data.base.band_hz, rounds=1, steps=COUPLED)
+        return CoupledSearch(found.candidate, evidence(found, misfit), misfit.model_error, misfit.cut_weight)
+
+
+def _unheard(stage: Stage, cost: float, solution: Solution) -> None:
+    """A task in another process tells nothing on its way."""
 
 
 def with_discs(theta: FloatArray, layout: CoupledLayout, discs: int, priors: Priors) -> tuple[FloatArray, CoupledLayout]:
@@ -121,7 +166,7 @@ def with_softening(theta: FloatArray, layout: CoupledLayout, softening: bool) ->
 def coupled_starts(
     data: CoupledData, priors: Priors, searched: list[AxisSearch], apart: Solution, weight: FloatArray, map: Map = map
 ) -> list[CoupledSearch]:
-    """Return where both planes come to as one machine, best first, from different starts.
+    """Return where both planes come to as one machine, best first: from different starts, of which the best `WALKED` walk on.
 
     Each plane's own search has bent its modes to explain the other one's forces; the fit of both apart has one joint, but has bent them
     further. What changes with speed may be the stiffness, or gyroscopic moments alone.
@@ -147,8 +192,10 @@ def coupled_starts(
         kinds.append((of_searches, turning, True))
     if turning:
         kinds.append((of_searches, 0, False))
-    found = finite(map(perform, [CoupledStart(summed, priors, start, weight, turning, softening) for start, turning, softening in kinds]))
-    return sorted(found, key=lambda start: start.evidence)
+    tasks = [CoupledStart(summed, priors, start, weight, turning, softening) for start, turning, softening in kinds]
+    starts = sorted(finite(map(perform, tasks)), key=lambda start: start.evidence)
+    walked = finite(map(perform, [CoupledWalk(summed, priors, start) for start in starts[:WALKED]]))
+    return sorted(walked, key=lambda start: start.evidence)
 
 
 def _side_by_side(data: CoupledData, searched: list[AxisSearch]) -> Apart:
@@ -170,9 +217,7 @@ def _flange_alone(apart: Solution) -> Apart:
     return np.concatenate([*parts, theta[old.joint], theta[old.force]]), layout, apart.evaluation.nuisance
 
 
-def fit_coupled(
-    data: CoupledData, priors: Priors, best: CoupledSearch, weight: FloatArray, report: Report
-) -> tuple[Solution, CoupledMisfit, Solution]:
+def fit_coupled(data: CoupledData, priors: Priors, best: CoupledSearch, report: Report) -> tuple[Solution, CoupledMisfit, Solution]:
     """Return the solution of both planes together, its misfit, and a rival with one mode more.
 
     A whole machine's modes reach across both planes: one more than the evidence asks for is worse as an answer, but how far it differs
@@ -185,66 +230,54 @@ def fit_coupled(
     priors : Priors
     best : CoupledSearch
         Where it begins: the first of `coupled_starts`.
-    weight : array, shape (k,)
-        Factor on each cut's weights to begin with.
     report : callable of (stage, cost, solution)
     """
-    summed = data.summed()
-    omega = np.concatenate([a.omega for a in data.base.axes])
-    band = float(omega.min() / (2.0 * np.pi)), float(omega.max() / (2.0 * np.pi))
-
-    def rough_of(shares: tuple[float, ...], weight: FloatArray) -> CoupledMisfit:
-        return CoupledMisfit(summed, priors, shares, weight)
 
     def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> CoupledMisfit:
         return CoupledMisfit(data, priors, shares, weight)
 
     def learned(
-        start: tuple[FloatArray, Unknowns, FloatArray], misfit: Misfit, tolerance: float = ROUGHLY
+        start: tuple[FloatArray, Unknowns, FloatArray], shares: tuple[float, ...], weight: FloatArray, tolerance: float
     ) -> tuple[Solution, CoupledMisfit]:
-        found, last = refine_and_learn_noise(misfit_of, start, misfit.model_error, misfit.cut_weight, report, tolerance)
-        assert isinstance(last, CoupledMisfit)
-        return found, last
+        found, misfit = refine_and_learn_noise(misfit_of, start, shares, weight, report, tolerance)
+        assert isinstance(misfit, CoupledMisfit)
+        return found, misfit
 
-    found, rough = refine_and_learn_noise(rough_of, best.candidate.point, (SHARES[-1], SHARES[-1]), weight, report, ROUGHLY)
-    if _layout(found).turning:
-        other = refine(rough, *turned_round(found), 60, tolerance=ROUGHLY)
-        if evidence(other, rough) < evidence(found, rough) - OTHER_SENSE:
-            found = other
-    found = exchange_modes(drop_modes(found, rough, steps=COUPLED), rough, band, report, rounds=1, steps=COUPLED)
-    here = learned(_with_all_outputs(data, found, priors), rough)
+    found, misfit = learned(_with_all_outputs(data, best.candidate, priors), best.model_error, best.cut_weight, ROUGHLY)
     if data.base.speed_changes:
-        layout = _layout(here[0])
-        other_kind = with_softening(here[0].theta, layout, not layout.softening)
-        there = learned((*other_kind, here[0].evaluation.nuisance), here[1])
-        here = there if evidence(*there) < evidence(*here) else here
-    here = learned(here[0].candidate.point, here[1], WELL)
+        layout = _layout(found.layout)
+        other_kind = *with_softening(found.theta, layout, not layout.softening), found.evaluation.nuisance
+        other, its_misfit = learned(other_kind, misfit.model_error, misfit.cut_weight, ROUGHLY)
+        if evidence(other, its_misfit) < evidence(found, misfit):
+            found, misfit = other, its_misfit
+    start = found.candidate
     while True:
+        found, misfit = learned(start.point, misfit.model_error, misfit.cut_weight, WELL)
         # all outputs may show a mode that the flange's own motion does not
-        grown = grow_modes(*here, band, steps=COUPLED)
+        grown = grow_modes(found, misfit, data.base.band_hz, steps=COUPLED)
         report(Stage.GROW, grown.cost, grown)
-        if evidence(grown, here[1]) >= evidence(*here) - 1.0:
-            return *here, grown
-        here = learned(grown.candidate.point, here[1], WELL)
+        if evidence(grown, misfit) >= evidence(found, misfit) - 1.0:
+            return found, misfit, grown
+        start = grown.candidate
 
 
 def turned_round(found: Solution) -> tuple[FloatArray, CoupledLayout, FloatArray]:
     """Return where the search for the same machine begins whose spindle turns the other way: gyroscopic moments change their sign."""
-    layout = _layout(found)
+    layout = _layout(found.layout)
     theta = found.theta.copy()
     discs = theta[layout.skews].reshape(layout.skew, 2, layout.modes)
     discs[:, 0] *= -1.0
     return theta, replace(layout, turning=-layout.turning), found.evaluation.nuisance
 
 
-def _layout(solution: Solution) -> CoupledLayout:
-    assert isinstance(solution.layout, CoupledLayout)
-    return solution.layout
+def _layout(layout: Unknowns) -> CoupledLayout:
+    assert isinstance(layout, CoupledLayout)
+    return layout
 
 
-def _with_all_outputs(data: CoupledData, found: Solution, priors: Priors) -> tuple[FloatArray, CoupledLayout, FloatArray]:
+def _with_all_outputs(data: CoupledData, found: Candidate, priors: Priors) -> tuple[FloatArray, CoupledLayout, FloatArray]:
     """Return a vector with all that the data may tell, from one of the flange's motion alone: what is new starts at nothing."""
-    old, theta, nuisance = _layout(found), found.theta, found.evaluation.nuisance
+    old, theta, nuisance = _layout(found.layout), found.theta, found.nuisance
     angles = theta[old.clamping]
     if old.skew:
         theta, old = with_discs(theta, old, DISCS, priors)
