@@ -220,15 +220,18 @@ def main(arguments: Sequence[str]) -> None:
     scratch = given.scratch or Path(tempfile.mkdtemp(prefix="rcsa-ident-study-"))
     print(f"scratch folder: {scratch}", flush=True)
     rows = run(scratch, named(given.machines), given.conditions, given.methods, given.seeds, given.processes)
-    apart, coupled = ([row for row in rows if is_coupled(row["machine"]) == kind] for kind in (False, True))
-    if apart:
-        print(f"\n{table(apart)}")
-    if coupled:
-        print(f"\n{coupled_table(coupled)}")
-    if given.page and apart:
-        write_rows(DOCS / "study.jsonl", apart)
-        draw_study(apart)
-        write_block("study", table(apart))
-    if given.page and coupled:
-        write_rows(DOCS / "study_coupled.jsonl", coupled)
-        write_block("coupled", coupled_table(coupled))
+    kinds = {
+        "study": [row for row in rows if not is_coupled(row["machine"])],
+        "coupled": [row for row in rows if row["machine"] not in TURNED_SAMPLE and is_coupled(row["machine"])],
+        "turned_sample": [row for row in rows if row["machine"] in TURNED_SAMPLE],
+    }
+    for name, members in kinds.items():
+        if not members:
+            continue
+        text = table(members) if name == "study" else coupled_table(members)
+        print(f"\n{text}")
+        if given.page:
+            write_rows(DOCS / ("study.jsonl" if name == "study" else f"study_{name}.jsonl"), members)
+            write_block(name, text)
+            if name == "study":
+                draw_study(members)

@@ -16,13 +16,16 @@ from benchmarks.machines import (
     HELD_OUT,
     MARGIN,
     TURNED,
+    TURNED_SAMPLE,
     is_coupled,
     least_limit,
     named,
     random_machine,
+    turned_sample,
     under,
 )
 from benchmarks.machines import drawn as named_one
+from benchmarks.study import MACHINES
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
 
@@ -172,3 +175,23 @@ def test_conditions_change_the_sensors_only(drawn):
     assert seen["noise-x3"].sensors.acceleration_noise == pytest.approx(0.15)
     assert all(s.spindle is machine.spindle and s.plan is machine.plan for s in seen.values())
     assert machine.sensors.tooth_angle != 0.0
+
+
+@pytest.mark.parametrize("name", TURNED_SAMPLE)
+def test_the_sample_machine_turned(name):
+    """All of it is what the file says, but for angles, moments and Y's springs and dampers."""
+    plain, machine = read_machine(MACHINES / "hpm.toml"), turned_sample(MACHINES / "hpm.toml", name)
+    assert is_coupled(name)
+    assert name in named(["turned-sample"])
+    assert (machine.toolings, machine.truth_toolings) == (plain.toolings, plain.truth_toolings)
+    assert machine.plan.spindle_speeds == plain.plan.spindle_speeds
+    spindle, before = machine.spindle, plain.spindle
+    assert spindle.coupled
+    assert spindle.gyroscopic == (not name.startswith("oblique"))
+    parts = [(spindle.housing, before.housing), *zip(spindle.bearings, before.bearings, strict=True)]
+    for part, old in parts:
+        assert part.stiffness[0] == old.stiffness[0]
+        assert part.damping[1] == pytest.approx(old.damping[1] * (0.6 if name.startswith("oblique") else 1.0))
+    angles = np.rad2deg([part.angle for part, _ in parts])
+    expected = {"gyroscopic": [0.0] * 4, "turned": [14.0, -17.0, -4.0, 11.0]}
+    np.testing.assert_allclose(angles, expected.get(name, [0.0 if "-" not in name else float(name.split("-")[-1])] * 4))

@@ -141,6 +141,19 @@ def test_axes_of_different_outputs_are_planes_apart(straight, start):
     assert found.status is not Status.FAILED
 
 
+@slow
+def test_stiffness_that_changes_with_speed_is_not_taken_for_coupling(start):
+    """Lines that no speed explains look like something felt across: it is asked only after the stiffness may change."""
+
+    def softening(spindle):
+        return replace(spindle, bearings=tuple(replace(b, softening=4e-6 / RPM) for b in spindle.bearings))
+
+    campaign = Campaign(20, softening, start=start)
+    assert campaign.found.whole is None
+    assert campaign.scores[-1].score < STRIKES
+    assert all(part.posterior.layout.softening for part in campaign.found.axes.values())
+
+
 def apart(campaign):
     """Score, and both kinds, where the planes' fit ended."""
     last = campaign.scores[-1]

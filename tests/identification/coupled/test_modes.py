@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rcsa_ident.identification.coupled.data import coupled_data
-from rcsa_ident.identification.coupled.fit import with_discs
+from rcsa_ident.identification.coupled.fit import with_discs, with_softening
 from rcsa_ident.identification.coupled.misfit import CoupledMisfit
 from rcsa_ident.identification.coupled.modes import COUPLED, selected, with_mode
 from rcsa_ident.identification.coupled.parameters import CoupledLayout, pack, unpack
@@ -59,6 +59,21 @@ def test_more_discs_are_next_to_nothing_but_have_a_gradient():
     assert 0.0 < np.abs(change).max() < 0.05
     again, _ = with_discs(theta, layout, 2, Priors())
     np.testing.assert_array_equal(again, grown)
+
+
+def test_softening_comes_with_nothing_and_goes_alone():
+    layout = CoupledLayout(4, fixture=True, skew=2, turning=1, coefficients=2)
+    theta = coupled_vector(layout)
+    softer, wider = with_softening(theta, layout, True)
+    assert wider == replace(layout, softening=True)
+    one, other = unpack(theta, layout), unpack(softer, wider)
+    np.testing.assert_array_equal(other.softening, np.zeros((4, 4)))
+    np.testing.assert_array_equal(other.skew, one.skew)
+    np.testing.assert_array_equal(other.fixture, one.fixture)
+    same, again = with_softening(softer, wider, False)
+    assert again == layout
+    np.testing.assert_allclose(same, theta, rtol=1e-12)
+    assert with_softening(theta, layout, False) == (theta, layout)
 
 
 def remade(points, theta, layout, noise=1e-3):
