@@ -32,8 +32,10 @@ WITH_SKEW, FIRST_SKEW = 0.01, 0.3
 #: Gain in evidence for which the spindle is believed to turn the other way: two valleys of one sense differ by up to half of it, and
 #: where gyroscopic moments are strong the wrong sense loses by thousands.
 OTHER_SENSE = 300.0
-#: Discs whose slopes make the gyroscopic coupling: where each starts from, and what the last fit has.
+#: Discs whose slopes make the gyroscopic coupling of the last fit; starts have one.
 DISCS = 2
+#: Modes that the last fit adds at most where all outputs ask for them.
+ADDED = 5
 #: Starts that go on.
 WALKED = 2
 #: Polishes before the last one stop where two steps in a row lower the cost by less than this share, the last one at this.
@@ -251,14 +253,15 @@ def fit_coupled(data: CoupledData, priors: Priors, best: CoupledSearch, report: 
         if evidence(other, its_misfit) < evidence(found, misfit):
             found, misfit = other, its_misfit
     start = found.candidate
-    while True:
+    for _ in range(1 + ADDED):
         found, misfit = learned(start.point, misfit.model_error, misfit.cut_weight, WELL)
         # all outputs may show a mode that the flange's own motion does not
         grown = grow_modes(found, misfit, data.base.band_hz, steps=COUPLED)
         report(Stage.GROW, grown.cost, grown)
         if evidence(grown, misfit) >= evidence(found, misfit) - 1.0:
-            return found, misfit, grown
+            break
         start = grown.candidate
+    return found, misfit, grown
 
 
 def turned_round(found: Solution) -> tuple[FloatArray, CoupledLayout, FloatArray]:
