@@ -102,7 +102,9 @@ def compared_at_speeds(machine: Machine | None, setup: MachineFile, truth: Path)
             tooling = read_tooling(path)
             worst = np.zeros((3, 2))
             for speed in (min(programmed), mean, max(programmed)):
-                known = read_tip(truth / "tip" / true_name(tooling.name, None if speed == mean else speed))
+                # where nothing changes with the speed, one file is true of all
+                its_own = speed != mean and setup.spindle.speed_dependent
+                known = read_tip(truth / "tip" / true_name(tooling.name, speed if its_own else None))
                 true = known.values[np.searchsorted(to_hz(known.omega), FREQUENCY - 1e-6)]
                 values = np.zeros_like(true)
                 if machine is not None:
