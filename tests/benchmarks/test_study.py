@@ -130,7 +130,8 @@ def test_cross_terms_are_compared_at_the_worst_of_three_speeds(tmp_path):
         ("S4-shrink", 1200): [[1.0, 1.5], [0.0, 1.0]],
     }
     plan = SimpleNamespace(spindle_speeds=(800.0, 1000.0, 1200.0))
-    setup = SimpleNamespace(toolings=files[:2], truth_toolings=files[2:], plan=plan)
+    turning = SimpleNamespace(speed_dependent=True)
+    setup = SimpleNamespace(toolings=files[:2], truth_toolings=files[2:], plan=plan, spindle=turning)
     found = compared_at_speeds(Known(truth, factors), setup, tmp_path)
     assert found["cut"]["errors"] == pytest.approx([0.1, 0.2, 0.0, 0.0], abs=1e-4)
     assert found["cut"]["cross"] == found["cut"]["cross_own"] == pytest.approx([0.0, 0.0], abs=1e-4)
@@ -143,6 +144,13 @@ def test_cross_terms_are_compared_at_the_worst_of_three_speeds(tmp_path):
     assert lost["cut"]["errors"] == [1.0] * 4
     assert (lost["cut"]["cross"], lost["cut"]["cross_own"]) == ([pytest.approx(0.1)] * 2, [1.0] * 2)
     assert all(lost[kind]["bands"] is None for kind in lost)
+    # a machine that no speed changes has one file of each tooling, true of all speeds
+    for path in (tmp_path / "tip").glob("*rpm.csv"):
+        path.unlink()
+    setup.spindle.speed_dependent = False
+    same = {(name, speed): truth[name, 1000] for name, speed in truth}
+    found = compared_at_speeds(Known(same, {("S2-PG25", 800): [[1.0, 1.0], [1.0, 1.3]]}), setup, tmp_path)
+    assert found["cut"]["errors"] == pytest.approx([0.0, 0.0, 0.0, 0.3], abs=1e-4)
 
 
 def row(machine, similar, different, status="converged", method="default", condition="trigger"):
