@@ -80,14 +80,15 @@ def coupling(theta: FloatArray, layout: Layout, nuisance: FloatArray, misfit: Co
     modes_x = layout.axes[0].modes
     vector, coupled = coupled_start(theta, layout, EVERY_PAIR)
     evaluation = misfit.evaluate(vector, coupled, nuisance, normal=True)
-    assert evaluation.linear is not None
+    linear = evaluation.linear
+    assert linear is not None
     across, turning = _across(coupled, modes_x), np.zeros(coupled.size, dtype=bool)
     turning[coupled.skews] = True
     per_point = max(sum(evaluation.chi2) / misfit.points, 1e-300)
     prior = misfit.prior(coupled).spread
 
     def score(asked: np.ndarray, known: np.ndarray) -> tuple[float, float]:
-        gain, chance = _gain(evaluation.hessian, evaluation.linear.gradient, prior, asked, known)  # type: ignore[union-attr]
+        gain, chance = _gain(linear.hessian, linear.gradient, prior, asked, known)
         return (gain / per_point - chance) / np.sqrt(2.0 * max(chance, 1.0)), gain
 
     known = ~(across | turning)

@@ -143,7 +143,7 @@ def test_axes_of_different_outputs_are_planes_apart(straight, start):
 
 @slow
 def test_stiffness_that_changes_with_speed_is_not_taken_for_coupling(start):
-    """Lines that no speed explains look like something felt across: it is asked only after the stiffness may change."""
+    """Lines that no speed explains look like something felt across: asked before the stiffness may change, the score is 38 here."""
 
     def softening(spindle):
         return replace(spindle, bearings=tuple(replace(b, softening=4e-6 / RPM) for b in spindle.bearings))
