@@ -106,20 +106,21 @@ class EvidenceSelection:
     def _fit(self, data: IdentificationData, searched: list[AxisSearch], map: Map, report: Report) -> Fit:
         """Return the fit of both axes: apart, or together where they feel each other.
 
-        That is asked only where both have been fitted apart as well as they can be: a stiffness that changes with speed, or a search that
-        has ended in a wrong valley, looks like something felt across until then. The evidence has the last word.
+        That is asked only where a stiffness that changes with speed is in the fit of both apart and its modes are exchanged: left out,
+        either looks like something felt across. The evidence has the last word, each after its last fit: a mode too few looks like it, too.
         """
         smooth = data.with_smooth_errors(SMOOTH_ERROR)
         apart, misfit = fit_jointly(smooth, self.priors, searched, first_starts(smooth, self.priors, searched, map), report)
+        grown = grow_jointly(smooth, self.priors, apart, misfit, report)
         if couplable(data):
             points, noise = coupled_data(smooth), (misfit.model_error, misfit.cut_weight)
             felt = coupling(apart.theta, planes(apart.layout), apart.evaluation.nuisance, CoupledMisfit(points, self.priors, *noise))
             if felt.found:
                 starts = coupled_starts(points, self.priors, searched, apart, misfit.cut_weight, map)
                 found = fit_coupled(points, self.priors, starts[0], report)
-                if evidence(found[0], found[1]) < evidence(apart, misfit):
+                if evidence(found[0], found[1]) < evidence(grown[0], grown[1]):
                     return CoupledFit(data, points, felt, *found)
-        return PlaneFit(data, searched, *grow_jointly(smooth, self.priors, apart, misfit, report))
+        return PlaneFit(data, searched, *grown)
 
 
 def _report_to(axis: str, trace: list[Step], progress: Progress | None) -> Report:
