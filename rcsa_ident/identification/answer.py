@@ -22,6 +22,7 @@ from rcsa_ident.identification.diagnostics import deviation_of_tip, diagnose, re
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
+from rcsa_ident.identification.model_order import evidence
 from rcsa_ident.identification.parameters import Layout, parameter_names, planes
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
@@ -59,6 +60,11 @@ class Fit(ABC):
     @abstractmethod
     def doubts(self) -> tuple[list[Remark], list[Remark]]:
         """Return the reasons for `suspect` and the notes that belong to this kind of fit."""
+
+    @cached_property
+    def evidence(self) -> float:
+        """Minus twice the log evidence [-]: less is better."""
+        return evidence(self.solution, self.misfit)
 
     @cached_property
     def covariance(self) -> FloatArray:

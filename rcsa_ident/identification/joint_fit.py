@@ -28,6 +28,8 @@ STARTS = ((0.005, None), (0.02, 0), (0.005, 1), (0.02, 1), (0.02, None))
 SAME_POLISH = 5.0
 #: Evidences closer than this belong to one answer, with a mode more or less that hardly matters.
 SAME_ANSWER = 60.0
+#: Polishes before the last one stop where two steps in a row lower the cost by less than this share.
+ROUGHLY = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,6 +80,29 @@ def first_starts(data: IdentificationData, priors: Priors, searched: list[AxisSe
     return sorted(found, key=lambda candidate: candidate.cost)
 
 
+def fit_roughly(
+    data: IdentificationData, priors: Priors, searched: list[AxisSearch], first: Candidate, report: Report
+) -> tuple[Solution, Misfit]:
+    """Return about where a start leads with a stiffness that is free to change with speed, and the misfit there.
+
+    Parameters
+    ----------
+    data : IdentificationData
+        As in `fit_jointly`.
+    priors : Priors
+    searched : list of AxisSearch
+    first : Candidate
+        From `first_starts`.
+    report : callable of (stage, cost, solution)
+    """
+
+    def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> Misfit:
+        return Misfit(data, priors, shares, weight)
+
+    start = _start(data, first, data.speed_changes)
+    return refine_and_learn_noise(misfit_of, start, *learned_noise(searched), report, ROUGHLY)
+
+
 def fit_jointly(
     data: IdentificationData, priors: Priors, searched: list[AxisSearch], first: list[Candidate], report: Report
 ) -> tuple[Solution, Misfit]:
@@ -101,7 +126,7 @@ def fit_jointly(
     start = _from_several_starts(data, priors, searched, first).point
     found, misfit = refine_and_learn_noise(misfit_of, start, *learned_noise(searched), report)
     if data.speed_changes:
-        with_softening = _start(data, found, True)
+        with_softening = _start(data, found.candidate, True)
         moving, other = refine_and_learn_noise(misfit_of, with_softening, misfit.model_error, misfit.cut_weight, report)
         if evidence(moving, other) < evidence(found, misfit):
             found, misfit = moving, other
@@ -187,7 +212,7 @@ class JointStart:
         theta = np.concatenate([*(c.theta[c.layout.axis(0)] for c in best), joint, force])
         rough = Misfit(data.summed(), priors, tuple(max(f, self.coarse) for f in shares), weight)
         start = refine(rough, theta, layout, best[0].nuisance, 40, grid=32)
-        return refine(Misfit(data, priors, shares, weight), *_start(data, start, False), 60).candidate
+        return refine(Misfit(data, priors, shares, weight), *_start(data, start.candidate, False), 60).candidate
 
 
 def learned_noise(searched: list[AxisSearch]) -> tuple[tuple[float, ...], FloatArray]:
@@ -231,7 +256,7 @@ def refine_and_learn_noise(
     return found, misfit
 
 
-def _start(data: IdentificationData, found: Solution, softening: bool) -> tuple[FloatArray, Layout, FloatArray]:
+def _start(data: IdentificationData, found: Candidate, softening: bool) -> tuple[FloatArray, Layout, FloatArray]:
     """Return a vector with all that the data may tell, from one with less: what is new starts at nothing."""
     old = planes(found.layout)
     axes = tuple(replace(a, fixture=axis.outputs == 2, softening=softening) for a, axis in zip(old.axes, data.axes, strict=True))
@@ -239,7 +264,7 @@ def _start(data: IdentificationData, found: Solution, softening: bool) -> tuple[
     parts = [pack(unpack(found.theta[old.axis(i)], old.axes[i]), axes[i]) for i in range(len(axes))]
     force = np.zeros(layout.coefficients)
     force[: old.coefficients] = found.theta[old.force]
-    nuisance = found.evaluation.nuisance
+    nuisance = found.nuisance
     angles = found.theta[old.clamping]
     if not old.clampings and layout.clampings:
         angles, nuisance = tooth_angles(data, nuisance)

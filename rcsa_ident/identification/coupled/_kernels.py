@@ -122,14 +122,17 @@ def coupled_lines(machine, points, lines_x, lines_y):
     """
     omega_n, psi, factor, softening, skew, residual, fixture_residual, joint = machine
     m = omega_n.size
+    linear = lines_x.gradient.shape[0] > 0 or lines_y.gradient.shape[0] > 0
+    # the fixture's two columns are felt where its motion is an output of its own
+    sides = 6 if lines_x.parts.shape[1] == 2 else 4
     soft, turns = softening.shape[0] > 0, skew.shape[0] > 0
     damping = factor @ factor.T
     static = residual @ residual.T
     stiffness = np.zeros((m, m))
     dynamic = np.empty((m, m), dtype=np.complex128)
-    right = np.empty((m, 6), dtype=np.complex128)
-    left = np.empty((m, 6), dtype=np.complex128)
-    block = np.empty((6, 4), dtype=np.complex128)
+    right = np.empty((m, sides), dtype=np.complex128)
+    left = np.empty((m, sides), dtype=np.complex128)
+    block = np.zeros((6, 4), dtype=np.complex128)
     together = np.empty((4, 4), dtype=np.complex128)
     carried = np.empty((4, 2), dtype=np.complex128)
     x, v, b, rx, rv = np.empty((5, 4), dtype=np.complex128)
@@ -148,16 +151,16 @@ def coupled_lines(machine, points, lines_x, lines_y):
                 if turns:
                     d_ij += speed * skew[i, j]
                 dynamic[i, j] = complex(k_ij - (w * w if i == j else 0.0), w * d_ij)
-            for a in range(6):
+            for a in range(sides):
                 right[i, a] = psi[i, a]
         _factorise(dynamic)
-        if turns:
+        if turns and linear:
             left[:] = right
             _solve_transposed(dynamic, left)
         _solve(dynamic, right)
         # without gyroscopic coupling Z is symmetric
         back = left if turns else right
-        for a in range(6):
+        for a in range(sides):
             for c in range(4):
                 total = complex(static[a, c], 0.0) if a < 4 else complex(fixture_residual[a - 4, c], 0.0)
                 for i in range(m):
@@ -211,9 +214,11 @@ def coupled_lines(machine, points, lines_x, lines_y):
                     felt[row_number, o, c] = v[c]
                     moved[row_number, c] = x[c]
                 for i in range(m):
-                    total = fixture * back[i, 4 + axis]
+                    total = complex(0.0, 0.0)
                     for c in range(4):
                         total += back[i, c] * v[c]
+                    if outputs == 2:
+                        total += fixture * back[i, 4 + axis]
                     p[i] = total
                 for j in range(m):
                     sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)

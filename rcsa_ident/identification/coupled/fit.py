@@ -14,7 +14,7 @@ from rcsa_ident.identification.coupled.misfit import CoupledMisfit
 from rcsa_ident.identification.coupled.modes import COUPLED
 from rcsa_ident.identification.coupled.parameters import CoupledLayout, pack, unpack
 from rcsa_ident.identification.coupled.score import coupled_start
-from rcsa_ident.identification.joint_fit import AxisSearch, refine_and_learn_noise, tooth_angles
+from rcsa_ident.identification.joint_fit import ROUGHLY, AxisSearch, refine_and_learn_noise, tooth_angles
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.model_order import Report, drop_modes, evidence, exchange_modes, grow_modes
 from rcsa_ident.identification.parameters import Layout, Unknowns, planes
@@ -38,8 +38,8 @@ DISCS = 2
 ADDED = 5
 #: Starts that go on.
 WALKED = 2
-#: Polishes before the last one stop where two steps in a row lower the cost by less than this share, the last one at this.
-ROUGHLY, WELL = 1e-3, 1e-4
+#: The last polish stops where two steps in a row lower the cost by less than this share.
+WELL = 1e-4
 
 #: Unknowns of both planes side by side, their layout, and the cuts' delays and angles.
 Apart = tuple[FloatArray, Layout, FloatArray]
@@ -166,7 +166,7 @@ def with_softening(theta: FloatArray, layout: CoupledLayout, softening: bool) ->
 
 
 def coupled_starts(
-    data: CoupledData, priors: Priors, searched: list[AxisSearch], apart: Solution, weight: FloatArray, map: Map = map
+    data: CoupledData, priors: Priors, searched: list[AxisSearch], apart: Candidate, weight: FloatArray, map: Map = map
 ) -> list[CoupledSearch]:
     """Return where both planes come to as one machine, best first: from different starts, of which the best `WALKED` walk on.
 
@@ -179,7 +179,7 @@ def coupled_starts(
     priors : Priors
     searched : list of AxisSearch
         Of X and of Y.
-    apart : Solution
+    apart : Candidate
         Of both planes as if they did not feel each other.
     weight : array, shape (k,)
         Factor on each cut's weights there.
@@ -211,12 +211,12 @@ def _side_by_side(data: CoupledData, searched: list[AxisSearch]) -> Apart:
     return np.concatenate([*(c.theta[c.layout.axis(0)] for c in best), joint, force]), layout, best[0].nuisance
 
 
-def _flange_alone(apart: Solution) -> Apart:
+def _flange_alone(apart: Candidate) -> Apart:
     """The fit of both planes without fixture and tooth angles."""
     old, theta = planes(apart.layout), apart.theta
     layout = Layout(tuple(replace(axis, fixture=False) for axis in old.axes), old.coefficients)
     parts = [plane_pack(plane_unpack(theta[old.axis(i)], old.axes[i]), axis) for i, axis in enumerate(layout.axes)]
-    return np.concatenate([*parts, theta[old.joint], theta[old.force]]), layout, apart.evaluation.nuisance
+    return np.concatenate([*parts, theta[old.joint], theta[old.force]]), layout, apart.nuisance
 
 
 def fit_coupled(data: CoupledData, priors: Priors, best: CoupledSearch, report: Report) -> tuple[Solution, CoupledMisfit, Solution]:

@@ -121,8 +121,8 @@ class _CoupledAnswer:
             gradient = np.concatenate([gradient[:, :, :first], skew, gradient[:, :, -JOINT:]], axis=2)
         scale = np.concatenate([chain(self.machine, layout), scaled_joint(self.theta[layout.joint])])
         rows = gradient.reshape(-1, gradient.shape[2])
-        own = np.empty((2 * rows.shape[0], rows.shape[1]))
-        model = self.model.ravel()
-        whiten(rows, np.empty((rows.shape[0], 0), dtype=complex), model, lines.weight, scale, own)
-        extra = self.extra.reshape(rows.shape[0], -1) * -np.sqrt(lines.weight)[:, None]
-        return np.hstack([own, np.concatenate([extra.real, extra.imag])]), self.compliance
+        extra = self.extra.reshape(rows.shape[0], -1)
+        out = np.empty((2 * rows.shape[0], rows.shape[1] + extra.shape[1]))
+        # a line's change with the coefficients is its parts', not a multiple of the line
+        whiten(rows, extra, np.ones(rows.shape[0], dtype=complex), lines.weight, scale, out)
+        return out, self.compliance
