@@ -66,8 +66,9 @@ class ZeroOrder:
             lobe,
             max_depth,
             self.name,
-            absolute_limit=1.0 / (2.0 * coefficients.tangential * strongest) if exists else float("inf"),
-            absolute_frequency=place if exists else None,
+            # of equal teeth: others have limits below it
+            absolute_limit=None if unlike else 1.0 / (2.0 * coefficients.tangential * strongest) if exists else float("inf"),
+            absolute_frequency=place if exists and not unlike else None,
             warnings=(*([unlike] if unlike else []), *_doubts(process, receptance, place if exists else None)),
             withheld=unlike,
         )

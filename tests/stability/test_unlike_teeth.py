@@ -42,6 +42,8 @@ def test_two_alternating_pitches():
     wrong, right = limits(pitch=UNEQUAL), limits(FullDiscretisation(), pitch=UNEQUAL)
     assert 1e3 * wrong.limit_depth == pytest.approx([7.22, 9.62], abs=0.005)
     assert 1e3 * right.limit_depth == pytest.approx([3.4761, 4.9347], rel=1e-3)
+    # the closed form's depth that is stable at any speed, 3.668 mm, is not: 3.4761 mm is less
+    assert (wrong.absolute_limit, wrong.absolute_frequency) == (None, None)
     assert wrong.withheld in wrong.warnings
     assert "unequal pitch (84/96/84/96 degrees)" in wrong.withheld
     assert wrong.withheld.endswith(METHOD)
@@ -57,6 +59,7 @@ def test_run_out_is_withheld_too_and_equal_teeth_are_not():
     assert "run-out is left out" in both
     alike = limits()
     assert alike.withheld == ""
+    assert 1e3 * alike.absolute_limit == pytest.approx(3.668, abs=1e-3)
     assert np.isfinite(alike.recommended_depth()).all()
 
 

@@ -17,7 +17,6 @@ export function headline(found, question) {
     if (!best) {
       const limit = lobes.absolute_limit_mm;
       const below = limit === null ? "" : ` Stable below ${text("depth", limit)} everywhere.`;
-      // limits that are no source of a recommendation are none of a safe depth either
       const why = lobes.withheld ? `No cut is recommended: ${lobes.withheld}.` : `No cut is recommended at these speeds.${below}`;
       return h(
         "article",
