@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.materials import material
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
 from rcsa_ident.errors import InputError
+from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Saved, Shown
 from rcsa_ident.signals.recording import Sensor
 from rcsa_ident.tool_holder.geometry import ToolAssembly
@@ -163,6 +164,15 @@ class Campaign(Shown):
     workpiece: Workpiece
     toolings: Mapping[str, Tooling]
     cuts: tuple[Cut, ...]
+
+    def cylinder_remarks(self, used: Collection[str]) -> tuple[Remark, ...]:
+        """Return what to make of forces that took cutters for cylinders, for each tooling of the cuts of these ids."""
+        found = []
+        for name, tooling in self.toolings.items():
+            depths = [cut.conditions.axial_depth for cut in self.cuts if cut.tooling == name and cut.id in used]
+            if depths:
+                found += [remark.of(name) for remark in tooling.cutter.cylinder_remarks(min(depths), forces=True)]
+        return tuple(found)
 
     def __str__(self) -> str:
         speeds = to_rpm(np.array([cut.conditions.spindle_speed for cut in self.cuts]))

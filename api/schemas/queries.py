@@ -201,7 +201,7 @@ class BestSpeed(Answer):
 
     spindle_speed_rpm: float
     limit_depth_mm: float | None = Field(description="Stability limit; null: stable up to the depth that was asked for.")
-    recommended_depth_mm: float = Field(description="The limit less what a recommendation holds back.")
+    recommended_depth_mm: float | None = Field(description="The limit less what a recommendation holds back; null: see withheld.")
 
 
 class RecommendedCut(Answer):
@@ -233,7 +233,7 @@ class ToolingLobes(Answer):
     limit_depth_mm: list[float | None]
     limit_depth_low_mm: list[float | None] | None = Field(description="95 % of the machines that the records allow lie above it.")
     limit_depth_high_mm: list[float | None] | None
-    recommended_depth_mm: list[float]
+    recommended_depth_mm: list[float | None]
     chatter_frequency_hz: list[float | None]
     lobe: list[int | None]
     flip: list[bool]
@@ -241,6 +241,7 @@ class ToolingLobes(Answer):
     absolute_frequency_hz: float | None
     best_speeds: list[BestSpeed]
     recommended: list[RecommendedCut]
+    withheld: str | None = Field(None, description="Why these limits are no source of a recommended depth; null where they are.")
     flip_speeds: int = Field(description="Speeds at which stability is lost by period doubling.")
     tested: TestedTally | None = Field(None, description="null: no tested cuts were given.")
     warnings: list[str]
@@ -345,6 +346,7 @@ class ToolingAdvice(Answer):
     stickout_mm: float
     lowest_limit_mm: float
     common_stable_depth_mm: float | None = Field(description="Stable at every speed on all machines that the records allow.")
+    withheld: str | None = Field(None, description="Why these limits are no source of a recommended depth; null where they are.")
     highest_removal: list[OperatingPoint]
     windows: list[Window]
     planned: list[PlannedAnswer]

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field, StringConstraints
 
 from api.schemas.common import Answer, Body, Line
+from rcsa_ident.cutting.shape import CutterShape
 
 Text = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 MOST_SEGMENTS = 200
@@ -35,6 +36,8 @@ class CutterKeys(Body):
     diameter_mm: float
     helix_deg: float = 0.0
     pitch_deg: list[float] | None = Field(None, max_length=100)
+    shape: Text | None = Field(None, description=f"One of {', '.join(CutterShape)}; flat without it. A cylinder is computed, and said so.")
+    corner_radius_mm: float | None = None
 
 
 class SegmentKeys(Body):

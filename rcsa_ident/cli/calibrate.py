@@ -105,7 +105,7 @@ def _remarks(setup: Campaign, found: Calibrated) -> list[str]:
     head = (
         f"Calibrated from {len(found.used)} cuts of {setup.name}, method {forces.method}; +- is 95 %, spreads are one standard deviation."
     )
-    return [head, "; ".join(rows), *forces.reasons]
+    return [head, "; ".join(rows), *forces.reasons, *found.notes]
 
 
 def _summary(found: Calibrated) -> dict[str, Any]:

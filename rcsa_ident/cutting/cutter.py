@@ -1,4 +1,4 @@
-"""The cutter: teeth, pitch, helix, run-out."""
+"""The cutter: teeth, pitch, helix, run-out, and the name of its shape."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray, frozen
+from rcsa_ident.cutting.shape import IGNORED_CORNER, CutterShape, cylinder_remark
 from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Cutter(Shown):
-    """A cylindrical end mill.
+    """A milling cutter, computed as the cylinder of its diameter.
 
     Parameters
     ----------
@@ -25,6 +27,10 @@ class Cutter(Shown):
         `pitch[j]` is the angle from tooth j to tooth j + 1, which runs ahead of it and has cut there before.
     runout : array, shape (teeth,) [m], default none
         Radial offset of each edge.
+    shape : CutterShape or its name, default flat
+        What is computed is a cylinder whatever it is; `cylinder_remarks` say so.
+    corner_radius : float [m], default 0
+        Of the edge's corner, or of its arc where the shape is one; 0 where it is sharp or not known.
 
     Examples
     --------
@@ -40,6 +46,8 @@ class Cutter(Shown):
     helix: float = 0.0
     pitch: FloatArray = field(default=None)  # type: ignore[arg-type]
     runout: FloatArray = field(default=None)  # type: ignore[arg-type]
+    shape: CutterShape = CutterShape.FLAT
+    corner_radius: float = 0.0
 
     def __post_init__(self) -> None:
         if isinstance(self.teeth, bool) or int(self.teeth) != self.teeth or not 1 <= self.teeth <= 100:
@@ -54,6 +62,13 @@ class Cutter(Shown):
             raise InputError("pitch", pitch.tolist(), f"{self.teeth} positive angles that add up to a full turn")
         if runout.shape != (self.teeth,) or not np.all(np.isfinite(runout)):
             raise InputError("runout", runout.tolist(), f"{self.teeth} finite radial offsets [m]")
+        if self.shape not in tuple(CutterShape):
+            raise InputError("shape", self.shape, f"one of {', '.join(CutterShape)}")
+        shape = CutterShape(self.shape)
+        corner = non_negative("corner_radius", self.corner_radius, "m")
+        if not shape.has_room(corner, self.diameter):
+            raise InputError("corner_radius", corner, f"at most half of the diameter, {0.5 * self.diameter:g} m")
+        object.__setattr__(self, "shape", shape)
         object.__setattr__(self, "pitch", pitch)
         object.__setattr__(self, "runout", runout)
 
@@ -67,9 +82,24 @@ class Cutter(Shown):
         """True where all teeth are alike, so that only multiples of the tooth-passing frequency are excited."""
         return bool(np.ptp(self.pitch) < 1e-9 and np.ptp(self.runout) == 0.0)
 
+    def cylinder_remarks(self, depth: float | None = None, forces: bool = False) -> tuple[Remark, ...]:
+        """Return what to make of an answer that took the cutter for a cylinder; nothing where it is one.
+
+        Parameters
+        ----------
+        depth : float or None [m]
+            The smallest that counts, which a corner radius is seen beside; None leaves corner radii aside.
+        forces : bool
+            Whether the answer was found from cutting forces.
+        """
+        sharp = depth is None or self.corner_radius <= IGNORED_CORNER * depth
+        return () if self.shape is CutterShape.FLAT and sharp else (cylinder_remark(self.shape, forces),)
+
     def __str__(self) -> str:
         parts = [f"{self.teeth} {'tooth' if self.teeth == 1 else 'teeth'}", f"Ø{1e3 * self.diameter:.4g} mm"]
         parts += [f"helix {np.degrees(self.helix):.3g}°"] if self.helix else []
         parts += [] if np.ptp(self.pitch) < 1e-9 else ["pitch " + "/".join(f"{angle:.4g}" for angle in np.degrees(self.pitch)) + "°"]
         parts += [f"run-out {1e6 * np.ptp(self.runout):.2g} µm"] if np.any(self.runout) else []
+        parts += [] if self.shape is CutterShape.FLAT else [f"shape {self.shape}"]
+        parts += [f"corner radius {1e3 * self.corner_radius:.4g} mm"] if self.corner_radius else []
         return ", ".join(parts)

@@ -55,7 +55,7 @@ def read_lobes(path: str | Path, max_depth: float | None = None) -> StabilityLob
     Notes
     -----
     Of the machines that were drawn the file keeps the band alone: its edges take their place, so that a recommended depth is rather
-    too small than too large.
+    too small than too large. Where the file recommends no depth, neither does what is read.
     """
     curves = read_lobes_csv(path)
     limit = np.where(np.isnan(curves.limit), np.inf, curves.limit * 1e-3)
@@ -73,6 +73,7 @@ def read_lobes(path: str | Path, max_depth: float | None = None) -> StabilityLob
         "from a file",
         flip=curves.extra["flip"] == 1.0 if "flip" in curves.extra else None,  # type: ignore[arg-type]
         drawn=np.array(drawn) if drawn else None,
+        withheld="the file recommends no depth" if np.isnan(curves.extra.get("recommended_depth_mm", np.zeros(1))).all() else "",
     )
 
 

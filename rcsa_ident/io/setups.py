@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes
@@ -27,7 +29,7 @@ LARGEST_SETUP = 4 * MEGABYTE
 FEED_DIRECTIONS = {"+X": 0.0, "-X": np.pi, "+Y": 0.5 * np.pi, "-Y": -0.5 * np.pi}
 
 _TOOLING = ("name", "cutter", "tool", "holder", "contact", "materials")
-_CUTTER = ("teeth", "diameter_mm", "helix_deg", "pitch_deg")
+_CUTTER = ("teeth", "diameter_mm", "helix_deg", "pitch_deg", "shape", "corner_radius_mm")
 _SEGMENT = (
     "length_mm", "outer_diameter_mm", "inner_diameter_mm", "end_diameter_mm", "material", "area_mm2", "second_moment_mm4",
 )  # fmt: skip
@@ -116,13 +118,18 @@ def _cutter(table: Table) -> Cutter:
     teeth = table.number("teeth", least=1, most=100, whole=True)
     diameter = table.number("diameter_mm", "mm", above=0.0, most=1000.0) * 1e-3
     helix = float(np.radians(table.number("helix_deg", "deg", 0.0, least=0.0, most=80.0)))
+    shape = CutterShape(table.text("shape", CutterShape.FLAT, choices=tuple(CutterShape)))
+    corner = table.number("corner_radius_mm", "mm", 0.0, least=0.0, most=1000.0) * 1e-3
+    if not shape.has_room(corner, diameter):
+        table.refuse("corner_radius_mm", f"{1e3 * corner:g}", f"at most half of the diameter, {500.0 * diameter:g} [mm]")
+    plain = Cutter(teeth, diameter, helix, shape=shape, corner_radius=corner)
     if "pitch_deg" not in table:
-        return Cutter(teeth, diameter, helix)
+        return plain
     degrees = np.array(table.numbers("pitch_deg", teeth, "deg"))
     if np.any(degrees <= 0.0) or abs(degrees.sum() - 360.0) > 0.01 * teeth:
         table.refuse("pitch_deg", f"{degrees.tolist()}, sum {degrees.sum():g}", f"{teeth} angles above 0 that add up to 360 [deg]")
     # angles written with few decimals add up to nearly a turn
-    return Cutter(teeth, diameter, helix, degrees * (2.0 * np.pi / degrees.sum()))
+    return replace(plain, pitch=degrees * (2.0 * np.pi / degrees.sum()))
 
 
 def beam_segments(body: Table, materials: Mapping[str, Material]) -> tuple[BeamSegment, ...]:

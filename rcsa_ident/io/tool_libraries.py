@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
+from rcsa_ident.cutting.shape import CutterShape, cylinder_remark
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes
 from rcsa_ident.io.setups import tooling_of
@@ -34,6 +35,25 @@ UNITS = {"millimeters": 1.0, "inches": 25.4}
 _ROUNDING = 0.05
 _HOLDER = "holder"
 _CARBIDE, _STEEL = "carbide", "steel"
+#: Shapes by the names of libraries; a milling tool that has another name keeps it in a note.
+_SHAPES = {
+    "flat end mill": CutterShape.FLAT,
+    "rough end mill": CutterShape.FLAT,
+    "slot mill": CutterShape.FLAT,
+    "bull nose end mill": CutterShape.BULL_NOSE,
+    "ball end mill": CutterShape.BALL,
+    "tapered mill": CutterShape.TAPERED,
+    "face mill": CutterShape.FACE,
+    "radius mill": CutterShape.RADIUS,
+    "circle segment barrel": CutterShape.BARREL,
+    "circle segment lens": CutterShape.LENS,
+    "circle segment oval": CutterShape.OVAL,
+    "circle segment taper": CutterShape.TAPER_BARREL,
+    "lollipop mill": CutterShape.LOLLIPOP,
+    "chamfer mill": CutterShape.CHAMFER,
+    "dovetail mill": CutterShape.DOVETAIL,
+    "form mill": CutterShape.PROFILE,
+}
 _BODIES = {"carbide": _CARBIDE, "hss": _STEEL, "hssco": _STEEL}
 
 
@@ -246,7 +266,7 @@ def _name(entry: Mapping[str, Any]) -> str:
 def _tooling(entry: Table, name: str, given: Assumptions, spare: Mapping[str, Any] | None) -> tuple[dict[str, Any], list[str]]:
     """Keys of a tooling file, lengths in millimetres, and what was assumed."""
     kind = _line(entry.data.get("type", ""))
-    if "mill" not in kind or "thread" in kind:
+    if kind not in _SHAPES and ("mill" not in kind or "thread" in kind):
         raise _Skipped(f"a {kind}, not a milling tool" if kind else "an entry without a type")
     notes: list[str] = []
     scale = _unit(entry, notes)
@@ -266,7 +286,7 @@ def _tooling(entry: Table, name: str, given: Assumptions, spare: Mapping[str, An
         holder = _bored(holder, insertion, shank)
     data: dict[str, Any] = {
         "name": name,
-        "cutter": {"teeth": teeth, "diameter_mm": diameter, "helix_deg": helix},
+        "cutter": {"teeth": teeth, "diameter_mm": diameter, "helix_deg": helix} | _shape(geometry, kind, scale, notes),
         "tool": {"stickout_mm": stickout, "segments": segments},
         "holder": {"insertion_mm": insertion, "segments": holder},
     }
@@ -287,6 +307,25 @@ def _unit(table: Table, notes: list[str]) -> float:
     if unit == "inches":
         notes.append("lengths converted from inches")
     return UNITS[unit]
+
+
+def _shape(geometry: Table, kind: str, scale: float, notes: list[str]) -> dict[str, Any]:
+    """The keys that say what the edges sweep over, where that is not a plain cylinder."""
+    shape = _SHAPES.get(kind, CutterShape.PROFILE)
+    keys: dict[str, Any] = {} if shape is CutterShape.FLAT else {"shape": str(shape)}
+    corner = (geometry.number("RE", "", None, least=0.0) or 0.0) * scale
+    if corner:
+        keys["corner_radius_mm"] = corner
+    if shape is CutterShape.PROFILE:
+        notes.append(f"the library's {kind}: its outline is not read, the shape is kept as {shape}")
+    if kind.startswith("rough"):
+        notes.append(
+            f"the library's {kind} is computed with smooth edges: it says nothing of serrations, for which stability limits were told at "
+            "0.24 to 0.47 times the true ones"
+        )
+    if shape is not CutterShape.FLAT:
+        notes.append(str(cylinder_remark(shape)))
+    return keys
 
 
 def _body(entry: Table, given: Assumptions, notes: list[str]) -> str:

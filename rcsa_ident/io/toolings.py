@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.io.files import write_text
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Material
@@ -37,6 +38,10 @@ def tooling_keys(tooling: Tooling) -> dict[str, Any]:
     }
     if np.ptp(cutter.pitch) > 1e-9:
         data["cutter"]["pitch_deg"] = np.degrees(cutter.pitch).tolist()
+    if cutter.shape is not CutterShape.FLAT:
+        data["cutter"]["shape"] = str(cutter.shape)
+    if cutter.corner_radius:
+        data["cutter"]["corner_radius_mm"] = 1e3 * cutter.corner_radius
     if assembly.contact is not None:
         data["contact"] = {key: getattr(assembly.contact, key) for key in _CONTACT}
     own = {name: material for name, material in materials.items() if name not in MATERIALS}

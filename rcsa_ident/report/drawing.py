@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from html import escape
 from itertools import groupby
 
+from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import BeamSegment
 
@@ -231,6 +232,8 @@ def _page(sheet: _Sheet, tooling: Tooling, nose: float, flange: float) -> str:
     cutter, assembly = tooling.cutter, tooling.assembly
     teeth = f"{cutter.teeth} teeth" if cutter.teeth > 1 else "1 tooth"
     words = f"{teeth}, Ø{_figure(1e3 * cutter.diameter)}, helix {_figure(math.degrees(cutter.helix))}°"
+    words += "" if cutter.shape is CutterShape.FLAT else f", shape {cutter.shape}"
+    words += f", corner radius {_figure(1e3 * cutter.corner_radius)}" if cutter.corner_radius else ""
     scale = "millimetres, 1:1"
     contact = assembly.contact
     joined = "tool and holder joined rigidly"

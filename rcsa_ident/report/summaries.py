@@ -215,11 +215,12 @@ def lobes_summary(advice: Advice) -> dict[str, Any]:
             {
                 "spindle_speed_rpm": to_rpm(pocket.spindle_speed, 6),
                 "limit_depth_mm": finite(pocket.limit_depth, 1e3),
-                "recommended_depth_mm": 1e3 * pocket.recommended_depth,
+                "recommended_depth_mm": finite(pocket.recommended_depth, 1e3),
             }
             for pocket in lobes.best_speeds(recommended=advice.usable.stable)
         ],
         "recommended": [_recommended(point, lobes) for point in advice.recommended],
+        "withheld": lobes.withheld or None,
         "flip_speeds": int(lobes.flip.sum()),
         "tested": None if advice.tested is None else tally_summary(advice.tested),
     }
@@ -233,7 +234,7 @@ def lobes_curves(advice: Advice) -> dict[str, Any]:
         "limit_depth_mm": _finite_list(lobes.limit_depth * 1e3),
         "limit_depth_low_mm": None if band is None else _finite_list(band[0] * 1e3),
         "limit_depth_high_mm": None if band is None else _finite_list(band[1] * 1e3),
-        "recommended_depth_mm": (1e3 * advice.usable.stable).tolist(),
+        "recommended_depth_mm": _finite_list(1e3 * advice.usable.stable),
         "chatter_frequency_hz": _finite_list(to_hz(lobes.chatter_frequency)),
         "lobe": [None if n < 0 else n for n in lobes.lobe.tolist()],
         "flip": lobes.flip.tolist(),
@@ -253,6 +254,7 @@ def advice_summary(advice: Advice) -> dict[str, Any]:
         "stickout_mm": None if advice.stickout is None else advice.stickout * 1e3,
         "lowest_limit_mm": float(advice.lobes.nominal.min()) * 1e3,
         "common_stable_depth_mm": None if common is None else float(common.min()) * 1e3,
+        "withheld": advice.lobes.withheld or None,
         "highest_removal": [_point(point, advice.lobes) for point in advice.recommended],
         "windows": [
             {

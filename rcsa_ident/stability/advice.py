@@ -39,11 +39,11 @@ class UsableDepths(Shown):
     limit : array, shape (n,) [m]
         The stability limit, up to the largest depth.
     stable : array, shape (n,) [m]
-        The recommended depth by stability alone: the limit less what is held back of it.
+        The recommended depth by stability alone: the limit less what is held back of it; NaN where the limits are no source of one.
     by_power, by_torque : array, shape (n,) [m]
         By what the spindle has, up to the largest depth.
     depth : array, shape (n,) [m]
-        The smallest of them; 0 beyond the spindle's highest speed.
+        The smallest of them; 0 beyond the spindle's highest speed, NaN where none is recommended.
     bound : tuple of Bound, length n
     removal_rate : array, shape (n,) [m^3/s], or None
         At that depth; None without a feed.
@@ -90,6 +90,8 @@ class UsableDepths(Shown):
         if self.spindle_speed.size == 0:
             return "no speeds"
         speed, depth = to_rpm(self.spindle_speed), 1e3 * self.depth
+        if np.isnan(depth).any():
+            return f"{speed[0]:.0f} to {speed[-1]:.0f} rev/min: no depth is recommended"
         return f"{speed[0]:.0f} to {speed[-1]:.0f} rev/min: recommended depth {depth.min():.2f} to {depth.max():.2f} mm"
 
 
@@ -173,7 +175,9 @@ class OperatingPoint(Shown):
 
 def highest_removal(usable: UsableDepths, process: MillingProcess, count: int = 3) -> list[OperatingPoint]:
     """Return the cuts that remove most, one for each pocket, the best first."""
-    found = []
+    found: list[OperatingPoint] = []
+    if np.isnan(usable.depth).any():
+        return found
     # whatever the feed is, the removal rate grows with speed and depth
     level = usable.depth * usable.spindle_speed if usable.removal_rate is None else usable.removal_rate
     for speed, _ in peaks(usable.spindle_speed, level, count):
@@ -375,4 +379,5 @@ class Advice(Drawn):
         return None if self.lobes.drawn is None else self.lobes.limit_quantile(1.0)
 
     def __str__(self) -> str:
-        return f"{self.tooling}: {self.recommended[0]}" if self.recommended else f"{self.tooling}: no cut is recommended"
+        none = self.lobes.withheld or "no cut is recommended"
+        return f"{self.tooling}: {self.recommended[0] if self.recommended else none}"

@@ -64,6 +64,21 @@ def stability_lobes(
     if speeds.ndim != 1 or speeds.size == 0 or not np.all(np.isfinite(speeds) & (speeds > 0.0)):
         raise InputError("speeds", speeds.tolist(), "one or more finite spindle speeds above 0 [rad/s]")
     max_depth = positive("max_depth", max_depth, "m")
+    found = _limits(tip, process, speeds, max_depth, method, draws, seed)
+    # the smallest limit is the depth beside which a corner radius is seen
+    return replace(found, warnings=(*found.warnings, *process.cutter.cylinder_remarks(float(found.nominal.min()))))
+
+
+def _limits(
+    tip: Receptance | TipModes,
+    process: MillingProcess,
+    speeds: FloatArray,
+    max_depth: float,
+    method: StabilityMethod,
+    draws: int,
+    seed: int,
+) -> StabilityLobes:
+    """What `stability_lobes` returns, of the cylinder."""
     both = tip if isinstance(tip, TipModes) else both_directions(tip)
     if isinstance(both, TipModes) or method.needs == "receptance":
         found = method.lobes(both, process, speeds, max_depth)

@@ -63,7 +63,7 @@ class MultiFrequency:
             allowed = "one engagement for the whole edge: full-discretisation takes one that changes"
             raise InputError("engagement_profile", "an engagement that changes along the edge", allowed)
         if np.ptp(cutter.pitch) > 1e-9:
-            raise InputError("pitch", np.degrees(cutter.pitch).tolist(), "equal pitch: zero-order and full-discretisation take any")
+            raise InputError("pitch", np.degrees(cutter.pitch).tolist(), "equal pitch: full-discretisation takes any")
         motion = TipMotion.of(receptance_of(tip, wide=True))
         teeth = PeriodicTeeth(process, self.harmonics)
         limit = np.full(speeds.size, np.inf)

@@ -30,7 +30,7 @@ class Pocket(Shown):
     limit_depth : float [m]
         The stability limit there; infinite where the cut is stable up to the depth that was asked for.
     recommended_depth : float [m]
-        The limit there less what a recommendation holds back.
+        The limit there less what a recommendation holds back; NaN where none is recommended.
     """
 
     spindle_speed: float
@@ -43,7 +43,8 @@ class Pocket(Shown):
             if self.limit_depth == np.inf
             else f"stability limit {1e3 * self.limit_depth:.2f} mm"
         )
-        return f"{to_rpm(self.spindle_speed):.0f} rev/min: {limit}, recommended {1e3 * self.recommended_depth:.2f} mm"
+        deep = "none recommended" if np.isnan(self.recommended_depth) else f"recommended {1e3 * self.recommended_depth:.2f} mm"
+        return f"{to_rpm(self.spindle_speed):.0f} rev/min: {limit}, {deep}"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -73,6 +74,8 @@ class StabilityLobes(Drawn):
         Where stability is lost by period doubling (an eigenvalue of -1 per tooth period); elsewhere the vibration is quasi-periodic.
     drawn : array, shape (d, n) [m], or None
         Limits of machines drawn from what the records leave open.
+    withheld : str
+        Why no depth is recommended from these limits; empty where one is.
     """
 
     spindle_speed: FloatArray
@@ -86,6 +89,7 @@ class StabilityLobes(Drawn):
     warnings: tuple[str, ...] = ()
     flip: NDArray[np.bool_] = None  # type: ignore[assignment]  # all False, of the speeds' shape
     drawn: FloatArray | None = None
+    withheld: str = ""
 
     def __post_init__(self) -> None:
         for name in ("spindle_speed", "limit_depth", "chatter_frequency"):
@@ -147,7 +151,7 @@ class StabilityLobes(Drawn):
         return None if self.drawn is None else float(np.mean(self.drawn[:, place] >= depth))
 
     def recommended_depth(self, tolerance: float = TOLERANCE, probability: float = PROBABILITY, reserve: float = RESERVE) -> FloatArray:
-        """Return the depth that is recommended at each speed, shape (n,) [m]: the limit less what is held back of it.
+        """Return the depth that is recommended at each speed, shape (n,) [m]: the limit less what is held back of it; NaN if `withheld`.
 
         Parameters
         ----------
@@ -160,6 +164,8 @@ class StabilityLobes(Drawn):
         """
         if not 0.0 <= reserve < 1.0:
             raise InputError("reserve", reserve, "a share from 0 to below 1")
+        if self.withheld:
+            return np.full(self.spindle_speed.shape, np.nan)
         return (1.0 - reserve) * least_within_tolerance(self.spindle_speed, self.limit_quantile(probability), tolerance)
 
     def best_speeds(self, count: int = 3, recommended: FloatArray | None = None) -> list[Pocket]:
@@ -209,6 +215,7 @@ class StabilityLobes(Drawn):
             absolute_frequency=lowest.absolute_frequency,
             warnings=tuple(dict.fromkeys(warning for part in parts for warning in part.warnings)),
             drawn=np.concatenate(drawn, axis=1)[:, back] if len(drawn) == len(parts) else None,
+            withheld=next((part.withheld for part in parts if part.withheld), ""),
         )
 
     def __str__(self) -> str:

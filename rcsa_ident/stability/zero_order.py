@@ -30,7 +30,7 @@ class ZeroOrder:
     eigenvalues mu of [alpha0] G give the boundary a = 1 / (2 K_tc Re mu) at w tau = pi + 2 arg mu + 2 pi l. Between the
     given frequencies trace and determinant of [alpha0] G are interpolated by quintics. Unequal pitch replaces
     1 - e^{-i w tau} by its mean over the teeth [altintas1999] and costs
-    speeds times frequencies.
+    speeds times frequencies; limits can be twice as high as the true ones there, so that no depth is recommended from them.
     """
 
     name: ClassVar[str] = MethodName.ZERO_ORDER.value
@@ -58,6 +58,7 @@ class ZeroOrder:
         lobe[order] = np.where(beyond, -1, curve[2])
         strongest, place = largest_real_part(omega, trace, determinant)
         exists = strongest > 1e-12 * float(np.max(np.abs(trace)))
+        unlike = _unlike_teeth(process)
         return StabilityLobes(
             speeds,
             limit,
@@ -65,9 +66,11 @@ class ZeroOrder:
             lobe,
             max_depth,
             self.name,
-            absolute_limit=1.0 / (2.0 * coefficients.tangential * strongest) if exists else float("inf"),
-            absolute_frequency=place if exists else None,
-            warnings=tuple(_doubts(process, receptance, place if exists else None)),
+            # of equal teeth: others have limits below it
+            absolute_limit=None if unlike else 1.0 / (2.0 * coefficients.tangential * strongest) if exists else float("inf"),
+            absolute_frequency=place if exists and not unlike else None,
+            warnings=(*([unlike] if unlike else []), *_doubts(process, receptance, place if exists else None)),
+            withheld=unlike,
         )
 
     def depths(self, omega: FloatArray, tips: ComplexArray, process: MillingProcess, speeds: FloatArray, max_depth: float) -> FloatArray:
@@ -153,6 +156,19 @@ def _finite(*values: ComplexArray | FloatArray) -> None:
         raise InputError("tip receptance", "values that are not finite", "finite values at every frequency above 0")
 
 
+def _unlike_teeth(process: MillingProcess) -> str:
+    """Why no depth is recommended for teeth that are not alike; empty where they are."""
+    told = []
+    if not _equal_pitch(process):
+        told.append(
+            f"unequal pitch ({'/'.join(f'{angle:.4g}' for angle in np.degrees(process.cutter.pitch))} degrees) is taken as the mean of its "
+            "delays: limits can be twice as high as the true ones"
+        )
+    if np.ptp(process.cutter.runout) > 0.0:
+        told.append("run-out is left out: the limit is that of equal teeth")
+    return f"{'; '.join(told)}; no depth is recommended from zero-order limits: full-discretisation takes unlike teeth" if told else ""
+
+
 def _doubts(process: MillingProcess, receptance: Receptance, critical: float | None) -> list[str]:
     cutter, engagement = process.cutter, process.engagement
     doubts = []
@@ -164,8 +180,6 @@ def _doubts(process: MillingProcess, receptance: Receptance, critical: float | N
             "moved limits, and at low immersion period-doubling (flip) lobes, that the mean directional coefficients do not show: "
             "multi-frequency and full-discretisation do"
         )
-    if np.ptp(cutter.runout) > 0.0:
-        doubts.append("run-out is left out: the limit is that of equal teeth")
     if process.damping is not None:
         doubts.append("process damping is left out: the limit is too low at low speeds")
     if critical is not None:

@@ -214,6 +214,7 @@ def calibrate(
     if not used:
         raise InputError("cuts", f"none of {len(campaign.cuts)} usable ({left_out[0][1]})", "recordings of the cutting force")
     notes = [] if any(cut.air is not None for cut in campaign.cuts) else ["no air cuts: the sensors' own zero level is used"]
+    notes += campaign.cylinder_remarks({measured.cut_id for measured in used})
     if not signal:
         return Calibrated(_mean(used), None, tuple(used), tuple(left_out), tuple(notes))
     found = calibrate_signal([m.record for m in used], dynamometer, free_helix)

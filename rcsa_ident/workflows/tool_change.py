@@ -89,6 +89,7 @@ def tooltip(
     if machine.band is not None and tip.omega.max() > 1.001 * machine.band[1]:
         top = to_hz(machine.band[1])
         remarks.append(f"the machine is known up to {top:.0f} Hz; above that the receptance is extrapolated")
+    remarks += tooling.cutter.cylinder_remarks()
     return TipAnswer(tooling, tip, tuple(remarks), machine.speed_answered(speed))
 
 

@@ -180,6 +180,24 @@ def test_a_speed_that_the_machine_was_not_cut_at(client, tmp_path):
     assert inside.axes["X"].re != outside.axes["X"].re
 
 
+def test_unequal_pitch_and_a_shape_are_told_with_every_answer(shop):
+    client, id = shop
+    odd = example(cutter={"teeth": 4, "diameter_mm": 12.0, "pitch_deg": [84, 96, 84, 96], "shape": "high-feed"})
+    ask = {"speeds": {"from_rpm": 8000, "to_rpm": 9000, "step_rpm": 500}, "bands": False}
+    lobes, advice = client.lobes(id, odd, **ask).toolings[0], client.advice(id, odd, cut={"feed_per_tooth_mm": 0.1}, **ask).toolings[0]
+    for answer in (lobes, advice):
+        assert answer.withheld in answer.warnings
+        assert answer.withheld.endswith("full-discretisation takes unlike teeth")
+        assert any("the cutter's shape is high-feed; its stability limits were 0.61 to 1.45 times" in w for w in answer.warnings)
+    assert (lobes.recommended, advice.highest_removal, lobes.recommended_depth_mm) == ([], [], [None] * 3)
+    assert lobes.best_speeds[0].recommended_depth_mm is None
+    right = client.lobes(id, odd, method="full-discretisation", **ask).toolings[0]
+    assert right.withheld is None
+    assert all(depth > 0.0 for depth in right.recommended_depth_mm)
+    assert any("high-feed" in warning for warning in client.tooltip(id, odd, step_hz=10).warnings)
+    assert not any("cylinder" in warning for warning in client.tooltip(id, "T1", step_hz=10).warnings)
+
+
 def test_advice_stands_by_the_lobes(shop):
     client, id = shop
     cut = {"feed_per_tooth_mm": 0.1}

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from api.work.toolings import MOST_ELEMENTS, toml_of, tooling_of, weigh
+from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.tool_holder.model import tool_holder_structure
@@ -133,3 +134,19 @@ def test_a_tooling_that_would_cost_too_much_is_refused_before_it_does():
     weigh(assembly, 4300.0)
     # an element has four freedoms of its own in each of two bodies
     assert tool_holder_structure(assembly, 4300.0).mass.shape[0] <= 8 * MOST_ELEMENTS
+
+
+@pytest.mark.parametrize("shape", CutterShape)
+def test_shapes_of_cutters_go_in_and_come_out(client, shape):
+    cutter = {"teeth": 4, "diameter_mm": 12.0, "shape": str(shape), "corner_radius_mm": 1.5}
+    client.write_tooling("S1", example(cutter=cutter))
+    kept = client.tooling("S1").tooling.cutter
+    assert (kept.shape, kept.corner_radius_mm) == (str(shape), 1.5)
+    read = tooling_of(client.tooling_file("S1")).cutter
+    assert (read.shape, read.corner_radius) == (shape, 1.5e-3)
+
+
+def test_an_unknown_shape_is_refused_with_the_known_ones(client):
+    problem = refused(422, client.write_tooling, "S1", example(cutter={"teeth": 4, "diameter_mm": 12.0, "shape": "round"}))
+    assert problem.errors[0].field == "cutter.shape"
+    assert all(shape in problem.errors[0].allowed for shape in CutterShape)

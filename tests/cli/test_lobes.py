@@ -362,3 +362,25 @@ def test_cases_in_process_and_at_standstill(result_file, tmp_path):
     assert both["tested_idle"]["chatter_stable"] == 4
     assert "from tap tests" in (tmp_path / "C.svg").read_text(encoding="utf-8")
     assert "8 of 8" in run(*common).stdout
+
+
+def test_a_ball_of_unequal_pitch_is_told_as_both(shop):
+    """Zero order recommends nothing and says which method does; the shape is said by every command."""
+    keys = 'teeth = 2\npitch_deg = [170, 190]\nshape = "ball"'
+    (shop / "B.toml").write_text(by_hand.TOOLING.replace("teeth = 4", keys), encoding="utf-8")
+    tip, said = ("--modes", shop / "M.toml", shop / "B.toml", *KNOWN, *SPEEDS), "full-discretisation takes unlike teeth"
+    shape = "computed as a cylinder: the cutter's shape is ball"
+    found = answer_of("lobes", *tip, "--out", shop / "L.csv")
+    assert [sum(words in warning for warning in found["warnings"]) for words in (said, shape)] == [1, 1]
+    assert said in found["withheld"]
+    assert [found["recommended"], found["best_speeds"][0]["recommended_depth_mm"]] == [[], None]
+    assert np.isnan(read_lobes_csv(shop / "L.csv").extra["recommended_depth_mm"]).all()
+    (told,) = answer_of("advise", *tip, *FEED, "--depth-mm", 0.1, "--plot", shop / "A.png", "--out", shop / "A.csv")["toolings"]
+    assert [told["highest_removal"], told["windows"], said in told["withheld"]] == [[], [], True]
+    text = " ".join(run("lobes", *tip, "--plot", shop / "L.png", "--out", shop / "L.csv").output.split())
+    assert said in text
+    assert shape in text
+    right = answer_of("lobes", *tip, "--method", "full-discretisation", "--out", shop / "L.csv")
+    assert right["withheld"] is None
+    assert right["recommended"][0]["recommended_depth_mm"] > 0.0
+    assert any(warning.startswith(shape) for warning in right["warnings"])

@@ -10,9 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_campaign, read_tooling
+from rcsa_ident.io.toolings import write_tooling
 from rcsa_ident.signals.recording import Quantity
 from rcsa_ident.tool_holder.geometry import MATERIALS
 
@@ -58,6 +60,24 @@ def test_defaults(tmp_path):
     assert tooling.assembly.tool_length == pytest.approx(0.08)  # a longer tool is cut
     assert tooling.assembly.tool[0].inner_diameter == 0.0
     assert tooling.assembly.tool[0].material == MATERIALS["steel"]
+
+
+@pytest.mark.parametrize("shape", CutterShape)
+@pytest.mark.parametrize("corner", [0.0, 1.25])
+def test_shapes_go_out_and_come_back(tmp_path, tooling_text, shape, corner):
+    keys = f'helix_deg = 30.0\nshape = "{shape}"\ncorner_radius_mm = {corner}'
+    read = read_tooling(tooling_file(tmp_path, tooling_text, "helix_deg = 30.0", keys))
+    assert (read.cutter.shape, read.cutter.corner_radius) == (shape, 1e-3 * corner)
+    write_tooling(tmp_path / "again.toml", read)
+    again = read_tooling(tmp_path / "again.toml").cutter
+    assert (again.shape, again.corner_radius, again.teeth) == (shape, pytest.approx(1e-3 * corner), 4)
+
+
+def test_a_tooling_without_a_shape_is_flat_and_stays_so(tmp_path, tooling_text):
+    read = read_tooling(tooling_file(tmp_path, tooling_text))
+    assert (read.cutter.shape, read.cutter.corner_radius) == (CutterShape.FLAT, 0.0)
+    write_tooling(tmp_path / "again.toml", read)
+    assert not any(key in (tmp_path / "again.toml").read_text() for key in ("shape", "corner"))
 
 
 def test_taper_and_fluted_section(tmp_path, tooling_text):
@@ -114,6 +134,10 @@ BROKEN_TOOLINGS = [
     ("[90, 90, 90, 90]", "[90, 90, 90]", ["cutter.pitch_deg", "a list of 3", "a list of 4 finite numbers"]),
     ("[90, 90, 90, 90]", "[90, 90, 90, 80]", ["cutter.pitch_deg", "sum 350", "add up to 360"]),
     ("[90, 90, 90, 90]", '[90, 90, 90, "90"]', ["cutter.pitch_deg", 'the text "90" in the list']),
+    ("teeth = 4", 'teeth = 4\nshape = "bal"', ["cutter.shape", '"bal"', "one of flat, bull-nose, ball", "did you mean ball?"]),
+    ("teeth = 4", "teeth = 4\nshape = 3", ["cutter.shape", "found 3", "one of flat"]),
+    ("teeth = 4", "teeth = 4\ncorner_radius_mm = 6.5", ["cutter.corner_radius_mm", "found 6.5", "at most half of the diameter, 6 [mm]"]),
+    ("teeth = 4", "teeth = 4\ncorner_radius_mm = -1", ["cutter.corner_radius_mm", "found -1", "at least 0"]),
     ("[cutter]", "[cutters]", ["cutters", "an unknown key", "did you mean cutter?"]),
     ("stickout_mm = 70.5", "stickout = 70.5", ["tool.stickout", "did you mean stickout_mm?"]),
     ("stickout_mm = 70.5", "stickout_mm = 80", ["tool.stickout_mm + holder.insertion_mm", "120 mm", "the tool's length, 110.5 mm"]),

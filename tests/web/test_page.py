@@ -244,6 +244,26 @@ def test_a_tooling_is_drawn_as_it_is_written(opened, client: Client, shop: str):
     assert "T1-drawn" not in [t.name for t in client.toolings()]
 
 
+def test_the_shape_of_a_cutter_is_kept_and_said(opened, client: Client, shop: str):
+    page = opened("#/toolings/new?from=T1")
+    page.get_by_label("Shape").select_option("ball")
+    page.get_by_label("Corner radius").fill("6")
+    page.get_by_label("Pitch angles").fill("84, 96, 84, 96")
+    page.get_by_label("Name", exact=True).fill("T1-ball")
+    page.get_by_role("button", name="Put into the library").click()
+    expect(page.get_by_role("heading", name="T1-ball")).to_be_visible()
+    kept = client.tooling("T1-ball").tooling.cutter
+    assert (kept.shape, kept.corner_radius_mm, kept.pitch_deg) == ("ball", 6.0, [84.0, 96.0, 84.0, 96.0])
+    again = opened("#/toolings/edit/T1-ball")
+    expect(again.get_by_label("Shape")).to_have_value("ball")
+    expect(again.get_by_label("Corner radius")).to_have_value("6")
+    asked = opened(f"#/change?machine={shop}&tooling=T1-ball")
+    expect(asked.locator(".best")).to_contain_text("full-discretisation takes unlike teeth", timeout=30_000)
+    expect(asked.locator(".change-results .note.doubt")).to_contain_text("computed as a cylinder: the cutter's shape is ball")
+    expect(asked.locator(".reads li")).not_to_contain_text("recommended")
+    client.forget_tooling("T1-ball")
+
+
 def test_names_of_others_are_text(opened, client: Client, served: Served, result: str):
     id = client.make_machine("Named by others", HOSTILE).id
     client.identify(id, result.replace("mode 1", HOSTILE))

@@ -129,6 +129,11 @@ def test_campaign_with_what_must_be_left_out():
     np.testing.assert_allclose(found.forces.value[:2], TRUE[:2], rtol=0.02)
     for m in found.used:
         np.testing.assert_allclose(found.mean_force_model(m)[:2], m.mean, atol=0.02 * np.abs(m.mean).max())
+    assert not any("cylinder" in note for note in found.notes)
+    rounded = replace(setup.toolings["T"], cutter=replace(CUTTER, shape="ball"))
+    note = calibrate(replace(setup, toolings={"T": rounded}), read).notes[-1]
+    assert note.startswith("T: computed as a cylinder: the cutter's shape is ball")
+    assert "forces of shallow cuts" in note
     signal = calibrate(setup, read, signal=True)
     assert signal.signal is not None
     np.testing.assert_allclose(signal.forces.value, TRUE, rtol=0.02)

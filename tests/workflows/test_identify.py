@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rcsa_ident.cutting.shape import CutterCode
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.parameters import AxisLayout, pack, simple_axis
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.workflows.identify import mode_deviations
+from rcsa_ident.remarks import says
+from rcsa_ident.workflows.identify import mode_deviations, of_campaign
 from tests.fixtures import by_hand
 
 
@@ -79,3 +81,25 @@ def test_they_stand_in_the_modes_order(axis):
     omega_std, _ = mode_deviations(only)[axis]
     assert omega_std[1] == pytest.approx(0.01 * part.modes.omega_n[1], rel=0.02)
     assert omega_std[0] < 0.1 * omega_std[1]
+
+
+@pytest.mark.parametrize(
+    ("cutter", "told"),
+    [
+        ({}, ""),
+        ({"corner_radius": 0.03e-3}, ""),
+        ({"corner_radius": 0.5e-3}, "T1: computed as a cylinder: the corner radius is more than a tenth of the depth"),
+        ({"shape": "bull-nose", "corner_radius": 2e-3}, "T1: computed as a cylinder: the cutter's shape is bull-nose"),
+    ],
+)
+def test_cutters_that_are_no_cylinders_are_noted(tmp_path, cutter, told):
+    """Cuts are 0.4 mm deep; what was noted before stays, and nothing becomes suspect for it."""
+    campaign, found = by_hand.campaign(tmp_path), by_hand.identification()
+    tooling = campaign.toolings["T1"]
+    campaign = replace(campaign, toolings={"T1": replace(tooling, cutter=replace(tooling.cutter, **cutter))})
+    again = of_campaign(found, campaign)
+    assert again.notes[: len(found.notes)] == found.notes
+    assert again.reasons == found.reasons
+    further = again.notes[len(found.notes) :]
+    assert says(further, CutterCode.AS_CYLINDER) == bool(told)
+    assert [note.startswith(told) and "forces of shallow cuts are 6 to 50 % off" in note for note in further] == [True] * bool(told)

@@ -249,6 +249,32 @@ def test_what_speaks_against_the_machine_and_the_limits_is_said_once():
     assert change(machine, [900.0]).remarks(told) == ("the identification is suspect: few cuts", "interrupted cut")
 
 
+def shaped(shape="flat", corner=0.0):
+    tooling = by_hand.tooling()
+    return replace(tooling, cutter=replace(tooling.cutter, shape=shape, corner_radius=corner))
+
+
+def test_a_cutter_that_is_no_cylinder_is_said_with_every_answer():
+    told = "computed as a cylinder: the cutter's shape is ball; its stability limits were 0.80 to 1.07 times the true ones in a slot"
+    for softening in (False, True):
+        machine = one_axis(softening=softening)
+        plain, ball = (replace(change(machine, np.linspace(LOW, HIGH, 9), draws=0), tooling=shaped(shape)) for shape in ("flat", "ball"))
+        answers = [(advise(each).remarks, tooltip(machine, each.tooling, spread=False).remarks) for each in (plain, ball)]
+        assert not any("cylinder" in remark for remarks in answers[0] for remark in remarks)
+        assert [sum(remark.startswith(told) for remark in remarks) for remarks in answers[1]] == [1, 1]
+
+
+def test_a_corner_radius_is_said_where_limits_are_shallow():
+    """A tooltip knows no depth; limits of a machine that changes with speed say it once for all its blocks."""
+    machine = one_axis(softening=True)
+    asked = replace(change(machine, np.linspace(LOW, HIGH, 9), draws=0), tooling=shaped(corner=5e-3))
+    lowest = float(asked.limits().nominal.min())
+    assert tooltip(machine, asked.tooling, spread=False).remarks == ()
+    for share, count in ((0.05, 0), (0.5, 1)):
+        remarks = advise(replace(asked, tooling=shaped(corner=share * lowest))).remarks
+        assert sum("the corner radius is more than a tenth of the depth" in remark for remark in remarks) == count
+
+
 def test_a_tooltip_beyond_the_band_and_the_speeds_is_told_to_be_extrapolated():
     machine, tooling = by_hand.machine(softening=True), by_hand.tooling()
     inside = tooltip(machine, tooling, speed=1000.0)

@@ -36,9 +36,10 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
       const band = each.limit_depth_low_mm && low !== null ? ` (95 %: ${text("depth", low)})` : "";
       const limit = depth === null ? `limit above ${text("depth", maxDepth)}` : `limit ${text("depth", depth)}${band}`;
       const deep = each.recommended_depth_mm[k];
-      const rate = removal[i] ? ` · ${text("removal", removal[i] * rpm * deep)}` : "";
+      const rate = removal[i] && deep !== null ? ` · ${text("removal", removal[i] * rpm * deep)}` : "";
       const chatter = each.chatter_frequency_hz[k];
-      return `${limit} · recommended ${text("depth", deep)}${rate}${chatter === null ? "" : ` · ${plain(chatter)} Hz`}`;
+      const held = deep === null ? "" : ` · recommended ${text("depth", deep)}`;
+      return `${limit}${held}${rate}${chatter === null ? "" : ` · ${plain(chatter)} Hz`}`;
     });
     data.push({
       x,

@@ -71,6 +71,7 @@ function lobesCard(found, removal, question, tested, ontested) {
             const low = lobes.limit_depth_low_mm?.[k];
             const high = lobes.limit_depth_high_mm?.[k];
             const chatter = lobes.chatter_frequency_hz[k];
+            const deep = lobes.recommended_depth_mm[k];
             return h(
               "li",
               null,
@@ -80,9 +81,8 @@ function lobesCard(found, removal, question, tested, ontested) {
               low !== undefined && low !== null && high
                 ? [" (95 %: ", q("depth", low, { bare: true }), " to ", q("depth", high), ")"]
                 : null,
-              ", recommended depth ",
-              q("depth", lobes.recommended_depth_mm[k]),
-              removal[i] ? [" · ", q("removal", removal[i] * lobes.spindle_speed_rpm[k] * lobes.recommended_depth_mm[k])] : null,
+              deep === null ? null : [", recommended depth ", q("depth", deep)],
+              removal[i] && deep !== null ? [" · ", q("removal", removal[i] * lobes.spindle_speed_rpm[k] * deep)] : null,
               chatter === null ? null : ` · beyond the limit chatter at ${plain(chatter)} Hz`,
               lobes.flip[k] ? " · period doubling" : null,
             );

@@ -17,11 +17,12 @@ export function headline(found, question) {
     if (!best) {
       const limit = lobes.absolute_limit_mm;
       const below = limit === null ? "" : ` Stable below ${text("depth", limit)} everywhere.`;
+      const why = lobes.withheld ? `No cut is recommended: ${lobes.withheld}.` : `No cut is recommended at these speeds.${below}`;
       return h(
         "article",
         { class: "best" },
         h("h2", null, key, lobes.tooling),
-        h("p", null, `No cut is recommended at these speeds.${below}`),
+        h("p", null, why),
         drawing,
       );
     }

@@ -2,7 +2,7 @@
 import { getText, part, Problem, send, get } from "../api.js";
 import { add, card, fill, h, head, link, save, tell } from "../dom.js";
 import { drawn, picture } from "../drawing.js";
-import { busy, clearFaults, confirmed, failed, field, quantity, showProblem } from "../forms.js";
+import { busy, clearFaults, confirmed, failed, field, quantity, select, showProblem } from "../forms.js";
 import { go, to } from "../router.js";
 import { machine } from "../state.js";
 import { segmentsTable } from "./segments.js";
@@ -25,6 +25,23 @@ const START = {
   },
   contact: { translational_stiffness: 2e10, rotational_stiffness: 6e5, translational_damping: 6e4, rotational_damping: 9 },
 };
+const SHAPES = [
+  ["flat", "flat end"],
+  ["bull-nose", "bull nose"],
+  ["ball", "ball end"],
+  ["tapered", "tapered"],
+  ["face", "face mill"],
+  ["high-feed", "high feed"],
+  ["radius", "hollow radius"],
+  ["barrel", "barrel"],
+  ["lens", "lens"],
+  ["oval", "oval"],
+  ["taper-barrel", "tapered barrel"],
+  ["lollipop", "lollipop"],
+  ["chamfer", "chamfer mill"],
+  ["dovetail", "dovetail"],
+  ["profile", "outline of its own"],
+];
 const CONTACT = [
   ["translational_stiffness", "Translational stiffness", "N/m per m"],
   ["rotational_stiffness", "Rotational stiffness", "N m/rad per m"],
@@ -46,6 +63,11 @@ export async function view({ name = "" }, query, place) {
     diameter_mm: quantity("Cutting diameter", "length", keys.cutter.diameter_mm, { name: "cutter.diameter_mm" }),
     helix_deg: quantity("Helix", "degree", keys.cutter.helix_deg ?? 0, { name: "cutter.helix_deg" }),
   };
+  const shape = select(SHAPES, keys.cutter.shape ?? "flat");
+  const corner = quantity("Corner radius", "length", keys.cutter.corner_radius_mm ?? null, {
+    name: "cutter.corner_radius_mm",
+    hint: "Empty: sharp, or not known",
+  });
   const pitch = h("input", { autocomplete: "off", placeholder: "equal" });
   pitch.value = (keys.cutter.pitch_deg ?? []).join(", ");
   const stickout = quantity("Stickout", "length", keys.tool.stickout_mm, { name: "tool.stickout_mm", hint: "Tip to the holder's face" });
@@ -77,6 +99,8 @@ export async function view({ name = "" }, query, place) {
         cutter.teeth,
         cutter.diameter_mm,
         cutter.helix_deg,
+        field("Shape", shape, { name: "cutter.shape", hint: "Computed as a cylinder; answers say what that means" }),
+        corner,
         field("Pitch angles [°]", pitch, { name: "cutter.pitch_deg", hint: "For unequal pitch, with commas" }),
         stickout,
         insertion,
@@ -127,6 +151,10 @@ export async function view({ name = "" }, query, place) {
       tool: { ...keys.tool, stickout_mm: stickout.input.base, segments: tool.rows() },
       holder: { ...keys.holder, insertion_mm: insertion.input.base, segments: holder.rows() },
     };
+    if (shape.value === "flat") delete found.cutter.shape;
+    else found.cutter.shape = shape.value;
+    if (corner.input.base) found.cutter.corner_radius_mm = corner.input.base;
+    else delete found.cutter.corner_radius_mm;
     const angles = pitch.value.trim();
     if (angles)
       found.cutter.pitch_deg = angles
