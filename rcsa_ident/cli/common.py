@@ -145,10 +145,8 @@ def _finite(value: Any) -> Any:
 
 
 def say(text: str) -> None:
-    """Print a line with rich markup."""
-    from rich.console import Console
-
-    Console(highlight=False, soft_wrap=True).print(text)
+    """Print a line as it is."""
+    typer.echo(text)
 
 
 def warn(text: str) -> None:

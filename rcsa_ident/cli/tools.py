@@ -61,7 +61,7 @@ def import_tools(
     json_: Json = False,
 ) -> None:
     """Make toolings from the tool library of a CAM program; each file says what was assumed."""
-    from rcsa_ident.io.files import write_text
+    from rcsa_ident.io.files import filling, write_text
     from rcsa_ident.io.tool_libraries import Assumptions, file_names, read_tool_library
 
     if (out is None) != list_:
@@ -75,9 +75,9 @@ def import_tools(
         there = [path.name for path in paths if path.exists()]
         if there and not overwrite:
             raise InputError("--out", f"{len(there)} of the files already ({there[0]})", "another folder, or --overwrite", str(out))
-        _folder(out)
-        for entry, path in zip(made, paths, strict=True):
-            write_text(path, entry.text)
+        with filling(out, "--out") as part:
+            for entry, path in zip(made, paths, strict=True):
+                write_text(part / path.name, entry.text)
     if json_:
         files = dict(zip([entry.number for entry in made], map(str, paths), strict=False))
         emit(
@@ -143,22 +143,16 @@ def _chosen(entries: list[Imported], wanted: list[str], where: str) -> list[Impo
     return found
 
 
-def _folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError("--out", error.strerror or str(error), "a folder that can be written to", str(out)) from None
-
-
 def _row(entry: Imported, path: str | None) -> dict[str, object]:
     row: dict[str, object] = {"number": entry.number, "name": entry.name, "type": entry.kind, "usable": entry.tooling is not None}
     return row | {"reason": entry.reason, "notes": list(entry.notes), "file": path}
 
 
 def _show(entries: list[Imported]) -> None:
-    from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
+
+    from rcsa_ident.cli.tables import show
 
     table = Table()
     for title in ("no.", "tool", "type", "teeth", "Ø mm", "stickout + insertion mm", ""):
@@ -170,4 +164,4 @@ def _show(entries: list[Imported]) -> None:
             shape = [str(cutter.teeth), f"{1e3 * cutter.diameter:.4g}", f"{1e3 * assembly.stickout:.4g} + {1e3 * assembly.insertion:.4g}"]
         last = entry.reason or f"{len(entry.notes)} assumptions"
         table.add_row(str(entry.number), *(escape(text) for text in (entry.name, entry.kind, *shape, last)))
-    Console(highlight=False).print(table)
+    show(table)

@@ -36,9 +36,10 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
       const band = each.limit_depth_low_mm && low !== null ? ` (95 %: ${text("depth", low)})` : "";
       const limit = depth === null ? `limit above ${text("depth", maxDepth)}` : `limit ${text("depth", depth)}${band}`;
       const deep = each.recommended_depth_mm[k];
-      const rate = removal[i] ? ` · ${text("removal", removal[i] * rpm * deep)}` : "";
+      const rate = removal[i] && deep !== null ? ` · ${text("removal", removal[i] * rpm * deep)}` : "";
       const chatter = each.chatter_frequency_hz[k];
-      return `${limit} · recommended ${text("depth", deep)}${rate}${chatter === null ? "" : ` · ${plain(chatter)} Hz`}`;
+      const advised = deep === null ? "no depth recommended" : `recommended ${text("depth", deep)}`;
+      return `${limit} · ${advised}${rate}${chatter === null ? "" : ` · ${plain(chatter)} Hz`}`;
     });
     data.push({
       x,
@@ -72,7 +73,7 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
       hoverinfo: "skip",
     });
     const cut = recommended[i];
-    if (cut) {
+    if (cut && cut.recommended_depth_mm !== null) {
       data.push({
         x: [cut.spindle_speed_rpm],
         y: [cut.recommended_depth_mm * times],

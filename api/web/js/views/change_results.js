@@ -80,9 +80,8 @@ function lobesCard(found, removal, question, tested, ontested) {
               low !== undefined && low !== null && high
                 ? [" (95 %: ", q("depth", low, { bare: true }), " to ", q("depth", high), ")"]
                 : null,
-              ", recommended depth ",
-              q("depth", lobes.recommended_depth_mm[k]),
-              removal[i] ? [" · ", q("removal", removal[i] * lobes.spindle_speed_rpm[k] * lobes.recommended_depth_mm[k])] : null,
+              lobes.recommended_depth_mm[k] === null ? ", no depth recommended" : [", recommended depth ", q("depth", lobes.recommended_depth_mm[k])],
+              removal[i] && lobes.recommended_depth_mm[k] !== null ? [" · ", q("removal", removal[i] * lobes.spindle_speed_rpm[k] * lobes.recommended_depth_mm[k])] : null,
               chatter === null ? null : ` · beyond the limit chatter at ${plain(chatter)} Hz`,
               lobes.flip[k] ? " · period doubling" : null,
             );
