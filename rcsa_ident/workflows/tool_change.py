@@ -191,8 +191,8 @@ def advise(
     """
     process = change.process
     if depth is not None and 0.0 <= reserve < 1.0:
-        # limits are looked for as deep as tells whether this depth may be cut
-        change = replace(change, max_depth=max(change.max_depth, depth / (1.0 - reserve) * (1.0 + 1e-9)))
+        # twice as deep as tells whether this depth may be cut: straight lines to the limits beside it show where its windows end
+        change = replace(change, max_depth=max(change.max_depth, 2.0 * depth / (1.0 - reserve)))
     wide = _limits_beside(change, pad_speeds(change.speeds, tolerance, [speed for speed, _ in planned]))
     low, high = float(np.min(change.speeds)), float(np.max(change.speeds))
     usable = usable_depths(wide, process, drive, tolerance, probability, reserve).between(low, high)
