@@ -57,7 +57,7 @@ app = typer.Typer(
 #: In the order of the work, under headings.
 _COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
     "Identification": (demo.demo, identify.check, identify.identify, plan.plan, export.export),
-    "Tool change": (lobes.tooltip, lobes.lobes, advice.advise, cases.cases, forces.forces, tools.import_tools, tools.draw),
+    "Tool change": (lobes.tooltip, lobes.lobes, advice.advise, cases.cases, forces.forces, tools.import_tools, tools.holders, tools.draw),
     "Further measurements": (calibrate.calibrate, calibrate.materials, compare.compare, decouple.decouple, contact.contact),
     "Virtual machine and set-up": (machine.simulate, machine.warm),
 }

@@ -33,6 +33,8 @@ _OPTIONS = {
     "frf": ("frf", "X=FILE, Y=FILE, XY=FILE for a response in X and a force in Y; FILE#3 is record 3 of the file"),
     "frf_units": ("frf_units", ""),
     "stickout": ("stickout_mm", ""),
+    "bore": ("bore_mm", ""),
+    "holder length": ("length_mm", ""),
     "tangential coefficient": ("ktc_mpa", "in MPa"),
     "radial ratio": ("krc", ""),
     "runout": ("runout_um", "in um"),

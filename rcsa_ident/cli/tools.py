@@ -120,6 +120,40 @@ def draw(
         say(f"written: {out}")
 
 
+@answers
+def holders(
+    taper: Annotated[str | None, typer.Argument(help="Taper, as HSK-A63; by default all are listed.", show_default=False)] = None,
+    chuck: Annotated[str | None, typer.Argument(help="Chuck, as ER32.", show_default=False)] = None,
+    bore_mm: Annotated[float | None, typer.Option(help="Diameter of the tool's shank, mm.", show_default=False)] = None,
+    length_mm: Annotated[
+        float | None,
+        typer.Option(help="From the nose to the spindle's face or gauge line, mm; default: a typical one.", show_default=False),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Print a holder of the catalogue as [holder] of a TOOLING.toml, or what there is."""
+    from rcsa_ident.io.toolings import holder_keys, tooling_text
+    from rcsa_ident.tool_holder.catalogue import bores, chucks, tapers
+    from rcsa_ident.tool_holder.catalogue import holder as made
+
+    if taper is None:
+        rows = [{"chuck": each, "least_bore_mm": 1e3 * bores(each)[0], "largest_bore_mm": 1e3 * bores(each)[1]} for each in chucks()]
+        if json_:
+            emit({"tapers": list(tapers()), "chucks": rows})
+            return
+        say(f"tapers: {', '.join(tapers())}")
+        say("chucks: " + ", ".join(f"{r['chuck']} ({r['least_bore_mm']:g} to {r['largest_bore_mm']:g} mm)" for r in rows))
+        return
+    if chuck is None or bore_mm is None:
+        missing = "chuck" if chuck is None else "--bore-mm"
+        raise InputError(missing, "nothing", "a taper, a chuck and --bore-mm, as HSK-A63 ER32 --bore-mm 12")
+    found = made(taper, chuck, bore_mm * 1e-3, None if length_mm is None else length_mm * 1e-3)
+    if json_:
+        emit({"name": f"{taper} {chuck}", "mass_kg": found.mass, "sources": list(found.sources), "holder": holder_keys(found)})
+    else:
+        say(tooling_text({"holder": holder_keys(found)}, (str(found), *found.sources)).rstrip())
+
+
 def _contact(path: Path | None) -> Contact | None:
     if path is None:
         return None
