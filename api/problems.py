@@ -25,6 +25,8 @@ _FIELDS = {
     "tangential coefficient": "cut.ktc_mpa",
     "radial ratio": "cut.krc",
     "feed_per_tooth": "cut.feed_per_tooth_mm",
+    "bore": "bore_mm",
+    "holder length": "length_mm",
 }
 _TITLES = {413: "Content too large", 422: "Input not usable"}
 

@@ -235,8 +235,8 @@ def _(advice: Advice) -> str:
     points = [
         (
             f"{to_rpm(point.spindle_speed):.0f}",
-            f"{1e3 * point.depth:.2f}",
-            f"{1e3 * point.limit:.2f}",
+            "none" if point.depth == np.inf else f"{1e3 * point.depth:.2f}",
+            f"above {1e3 * point.limit:g}" if point.limit >= advice.lobes.max_depth else f"{1e3 * point.limit:.2f}",
             str(point.bound),
             "" if point.removal_rate is None else f"{to_cm3_per_min(point.removal_rate):.0f}",
             "" if point.power is None else f"{1e-3 * point.power:.2g}",

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -101,12 +100,4 @@ def make_sample_campaign(
         raise InputError("folder", str(folder), "a campaign, an empty folder, or one that does not exist")
     speeds = np.linspace(machine.plan.spindle_speeds[0], machine.plan.spindle_speeds[-1], each)
     machine = replace(machine, plan=replace(machine.plan, spindle_speeds=tuple(speeds.tolist())))
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    # whoever ends it half-way finds no half of a campaign
-    with TemporaryDirectory(dir=folder.parent) as half:
-        made = simulate_campaign(machine, Path(half) / folder.name, seed, progress, mapper)
-        if folder.is_dir():
-            folder.rmdir()
-        made.truth.rename(folder.with_name(made.truth.name))
-        made.folder.rename(folder)
-    return folder
+    return simulate_campaign(machine, folder, seed, progress, mapper).folder

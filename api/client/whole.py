@@ -16,6 +16,7 @@ from api.client.jobs import Jobs
 from api.client.uploads import Uploads
 from api.schemas.common import Page
 from api.schemas.forces import ForceAnswer, StreamsAnswer, StreamSummary
+from api.schemas.holders import CatalogueAnswer, Holders
 from api.schemas.keys import KeyAnswer, MadeKey
 from api.schemas.libraries import Example, Examples, ImportAnswer
 from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes
@@ -98,6 +99,15 @@ class Client(Uploads, Jobs):
         kind = "application/zip" if library.startswith(b"PK") else "application/json"
         query = {key: str(value).lower() if isinstance(value, bool) else value for key, value in assumed.items() if value is not None}
         return read(ImportAnswer, self.send("POST", "/toolings/import", content=library, params=query, headers={"Content-Type": kind}))
+
+    def holders(self) -> Holders:
+        """Return what the catalogue of holders has."""
+        return read(Holders, self.send("GET", "/holders"))
+
+    def holder(self, taper: str, chuck: str, bore_mm: float, length_mm: float | None = None) -> CatalogueAnswer:
+        """Return a holder of the catalogue, by default of a typical length."""
+        query = {"bore_mm": bore_mm} if length_mm is None else {"bore_mm": bore_mm, "length_mm": length_mm}
+        return read(CatalogueAnswer, self.send("GET", f"/holders/{taper}/{chuck}", params=query))
 
     def materials(self) -> list[MaterialAnswer]:
         """Return the library of materials."""

@@ -201,14 +201,16 @@ class BestSpeed(Answer):
 
     spindle_speed_rpm: float
     limit_depth_mm: float | None = Field(description="Stability limit; null: stable up to the depth that was asked for.")
-    recommended_depth_mm: float | None = Field(description="The limit less what a recommendation holds back; null: see withheld.")
+    recommended_depth_mm: float | None = Field(
+        description="The limit less what a recommendation holds back; null: as of the limit, or in a preview."
+    )
 
 
 class RecommendedCut(Answer):
     """A cut that is recommended: its depth is the stability limit less tolerance of the speed, probability and reserve."""
 
     spindle_speed_rpm: float
-    recommended_depth_mm: float
+    recommended_depth_mm: float | None = Field(description="null: nothing limits the cut up to the depth that was asked for.")
     limit_depth_mm: float | None = Field(description="Stability limit there; null: none up to the depth that was asked for.")
 
 
@@ -304,10 +306,10 @@ class AdviceQuery(Milled):
 class OperatingPoint(RecommendedCut):
     """A recommended cut with what it takes from the spindle."""
 
-    axial_depth_mm: float = Field(description="As recommended_depth_mm.")
-    removal_rate_cm3_per_min: float
-    power_kw: float
-    torque_nm: float
+    axial_depth_mm: float | None = Field(description="As recommended_depth_mm.")
+    removal_rate_cm3_per_min: float | None = Field(description="null without a recommended depth, as are power and torque.")
+    power_kw: float | None
+    torque_nm: float | None
     bound: str = Field(description="What stands against more depth: chatter, power, torque, speed or depth.")
 
 
@@ -317,7 +319,7 @@ class Window(Answer):
     from_rpm: float
     to_rpm: float
     best_rpm: float
-    allowed_mm: float
+    allowed_mm: float | None = Field(description="null: nothing limits the cut up to the depth that was asked for.")
 
 
 class PlannedAnswer(Answer):
@@ -344,7 +346,7 @@ class ToolingAdvice(Answer):
 
     tooling: str
     stickout_mm: float
-    lowest_limit_mm: float
+    lowest_limit_mm: float | None
     common_stable_depth_mm: float | None = Field(description="Stable at every speed on all machines that the records allow.")
     withheld: str | None = Field(None, description="Why these limits are no source of a recommended depth; null where they are.")
     highest_removal: list[OperatingPoint]

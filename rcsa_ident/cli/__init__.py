@@ -11,6 +11,7 @@ for _name in THREADS:
     os.environ.setdefault(_name, "1")
 
 import typer  # noqa: E402
+from typer.core import TyperCommand  # noqa: E402
 
 from rcsa_ident.cli import (  # noqa: E402
     advice,
@@ -29,6 +30,21 @@ from rcsa_ident.cli import (  # noqa: E402
     tools,
 )
 
+
+class _Literal(TyperCommand):
+    """A command whose help shows brackets as they are: the tables of files are called after them."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        from rich.markup import escape
+
+        written = [(param, getattr(param, "help", None)) for param in self.params]
+        for param, text in written:
+            param.help = text and escape(text)  # type: ignore[attr-defined]  # arguments of typer have one, too
+        super().format_help(ctx, formatter)
+        for param, text in written:
+            param.help = text  # type: ignore[attr-defined]
+
+
 app = typer.Typer(
     name="rcsa-ident",
     help="Spindle dynamics from ordinary stable cuts: tooltip FRFs and stability lobes of any tool. "
@@ -41,13 +57,13 @@ app = typer.Typer(
 #: In the order of the work, under headings.
 _COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
     "Identification": (demo.demo, identify.check, identify.identify, plan.plan, export.export),
-    "Tool change": (lobes.tooltip, lobes.lobes, advice.advise, cases.cases, forces.forces, tools.import_tools, tools.draw),
+    "Tool change": (lobes.tooltip, lobes.lobes, advice.advise, cases.cases, forces.forces, tools.import_tools, tools.holders, tools.draw),
     "Further measurements": (calibrate.calibrate, calibrate.materials, compare.compare, decouple.decouple, contact.contact),
     "Virtual machine and set-up": (machine.simulate, machine.warm),
 }
 for _title, _commands in _COMMANDS.items():
     for _command in _commands:
-        app.command(_command.__name__.replace("_", "-"), rich_help_panel=_title)(_command)
+        app.command(_command.__name__.replace("_", "-"), cls=_Literal, rich_help_panel=_title)(_command)
 
 
 def _version(asked: bool) -> None:

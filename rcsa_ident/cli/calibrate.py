@@ -137,7 +137,7 @@ def _summary(found: Calibrated) -> dict[str, Any]:
 def _show(found: Calibrated) -> None:
     from rich.table import Table
 
-    from rcsa_ident.cli.tables import console
+    from rcsa_ident.cli.tables import console, show
 
     forces = found.forces
     table = Table("coefficient", "value", "± 95 %", "unit", title=f"{len(found.used)} cuts, method {forces.method}", title_justify="left")
@@ -147,7 +147,7 @@ def _show(found: Calibrated) -> None:
         factor, unit = _SHOWN[name]
         table.add_row(name, f"{value * factor:.5g}", f"{width * factor:.2g}", unit)
     out = console()
-    out.print(table)
+    show(table)
     out.print(f"unexplained: {100.0 * forces.misfit:.2g} % of the force")
     if found.signal is not None:
         for name, offsets in found.signal.runout.items():
@@ -203,7 +203,7 @@ def materials(
     from rich.markup import escape
     from rich.table import Table
 
-    from rcsa_ident.cli.tables import console
+    from rcsa_ident.cli.tables import show
 
     table = Table("material", "K_tc\nMPa", "± %", "k_rc", "± %", "K_te\nN/mm", "K_re\nN/mm", "source")
     for column in table.columns[1:7]:
@@ -215,9 +215,9 @@ def materials(
         spreads = [f"{100.0 * s:.0f}" for s in (c.tangential_spread, c.ratio_spread)]
         values = (f"{1e-6 * c.tangential:.0f}", spreads[0], f"{c.radial_ratio:.2f}", spreads[1], *edges)
         table.add_row(escape(m.name), *values, str(sources.index(m.source) + 1))
-    console().print(table)
+    show(table)
     for number, source in enumerate(sources, start=1):
-        say(f"{number}: {escape(source)}")
+        say(f"{number}: {source}")
     if name is not None:
         for m in chosen:
-            say(escape(f"{m.condition}. {m.notes}"))
+            say(f"{m.condition}. {m.notes}")

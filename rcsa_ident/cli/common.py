@@ -33,6 +33,8 @@ _OPTIONS = {
     "frf": ("frf", "X=FILE, Y=FILE, XY=FILE for a response in X and a force in Y; FILE#3 is record 3 of the file"),
     "frf_units": ("frf_units", ""),
     "stickout": ("stickout_mm", ""),
+    "bore": ("bore_mm", ""),
+    "holder length": ("length_mm", ""),
     "tangential coefficient": ("ktc_mpa", "in MPa"),
     "radial ratio": ("krc", ""),
     "runout": ("runout_um", "in um"),
@@ -145,10 +147,8 @@ def _finite(value: Any) -> Any:
 
 
 def say(text: str) -> None:
-    """Print a line with rich markup."""
-    from rich.console import Console
-
-    Console(highlight=False, soft_wrap=True).print(text)
+    """Print a line as it is."""
+    typer.echo(text)
 
 
 def warn(text: str) -> None:

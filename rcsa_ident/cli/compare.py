@@ -126,7 +126,7 @@ def _row(each: ResponseComparison) -> dict[str, Any]:
 def _show(found: Sequence[ResponseComparison]) -> None:
     from rich.table import Table
 
-    from rcsa_ident.cli.tables import console
+    from rcsa_ident.cli.tables import console, show
 
     heads = ("response", "hammer\nHz", "change\n%", "damping\n%", "in process\n%", "|H|\nµm/N", "stiffness\n%")
     table = Table(*heads, title="modes of the idle machine (hammer), and how they differ in process (identified)", title_justify="left")
@@ -143,6 +143,6 @@ def _show(found: Sequence[ResponseComparison]) -> None:
             stiffness = f"{100 * (h.compliance / i.compliance - 1):+.1f}"
             table.add_row(*left, change, damping, f"{100 * i.damping:.2f}", size, stiffness)
     out = console()
-    out.print(table)
+    show(table)
     for each in found:
         out.print(f"{each.place} {each.axis.upper()}: FRAC {each.frac:.3f}, difference {100 * each.error:.1f} % of the hammer's")

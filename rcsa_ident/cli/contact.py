@@ -160,7 +160,7 @@ def _summary(found: ContactCalibration) -> dict[str, Any]:
 def _show(found: ContactCalibration) -> None:
     from rich.table import Table
 
-    from rcsa_ident.cli.tables import console
+    from rcsa_ident.cli.tables import console, show
     from rcsa_ident.workflows.contact import NAMES
 
     table = Table("per metre of insertion", "value", "± 1 σ", "unit", title="tool-holder contact", title_justify="left")
@@ -170,7 +170,7 @@ def _show(found: ContactCalibration) -> None:
         width = f"{100.0 * std:.2g} %" if std < 0.5 else f"factor {math.exp(std):.2g}"
         table.add_row(name.replace("_", " "), f"{getattr(found.contact, name):.4g}", width, unit)
     out = console()
-    out.print(table)
+    show(table)
     for name, value in found.misfit.items():
         out.print(f"{name}: rms difference {100.0 * value:.2g} %, scale {100.0 * (found.gain[name] - 1.0):+.1f} %", markup=False)
     if found.modulus_std > 0.0:

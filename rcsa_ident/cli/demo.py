@@ -11,7 +11,6 @@ import typer
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn
 from rcsa_ident.cli.identify import Method, exit_by_status, read_and_judge, result_of, search, warn_left_out
 from rcsa_ident.cli.processes import Processes
-from rcsa_ident.errors import InputError
 from rcsa_ident.processes import Workers, workers
 from rcsa_ident.units import from_rpm, to_hz, to_rpm
 
@@ -55,33 +54,32 @@ def demo(
     Where the virtual machine has left its truth beside the campaign (DATA.truth), predictions are compared with it
     afterwards; the identification never reads it.
     """
-    from rcsa_ident.io.files import write_text
+    from rcsa_ident.io.files import filling, write_text
     from rcsa_ident.io.results import write_result
     from rcsa_ident.report.html import report_html
     from rcsa_ident.workflows.identify import mode_deviations
 
     stages = Stages(quiet=json_)
-    _folder(out)
-    with workers(processes) as pool:
+    with workers(processes) as pool, filling(out, "--out") as part:
         data, others = _data(data, out, pool, stages)
         campaign, readings = read_and_judge(data, pool, stages)
         extra = _further_toolings(campaign, tooling or others)
         found = search(campaign, readings, Method.default, seed, pool, stages)
         deviations = mode_deviations(found)
         result = result_of(found, campaign, readings, deviations)
-        write_result(out / "RESULT.json", result)
+        write_result(part / "RESULT.json", result)
         pages: list[ToolingPage] = []
         if found.axes:
             recorded = frozenset(cut.tooling for cut in campaign.cuts)
-            task = partial(_page, found.machine, recorded, _truth_of(data), out)
+            task = partial(_page, found.machine, recorded, _truth_of(data), part)
             wanted = [*campaign.toolings.items(), *extra.items()]
             with stages.stage("tooltips and lobes") as progress:
                 for page in pool.map(task, wanted):
                     pages.append(page)
                     progress(len(pages), len(wanted))
-    with stages.stage("report"):
-        text = report_html(found, campaign, readings, pages, stages.seconds, deviations)
-        write_text(out / "report.html", text)
+        with stages.stage("report"):
+            text = report_html(found, campaign, readings, pages, stages.seconds, deviations)
+            write_text(part / "report.html", text)
     if json_:
         emit(_summary(found, pages, stages, out))
     else:
@@ -93,13 +91,6 @@ def demo(
         )
         say(f"written: {out / 'report.html'}, RESULT.json, {len(pages)} FRFs, {len(pages)} lobes")
     exit_by_status(found)
-
-
-def _folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError("--out", error.strerror or "an error", "a folder that can be created", str(out)) from None
 
 
 def _data(given: Path | None, out: Path, pool: Workers, stages: Stages) -> tuple[Path, list[Path]]:
@@ -217,9 +208,10 @@ def _truth(
 
 
 def _show(pages: list[ToolingPage], found: Identification, deviations: Mapping[Dof, tuple[FloatArray, FloatArray]]) -> None:
+    from rich.markup import escape
     from rich.table import Table
 
-    from rcsa_ident.cli.tables import console, show_identification
+    from rcsa_ident.cli.tables import limit_text, recommended_text, show, show_identification
 
     show_identification(found, deviations)
     known = any(page.error for page in pages)
@@ -235,10 +227,13 @@ def _show(pages: list[ToolingPage], found: Identification, deviations: Mapping[D
         errors = [f"{100 * page.error[axis]:.1f}" if axis in page.error else "" for axis in ("X", "Y")] if known else []
         assert page.advice is not None
         lobes = page.advice.lobes
-        best = "\n".join(f"{to_rpm(p.spindle_speed):.0f}: {1e3 * p.depth:.2f} ({1e3 * p.limit:.2f})" for p in page.advice.recommended)
+        best = "\n".join(
+            f"{to_rpm(p.spindle_speed):.0f}: {recommended_text(p)} ({limit_text(p.limit, lobes.max_depth)})"
+            for p in page.advice.recommended
+        )
         anywhere = "" if lobes.absolute_limit is None else f"{1e3 * lobes.absolute_limit:.2f}"
-        table.add_row(page.name, "yes" if page.recorded else "no", *errors, anywhere, best)
-    console().print(table)
+        table.add_row(escape(page.name), "yes" if page.recorded else "no", *errors, anywhere, best)
+    show(table)
     for page in pages:
         for doubt in page.warnings:
             warn(f"{page.name}: {doubt}")

@@ -268,9 +268,10 @@ def _summary(planned: PlannedCuts, wanted: float | None) -> dict[str, Any]:
 
 def _show(planned: PlannedCuts) -> None:
     """Print the cuts with what they are expected to leave open."""
-    from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
+
+    from rcsa_ident.cli.tables import console, show
 
     names = [f"{escape(name)}\n± %" for name in planned.targets]
     table = Table(
@@ -289,10 +290,9 @@ def _show(planned: PlannedCuts) -> None:
             *(f"{100.0 * v:.3f}" for v in after),
         )
         table.add_row(str(i), escape(cut.tooling), *numbers)
-    out = Console(highlight=False)
-    out.print(table)
+    show(table)
     even = ", ".join(f"{escape(name)} {100.0 * v:.3f} %" for name, v in zip(planned.targets, planned.even, strict=True))
-    out.print(
+    console().print(
         f"chosen from {planned.candidates} stable cuts ({planned.unstable} more may chatter); "
         f"as many at even distances would come to {even}"
     )

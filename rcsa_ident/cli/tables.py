@@ -4,24 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
 from rich.console import Console
 from rich.markup import escape
+from rich.measure import Measurement
 from rich.table import Table
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.report.summaries import ModeRow, RecordingRow, WholeModeRow, coefficient_rows, mode_rows, two_digits, whole_mode_rows
-from rcsa_ident.stability.advice import Advice, PlannedCut, SpeedWindow
+from rcsa_ident.stability.advice import Advice, Bound, OperatingPoint, PlannedCut, SpeedWindow
 from rcsa_ident.stability.tested_cuts import Tally
 from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
 
+#: Columns of a terminal that no cell reaches.
+_WIDEST = 10_000
 _COLOURS = {"converged": "green", "suspect": "yellow", "failed": "red"}
 
 
 def console() -> Console:
-    """Standard output, as wide as the terminal."""
-    return Console(highlight=False)
+    """Standard output; a sentence is as long as it is."""
+    return Console(highlight=False, soft_wrap=True)
+
+
+def show(table: Table) -> None:
+    """Print a table as wide as the terminal, wider where a word would be cut: an id that lost its end names nothing."""
+    out = console()
+    for column in table.columns:
+        cells = [column.header, *column.cells]
+        column.min_width = max(Measurement.get(out, out.options.update(max_width=_WIDEST), cell).minimum for cell in cells)
+    # a space on both sides of every column, and a line between all
+    out.width = max(out.width, 1 + sum((column.min_width or 0) + 3 for column in table.columns))
+    out.print(table, soft_wrap=False)
 
 
 def show_recordings(rows: Sequence[RecordingRow]) -> None:
@@ -38,7 +53,7 @@ def show_recordings(rows: Sequence[RecordingRow]) -> None:
         lines = str(row.lines) if row.lines else ""
         table.add_row(escape(row.id), escape(row.tooling), f"{row.programmed_rpm:.0f}", found, lines, *ratios, verdict)
     out = console()
-    out.print(table)
+    show(table)
     # sentences stand below: a column would break them into words
     for row in rows:
         for reason in row.reasons:
@@ -54,15 +69,15 @@ def show_identification(found: Identification, deviations: Mapping[Dof, tuple[Fl
     colour = _COLOURS[str(found.status)]
     out.print(f"status [bold {colour}]{found.status}[/], method {found.method}, seed {found.seed}, {len(found.cut_ids)} cuts used")
     for reason in found.reasons:
-        out.print(f"  [{colour}]{escape(reason)}[/]", soft_wrap=True)
+        out.print(f"  [{colour}]{escape(reason)}[/]")
     if found.whole is not None:
-        out.print(escape(found.coupling), soft_wrap=True)
+        out.print(escape(found.coupling))
         whole = whole_mode_rows(found.whole.best.standing(), next(iter(deviations.values()), None))
         angles = [f"{round(row.direction_deg)}" for row in whole]
-        out.print(_modes("modes at the flange, X and Y together, spindle at standstill", whole, angles))
+        show(_modes("modes at the flange, X and Y together, spindle at standstill", whole, angles))
     for axis, part in found.axes.items():
         if found.whole is None:
-            out.print(_modes(f"modes at the flange, {axis.upper()}", mode_rows(part.modes, deviations.get(axis))))
+            show(_modes(f"modes at the flange, {axis.upper()}", mode_rows(part.modes, deviations.get(axis))))
         misfit = ", ".join(f"{escape(name)} {value:.2f}" for name, value in part.per_tooling.items())
         name = "" if found.whole is None else f"{axis.upper()}: "
         out.print(f"  {name}chi²/point {part.chi2_per_point:.2f} ({misfit}), unexplained share of a line {100 * part.model_error:.2f} %")
@@ -77,7 +92,7 @@ def show_identification(found: Identification, deviations: Mapping[Dof, tuple[Fl
     for note in found.notes:
         if note == found.coupling:
             continue
-        out.print(f"note: {escape(note)}", soft_wrap=True)
+        out.print(f"note: {escape(note)}")
 
 
 def _modes(title: str, rows: Sequence[ModeRow | WholeModeRow], direction: Sequence[str] | None = None) -> Table:
@@ -108,14 +123,31 @@ def show_lobes(advice: Advice) -> None:
     heads = ("spindle speed\nrev/min", "recommended\ndepth mm", "stability\nlimit mm")
     table = _table(*heads, title="recommended cuts of the range")
     for point in advice.recommended:
-        table.add_row(f"{to_rpm(point.spindle_speed):.0f}", f"{1e3 * point.depth:.2f}", _limit(point.limit, lobes.max_depth))
-    out.print(table)
-    peaks = ", ".join(f"{_limit(p.limit_depth, lobes.max_depth)} mm at {to_rpm(p.spindle_speed):.0f} rev/min" for p in lobes.best_speeds())
+        table.add_row(f"{to_rpm(point.spindle_speed):.0f}", recommended_text(point), limit_text(point.limit, lobes.max_depth))
+    show(table)
+    _tell_unlimited(advice)
+    peaks = ", ".join(
+        f"{limit_text(p.limit_depth, lobes.max_depth)} mm at {to_rpm(p.spindle_speed):.0f} rev/min" for p in lobes.best_speeds()
+    )
     out.print(f"highest stability limits: {peaks}")
 
 
-def _limit(depth: float, most: float) -> str:
+def limit_text(depth: float, most: float) -> str:
+    """Return a limit in mm, up to the largest depth."""
     return f"{1e3 * depth:.2f}" if depth < most else f"more than {1e3 * most:g}"
+
+
+def recommended_text(point: OperatingPoint) -> str:
+    """Return the recommended depth in mm, if there is one."""
+    return "none" if point.bound is Bound.DEPTH else f"{1e3 * point.depth:.2f}"
+
+
+def _tell_unlimited(advice: Advice) -> None:
+    """Say where no depth is recommended because none was searched that would be too deep."""
+    free = [point for point in advice.recommended if point.bound is Bound.DEPTH]
+    if free:
+        at = " and ".join(f"{to_rpm(point.spindle_speed):.0f}" for point in free)
+        console().print(f"at {at} rev/min {free[0].unlimited}; a larger --max-depth-mm looks deeper")
 
 
 def show_tally(tally: Tally) -> None:
@@ -126,7 +158,7 @@ def show_tally(tally: Tally) -> None:
     table.add_row("stable", f"[green]{tally.stable_stable}[/]", f"[red]{tally.stable_chatter}[/]", str(tally.stable_marginal))
     table.add_row("chatter", f"[yellow]{tally.chatter_stable}[/]", f"[green]{tally.chatter_chatter}[/]", str(tally.chatter_marginal))
     out = console()
-    out.print(table)
+    show(table)
     if tally.decided:
         out.print(f"classified correctly: {_right(tally)}, {100.0 * tally.share_right:.1f} %")
 
@@ -142,7 +174,7 @@ def show_cases(rows: Sequence[tuple[str, Tally | None, Tally | None]]) -> None:
             marginal = own.stable_marginal + own.chatter_marginal
             cells = [_right(own), str(own.stable_chatter), str(own.chatter_stable), str(marginal) if marginal else ""]
         table.add_row(escape(name), *cells, "" if idle is None else _right(idle))
-    console().print(table)
+    show(table)
 
 
 def _right(tally: Tally) -> str:
@@ -169,10 +201,17 @@ def show_points(advice: Advice) -> None:
     )
     table = _table(*heads, title="recommended cuts: highest removal rate")
     for p in advice.recommended:
-        cells = f"{to_rpm(p.spindle_speed):.0f}", f"{1e3 * p.depth:.2f}", _limit(p.limit, advice.lobes.max_depth)
-        load = f"{to_cm3_per_min(p.removal_rate or 0.0):.0f}", f"{1e-3 * (p.power or 0.0):.2f}", f"{p.torque or 0.0:.1f}"
-        table.add_row(*cells, *load, str(p.bound))
-    console().print(table)
+        cells = f"{to_rpm(p.spindle_speed):.0f}", recommended_text(p), limit_text(p.limit, advice.lobes.max_depth)
+        load = "", "", ""
+        if p.removal_rate is not None and p.power is not None and p.torque is not None:
+            load = f"{to_cm3_per_min(p.removal_rate):.0f}", f"{1e-3 * p.power:.2f}", f"{p.torque:.1f}"
+        table.add_row(*cells, *load, _against(p))
+    show(table)
+    _tell_unlimited(advice)
+
+
+def _against(point: OperatingPoint) -> str:
+    return "" if point.bound is Bound.DEPTH else str(point.bound)
 
 
 def show_windows(windows: Sequence[SpeedWindow], depth_mm: float, name: str) -> None:
@@ -185,8 +224,10 @@ def show_windows(windows: Sequence[SpeedWindow], depth_mm: float, name: str) -> 
     heads = ("best at\nrev/min", "from\nrev/min", "to\nrev/min", "recommended\ndepth mm")
     table = _table(*heads, title=f"{about}speeds for a depth of {depth_mm:g} mm")
     for w in windows[:8]:
-        table.add_row(*(f"{to_rpm(speed):.0f}" for speed in (w.best, w.low, w.high)), f"{1e3 * w.allowed:.2f}")
-    out.print(table)
+        table.add_row(
+            *(f"{to_rpm(speed):.0f}" for speed in (w.best, w.low, w.high)), "none" if w.allowed == np.inf else f"{1e3 * w.allowed:.2f}"
+        )
+    show(table)
 
 
 def show_planned(cuts: Sequence[PlannedCut], name: str) -> None:
@@ -195,18 +236,19 @@ def show_planned(cuts: Sequence[PlannedCut], name: str) -> None:
     for cut in cuts:
         about = f"{escape(name)}: " if name else ""
         verdict = "[green]stable[/]" if cut.stable else "[red]chatter[/]"
-        limit = f"limit {1e3 * cut.limit:.2f} mm, margin {100.0 * cut.margin:+.0f} %" if cut.limit < float("inf") else "no limit found"
+        limit = f"limit {1e3 * cut.limit:.2f} mm, margin {100.0 * cut.margin:+.0f} %" if cut.limit < np.inf else "no limit found"
         words = [f"{about}{to_rpm(cut.spindle_speed):.0f} rev/min, {1e3 * cut.depth:.2f} mm: {verdict}, {limit}"]
         if cut.probability is not None:
             words.append(f"stable with a probability of {100.0 * cut.probability:.0f} %")
-        words.append(f"limit with tolerance and probability {1e3 * cut.robust_limit:.2f} mm")
+        if cut.robust_limit < np.inf:
+            words.append(f"limit with tolerance and probability {1e3 * cut.robust_limit:.2f} mm")
         near = [f"{to_rpm(speed):.0f} rev/min" for speed in (cut.slower, cut.faster) if speed is not None]
         if near:
             words.append(f"{'chatter begins at' if cut.stable else 'the nearest stable speeds are'} {' and '.join(near)}")
         words.append(
             f"{1e-3 * cut.power:.2f} kW, {cut.torque:.1f} N m" + (f" ({100.0 * cut.load:.0f} % of the spindle)" if cut.load else "")
         )
-        out.print("; ".join(words), soft_wrap=True)
+        out.print("; ".join(words))
 
 
 def show_comparison(answers: Sequence[Advice]) -> None:
@@ -218,10 +260,14 @@ def show_comparison(answers: Sequence[Advice]) -> None:
         cells = ["", "", "", ""]
         if answer.recommended:
             p = answer.recommended[0]
-            removal = to_cm3_per_min(p.removal_rate or 0.0)
-            cells = [f"{to_rpm(p.spindle_speed):.0f}", f"{1e3 * p.depth:.2f}", f"{removal:.0f}", str(p.bound)]
-        table.add_row(escape(answer.tooling), f"{1e3 * float(answer.lobes.nominal.min()):.3f}", *cells)
-    console().print(table)
+            removal = "" if p.removal_rate is None else f"{to_cm3_per_min(p.removal_rate):.0f}"
+            cells = [f"{to_rpm(p.spindle_speed):.0f}", recommended_text(p), removal, _against(p)]
+        lowest = float(answer.lobes.limit_depth.min())
+        lowest_mm = f"{1e3 * lowest:.3f}" if lowest < np.inf else limit_text(lowest, answer.lobes.max_depth)
+        table.add_row(escape(answer.tooling), lowest_mm, *cells)
+    show(table)
+    for answer in answers:
+        _tell_unlimited(answer)
 
 
 def show_peaks(rows: Mapping[str, tuple[float, float, float, float]]) -> None:
@@ -232,4 +278,4 @@ def show_peaks(rows: Mapping[str, tuple[float, float, float, float]]) -> None:
     for axis, (frequency, magnitude, lowest, band) in rows.items():
         width = f"{1e6 * band:.4f}" if band == band else ""
         table.add_row(axis, f"{frequency:.0f}", f"{1e6 * magnitude:.4f}", width, f"{1e6 * lowest:.4f}")
-    console().print(table)
+    show(table)

@@ -61,7 +61,7 @@ def import_tools(
     json_: Json = False,
 ) -> None:
     """Make toolings from the tool library of a CAM program; each file says what was assumed."""
-    from rcsa_ident.io.files import write_text
+    from rcsa_ident.io.files import filling, write_text
     from rcsa_ident.io.tool_libraries import Assumptions, file_names, read_tool_library
 
     if (out is None) != list_:
@@ -75,9 +75,9 @@ def import_tools(
         there = [path.name for path in paths if path.exists()]
         if there and not overwrite:
             raise InputError("--out", f"{len(there)} of the files already ({there[0]})", "another folder, or --overwrite", str(out))
-        _folder(out)
-        for entry, path in zip(made, paths, strict=True):
-            write_text(path, entry.text)
+        with filling(out, "--out") as part:
+            for entry, path in zip(made, paths, strict=True):
+                write_text(part / path.name, entry.text)
     if json_:
         files = dict(zip([entry.number for entry in made], map(str, paths), strict=False))
         emit(
@@ -120,6 +120,40 @@ def draw(
         say(f"written: {out}")
 
 
+@answers
+def holders(
+    taper: Annotated[str | None, typer.Argument(help="Taper, as HSK-A63; by default all are listed.", show_default=False)] = None,
+    chuck: Annotated[str | None, typer.Argument(help="Chuck, as ER32.", show_default=False)] = None,
+    bore_mm: Annotated[float | None, typer.Option(help="Diameter of the tool's shank, mm.", show_default=False)] = None,
+    length_mm: Annotated[
+        float | None,
+        typer.Option(help="From the nose to the spindle's face or gauge line, mm; default: a typical one.", show_default=False),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Print a holder of the catalogue as [holder] of a TOOLING.toml, or what there is."""
+    from rcsa_ident.io.toolings import holder_keys, tooling_text
+    from rcsa_ident.tool_holder.catalogue import bores, chucks, tapers
+    from rcsa_ident.tool_holder.catalogue import holder as made
+
+    if taper is None:
+        rows = [{"chuck": each, "least_bore_mm": 1e3 * bores(each)[0], "largest_bore_mm": 1e3 * bores(each)[1]} for each in chucks()]
+        if json_:
+            emit({"tapers": list(tapers()), "chucks": rows})
+            return
+        say(f"tapers: {', '.join(tapers())}")
+        say("chucks: " + ", ".join(f"{r['chuck']} ({r['least_bore_mm']:g} to {r['largest_bore_mm']:g} mm)" for r in rows))
+        return
+    if chuck is None or bore_mm is None:
+        missing = "chuck" if chuck is None else "--bore-mm"
+        raise InputError(missing, "nothing", "a taper, a chuck and --bore-mm, as HSK-A63 ER32 --bore-mm 12")
+    found = made(taper, chuck, bore_mm * 1e-3, None if length_mm is None else length_mm * 1e-3)
+    if json_:
+        emit({"name": f"{taper} {chuck}", "mass_kg": found.mass, "sources": list(found.sources), "holder": holder_keys(found)})
+    else:
+        say(tooling_text({"holder": holder_keys(found)}, (str(found), *found.sources)).rstrip())
+
+
 def _contact(path: Path | None) -> Contact | None:
     if path is None:
         return None
@@ -143,22 +177,16 @@ def _chosen(entries: list[Imported], wanted: list[str], where: str) -> list[Impo
     return found
 
 
-def _folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError("--out", error.strerror or str(error), "a folder that can be written to", str(out)) from None
-
-
 def _row(entry: Imported, path: str | None) -> dict[str, object]:
     row: dict[str, object] = {"number": entry.number, "name": entry.name, "type": entry.kind, "usable": entry.tooling is not None}
     return row | {"reason": entry.reason, "notes": list(entry.notes), "file": path}
 
 
 def _show(entries: list[Imported]) -> None:
-    from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
+
+    from rcsa_ident.cli.tables import show
 
     table = Table()
     for title in ("no.", "tool", "type", "teeth", "Ø mm", "stickout + insertion mm", ""):
@@ -170,4 +198,4 @@ def _show(entries: list[Imported]) -> None:
             shape = [str(cutter.teeth), f"{1e3 * cutter.diameter:.4g}", f"{1e3 * assembly.stickout:.4g} + {1e3 * assembly.insertion:.4g}"]
         last = entry.reason or f"{len(entry.notes)} assumptions"
         table.add_row(str(entry.number), *(escape(text) for text in (entry.name, entry.kind, *shape, last)))
-    Console(highlight=False).print(table)
+    show(table)

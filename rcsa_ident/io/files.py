@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import secrets
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -71,6 +72,52 @@ def replacing(path: str | Path) -> Iterator[Path]:
         raise InputError("output file", error.strerror or str(error), "a place that can be written to", str(path)) from None
     finally:
         part.unlink(missing_ok=True)
+
+
+@contextmanager
+def filling(folder: str | Path, field: str = "output folder") -> Iterator[Path]:
+    """Yield a temporary folder; at the end what is in it goes into `folder`, after an error it is gone and `folder` as it was.
+
+    Parameters
+    ----------
+    folder : path
+        Made with the folders around it if it is missing; its files of the same names are replaced.
+    field : str
+        What the folder is, for the message.
+
+    Raises
+    ------
+    InputError
+        Before anything is computed where nothing could be written.
+    """
+    folder = Path(folder).absolute()
+    # the folders around it are made at the end, too
+    there = next(each for each in (folder, *folder.parents) if each.exists())
+    if not (there.is_dir() and os.access(there, os.W_OK)):
+        found = "a folder without permission to write" if there.is_dir() else f"a file, {there.name}"
+        raise InputError(field, found, "a folder that can be written to", str(folder))
+    part = (there.parent if there == folder and os.access(there.parent, os.W_OK) else there) / f".{folder.name}.{secrets.token_hex(6)}.part"
+    try:
+        with _writing(field, folder):
+            part.mkdir()
+        yield part
+        with _writing(field, folder):
+            for path in [part, *sorted(part.rglob("*"))]:
+                into = folder / path.relative_to(part)
+                if path.is_dir():
+                    into.mkdir(parents=True, exist_ok=True)
+                else:
+                    os.replace(path, into)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+@contextmanager
+def _writing(field: str, folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise InputError(field, error.strerror or str(error), "a folder that can be written to", str(folder)) from None
 
 
 def write_text(path: str | Path, text: str) -> None:

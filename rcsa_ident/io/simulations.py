@@ -11,7 +11,7 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.files import write_text
+from rcsa_ident.io.files import filling, write_text
 from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.io.machines import MachineFile
 from rcsa_ident.io.workpieces import workpiece_keys
@@ -50,7 +50,7 @@ def write_simulation(
     flange: TrueFlange,
     progress: Progress | None = None,
 ) -> SimulatedCampaign:
-    """Write the campaign into `out` and the truth into ``<out>.truth``; recordings are written as they come.
+    """Write the campaign into `out` and the truth into ``<out>.truth``; whoever ends it half-way finds neither.
 
     Parameters
     ----------
@@ -71,29 +71,30 @@ def write_simulation(
     for folder in (out, truth):
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError("out", str(folder), "a folder that does not exist or is empty")
-    for folder in (out / "recordings", out / "toolings", truth / "tip", truth / "cross", truth / "forces"):
-        folder.mkdir(parents=True, exist_ok=True)
-    for path, tooling in zip(setup.toolings, toolings, strict=True):
-        shutil.copyfile(path, out / "toolings" / f"{tooling.name}.toml")
-    write_text(out / "campaign.toml", _campaign_text(setup, toolings))
     total = len(toolings) * len(setup.plan.spindle_speeds)
-    rows = ["record,spindle_speed_rpm,tooth_angle_deg"]
-    for done, cut in enumerate(cuts, start=1):
-        _write_columns(truth / "forces" / f"{cut.id}.csv", ("order",), np.arange(cut.force_lines.shape[0]), cut.force_lines)
-        for kind, record in cut.records.items():
-            write_hdf5(out / "recordings" / f"{cut.id}_{kind}.h5", setup.sensors.rate, record.channels)
-            rows.append(f"{cut.id}_{kind},{to_rpm(record.spindle_speed):.9g},{np.degrees(record.tooth_angle):.9g}")
-        if progress is not None:
-            progress(done, total)
-    write_text(truth / "records.csv", "\n".join(rows) + "\n")
-    mean = float(np.mean(setup.plan.spindle_speeds))
-    for true in receptances:
-        speed = None if true.spindle_speed == mean else true.spindle_speed
-        for place, values in (("tip", true.tip), ("cross", true.cross)):
-            names, columns = _directions(values[:, :, None, :, None])
-            _write_columns(truth / place / true_name(true.tooling, speed), ("frequency_hz",), true.frequency_hz, columns, names)
-    names, columns = _directions(flange.values.reshape(-1, 2, 2, 2, 2), tuple(f"_{entry}" for entry in ("tF", "tM", "rF", "rM")))
-    _write_columns(truth / "spindle.csv", ("frequency_hz",), flange.frequency_hz, columns, names)
+    with filling(out, "out") as runs, filling(truth, "out") as known:
+        for folder in (runs / "recordings", runs / "toolings", known / "tip", known / "cross", known / "forces"):
+            folder.mkdir()
+        for path, tooling in zip(setup.toolings, toolings, strict=True):
+            shutil.copyfile(path, runs / "toolings" / f"{tooling.name}.toml")
+        write_text(runs / "campaign.toml", _campaign_text(setup, toolings))
+        rows = ["record,spindle_speed_rpm,tooth_angle_deg"]
+        for done, cut in enumerate(cuts, start=1):
+            _write_columns(known / "forces" / f"{cut.id}.csv", ("order",), np.arange(cut.force_lines.shape[0]), cut.force_lines)
+            for kind, record in cut.records.items():
+                write_hdf5(runs / "recordings" / f"{cut.id}_{kind}.h5", setup.sensors.rate, record.channels)
+                rows.append(f"{cut.id}_{kind},{to_rpm(record.spindle_speed):.9g},{np.degrees(record.tooth_angle):.9g}")
+            if progress is not None:
+                progress(done, total)
+        write_text(known / "records.csv", "\n".join(rows) + "\n")
+        mean = float(np.mean(setup.plan.spindle_speeds))
+        for true in receptances:
+            speed = None if true.spindle_speed == mean else true.spindle_speed
+            for place, values in (("tip", true.tip), ("cross", true.cross)):
+                names, columns = _directions(values[:, :, None, :, None])
+                _write_columns(known / place / true_name(true.tooling, speed), ("frequency_hz",), true.frequency_hz, columns, names)
+        names, columns = _directions(flange.values.reshape(-1, 2, 2, 2, 2), tuple(f"_{entry}" for entry in ("tF", "tM", "rF", "rM")))
+        _write_columns(known / "spindle.csv", ("frequency_hz",), flange.frequency_hz, columns, names)
     return SimulatedCampaign(out, truth, total)
 
 

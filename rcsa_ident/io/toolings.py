@@ -12,6 +12,7 @@ import numpy as np
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.io.files import write_text
 from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.tool_holder.catalogue import CatalogueHolder
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Material
 
 _CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
@@ -48,8 +49,16 @@ def tooling_keys(tooling: Tooling) -> dict[str, Any]:
     return data | ({"materials": {name: _material(material) for name, material in own.items()}} if own else {})
 
 
+def holder_keys(holder: CatalogueHolder) -> dict[str, Any]:
+    """Return a holder of the catalogue as `holder` of a tooling file, in millimetres."""
+    names = {material: name for name, material in MATERIALS.items()}
+    # metres and back leave a last digit that nobody wrote
+    rows = [{k: round(v, 6) if isinstance(v, float) else v for k, v in _segment(s, names).items()} for s in holder.segments]
+    return {"insertion_mm": round(1e3 * holder.insertion, 6), "segments": rows}
+
+
 def tooling_text(data: Mapping[str, Any], notes: Sequence[str] = ()) -> str:
-    """Return the text of a tooling file of its keys.
+    """Return the text of a tooling file of its keys, or of those parts of one that are there.
 
     Parameters
     ----------
@@ -58,7 +67,7 @@ def tooling_text(data: Mapping[str, Any], notes: Sequence[str] = ()) -> str:
         Remarks in front of it.
     """
     lines = [f"# {note}" for note in notes]
-    lines.append(f"name = {json.dumps(data['name'], ensure_ascii=False)}")
+    lines += [f"name = {json.dumps(data['name'], ensure_ascii=False)}"] if "name" in data else []
     for key in ("cutter", "tool", "holder", "contact"):
         if key not in data:
             continue

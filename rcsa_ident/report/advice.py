@@ -18,7 +18,7 @@ from rcsa_ident.units import to_cm3_per_min, to_rpm
 
 
 class Mark(NamedTuple):
-    """A cut to point at: speed [rad/s], depth [m], removal rate [m^3/s], what it is."""
+    """A cut to point at: speed [rad/s], depth [m], removal rate [m^3/s], what it is; without a limit both are infinite, and only told."""
 
     spindle_speed: float
     depth: float
@@ -62,9 +62,10 @@ def usable_figure(
         for group, marker, colour, name in ((marks, "v", _GREEN, "recommended"), (planned, "s", _RED, "planned")):
             for i, mark in enumerate(group):
                 x, y = to_rpm(mark.spindle_speed), 1e3 * mark.depth
-                top.plot(x, y, marker, color=colour, ms=7.0, zorder=5, label=name if i == 0 else None)
-                bottom.plot(x, to_cm3_per_min(mark.removal_rate), marker, color=colour, ms=6.0, zorder=5)
-                _beside(top, x, y, mark.text, colour, speed)
+                if mark.depth < np.inf:
+                    top.plot(x, y, marker, color=colour, ms=7.0, zorder=5, label=name if i == 0 else None)
+                    bottom.plot(x, to_cm3_per_min(mark.removal_rate), marker, color=colour, ms=6.0, zorder=5)
+                _beside(top, x, min(y, float(limit.max())), mark.text, colour, speed)
         top.set_ylim(0.0, ceiling)
         top.set_ylabel("axial depth [mm]")
         figure.legend(*top.get_legend_handles_labels(), loc="outside upper center", ncols=4, fontsize=9.0, frameon=False)
@@ -87,12 +88,15 @@ def advice_figure(answers: Sequence[Advice]) -> Figure:
             return stability_figure(answer.lobes, answer.recommended, usable=answer.usable)
         recommended, planned = ([_mark(cut) for cut in cuts] for cuts in (answer.recommended, answer.planned))
         return usable_figure(answer.usable, recommended, planned, answer.common)
-    best = {answer.tooling: _mark(answer.recommended[0]) for answer in answers if answer.recommended}
+    deep = {answer.tooling: [cut for cut in answer.recommended if cut.removal_rate is not None] for answer in answers}
+    best = {name: _mark(cuts[0]) for name, cuts in deep.items() if cuts}
     marks_ = {name: mark._replace(text=f"{to_cm3_per_min(mark.removal_rate):.0f} cm³/min") for name, mark in best.items()}
     return comparison_figure({answer.tooling: answer.usable for answer in answers}, marks_)
 
 
 def _mark(cut: OperatingPoint | PlannedCut) -> Mark:
+    if isinstance(cut, OperatingPoint) and cut.depth == np.inf:
+        return Mark(cut.spindle_speed, cut.depth, np.inf, f"{to_rpm(cut.spindle_speed):.0f} rev/min\nno limit up to {1e3 * cut.limit:g} mm")
     removal, power = cut.removal_rate or 0.0, cut.power or 0.0
     what = f"{to_rpm(cut.spindle_speed):.0f} rev/min, {1e3 * cut.depth:.2f} mm"
     return Mark(cut.spindle_speed, cut.depth, removal, f"{what}\n{to_cm3_per_min(removal):.0f} cm³/min, {1e-3 * power:.2g} kW")

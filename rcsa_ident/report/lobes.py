@@ -101,10 +101,11 @@ def stability_figure(
             top.plot(to_rpm(speed), 1e3 * depth, color=_GREEN, lw=1.1, label="recommended depth")
         for point in recommended:
             x, y = to_rpm(point.spindle_speed), 1e3 * point.depth
-            top.plot(x, y, "v", color=_GREEN, ms=8.0)
+            if point.depth < np.inf:
+                top.plot(x, y, "v", color=_GREEN, ms=8.0)
             # above the limit, where no line crosses it
             above = (x, min(1e3 * point.limit, 0.86 * ceiling))
-            text = f"{x:.0f} rev/min\n{y:.2f} mm"
+            text = f"{x:.0f} rev/min\n" + (f"{y:.2f} mm" if point.depth < np.inf else f"no limit up to {1e3 * point.limit:g} mm")
             top.annotate(text, above, xytext=(0, 6), textcoords="offset points", ha="center", fontsize=8.5, color=_GREEN)
         if tested is not None:
             _draw_tested(top, tested)

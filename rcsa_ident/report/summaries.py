@@ -252,8 +252,8 @@ def advice_summary(advice: Advice) -> dict[str, Any]:
     return {
         "tooling": advice.tooling,
         "stickout_mm": None if advice.stickout is None else advice.stickout * 1e3,
-        "lowest_limit_mm": float(advice.lobes.nominal.min()) * 1e3,
-        "common_stable_depth_mm": None if common is None else float(common.min()) * 1e3,
+        "lowest_limit_mm": finite(float(advice.lobes.limit_depth.min()), 1e3),
+        "common_stable_depth_mm": None if common is None else finite(float(common.min()), 1e3),
         "withheld": advice.lobes.withheld or None,
         "highest_removal": [_point(point, advice.lobes) for point in advice.recommended],
         "windows": [
@@ -261,7 +261,7 @@ def advice_summary(advice: Advice) -> dict[str, Any]:
                 "from_rpm": to_rpm(w.low, 6),
                 "to_rpm": to_rpm(w.high, 6),
                 "best_rpm": to_rpm(w.best, 6),
-                "allowed_mm": w.allowed * 1e3,
+                "allowed_mm": finite(w.allowed, 1e3),
             }
             for w in advice.windows
         ],
@@ -272,14 +272,14 @@ def advice_summary(advice: Advice) -> dict[str, Any]:
 def _recommended(point: OperatingPoint, lobes: StabilityLobes) -> dict[str, Any]:
     return {
         "spindle_speed_rpm": to_rpm(point.spindle_speed, 6),
-        "recommended_depth_mm": point.depth * 1e3,
+        "recommended_depth_mm": finite(point.depth, 1e3),
         "limit_depth_mm": None if point.limit >= lobes.max_depth else point.limit * 1e3,
     }
 
 
 def _point(point: OperatingPoint, lobes: StabilityLobes) -> dict[str, Any]:
     return _recommended(point, lobes) | {
-        "axial_depth_mm": point.depth * 1e3,
+        "axial_depth_mm": finite(point.depth, 1e3),
         "removal_rate_cm3_per_min": None if point.removal_rate is None else to_cm3_per_min(point.removal_rate),
         "power_kw": None if point.power is None else point.power * 1e-3,
         "torque_nm": point.torque,
@@ -293,7 +293,7 @@ def _planned(cut: PlannedCut) -> dict[str, Any]:
         "axial_depth_mm": cut.depth * 1e3,
         "stable": cut.stable,
         "limit_depth_mm": finite(cut.limit, 1e3),
-        "robust_limit_mm": cut.robust_limit * 1e3,
+        "robust_limit_mm": finite(cut.robust_limit, 1e3),
         "margin": finite(cut.margin),
         "chatter_frequency_hz": None if cut.chatter_frequency is None else to_hz(cut.chatter_frequency),
         "slower_rpm": None if cut.slower is None else to_rpm(cut.slower, 6),

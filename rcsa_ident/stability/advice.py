@@ -12,7 +12,7 @@ from rcsa_ident.cutting.power import SpindleDrive, spindle_load
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.shown import Drawn, Shown
-from rcsa_ident.stability.pockets import least_within_tolerance, peaks
+from rcsa_ident.stability.pockets import peaks
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally
 from rcsa_ident.units import to_cm3_per_min, to_rpm
@@ -39,14 +39,18 @@ class UsableDepths(Shown):
     limit : array, shape (n,) [m]
         The stability limit, up to the largest depth.
     stable : array, shape (n,) [m]
-        The recommended depth by stability alone: the limit less what is held back of it; NaN where the limits are no source of one.
+        The recommended depth by stability alone: the limit less what is held back of it; infinite beyond `deepest`, NaN where the limits
+        are no source of one.
     by_power, by_torque : array, shape (n,) [m]
-        By what the spindle has, up to the largest depth.
+        By what the spindle has; infinite beyond `deepest`.
     depth : array, shape (n,) [m]
-        The smallest of them; 0 beyond the spindle's highest speed, NaN where none is recommended.
+        The smallest of them; 0 beyond the spindle's highest speed, infinite where nothing limits the cut up to `deepest`, NaN where none
+        is recommended.
     bound : tuple of Bound, length n
     removal_rate : array, shape (n,) [m^3/s], or None
         At that depth; None without a feed.
+    deepest : float [m]
+        The largest depth less the reserve: limits were looked for no further, so no depth beyond it can be recommended.
     """
 
     spindle_speed: FloatArray
@@ -57,6 +61,7 @@ class UsableDepths(Shown):
     depth: FloatArray
     bound: tuple[Bound, ...]
     removal_rate: FloatArray | None
+    deepest: float
 
     def __post_init__(self) -> None:
         for name in self._arrays:
@@ -84,7 +89,8 @@ class UsableDepths(Shown):
         """Return what is known of a range of speeds [rad/s]."""
         inside = (self.spindle_speed >= low * (1.0 - 1e-9)) & (self.spindle_speed <= high * (1.0 + 1e-9))
         arrays = {"removal_rate": None} | {name: getattr(self, name)[inside] for name in self._arrays}
-        return UsableDepths(**arrays, bound=tuple(b for b, there in zip(self.bound, inside, strict=True) if there))
+        bound = tuple(b for b, there in zip(self.bound, inside, strict=True) if there)
+        return UsableDepths(**arrays, bound=bound, deepest=self.deepest)
 
     def __str__(self) -> str:
         if self.spindle_speed.size == 0:
@@ -92,7 +98,8 @@ class UsableDepths(Shown):
         speed, depth = to_rpm(self.spindle_speed), 1e3 * self.depth
         if np.isnan(depth).any():
             return f"{speed[0]:.0f} to {speed[-1]:.0f} rev/min: no depth is recommended"
-        return f"{speed[0]:.0f} to {speed[-1]:.0f} rev/min: recommended depth {depth.min():.2f} to {depth.max():.2f} mm"
+        low, high = ("none" if np.isinf(d) else f"{d:.2f} mm" for d in (depth.min(), depth.max()))
+        return f"{speed[0]:.0f} to {speed[-1]:.0f} rev/min: recommended depth " + (low if low == high else f"{low} to {high}")
 
 
 def usable_depths(
@@ -125,18 +132,18 @@ def usable_depths(
         torque, power = torque / load.torque, power / (load.torque * speed)
     elif np.any(np.isfinite(drive.torque) | np.isfinite(drive.power)):
         raise InputError("feed_per_tooth", "nothing", "the feed per tooth [m]: power and torque grow with it")
-    by_torque, by_power = np.minimum(torque, lobes.max_depth), np.minimum(power, lobes.max_depth)
+    by_torque, by_power = lobes.searched(torque, reserve), lobes.searched(power, reserve)
     table = np.stack([stable, by_power, by_torque])
     depth = table.min(axis=0)
     which = table.argmin(axis=0)
     names = (Bound.CHATTER, Bound.POWER, Bound.TORQUE)
-    whole = (1.0 - reserve) * lobes.max_depth * (1.0 - 1e-12)
     bound = [
-        Bound.SPEED if d == 0.0 else Bound.DEPTH if d >= whole else names[k] for d, k in zip(depth.tolist(), which.tolist(), strict=True)
+        Bound.SPEED if d == 0.0 else Bound.DEPTH if d == np.inf else names[k] for d, k in zip(depth.tolist(), which.tolist(), strict=True)
     ]
     if process.feed_per_tooth is not None:
         removal_rate = depth * load.removal_rate * speed
-    return UsableDepths(speed, lobes.nominal, stable, by_power, by_torque, depth, tuple(bound), removal_rate)
+    deepest = (1.0 - reserve) * lobes.max_depth
+    return UsableDepths(speed, lobes.nominal, stable, by_power, by_torque, depth, tuple(bound), removal_rate, deepest)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -147,12 +154,13 @@ class OperatingPoint(Shown):
     ----------
     spindle_speed : float [rad/s]
     depth : float [m]
+        Infinite where nothing limits the cut up to the depth that was searched: no depth is recommended.
     limit : float [m]
         The stability limit there, up to the largest depth.
     bound : Bound
         What stands against more depth.
     removal_rate : float or None [m^3/s]
-        None without a feed, as are power and torque.
+        None without a feed or a depth, as are power and torque.
     power : float or None [W]
     torque : float or None [N m]
     """
@@ -166,15 +174,22 @@ class OperatingPoint(Shown):
     torque: float | None
 
     def __str__(self) -> str:
+        if self.depth == np.inf:
+            return f"{to_rpm(self.spindle_speed):.0f} rev/min: {self.unlimited}"
         depths = f"stability limit {1e3 * self.limit:.2f} mm, recommended {1e3 * self.depth:.2f} mm"
         ended = "" if self.bound is Bound.CHATTER else f" (ended by {self.bound})"
         removed = "" if self.removal_rate is None else f", {to_cm3_per_min(self.removal_rate):.0f} cm³/min"
         taken = "" if self.power is None else f", {1e-3 * self.power:.2g} kW"
         return f"{to_rpm(self.spindle_speed):.0f} rev/min: {depths}{ended}{removed}{taken}"
 
+    @property
+    def unlimited(self) -> str:
+        """What is said in place of a depth where none is recommended."""
+        return f"nothing up to {1e3 * self.limit:g} mm limits the cut, so no depth is recommended"
+
 
 def highest_removal(usable: UsableDepths, process: MillingProcess, count: int = 3) -> list[OperatingPoint]:
-    """Return the cuts that remove most, one for each pocket, the best first."""
+    """Return the cuts that remove most, one for each pocket, the best first; before them, speeds where nothing limits the depth."""
     found: list[OperatingPoint] = []
     if np.isnan(usable.depth).any():
         return found
@@ -185,7 +200,7 @@ def highest_removal(usable: UsableDepths, process: MillingProcess, count: int = 
         at, depth, limit = (float(values[place]) for values in (usable.spindle_speed, usable.depth, usable.limit))
         if depth <= 0.0:
             continue
-        if process.feed_per_tooth is None:
+        if process.feed_per_tooth is None or depth == np.inf:
             found.append(OperatingPoint(at, depth, limit, usable.bound[place], None, None, None))
         else:
             load = spindle_load(process.cutter, process.conditions(at, depth), process.coefficients)
@@ -203,7 +218,7 @@ class SpeedWindow(Shown):
     best : float [rad/s]
         Where most is allowed; the middle where that is so at several.
     allowed : float [m]
-        What is allowed there.
+        What is allowed there; infinite where nothing limits the cut up to the depth that was searched.
     """
 
     low: float
@@ -217,22 +232,32 @@ class SpeedWindow(Shown):
         return (self.high - self.low) / (0.5 * (self.high + self.low))
 
     def __str__(self) -> str:
-        best = f"up to {1e3 * self.allowed:.2f} mm at {to_rpm(self.best):.0f} rev/min"
+        most = "with no limit in the depths asked for" if self.allowed == np.inf else f"up to {1e3 * self.allowed:.2f} mm"
+        best = f"{most} at {to_rpm(self.best):.0f} rev/min"
         return f"{to_rpm(self.low):.0f} to {to_rpm(self.high):.0f} rev/min, {best}"
 
 
 def speed_windows(usable: UsableDepths, depth: float) -> list[SpeedWindow]:
-    """Return the ranges of speed in which a depth is allowed, the one with the most reserve first; ends by straight lines."""
+    """Return the ranges of speed in which a depth is allowed, the one with the most reserve first; ends by straight lines.
+
+    Raises
+    ------
+    InputError
+        Of a depth beyond `usable.deepest` nothing is known.
+    """
     depth = positive("depth", depth, "m")
-    speed, allowed = usable.spindle_speed, usable.depth
+    if depth > usable.deepest * (1.0 + 1e-12):
+        raise InputError("depth", depth, f"at most {usable.deepest:g} m: limits were looked for no further")
+    # so deep is allowed at least; with an infinity there is no straight line
+    speed, allowed = usable.spindle_speed, np.minimum(usable.depth, usable.deepest)
     good = allowed >= depth
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
     found = []
     for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         low = _crossing(speed, allowed, first - 1, depth) if first > 0 else float(speed[0])
         high = _crossing(speed, allowed, end - 1, depth) if end < speed.size else float(speed[-1])
-        top = float(allowed[first:end].max())
-        best = first + np.flatnonzero(allowed[first:end] >= top * (1.0 - 1e-12))
+        top = float(usable.depth[first:end].max())
+        best = first + np.flatnonzero(usable.depth[first:end] >= top * (1.0 - 1e-12))
         found.append(SpeedWindow(low, high, 0.5 * float(speed[best[0]] + speed[best[-1]]), top))
     return sorted(found, key=lambda w: (-w.allowed, -w.width))
 
@@ -254,7 +279,7 @@ class PlannedCut(Shown):
     limit : float [m]
         Infinite where it is stable up to the depth that was asked for.
     robust_limit : float [m]
-        The lowest within the tolerance of the speed and with the probability that were asked for.
+        The lowest within the tolerance of the speed and with the probability that were asked for; infinite as `limit` is.
     chatter_frequency : float or None [rad/s]
         Of the vibration at the limit; None where it is stable up to the depth that was asked for.
     slower, faster : float or None [rad/s]
@@ -322,7 +347,7 @@ def planned_cut(
     power, torque = drive.power_at(speeds[place : place + 1])[0], drive.torque_at(speeds[place : place + 1])[0]
     with np.errstate(divide="ignore"):
         share = float(np.max(np.array([load.power, load.torque]) / np.array([power, torque])))
-    lowest = least_within_tolerance(speeds, lobes.limit_quantile(probability), tolerance)[place]
+    lowest = lobes.recommended_depth(tolerance, probability, reserve=0.0)[place]
     return PlannedCut(
         float(speeds[place]),
         depth,
@@ -375,8 +400,8 @@ class Advice(Drawn):
 
     @property
     def common(self) -> FloatArray | None:
-        """What is stable on all machines that were drawn, shape (n,) [m]; None where none were."""
-        return None if self.lobes.drawn is None else self.lobes.limit_quantile(1.0)
+        """What is stable on all machines that were drawn, shape (n,) [m], infinite beyond the largest depth; None where none were."""
+        return None if self.lobes.drawn is None else self.lobes.searched(self.lobes.limit_quantile(1.0))
 
     def __str__(self) -> str:
         none = self.lobes.withheld or "no cut is recommended"

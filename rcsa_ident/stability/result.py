@@ -30,7 +30,8 @@ class Pocket(Shown):
     limit_depth : float [m]
         The stability limit there; infinite where the cut is stable up to the depth that was asked for.
     recommended_depth : float [m]
-        The limit there less what a recommendation holds back; NaN where none is recommended.
+        The limit there less what a recommendation holds back; infinite where nothing limits the cut up to that depth, NaN where none is
+        recommended.
     """
 
     spindle_speed: float
@@ -43,7 +44,7 @@ class Pocket(Shown):
             if self.limit_depth == np.inf
             else f"stability limit {1e3 * self.limit_depth:.2f} mm"
         )
-        deep = "none recommended" if np.isnan(self.recommended_depth) else f"recommended {1e3 * self.recommended_depth:.2f} mm"
+        deep = f"recommended {1e3 * self.recommended_depth:.2f} mm" if np.isfinite(self.recommended_depth) else "no depth recommended"
         return f"{to_rpm(self.spindle_speed):.0f} rev/min: {limit}, {deep}"
 
 
@@ -153,6 +154,8 @@ class StabilityLobes(Drawn):
     def recommended_depth(self, tolerance: float = TOLERANCE, probability: float = PROBABILITY, reserve: float = RESERVE) -> FloatArray:
         """Return the depth that is recommended at each speed, shape (n,) [m]: the limit less what is held back of it; NaN if `withheld`.
 
+        Infinite where the limit lies beyond `max_depth`: how far one may go there was not looked for, and no depth follows from it.
+
         Parameters
         ----------
         tolerance : float
@@ -166,7 +169,12 @@ class StabilityLobes(Drawn):
             raise InputError("reserve", reserve, "a share from 0 to below 1")
         if self.withheld:
             return np.full(self.spindle_speed.shape, np.nan)
-        return (1.0 - reserve) * least_within_tolerance(self.spindle_speed, self.limit_quantile(probability), tolerance)
+        least = least_within_tolerance(self.spindle_speed, self.limit_quantile(probability), tolerance)
+        return self.searched((1.0 - reserve) * least, reserve)
+
+    def searched(self, depth: FloatArray, reserve: float = 0.0) -> FloatArray:
+        """Return depths with infinity in place of what is as deep as the search went, less a reserve: no limit was found there."""
+        return np.where(depth < (1.0 - reserve) * self.max_depth * (1.0 - 1e-12), depth, np.inf)
 
     def best_speeds(self, count: int = 3, recommended: FloatArray | None = None) -> list[Pocket]:
         """Return the speeds with the highest limits, one for each pocket of the lobes, the highest first.
@@ -180,9 +188,11 @@ class StabilityLobes(Drawn):
         """
         lobes = self.ordered()
         recommended = lobes.recommended_depth() if recommended is None else recommended
-        found = []
-        for speed, limit in peaks(lobes.spindle_speed, lobes.limit_depth, count):
-            found.append(Pocket(speed, limit, float(np.interp(speed, lobes.spindle_speed, recommended))))
+        found, speeds = [], lobes.spindle_speed
+        for speed, limit in peaks(speeds, lobes.limit_depth, count):
+            # a plateau's middle lies on a speed or between two, where an infinite depth cannot be interpolated
+            beside = np.searchsorted(speeds, speed, "right") - 1, np.searchsorted(speeds, speed)
+            found.append(Pocket(speed, limit, min(float(recommended[place]) for place in beside)))
         return found
 
     def ordered(self) -> StabilityLobes:

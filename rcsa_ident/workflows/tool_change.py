@@ -6,7 +6,7 @@ Command line, service, page, report and a script ask here, so that all of them s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -191,6 +191,9 @@ def advise(
         Cuts that were tried: how many do the limits tell right?
     """
     process = change.process
+    if depth is not None and 0.0 <= reserve < 1.0:
+        # twice as deep as tells whether this depth may be cut: straight lines to the limits beside it show where its windows end
+        change = replace(change, max_depth=max(change.max_depth, 2.0 * depth / (1.0 - reserve)))
     wide = _limits_beside(change, pad_speeds(change.speeds, tolerance, [speed for speed, _ in planned]))
     low, high = float(np.min(change.speeds)), float(np.max(change.speeds))
     usable = usable_depths(wide, process, drive, tolerance, probability, reserve).between(low, high)

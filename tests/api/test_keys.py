@@ -30,6 +30,8 @@ CALLS = [
     ("POST", "/toolings/drawing", example(), "read"),
     ("POST", "/toolings/import", {"data": []}, "upload"),
     ("GET", "/materials", None, "read"),
+    ("GET", "/holders", None, "read"),
+    ("GET", "/holders/taper/chuck", None, "read"),
     ("GET", "/examples", None, "read"),
     ("GET", "/examples/n", None, "read"),
     ("POST", "/forces", {"machine": "m", "tooling": "t", "campaign": "c", "recording": "n"}, "run"),
@@ -74,7 +76,7 @@ def test_every_call_is_in_the_list(http):
         for method in item
         if path.startswith("/v1")
     ]
-    patterns = {"m": "{id}", "k": "{id}", "c": "{id}", "j": "{id}", "t": "{name}", "n": "{name}"}
+    patterns = {"m": "{id}", "k": "{id}", "c": "{id}", "j": "{id}", "t": "{name}", "n": "{name}", "taper": "{taper}", "chuck": "{chuck}"}
     listed = [(m, "/".join(patterns.get(part, part) for part in p.split("/"))) for m, p, _, _ in CALLS]
     assert sorted(operations) == sorted(listed)
 

@@ -81,8 +81,9 @@ def test_examples_are_what_they_show(model):
         model.model_validate_json(json.dumps(shown))
 
 
+_HOLDER = {"taper": "HSK-A63", "chuck": "ER40"}
 #: Calls that take nothing, so that nothing about them can be wrong.
-NOTHING_TO_SAY = ("/health", "/ready", "/metrics", "/v1/keys", "/v1/forces/streams", "/v1/examples", "/v1/materials")
+NOTHING_TO_SAY = ("/health", "/ready", "/metrics", "/v1/keys", "/v1/forces/streams", "/v1/examples", "/v1/materials", "/v1/holders")
 
 
 @pytest.fixture
@@ -143,7 +144,7 @@ def jobs(http, store, folder, machine, campaign, result) -> dict[str, dict[str, 
     query = {"machine": machine, "toolings": [example()], "speeds": {"step_rpm": 2000}}
     lobes = http.post("/v1/lobes", json=query, headers={"Prefer": "respond-async"}).json()["id"]
     carried(store, folder)
-    return {"/v1/identifications": {"id": id, "campaign": campaign}, "/v1/lobes/": {"id": lobes}}
+    return {"/v1/identifications": {"id": id, "campaign": campaign}, "/v1/lobes/": {"id": lobes}, "/v1/holders/": _HOLDER}
 
 
 @pytest.mark.slow(45)

@@ -131,6 +131,22 @@ def test_materials_are_those_of_the_library(shop):
     assert all(each.source for each in listed)
 
 
+def test_a_holder_of_the_catalogue_makes_a_tooling(shop):
+    client, id = shop
+    listed = client.holders()
+    assert "HSK-A63" in listed.tapers
+    assert {"ER32", "shrink", "power"} <= {each.name for each in listed.chucks}
+    found = client.holder("HSK-A63", "ER32", 12.0)
+    assert found.holder.insertion_mm == 40.0
+    assert sum(s.length_mm for s in found.holder.segments) == 100.0
+    assert "ISO 12164-1" in found.sources[0]
+    assert client.holder("BT40", "ER32", 12.0, 70.0).mass_kg < found.mass_kg
+    tooling = example(holder=found.holder.model_dump(exclude_none=True))
+    assert client.lobes(id, tooling, speeds=SPEEDS).toolings[0].limit_depth_mm
+    assert refused(422, client.holder, "HSK-A63", "ER32", 25.0).errors[0].field == "bore_mm"
+    assert refused(422, client.holder, "HSK-A32", "ER32", 12.0).errors[0].field == "taper"
+
+
 @pytest.mark.parametrize("method", ["multi-frequency", "full-discretisation"])
 def test_slower_methods_answer_for_few_speeds(shop, method):
     client, id = shop

@@ -178,8 +178,11 @@ def test_lobes_leave_cells_empty_where_the_cut_is_stable(tmp_path, result_file, 
     assert [row["spindle_speed_rpm"] for row in rows] == ["4000.0", "8000.0", "12000.0", "16000.0", "20000.0"]
     assert {row[key] for row in rows for key in ("limit_depth_mm", "chatter_frequency_hz", "lobe")} == {""}
     (best,) = json.loads(answer.splitlines()[-1])["best_speeds"]
-    # 10 % are kept in reserve
-    assert best == {"spindle_speed_rpm": pytest.approx(12000.0), "limit_depth_mm": None, "recommended_depth_mm": pytest.approx(0.009)}
+    # how deep the search went recommends nothing
+    assert best == {"spindle_speed_rpm": pytest.approx(12000.0), "limit_depth_mm": None, "recommended_depth_mm": None}
+    said = run("lobes", result_file, tooling_file, "--out", out, "--max-depth-mm", 0.01, "--speed-step", 4000).stdout
+    assert "at 12000 rev/min nothing up to 0.01 mm limits the cut, so no depth is recommended" in said
+    assert "0.009" not in said.replace("0.01 mm", "")
 
 
 def test_one_axis_alone_is_rigid_in_the_other(tmp_path, tooling_file):

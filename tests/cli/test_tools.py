@@ -18,6 +18,7 @@ TOOLING = Path(__file__).resolve().parents[2] / "data" / "machines" / "toolings"
 app = typer.Typer()
 app.command("import-tools")(tools.import_tools)
 app.command("draw")(tools.draw)
+app.command("holders")(tools.holders)
 
 
 def run(*arguments, code=0):
@@ -111,3 +112,15 @@ def test_a_drawing_is_written(tmp_path):
     assert ElementTree.parse(out).getroot().tag == "{http://www.w3.org/2000/svg}svg"
     assert "written" in run("draw", TOOLING, "--out", out).stdout
     assert "no folder" in run("draw", TOOLING, "--out", tmp_path / "none" / "T.svg", code=2).output
+
+
+def test_a_holder_of_the_catalogue_is_printed_as_a_tooling_takes_it(tmp_path):
+    assert "HSK-A63" in run("holders").output
+    text = run("holders", "HSK-A63", "ER32", "--bore-mm", 12).output
+    assert text.startswith("# HSK-A63 ER32, bore 12 mm, 100 mm, 1.54 kg")
+    assert "[holder]" in text
+    head = TOOLING.read_text(encoding="utf-8").split("[holder]")[0]
+    (tmp_path / "made.toml").write_text(head + text, encoding="utf-8")
+    assert read_tooling(tmp_path / "made.toml").assembly.holder_length == pytest.approx(0.1)
+    assert "--bore-mm: found 25 mm" in run("holders", "HSK-A63", "ER32", "--bore-mm", 25, code=2).output
+    assert "--bore-mm" in run("holders", "HSK-A63", "ER32", code=2).output

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from rcsa_ident.cutting.materials import material, materials
@@ -35,6 +36,44 @@ def test_published_numbers():
     assert c.tangential * c.radial_ratio == pytest.approx(270.93e6, rel=1e-4)
     c = material("Steel St 52-3 (S355)").coefficients
     assert c.tangential * c.radial_ratio == pytest.approx(2289e6, rel=1e-3)
+
+
+#: Specific cutting force [MPa] at a feed per tooth [mm], as the materials' sources print it.
+FEED = np.array([0.1, 0.2, 0.3, 0.4, 0.6])
+SPECIFIC = {
+    "C45 (AISI 1045)": (2520, 2200, 2040, 1850, 1740),
+    "42CrMo4 (AISI 4140)": (2540, 2250, 2140, 2000, 1800),
+    "Stainless steel 304 and 316 (1.4301, 1.4401)": (2030, 1970, 1900, 1770, 1710),
+    "Grey cast iron EN-GJL-250 (GG25)": (1750, 1400, 1240, 1050, 970),
+}
+
+
+@pytest.mark.parametrize("name", SPECIFIC)
+def test_forces_over_feed_are_those_of_the_table(name):
+    found = material(name)
+    slope, edge = np.polyfit(FEED, FEED * SPECIFIC[name], 1)
+    assert found.coefficients.tangential == pytest.approx(slope * 1e6, rel=1e-3)
+    assert found.coefficients.tangential_edge == pytest.approx(edge * 1e3, rel=1e-3)
+    assert all(str(value) in found.source for value in SPECIFIC[name])
+    assert "typical" in found.notes
+
+
+@pytest.mark.parametrize(("rake", "tangential", "ratio"), [(12.0, 1510e6, 0.1421), (0.0, 1775e6, 0.3148)])
+def test_titanium_is_made_oblique_from_its_orthogonal_parameters(rake, tangential, ratio):
+    """[altintas2012]: chip flow angle equal to the helix, shear angle from the chip ratio."""
+    helix, alpha, chip = np.radians(30.0), np.radians(rake), (1.755 - 0.028 * rake) * 0.05 ** (0.331 - 0.0082 * rake)
+    shear = np.arctan(chip * np.cos(alpha) / (1.0 - chip * np.sin(alpha)))
+    friction = np.arctan(np.tan(np.radians(19.1 + 0.29 * rake)) * np.cos(helix))
+    flow = np.tan(helix) * np.sin(friction)
+    common = 613e6 / np.sin(shear) / np.hypot(np.cos(shear + friction - alpha), flow)
+    found = common * (np.cos(friction - alpha) + np.tan(helix) * flow)
+    assert found == pytest.approx(tangential, rel=1e-3)
+    assert common * np.sin(friction - alpha) / np.cos(helix) / found == pytest.approx(ratio, rel=1e-3)
+    axial = common * (np.cos(friction - alpha) * np.tan(helix) - flow)
+    if rake:
+        c = material("Titanium Ti-6Al-4V").coefficients
+        assert (c.tangential, c.radial_ratio, c.axial_ratio) == pytest.approx((found, ratio, axial / found), rel=1e-3)
+        assert (c.tangential_edge, c.radial_edge) == (24e3, 43e3)
 
 
 def test_one_alloy_scatters_by_a_factor_of_two():

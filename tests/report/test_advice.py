@@ -20,7 +20,7 @@ def depths(scale=1.0):
     power = 8e-3 * 400.0 / SPEED
     usable = np.minimum(0.9 * scale * LIMIT, power)
     bound = tuple(Bound.POWER if p == u else Bound.CHATTER for p, u in zip(power, usable, strict=True))
-    return UsableDepths(SPEED, scale * LIMIT, 0.9 * scale * LIMIT, power, np.full(81, 10e-3), usable, bound, usable * SPEED * 1e-6)
+    return UsableDepths(SPEED, scale * LIMIT, 0.9 * scale * LIMIT, power, np.full(81, 10e-3), usable, bound, usable * SPEED * 1e-6, 9e-3)
 
 
 def advice(name="T1", scale=1.0, fed=True):

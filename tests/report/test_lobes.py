@@ -84,9 +84,11 @@ def test_limit_and_recommended_depth_are_drawn_with_the_recommended_cuts():
     curve = labelled(figure.axes[0])["recommended depth"]
     np.testing.assert_allclose(curve.get_ydata(), 1e3 * LOBES.recommended_depth())
     assert "9549 rev/min\n1.20 mm" in {text.get_text() for text in figure.axes[0].texts}
+    free = stability_figure(LOBES, (OperatingPoint(1000.0, np.inf, 10e-3, Bound.DEPTH, None, None, None),)).axes[0]
+    assert "9549 rev/min\nno limit up to 10 mm" in {text.get_text() for text in free.texts}
     # what an advice knows better is drawn as it is
     stable = 0.5 * LIMIT
-    usable = UsableDepths(SPEED, LIMIT, stable, np.full(81, 1.0), np.full(81, 1.0), stable, (Bound.CHATTER,) * 81, None)
+    usable = UsableDepths(SPEED, LIMIT, stable, np.full(81, 1.0), np.full(81, 1.0), stable, (Bound.CHATTER,) * 81, None, 9e-3)
     curve = labelled(stability_figure(LOBES, (point,), usable=usable).axes[0])["recommended depth"]
     np.testing.assert_array_equal(curve.get_ydata(), 1e3 * stable)
 

@@ -32,13 +32,14 @@ def test_power_torque_and_chatter_each_have_their_range():
     found = usable(lobes(depth, deepest=8e-3), PROCESS, drive)
     load = spindle_load(PROCESS.cutter, PROCESS.conditions(1.0, 1.0), PROCESS.coefficients)
     np.testing.assert_allclose(found.by_torque[:6], 4.0 / load.torque)
-    np.testing.assert_allclose(found.by_power[:6], np.minimum(5e3 / (load.torque * found.spindle_speed[:6]), 8e-3))
+    np.testing.assert_allclose(found.by_power[:6], [np.inf, np.inf, np.inf, np.inf, np.inf, 5e3 / (load.torque * 1000.0)])
     assert found.depth[6] == 0.0
     # 5.8 mm by torque; power would end it earlier only beyond 1250 rad/s
     assert [str(b) for b in found.bound] == ["chatter", "torque", "torque", "torque", "chatter", "torque", "speed"]
     np.testing.assert_allclose(found.removal_rate, found.depth * 12e-3 * 4e-4 * found.spindle_speed / (2.0 * np.pi))
     np.testing.assert_array_equal(found.limit, np.minimum(depth, 8e-3))
-    assert usable(lobes(depth, deepest=3e-3)).bound[1] is Bound.DEPTH
+    shallow = usable(lobes(np.where(depth > 3e-3, np.inf, depth), deepest=3.5e-3))
+    assert (shallow.bound[1], shallow.depth[1], shallow.removal_rate[1]) == (Bound.DEPTH, np.inf, np.inf)
     weak = usable(lobes(depth), PROCESS, SpindleDrive.flat(power=2e3))
     assert weak.bound[5] is Bound.POWER
     best = highest_removal(found, PROCESS)
@@ -47,6 +48,26 @@ def test_power_torque_and_chatter_each_have_their_range():
     assert best[0].power == pytest.approx(4000.0)
     assert best[0].removal_rate == pytest.approx(found.removal_rate.max())
     assert best[0].limit == 8e-3
+
+
+def test_where_nothing_limits_the_cut_no_depth_is_recommended():
+    here = lobes(np.array([1.0, np.inf, np.inf, np.inf, 1.0, 3.0, 1.0]) * 1e-3, deepest=10e-3)
+    found = usable(here, reserve=0.1)
+    free, other = highest_removal(found, PROCESS)
+    assert (free.spindle_speed, free.depth, free.bound) == (700.0, np.inf, Bound.DEPTH)
+    assert (free.removal_rate, free.power, free.torque) == (None, None, None)
+    assert str(free) == "6685 rev/min: nothing up to 10 mm limits the cut, so no depth is recommended"
+    assert other.depth == pytest.approx(2.7e-3)
+    # what is as deep as the search went is not known to be allowed, what is less deep is
+    (window,) = speed_windows(found, 9e-3)
+    assert (window.allowed, window.best) == (np.inf, 700.0)
+    (wider,) = speed_windows(found, 5e-3)
+    assert (wider.low, wider.high) == (pytest.approx(500.0 + 100.0 * 4.1 / 8.1), pytest.approx(900.0 - 100.0 * 4.1 / 8.1))
+    with pytest.raises(InputError, match=r"0\.009"):
+        speed_windows(found, 9.1e-3)
+    # power that ends the depth within what was searched is a reason of its own
+    power = spindle_load(PROCESS.cutter, PROCESS.conditions(700.0, 5e-3), PROCESS.coefficients).power
+    assert usable(here, PROCESS, SpindleDrive.flat(power=power), reserve=0.1).depth[2] == pytest.approx(5e-3)
 
 
 def test_a_reserve_and_a_tolerance_come_off_the_stable_depth():

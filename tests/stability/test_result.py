@@ -29,8 +29,17 @@ def test_best_speeds_are_one_a_pocket():
 def test_the_middle_of_a_stable_range_comes_first_the_widest_before_others():
     found = lobes([1.0, np.inf, 1.0, np.inf, np.inf, np.inf, 1.0, 3.0, 2.0], deepest=10.0).best_speeds()
     assert pockets(found) == [(900.0, np.inf), (600.0, np.inf), (1200.0, 3.0)]
-    # up to the largest depth nothing else holds it back in the middle of the range
-    assert found[0].recommended_depth == pytest.approx((1.0 - RESERVE) * 10.0)
+    # how deep the search went says nothing of how deep one may cut
+    assert [pocket.recommended_depth for pocket in found[:2]] == [np.inf, pytest.approx((1.0 - RESERVE) * (10.0 - 9.0 * 0.06))]
+    assert "10.0" not in str(found[0])
+    assert "no depth recommended" in str(found[0])
+
+
+@pytest.mark.parametrize(("deepest", "recommended"), [(3.0, [np.inf, 1.8, np.inf]), (10.0, [5.4, 1.8, 6.3])])
+def test_the_largest_depth_recommends_nothing(deepest, recommended):
+    here = lobes([6.0, 2.0, 7.0], [500.0, 1000.0, 1500.0], deepest=10.0)
+    found = replace(here, limit_depth=np.where(here.limit_depth > deepest, np.inf, here.limit_depth), max_depth=deepest)
+    np.testing.assert_allclose(found.recommended_depth(0.0), recommended)
 
 
 def test_order_of_the_speeds_does_not_matter():

@@ -264,6 +264,36 @@ def test_the_shape_of_a_cutter_is_kept_and_said(opened, client: Client, shop: st
     client.forget_tooling("T1-ball")
 
 
+def test_a_longer_stickout_takes_the_tool_out_of_the_bore(opened):
+    """A tool of 100 mm, 40 mm of it clamped: it keeps its length, and a shank of 12 mm sits 12 mm deep at least."""
+    page = opened("#/toolings/new")
+    stickout, insertion = page.get_by_label("Stickout"), page.get_by_label("Insertion")
+    shank = page.locator('[data-field="tool.segments.1.length_mm"] input')
+    fault, image = page.locator('[data-field="tool.stickout_mm"] .fault'), page.locator("img.drawing")
+    for out, deep in (("75", "25"), ("88", "12"), ("70", "30"), ("50", "40")):
+        first = image.get_attribute("src")
+        stickout.fill(out)
+        expect(insertion).to_have_value(deep)
+        expect(image).not_to_have_attribute("src", first)
+        expect(fault).to_be_hidden()
+    assert shank.input_value() == "74"
+    longer = page.get_by_role("button", name="longer")
+    expect(longer).to_have_count(0)
+    stickout.fill("95")
+    expect(longer).to_contain_text("7.0")
+    assert "at most the tool's length" in fault_beside(page, "tool.stickout_mm")
+    assert shank.input_value() == "74"
+    longer.click()
+    expect(shank).to_have_value("81")
+    expect(insertion).to_have_value("12")
+    expect(longer).to_have_count(0)
+    expect(fault).to_be_hidden()
+    # what somebody wants otherwise counts from then on
+    insertion.fill("20")
+    stickout.fill("80")
+    expect(insertion).to_have_value("20")
+
+
 def test_names_of_others_are_text(opened, client: Client, served: Served, result: str):
     id = client.make_machine("Named by others", HOSTILE).id
     client.identify(id, result.replace("mode 1", HOSTILE))

@@ -380,6 +380,28 @@ def test_advice_is_about_the_limits_that_are_shown():
     np.testing.assert_array_equal(found.common, found.lobes.limit_quantile(1.0))
 
 
+def test_how_deep_limits_are_looked_for_recommends_nothing_and_hides_no_speed():
+    asked = ToolChange(by_hand.machine(), by_hand.tooling(), FED, np.linspace(600.0, 1500.0, 60), 50e-3, draws=0)
+    whole = advise(asked)
+    depth = 0.5 * float(np.max(whole.usable.depth))
+    wanted = advise(asked, depth=depth).windows
+    assert wanted
+    # this depth's reserve lies beyond what is asked for otherwise
+    shallow = advise(replace(asked, max_depth=depth), depth=depth, planned=[(1000.0, 0.1 * depth)])
+    assert len(shallow.windows) == len(wanted)
+    step = float(asked.speeds[1] - asked.speeds[0])
+    for found, known in zip(*(sorted(each, key=lambda w: w.low) for each in (shallow.windows, wanted)), strict=True):
+        # without a straight line to a limit that nobody has looked for a window ends at a speed that was asked
+        assert known.low * (1.0 - 1e-9) <= found.low <= known.low + step
+        assert known.high - step <= found.high <= known.high * (1.0 + 1e-9)
+    # nothing ends the cut where the search was shallower than the limit
+    tiny = 0.1 * float(whole.usable.depth.min())
+    free = advise(replace(asked, max_depth=tiny), planned=[(1000.0, 0.5 * tiny)])
+    assert np.all(np.isinf(free.usable.depth))
+    assert [point.depth for point in free.recommended] == [np.inf]
+    assert free.planned[0].robust_limit == np.inf
+
+
 def test_tested_cuts_are_asked_each_at_its_own_speed():
     asked = change(by_hand.machine(softening=True), np.linspace(700.0, 1300.0, 5), depth=1e-3, draws=0)
     speed = np.array([1111.0, 650.0, 977.0, 1111.0])

@@ -38,8 +38,8 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
       const deep = each.recommended_depth_mm[k];
       const rate = removal[i] && deep !== null ? ` · ${text("removal", removal[i] * rpm * deep)}` : "";
       const chatter = each.chatter_frequency_hz[k];
-      const held = deep === null ? "" : ` · recommended ${text("depth", deep)}`;
-      return `${limit}${held}${rate}${chatter === null ? "" : ` · ${plain(chatter)} Hz`}`;
+      const advised = deep === null ? "no depth recommended" : `recommended ${text("depth", deep)}`;
+      return `${limit} · ${advised}${rate}${chatter === null ? "" : ` · ${plain(chatter)} Hz`}`;
     });
     data.push({
       x,
@@ -73,7 +73,7 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
       hoverinfo: "skip",
     });
     const cut = recommended[i];
-    if (cut) {
+    if (cut && cut.recommended_depth_mm !== null) {
       data.push({
         x: [cut.spindle_speed_rpm],
         y: [cut.recommended_depth_mm * times],

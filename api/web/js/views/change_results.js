@@ -81,7 +81,7 @@ function lobesCard(found, removal, question, tested, ontested) {
               low !== undefined && low !== null && high
                 ? [" (95 %: ", q("depth", low, { bare: true }), " to ", q("depth", high), ")"]
                 : null,
-              deep === null ? null : [", recommended depth ", q("depth", deep)],
+              deep === null ? ", no depth recommended" : [", recommended depth ", q("depth", deep)],
               removal[i] && deep !== null ? [" · ", q("removal", removal[i] * lobes.spindle_speed_rpm[k] * deep)] : null,
               chatter === null ? null : ` · beyond the limit chatter at ${plain(chatter)} Hz`,
               lobes.flip[k] ? " · period doubling" : null,

@@ -34,14 +34,17 @@ export function headline(found, question) {
         "p",
         { class: "set" },
         h("span", { class: "figure" }, h("output", null, plain(best.spindle_speed_rpm)), h("span", { class: "of" }, " rev/min")),
-        h("span", { class: "figure" }, h("span", { class: "of" }, "recommended depth "), q("depth", best.recommended_depth_mm)),
+        best.recommended_depth_mm === null
+          ? null
+          : h("span", { class: "figure" }, h("span", { class: "of" }, "recommended depth "), q("depth", best.recommended_depth_mm)),
       ),
+      best.recommended_depth_mm === null ? unlimited(question) : null,
       h(
         "p",
         null,
         "stability limit ",
         limitOf(best, question),
-        best.bound === undefined
+        best.bound === undefined || best.recommended_depth_mm === null
           ? null
           : [
               " · ",
@@ -60,8 +63,8 @@ export function headline(found, question) {
             "Or ",
             further.map((cut, k) => [
               k ? " and " : "",
-              `${plain(cut.spindle_speed_rpm)}\u00a0rev/min at `,
-              q("depth", cut.recommended_depth_mm),
+              `${plain(cut.spindle_speed_rpm)}\u00a0rev/min`,
+              cut.recommended_depth_mm === null ? null : [" at ", q("depth", cut.recommended_depth_mm)],
               " (limit ",
               limitOf(cut, question),
               ")",
@@ -78,6 +81,16 @@ export function headline(found, question) {
 /** The stability limit of a cut or a speed; null is none up to the depth that was asked for. */
 export const limitOf = (cut, question, options) =>
   cut.limit_depth_mm === null ? ["above ", q("depth", question.max_depth_mm, options)] : q("depth", cut.limit_depth_mm, options);
+
+/** What is said in place of a depth: how deep limits were looked for tells nothing of how deep one may cut. */
+const unlimited = (question) =>
+  h(
+    "p",
+    { class: "unlimited" },
+    "Nothing up to ",
+    q("depth", question.max_depth_mm),
+    " limits this cut, so no depth is recommended. Ask for a deeper cut to see where its limit lies.",
+  );
 
 /** How sure the recommendation is, and what it stays away from. */
 export function reserve(lobes, question, pocket = null) {
@@ -96,5 +109,4 @@ const bounds = (bound) =>
     power: "the spindle's power stands against more",
     torque: "the spindle's torque stands against more",
     speed: "the highest speed",
-    depth: "the deepest cut that was asked for",
   })[bound] ?? bound;

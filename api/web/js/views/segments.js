@@ -10,7 +10,7 @@ const COLUMNS = [
 ];
 const MATERIALS = ["carbide", "steel", "aluminium"];
 
-/** The table, and `rows()`: the segments as the service wants them. */
+/** The table, `rows()`: the segments as the service wants them, and `lengthen()`. */
 export function segmentsTable(caption, name, segments, onchange) {
   const body = h("tbody");
   const known = [...new Set([...MATERIALS, ...segments.map((s) => s.material)])];
@@ -130,5 +130,10 @@ export function segmentsTable(caption, name, segments, onchange) {
       body,
     ),
   );
-  return { box, rows: () => [...body.children].map(values) };
+  /** Make the last segment longer by so many millimetres. */
+  function lengthen(by) {
+    body.lastElementChild.inputs.length_mm.base += by;
+    onchange();
+  }
+  return { box, rows: () => [...body.children].map(values), lengthen };
 }

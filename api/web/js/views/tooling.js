@@ -5,6 +5,7 @@ import { drawn, picture } from "../drawing.js";
 import { busy, clearFaults, confirmed, failed, field, quantity, select, showProblem } from "../forms.js";
 import { go, to } from "../router.js";
 import { machine } from "../state.js";
+import { q, text } from "../units.js";
 import { segmentsTable } from "./segments.js";
 
 const START = {
@@ -42,6 +43,8 @@ const SHAPES = [
   ["dovetail", "dovetail"],
   ["profile", "outline of its own"],
 ];
+// of the tool inside the bore, in diameters of its shank: below it no clamping holds; as where the library asks for stickouts
+const LEAST_INSERTION = 1;
 const CONTACT = [
   ["translational_stiffness", "Translational stiffness", "N/m per m"],
   ["rotational_stiffness", "Rotational stiffness", "N m/rad per m"],
@@ -82,6 +85,42 @@ export async function view({ name = "" }, query, place) {
     quantity(label, "none", keys.contact?.[key] ?? null, { name: `contact.${key}`, hint: unit }),
   ]);
 
+  // how deep the tool shall sit where it is long enough
+  let deep = insertion.input.base;
+  const offer = h("div", { role: "status" });
+  insertion.input.addEventListener("input", () => (deep = insertion.input.base));
+  stickout.input.addEventListener("input", reclamp);
+  /** A tool keeps its length: further out it sits less deep, and only a person makes it longer. */
+  function reclamp() {
+    offer.replaceChildren();
+    const pieces = tool.rows();
+    const last = pieces[pieces.length - 1];
+    const length = pieces.reduce((sum, each) => sum + each.length_mm, 0);
+    const out = stickout.input.base;
+    const least = Math.min(deep, LEAST_INSERTION * (last.end_diameter_mm ?? last.outer_diameter_mm));
+    if (![length, out, least].every(Number.isFinite) || out === null || out <= 0) return;
+    insertion.input.base = Math.max(least, Math.min(deep, Number((length - out).toFixed(6))));
+    const short = Number((out + least - length).toFixed(6));
+    if (short <= 0) return;
+    const longer = () => {
+      tool.lengthen(short);
+      reclamp();
+    };
+    add(
+      offer,
+      h(
+        "p",
+        { class: "note doubt" },
+        "The tool is ",
+        q("length", length, { digits: 1 }),
+        " long, and no less than ",
+        q("length", least, { digits: 1 }),
+        " of it hold in the bore. ",
+        h("button", { type: "button", class: "quiet", onclick: longer }, `Make the tool ${text("length", short, { digits: 1 })} longer`),
+      ),
+    );
+  }
+
   const image = picture("The tooling, to scale");
   const doubt = h("div", { class: "fault", role: "status" });
   const store = h("button", { class: "primary" }, name ? "Save" : "Put into the library");
@@ -105,6 +144,7 @@ export async function view({ name = "" }, query, place) {
         stickout,
         insertion,
       ),
+      offer,
     ),
     card("Tool", null, tool.box),
     card("Holder", null, holder.box),

@@ -1,0 +1,32 @@
+"""The catalogue of holders."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from api.schemas.common import Answer
+from api.schemas.toolings import HolderKeys
+
+
+class ChuckAnswer(Answer):
+    """A kind of chuck and the shanks that it takes."""
+
+    name: str
+    least_bore_mm: float
+    largest_bore_mm: float
+
+
+class Holders(Answer):
+    """What the catalogue holds: every chuck with every taper."""
+
+    tapers: list[str]
+    chucks: list[ChuckAnswer]
+
+
+class CatalogueAnswer(Answer):
+    """A holder of the catalogue."""
+
+    name: str
+    mass_kg: float = Field(description="With collet and nut, without the taper behind the spindle's face.")
+    sources: list[str] = Field(description="Of the dimensions; what is typical is called so.")
+    holder: HolderKeys

@@ -1,0 +1,163 @@
+"""Holders generated from a few dimensions: a taper's flange, a chuck's body, each with its source."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from rcsa_ident.errors import InputError, positive
+from rcsa_ident.shown import Shown
+from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment
+
+#: Least length of a chuck's body in front of the flange [m].
+_LEAST_BODY = 5e-3
+#: Nobody makes a chuck whose nose is wider than so many diameters of the taper's flange.
+_WIDEST = 1.4
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class CatalogueHolder(Shown):
+    """A holder as its dimensions make it, without the taper behind the spindle's face.
+
+    Parameters
+    ----------
+    taper, chuck : str
+    segments : tuple of BeamSegment
+        From the nose to the spindle's face (HSK) or the gauge line (BT, CAT); of steel.
+    insertion : float [m]
+        How deep its bore clamps.
+    sources : tuple of str
+        Where the taper's dimensions and the chuck's come from, or that they are typical.
+    """
+
+    taper: str
+    chuck: str
+    segments: tuple[BeamSegment, ...]
+    insertion: float
+    sources: tuple[str, ...]
+
+    @property
+    def length(self) -> float:
+        """Length from the nose to the spindle's face or the gauge line [m]."""
+        return sum(s.length for s in self.segments)
+
+    @property
+    def mass(self) -> float:
+        """Mass of the segments [kg]: with collet and nut, without the taper and the tool."""
+        return sum(_mass(s) for s in self.segments)
+
+    def __str__(self) -> str:
+        return f"{self.taper} {self.chuck}, bore {1e3 * self.segments[0].inner_diameter:g} mm, {1e3 * self.length:g} mm, {self.mass:.2f} kg"
+
+
+def tapers() -> tuple[str, ...]:
+    """Return the names of the tapers."""
+    return tuple(_data()["tapers"])
+
+
+def chucks() -> tuple[str, ...]:
+    """Return the names of the chucks."""
+    return tuple(_data()["chucks"])
+
+
+def bores(chuck: str, taper: str | None = None) -> tuple[float, float]:
+    """Return the least and the largest bore of a chuck [m], of all its sizes or of those that a taper carries."""
+    found = _entry("chucks", "chuck", chuck)
+    sizes = found["sizes"]
+    if taper is not None:
+        flange = _entry("tapers", "taper", taper)["flange_diameter"]
+        sizes = [size for size in sizes if size[1] <= _WIDEST * flange]
+        if not sizes:
+            raise InputError("chuck", chuck, f"one that {taper} carries, with a nose of at most {_WIDEST * flange:g} mm")
+    return 1e-3 * found["least_bore"], 1e-3 * sizes[-1][0]
+
+
+def holder(taper: str, chuck: str, bore: float, length: float | None = None) -> CatalogueHolder:
+    """Return a holder of the catalogue for a shank.
+
+    Parameters
+    ----------
+    taper : str
+        One of `tapers()`, as ``HSK-A63``.
+    chuck : str
+        One of `chucks()`, as ``ER32``.
+    bore : float [m]
+        Diameter of the tool's shank; the smallest size that takes it is chosen.
+    length : float or None [m]
+        From the nose to the spindle's face or the gauge line, which a drawing calls A; by default a typical one.
+
+    Raises
+    ------
+    InputError
+        Of a name that is not there, a shank that the chuck does not take, or a length that leaves no room for the chuck.
+
+    Examples
+    --------
+    >>> print(holder("HSK-A63", "ER32", 0.012))
+    HSK-A63 ER32, bore 12 mm, 100 mm, 1.54 kg
+    """
+    flange, body = _entry("tapers", "taper", taper), _entry("chucks", "chuck", chuck)
+    least, most = bores(chuck, taper)
+    bore = positive("bore", bore, "m")
+    if not least - 1e-9 <= bore <= most + 1e-9:
+        raise InputError("bore", f"{1e3 * bore:g} mm", f"from {1e3 * least:g} to {1e3 * most:g} mm for {taper} {chuck}")
+    _, nose, behind, clamped = (1e-3 * v for v in next(size for size in body["sizes"] if 1e-3 * size[0] >= bore - 1e-9))
+    length = 1e-3 * body["length"] if length is None else positive("holder length", length, "m")
+    collar = 1e-3 * flange["flange_length"]
+    shortest = max(collar + _LEAST_BODY, clamped)
+    if length < shortest:
+        raise InputError("holder length", f"{1e3 * length:g} mm", f"at least {1e3 * shortest:g} mm for {taper} {chuck}")
+    behind = max(nose, min(behind, 1e-3 * flange["flange_diameter"]))
+    outer = _body(nose, behind, length - collar, body.get("slope_deg"))
+    outer.append(BeamSegment(collar, 1e-3 * flange["flange_diameter"], MATERIALS["steel"]))
+    rear = body["rear"] * bore if body["rear"] < 1.0 else min(1e-3 * body["rear"], 0.8 * nose)
+    segments = tuple(_bored(outer, clamped, bore, rear))
+    return CatalogueHolder(taper, chuck, segments, clamped, (f"{taper}: {flange['source']}", f"{chuck}: {body['source']}"))
+
+
+@cache
+def _data() -> dict[str, dict[str, Any]]:
+    return tomllib.loads(files("rcsa_ident.tool_holder").joinpath("holders.toml").read_text(encoding="utf-8"))
+
+
+def _entry(table: str, field: str, name: str) -> dict[str, Any]:
+    known = _data()[table]
+    if name not in known:
+        raise InputError(field, name, f"one of {', '.join(known)}")
+    found: dict[str, Any] = known[name]
+    return found
+
+
+def _body(nose: float, behind: float, length: float, slope_deg: float | None) -> list[BeamSegment]:
+    """The chuck in front of the flange: a cylinder, one of two diameters with the step in the middle, or a cone and what follows it."""
+    steel = MATERIALS["steel"]
+    if behind == nose:
+        return [BeamSegment(length, nose, steel)]
+    if slope_deg is None:
+        return [BeamSegment(0.5 * length, nose, steel), BeamSegment(0.5 * length, behind, steel)]
+    cone = 0.5 * (behind - nose) / math.tan(math.radians(slope_deg))
+    whole = BeamSegment(cone, nose, steel, end_diameter=behind)
+    return [whole.part(0.0, length)] if cone >= length else [whole, BeamSegment(length - cone, behind, steel)]
+
+
+def _bored(outer: list[BeamSegment], clamped: float, bore: float, rear: float) -> list[BeamSegment]:
+    """The same with its bore: the shank's as deep as it clamps, another one behind."""
+    found, start = [], 0.0
+    for segment in outer:
+        inside = min(max(clamped - start, 0.0), segment.length)
+        if inside > 1e-9:
+            found.append(replace(segment.part(0.0, inside), inner_diameter=bore))
+        if segment.length - inside > 1e-9:
+            found.append(replace(segment.part(inside, segment.length), inner_diameter=rear))
+        start += segment.length
+    return found
+
+
+def _mass(segment: BeamSegment) -> float:
+    """Of a hollow cone [kg]."""
+    a, b = segment.diameter, segment.end
+    return segment.material.density * math.pi / 4.0 * segment.length * ((a * a + a * b + b * b) / 3.0 - segment.inner_diameter**2)
