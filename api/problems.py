@@ -24,6 +24,9 @@ _FIELDS = {
     "runout": "cut.runout_um",
     "tangential coefficient": "cut.ktc_mpa",
     "radial ratio": "cut.krc",
+    "radial_ratio": "cut.krc",
+    "tangential_edge": "cut.kte_n_per_mm",
+    "radial_edge": "cut.kre_n_per_mm",
     "feed_per_tooth": "cut.feed_per_tooth_mm",
 }
 _TITLES = {413: "Content too large", 422: "Input not usable"}

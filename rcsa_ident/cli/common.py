@@ -33,10 +33,13 @@ _OPTIONS = {
     "frf": ("frf", "X=FILE, Y=FILE, XY=FILE for a response in X and a force in Y; FILE#3 is record 3 of the file"),
     "frf_units": ("frf_units", ""),
     "stickout": ("stickout_mm", ""),
-    "tangential coefficient": ("ktc_mpa", "in MPa"),
+    "tangential coefficient": ("ktc_mpa", ""),
     "radial ratio": ("krc", ""),
+    "radial_ratio": ("krc", ""),
+    "tangential_edge": ("kte_n_per_mm", ""),
+    "radial_edge": ("kre_n_per_mm", ""),
     "runout": ("runout_um", "in um"),
-    "feed_per_tooth": ("feed_per_tooth_mm", "in mm"),
+    "feed_per_tooth": ("feed_per_tooth_mm", ""),
 }
 
 Command = TypeVar("Command", bound=Callable[..., Any])

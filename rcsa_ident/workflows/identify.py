@@ -94,8 +94,9 @@ def identify(
 
 
 def of_campaign(found: Identification, campaign: Campaign) -> Identification:
-    """Return the identification with what its machine has to know of the campaign: name, workpiece and sensors."""
-    return replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors)
+    """Return the identification with what its machine has to know of the campaign, and what is unusual about that."""
+    notes = tuple(dict.fromkeys((*found.notes, *campaign.remarks)))
+    return replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors, notes=notes)
 
 
 def mode_deviations(found: Identification) -> dict[Dof, tuple[FloatArray, FloatArray]]:
