@@ -58,8 +58,13 @@ def non_negative(field: str, value: float, unit: str = "") -> float:
     return _within(field, value, unit, "0 or more", lambda v: v >= 0.0)
 
 
+def finite(field: str, value: float, unit: str = "") -> float:
+    """Return `value` as a float if it is a finite number, else raise `InputError`."""
+    return _within(field, value, unit, "", lambda v: True)
+
+
 def _within(field, value, unit, words, test) -> float:  # type: ignore[no-untyped-def]
-    allowed = f"a finite number {words}" + (f" [{unit}]" if unit else "")
+    allowed = f"a finite number {words}".rstrip() + (f" [{unit}]" if unit else "")
     if isinstance(value, bool):
         raise InputError(field, value, allowed)
     try:

@@ -14,20 +14,36 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.materials import material
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
 from rcsa_ident.errors import InputError
+from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, IMMERSION, SPINDLE_SPEED, remarks_of
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Saved, Shown
 from rcsa_ident.signals.recording import Sensor
 from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.tool_holder.proportions import proportions
 from rcsa_ident.units import to_rpm
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Tooling(Saved):
-    """A cutter, with the tool and holder that carry it."""
+    """A cutter, with the tool and holder that carry it.
+
+    Raises
+    ------
+    InputError
+        If something about them is impossible, each taken for itself or all together.
+    """
 
     name: str
     cutter: Cutter
     assembly: ToolAssembly
+
+    def __post_init__(self) -> None:
+        proportions(self.assembly, self.cutter)
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What is unusual about it, as a wrong unit would make it."""
+        return proportions(self.assembly, self.cutter)
 
     def __str__(self) -> str:
         return f"{self.name}: {self.cutter}, {self.assembly}"
@@ -144,6 +160,21 @@ class Cut(Shown):
     recording: Path
     air: Path | None = None
 
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What is unusual about it, as a wrong unit would make it."""
+        c = self.conditions
+        return tuple(
+            remarks_of(
+                (
+                    ("spindle_speed_rpm", SPINDLE_SPEED, c.spindle_speed),
+                    ("axial_depth_mm", AXIAL_DEPTH, c.axial_depth),
+                    ("feed_per_tooth_mm", FEED_PER_TOOTH, c.feed_per_tooth),
+                    ("radial immersion", IMMERSION, c.engagement.immersion),
+                )
+            )
+        )
+
     def __str__(self) -> str:
         return f"{self.id}: {self.tooling}, {self.conditions}{'' if self.air else ', no air cut'}"
 
@@ -172,6 +203,19 @@ class Campaign(Shown):
             depths = [cut.conditions.axial_depth for cut in self.cuts if cut.tooling == name and cut.id in used]
             if depths:
                 found += [remark.of(name) for remark in tooling.cutter.cylinder_remarks(min(depths), forces=True)]
+        return tuple(found)
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What is unusual about its toolings, its workpiece and its cuts; of cuts that share a remark it names the first."""
+        found = [remark.of(name) for name, tooling in self.toolings.items() for remark in tooling.remarks]
+        found += [remark.of(self.workpiece.name) for remark in self.workpiece.coefficients.remarks]
+        cuts: dict[Remark, list[str]] = {}
+        for cut in self.cuts:
+            for remark in cut.remarks:
+                cuts.setdefault(remark, []).append(cut.id)
+        for remark, names in cuts.items():
+            found.append(remark.of(names[0] + (f" and {len(names) - 1} more" if len(names) > 1 else "")))
         return tuple(found)
 
     def __str__(self) -> str:

@@ -76,12 +76,12 @@ class Cut(Body):
     entry_deg: Annotated[Angle | None, Field(description="With exit_deg in place of immersion.")] = None
     exit_deg: Angle | None = None
     feed_direction: Annotated[Literal["+X", "-X", "+Y", "-Y"] | Turn, Field(description="Or degrees from +X.")] = "+X"
-    feed_per_tooth_mm: Annotated[float, Field(gt=0.0, le=10.0)] | None = None
+    feed_per_tooth_mm: float | None = None
     material: Annotated[Line | None, Field(description="Of the library of materials.")] = None
-    ktc_mpa: Annotated[float, Field(ge=1.0, le=50_000.0)] | None = None
-    krc: Annotated[float, Field(ge=-1.0, le=5.0)] | None = None
-    kte_n_per_mm: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
-    kre_n_per_mm: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    ktc_mpa: float | None = None
+    krc: float | None = None
+    kte_n_per_mm: float | None = None
+    kre_n_per_mm: float | None = None
     runout_um: Annotated[list[Micrometre] | None, Field(max_length=100, description="Radial offset of each edge.")] = None
     wear_land_um: Annotated[Land | None, Field(description="Process damping, with indentation.")] = None
     indentation: Annotated[Pressure | None, Field(description="[N/m^3], 1e14 for aluminium.")] = None

@@ -115,6 +115,6 @@ def _planned(
         "delay_samples": round(float(delay), 3),
         "std_n": {axis: float(deviation[-1, axes.index(axis)]) for axis in question.axes},
         "first": first,
-        "notes": [*known.remarks, *found.notes],
+        "notes": [*tool.remarks, *known.remarks, *found.notes],
     }
     return pickle.dumps(plan), ready

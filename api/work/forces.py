@@ -117,7 +117,7 @@ def forces(machine: MachineText, tooling: ToolingSource, question: ForceQuestion
         "spindle_speed_rpm": to_rpm(found.spindle_speed),
         "sampling_rate_hz": cut.rate,
         "band_hz": [to_hz(w) for w in found.band],
-        "notes": [*known.remarks, *found.notes],
+        "notes": [*tool.remarks, *known.remarks, *found.notes],
         "axes": axes,
         "time_s": (begin * estimate.step).tolist(),
         "harmonics": lines,

@@ -35,10 +35,13 @@ _OPTIONS = {
     "stickout": ("stickout_mm", ""),
     "bore": ("bore_mm", ""),
     "holder length": ("length_mm", ""),
-    "tangential coefficient": ("ktc_mpa", "in MPa"),
+    "tangential coefficient": ("ktc_mpa", ""),
     "radial ratio": ("krc", ""),
+    "radial_ratio": ("krc", ""),
+    "tangential_edge": ("kte_n_per_mm", ""),
+    "radial_edge": ("kre_n_per_mm", ""),
     "runout": ("runout_um", "in um"),
-    "feed_per_tooth": ("feed_per_tooth_mm", "in mm"),
+    "feed_per_tooth": ("feed_per_tooth_mm", ""),
 }
 
 Command = TypeVar("Command", bound=Callable[..., Any])

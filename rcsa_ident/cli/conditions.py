@@ -112,17 +112,16 @@ def share_of(percent: float, option: str, most: float, above: bool = False) -> f
 
 def cut_of(cut: CutOptions, speed_variation: str | None = None) -> CutSpec:
     """Return the cut that is asked about."""
-    from rcsa_ident.errors import positive
     from rcsa_ident.machining_setup import CutSpec
 
-    given = {} if cut.ktc_mpa is None else {"tangential": positive("--ktc-mpa", cut.ktc_mpa, "MPa") * 1e6}
+    given = {} if cut.ktc_mpa is None else {"tangential": cut.ktc_mpa * 1e6}
     given |= {} if cut.krc is None else {"radial_ratio": cut.krc}
     given |= {} if cut.kte_n_per_mm is None else {"tangential_edge": cut.kte_n_per_mm * 1e3}
     given |= {} if cut.kre_n_per_mm is None else {"radial_edge": cut.kre_n_per_mm * 1e3}
     return CutSpec(
         engagement(cut.immersion, cut.strategy, cut.entry_deg, cut.exit_deg),
         feed_angle(cut.feed_direction),
-        None if cut.feed_per_tooth_mm is None else positive("--feed-per-tooth-mm", cut.feed_per_tooth_mm, "mm") * 1e-3,
+        None if cut.feed_per_tooth_mm is None else cut.feed_per_tooth_mm * 1e-3,
         cut.material,
         given,
         None if cut.runout_um is None else tuple(offset * 1e-6 for offset in numbers(cut.runout_um, "--runout-um", "um")),
@@ -164,15 +163,27 @@ def numbers(text: str, option: str, unit: str) -> list[float]:
     return found
 
 
-def engagement(immersion: float, strategy: Strategy, entry_deg: float | None, exit_deg: float | None) -> Engagement:
+def engagement(immersion: str, strategy: Strategy, entry_deg: float | None, exit_deg: float | None) -> Engagement:
     """Return the engagement from both angles, or from immersion and strategy."""
     from rcsa_ident.cutting.conditions import Engagement
 
     if (entry_deg is None) != (exit_deg is None):
         raise InputError("--entry-deg and --exit-deg", "one of them", "both, or neither")
     if entry_deg is None or exit_deg is None:
-        return Engagement.from_immersion(immersion, str(strategy))
+        return Engagement.from_immersion(immersion_of(immersion), str(strategy))
     return Engagement(math.radians(entry_deg), math.radians(exit_deg))
+
+
+def immersion_of(text: str) -> float:
+    """Return the radial immersion [-] that an option says as a share or in percent."""
+    number, percent = text.strip().removesuffix("%"), text.strip().endswith("%")
+    try:
+        share = float(number) / (100.0 if percent else 1.0)
+    except ValueError:
+        share = math.nan
+    if not 0.0 < share <= 1.0:
+        raise InputError("--immersion", text, "radial depth over diameter, above 0 and not above 1, or in percent: 0.5 or 50%")
+    return share
 
 
 def feed_angle(text: str) -> float:

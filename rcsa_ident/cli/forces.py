@@ -77,7 +77,7 @@ def forces(
     ] = None,
     axial_depth_mm: Annotated[float | None, typer.Option(help="Axial depth, mm, for --wear.", show_default=False)] = None,
     feed_mm: Annotated[float | None, typer.Option(help="Feed per tooth, mm, for --wear.", show_default=False)] = None,
-    immersion: Annotated[float, typer.Option(help="Radial depth over diameter, for --wear.")] = 0.5,
+    immersion: Annotated[str, typer.Option(help="Radial depth over diameter, as 0.5 or 50%, for --wear.")] = "0.5",
     strategy: Annotated[Strategy, typer.Option(help="Up or down milling, for --wear.")] = Strategy.down,
     feed_direction: Annotated[str, typer.Option(help="+X -X +Y -Y, or degrees from +X, for --wear.")] = "+X",
     json_: Json = False,
@@ -104,6 +104,8 @@ def forces(
     machine = read_machine(result)
     tell(machine, result)
     setup, known = read_tooling(tooling), _sensors(machine, sensors, result)
+    for remark in setup.remarks:
+        warn(f"{tooling}: {remark}")
     stages = Stages(quiet=json_)
     with stages.stage("recordings"):
         cut = read_recording(recording, known, rate)
@@ -210,7 +212,7 @@ def _draw(path: Path, found: MonitoredCut) -> None:
 
 
 def _wear(
-    path: Path, found: MonitoredCut, setup: Tooling, cut_mm: tuple[float, float], immersion: float, strategy: Strategy, feed_direction: str
+    path: Path, found: MonitoredCut, setup: Tooling, cut_mm: tuple[float, float], immersion: str, strategy: Strategy, feed_direction: str
 ) -> dict[str, Any]:
     """Write the coefficients of each revolution and return their summary."""
     import numpy as np

@@ -58,10 +58,10 @@ def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask 
     stages = Stages(quiet=json_)
     with workers_or_cluster(processes, dask) as pool:
         campaign, readings = read_and_judge(campaign_dir, pool, stages)
-    rows, open_ = recording_rows(readings), left_open(campaign, readings)
+    rows, open_, remarks = recording_rows(readings), left_open(campaign, readings), campaign.remarks
     usable = sum(row.usable for row in rows)
     if json_:
-        told = {"campaign": campaign.name, "cuts": len(rows), "usable": usable, "left_open": list(open_)}
+        told = {"campaign": campaign.name, "cuts": len(rows), "usable": usable, "left_open": list(open_), "warnings": list(remarks)}
         emit(told | {"recordings": [asdict(row) for row in rows]})
     else:
         from rcsa_ident.cli.tables import show_recordings
@@ -69,6 +69,8 @@ def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask 
         show_recordings(rows)
         for sentence in open_:
             say(f"note: {sentence}")
+        for remark in remarks:
+            warn(remark)
         say(f"{usable} of {len(rows)} recordings usable, {stages.seconds['recordings']:.1f} s")
     if not usable:
         raise typer.Exit(BAD_INPUT)

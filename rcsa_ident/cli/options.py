@@ -85,7 +85,7 @@ class TipOptions:
 class CutOptions:
     """What is cut, and how."""
 
-    immersion: Annotated[float, typer.Option(help="Radial depth over diameter, up to 1 (a slot).", rich_help_panel=_CUT)] = 0.5
+    immersion: Annotated[str, typer.Option(help="Radial depth over diameter, as 0.5 or 50%; 1 is a slot.", rich_help_panel=_CUT)] = "0.5"
     strategy: Annotated[Strategy, typer.Option(help="Up or down milling.", rich_help_panel=_CUT)] = Strategy.down
     entry_deg: Annotated[
         float | None,

@@ -55,7 +55,7 @@ def plan(
         float | None, typer.Option(help="Lowest spindle speed, rev/min; default: the campaign's.", show_default=False)
     ] = None,
     speed_to: Annotated[float | None, typer.Option(help="Highest spindle speed; default: the campaign's.", show_default=False)] = None,
-    immersion: Annotated[float, typer.Option(help="Radial depth over diameter, up to 1 (a slot).")] = 0.5,
+    immersion: Annotated[str, typer.Option(help="Radial depth over diameter, as 0.5 or 50%; 1 is a slot.")] = "0.5",
     strategy: Annotated[Strategy, typer.Option(help="Up or down milling.")] = Strategy.down,
     entry_deg: Annotated[
         float | None, typer.Option(help="Entry angle from the normal direction, instead of --immersion.", show_default=False)

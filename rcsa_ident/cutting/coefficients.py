@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.errors import InputError
+from rcsa_ident.plausibility import AXIAL_RATIO, EDGE, RADIAL_RATIO, TANGENTIAL, Range, remarks_of
+from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
 
 
@@ -41,15 +43,27 @@ class CuttingCoefficients(Shown):
     edge_spread: float = 0.1
 
     def __post_init__(self) -> None:
-        positive("tangential coefficient", self.tangential, "N/m^2")
-        for name in ("radial_ratio", "axial_ratio"):
-            if not -1.0 <= getattr(self, name) <= 5.0:
-                raise InputError(name, getattr(self, name), "a ratio from -1 to 5")
-        for name in ("tangential_edge", "radial_edge", "axial_edge"):
-            non_negative(name, getattr(self, name), "N/m")
+        for name, kind, value in self._values:
+            kind.checked(name, value)
         for name in ("tangential_spread", "ratio_spread", "edge_spread"):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise InputError(name, getattr(self, name), "a share from 0 to 1")
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What is unusual about them, as a wrong unit would make it."""
+        return tuple(remarks_of(self._values))
+
+    @property
+    def _values(self) -> tuple[tuple[str, Range, float], ...]:
+        return (
+            ("tangential coefficient", TANGENTIAL, self.tangential),
+            ("radial_ratio", RADIAL_RATIO, self.radial_ratio),
+            ("axial_ratio", AXIAL_RATIO, self.axial_ratio),
+            ("tangential_edge", EDGE, self.tangential_edge),
+            ("radial_edge", EDGE, self.radial_edge),
+            ("axial_edge", EDGE, self.axial_edge),
+        )
 
     def __str__(self) -> str:
         ratios = {"rc": self.radial_ratio, "ac": self.axial_ratio}

@@ -50,6 +50,11 @@ class Engagement(Shown):
             return cls(float(np.arccos(2.0 * immersion - 1.0)), float(np.pi))
         raise InputError("strategy", strategy, "up or down")
 
+    @property
+    def immersion(self) -> float:
+        """Width of the cut over the cutter's diameter, (cos entry - cos exit) / 2 [-]."""
+        return float(0.5 * (np.cos(self.entry) - np.cos(self.exit)))
+
     def __str__(self) -> str:
         return f"{np.degrees(self.entry):.4g}° to {np.degrees(self.exit):.4g}°"
 

@@ -10,6 +10,8 @@ from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, EngagementProfile, feed_direction
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.plausibility import FEED_PER_TOOTH, IMMERSION, remarks_of
+from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
 
 
@@ -115,7 +117,13 @@ class MillingProcess(Shown):
         if not np.isfinite(self.feed_angle):
             raise InputError("feed_angle", self.feed_angle, "a finite angle [rad]")
         if self.feed_per_tooth is not None:
-            positive("feed_per_tooth", self.feed_per_tooth, "m")
+            FEED_PER_TOOTH.checked("feed_per_tooth", self.feed_per_tooth)
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What is unusual about coefficients, feed and immersion, as a wrong unit would make it."""
+        feed = () if self.feed_per_tooth is None else (("feed_per_tooth", FEED_PER_TOOTH, self.feed_per_tooth),)
+        return *self.coefficients.remarks, *remarks_of((*feed, ("radial immersion", IMMERSION, self.engagement.immersion)))
 
     @property
     def machine_from_feed(self) -> np.ndarray:

@@ -13,6 +13,7 @@ from rcsa_ident.io.setups import feed_angle_of, read_toml, read_tooling
 from rcsa_ident.io.tested_cuts import read_tested_cuts
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.plausibility import FEED_PER_TOOTH
 from rcsa_ident.stability.tested_cuts import TestedCuts
 
 _CASE = (
@@ -62,7 +63,7 @@ def _case(table: Table, folder: Path, number: int) -> Case:
     idle = table.value("idle", "a list of texts, as X=FILE", [])
     if not isinstance(idle, list) or not all(isinstance(text, str) for text in idle):
         table.refuse("idle", f"{idle!r}", "a list of texts, as X=FILE")
-    feed = table.number("feed_per_tooth_mm", "mm", None, above=0.0, most=10.0)
+    feed = table.quantity("feed_per_tooth_mm", FEED_PER_TOOTH, None)
     return Case(
         table.text("name", f"case {number}"),
         tooling,

@@ -12,6 +12,7 @@ from rcsa_ident.io.setups import beam_segments, feed_angle_of, material_library,
 from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Workpiece
+from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH
 from rcsa_ident.units import from_rpm, to_rpm
 from rcsa_ident.virtual.machine import Bearing, CutPlan, FlangeJoint, Housing, PerAxis, VirtualSpindle
 from rcsa_ident.virtual.sensors import SensorSuite
@@ -153,8 +154,8 @@ def _plan(table: Table) -> CutPlan:
         table.refuse("exit_angle_deg", f"{exit_:g}", f"above entry_angle_deg, {entry:g}, and at most 180 [deg]")
     return CutPlan(
         spindle_speeds=tuple(from_rpm(float(speed)) for speed in _speeds(table)),
-        axial_depth=table.number("axial_depth_mm", "mm", above=0.0, most=500.0) * 1e-3,
-        feed_per_tooth=table.number("feed_per_tooth_mm", "mm", above=0.0, most=10.0) * 1e-3,
+        axial_depth=table.quantity("axial_depth_mm", AXIAL_DEPTH) * 1e-3,
+        feed_per_tooth=table.quantity("feed_per_tooth_mm", FEED_PER_TOOTH) * 1e-3,
         engagement=Engagement(float(np.radians(entry)), float(np.radians(exit_))),
         feed_angle=feed_angle_of(table),
         duration=table.number("duration_s", "s", 0.3, above=0.0, most=60.0),

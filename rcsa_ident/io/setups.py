@@ -20,6 +20,18 @@ from rcsa_ident.io.files import MEGABYTE, read_bytes
 from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Campaign, Cut, Tooling
+from rcsa_ident.plausibility import (
+    AXIAL_DEPTH,
+    CONTACT,
+    DENSITY,
+    DIAMETER,
+    FEED_PER_TOOTH,
+    LOSS_FACTOR,
+    MODULUS,
+    SEGMENT_DIAMETER,
+    SPINDLE_SPEED,
+    STICKOUT,
+)
 from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, clamped
 from rcsa_ident.units import from_rpm
@@ -31,17 +43,31 @@ FEED_DIRECTIONS = {"+X": 0.0, "-X": np.pi, "+Y": 0.5 * np.pi, "-Y": -0.5 * np.pi
 _TOOLING = ("name", "cutter", "tool", "holder", "contact", "materials")
 _CUTTER = ("teeth", "diameter_mm", "helix_deg", "pitch_deg", "shape", "corner_radius_mm")
 _SEGMENT = (
-    "length_mm", "outer_diameter_mm", "inner_diameter_mm", "end_diameter_mm", "material", "area_mm2", "second_moment_mm4",
-)  # fmt: skip
+    "length_mm",
+    "outer_diameter_mm",
+    "inner_diameter_mm",
+    "end_diameter_mm",
+    "material",
+    "area_mm2",
+    "second_moment_mm4",
+)
 _CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
 _MATERIAL = ("youngs_modulus_gpa", "density", "poisson", "loss_factor")
 _CAMPAIGN = ("campaign", "sensors", "workpiece", "toolings", "cuts")
 _SENSOR = ("quantity", "axis", "sensitivity", "delay_s", "bandwidth_hz")
 _TRIGGER = ("quantity", "sensitivity", "delay_s", "bandwidth_hz", "pulses_per_revolution", "tooth_angle_deg")
 _CUT = (
-    "id", "tooling", "spindle_speed_rpm", "axial_depth_mm", "feed_per_tooth_mm", "entry_angle_deg", "exit_angle_deg",
-    "feed_direction", "cut", "air",
-)  # fmt: skip
+    "id",
+    "tooling",
+    "spindle_speed_rpm",
+    "axial_depth_mm",
+    "feed_per_tooth_mm",
+    "entry_angle_deg",
+    "exit_angle_deg",
+    "feed_direction",
+    "cut",
+    "air",
+)
 
 
 def read_toml(path: str | Path, field: str) -> dict[str, Any]:
@@ -92,7 +118,7 @@ def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
     name = top.text("name", name)
     cutter = _cutter(top.table("cutter", _CUTTER))
     pieces = beam_segments(tool, materials)
-    stickout = tool.number("stickout_mm", "mm", above=0.0, most=5000.0) * 1e-3
+    stickout = tool.quantity("stickout_mm", STICKOUT) * 1e-3
     insertion = holder.number("insertion_mm", "mm", least=0.0, most=5000.0) * 1e-3
     carriers = beam_segments(holder, materials)
     contact = _contact(top.table("contact", _CONTACT)) if "contact" in top else None
@@ -106,17 +132,17 @@ def material_library(top: Table) -> dict[str, Material]:
     for name, table in top.named_tables("materials", _MATERIAL, {}).items():
         base = MATERIALS.get(name)
         optional = (base.youngs_modulus, base.density, base.poisson) if base else None
-        modulus = table.number("youngs_modulus_gpa", "GPa", *([optional[0] * 1e-9] if optional else []), above=0.0, most=2000.0)
-        density = table.number("density", "kg/m^3", *([optional[1]] if optional else []), least=100.0, most=30000.0)
+        modulus = table.quantity("youngs_modulus_gpa", MODULUS, *([optional[0] * 1e-9] if optional else []))
+        density = table.quantity("density", DENSITY, *([optional[1]] if optional else []))
         poisson = table.number("poisson", "", *([optional[2]] if optional else []), least=0.0, most=0.499)
-        loss = table.number("loss_factor", "", base.loss_factor if base else 0.0, least=0.0, most=1.0)
+        loss = table.quantity("loss_factor", LOSS_FACTOR, base.loss_factor if base else 0.0)
         materials[name] = Material(modulus * 1e9, density, poisson, loss)
     return materials
 
 
 def _cutter(table: Table) -> Cutter:
     teeth = table.number("teeth", least=1, most=100, whole=True)
-    diameter = table.number("diameter_mm", "mm", above=0.0, most=1000.0) * 1e-3
+    diameter = table.quantity("diameter_mm", DIAMETER) * 1e-3
     helix = float(np.radians(table.number("helix_deg", "deg", 0.0, least=0.0, most=80.0)))
     shape = CutterShape(table.text("shape", CutterShape.FLAT, choices=tuple(CutterShape)))
     corner = table.number("corner_radius_mm", "mm", 0.0, least=0.0, most=1000.0) * 1e-3
@@ -138,9 +164,9 @@ def beam_segments(body: Table, materials: Mapping[str, Material]) -> tuple[BeamS
 
 def _segment(table: Table, materials: Mapping[str, Material]) -> BeamSegment:
     length = table.number("length_mm", "mm", above=0.0, most=5000.0)
-    outer = table.number("outer_diameter_mm", "mm", above=0.0, most=1000.0)
-    end = table.number("end_diameter_mm", "mm", None, above=0.0, most=1000.0)
-    inner = table.number("inner_diameter_mm", "mm", 0.0, least=0.0, most=1000.0)
+    outer = table.quantity("outer_diameter_mm", SEGMENT_DIAMETER)
+    end = table.quantity("end_diameter_mm", SEGMENT_DIAMETER, None)
+    inner = table.number("inner_diameter_mm", "mm", 0.0, least=0.0)
     material = materials[table.text("material", choices=tuple(materials))]
     smallest, largest = min(outer, end or outer), max(outer, end or outer)
     if inner >= smallest:
@@ -164,10 +190,10 @@ def _segment(table: Table, materials: Mapping[str, Material]) -> BeamSegment:
 
 def _contact(table: Table) -> Contact:
     return Contact(
-        table.number("translational_stiffness", "N/m per m", above=0.0),
-        table.number("rotational_stiffness", "N m/rad per m", least=0.0),
-        table.number("translational_damping", "N s/m per m", 0.0, least=0.0),
-        table.number("rotational_damping", "N m s/rad per m", 0.0, least=0.0),
+        table.quantity("translational_stiffness", CONTACT["translational_stiffness"]),
+        table.quantity("rotational_stiffness", CONTACT["rotational_stiffness"]),
+        table.quantity("translational_damping", CONTACT["translational_damping"], 0.0),
+        table.quantity("rotational_damping", CONTACT["rotational_damping"], 0.0),
     )
 
 
@@ -274,9 +300,9 @@ def _cut(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Table,
     if exit_ <= entry:
         table.refuse("exit_angle_deg", f"{exit_:g}", f"above entry_angle_deg, {entry:g}, and at most 180 [deg]")
     conditions = CuttingConditions(
-        from_rpm(table.number("spindle_speed_rpm", "rev/min", above=0.0, most=500000.0)),
-        table.number("axial_depth_mm", "mm", above=0.0, most=500.0) * 1e-3,
-        table.number("feed_per_tooth_mm", "mm", above=0.0, most=10.0) * 1e-3,
+        from_rpm(table.quantity("spindle_speed_rpm", SPINDLE_SPEED)),
+        table.quantity("axial_depth_mm", AXIAL_DEPTH) * 1e-3,
+        table.quantity("feed_per_tooth_mm", FEED_PER_TOOTH) * 1e-3,
         Engagement(float(np.radians(entry)), float(np.radians(exit_))),
         feed_angle_of(table),
     )

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import Any, NoReturn
 
 from rcsa_ident.errors import InputError
+from rcsa_ident.plausibility import Range
 
 _REQUIRED: Any = object()
 
@@ -119,6 +120,21 @@ class Table:
         ):
             self.refuse(key, describe(value), allowed)
         return int(number) if whole else number
+
+    def quantity(self, key: str, kind: Range, default: Any = _REQUIRED) -> Any:
+        """Return a number in its own unit that is possible for a quantity; a default is returned unchecked.
+
+        Parameters
+        ----------
+        key : str
+        kind : Range
+        default : object, optional
+        """
+        value = self.number(key, kind.unit, default)
+        if key in self.data:
+            with self.naming({}):
+                kind.checked(key, value * kind.size)
+        return value
 
     def numbers(self, key: str, count: int | None, unit: str = "") -> list[float]:
         """Return a list of `count` finite numbers (any number of them if None).

@@ -7,11 +7,12 @@ from typing import Any
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machining_setup import Workpiece
+from rcsa_ident.plausibility import AXIAL_RATIO, EDGE, RADIAL_RATIO, TANGENTIAL
 
 #: Edge forces of a workpiece: key and unit in N/m.
 _EDGES = {"tangential_edge_n_per_mm": 1e3, "radial_edge_n_per_mm": 1e3, "axial_edge_n_per_mm": 1e3}
 #: What a noun without them takes: a file's silence means the same.
-_USUAL = CuttingCoefficients(1.0, 0.0)
+_USUAL = CuttingCoefficients(1e9, 0.0)
 #: Standard deviations in percent, 0 being known exactly.
 _SPREADS = {
     "tangential_coefficient_spread_percent": _USUAL.tangential_spread,
@@ -24,10 +25,10 @@ WORKPIECE_KEYS = ("name", "tangential_coefficient_mpa", "radial_ratio", "axial_r
 def workpiece_of(table: Table) -> Workpiece:
     """Return the workpiece of a table that holds some of `WORKPIECE_KEYS`."""
     coefficients = CuttingCoefficients(
-        table.number("tangential_coefficient_mpa", "MPa", above=0.0, most=50000.0) * 1e6,
-        table.number("radial_ratio", "", least=-1.0, most=5.0),
-        table.number("axial_ratio", "", 0.0, least=-5.0, most=5.0),
-        *(table.number(key, "N/mm", 0.0, least=0.0, most=1000.0) * unit for key, unit in _EDGES.items()),
+        table.quantity("tangential_coefficient_mpa", TANGENTIAL) * 1e6,
+        table.quantity("radial_ratio", RADIAL_RATIO),
+        table.quantity("axial_ratio", AXIAL_RATIO, 0.0),
+        *(table.quantity(key, EDGE, 0.0) * unit for key, unit in _EDGES.items()),
         *(table.number(key, "%", 100.0 * usual, least=0.0, most=100.0) / 100.0 for key, usual in _SPREADS.items()),
     )
     return Workpiece(table.text("name"), coefficients)

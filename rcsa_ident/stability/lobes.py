@@ -90,6 +90,7 @@ def _limits(
         what = "a fit with" if known is None else "the assembly's own"
         told = f"the receptance was replaced by {what} {modes.pole.size} modes (relative error {share} %)"
         found = replace(found, warnings=(*found.warnings, told))
+    found = replace(found, warnings=(*found.warnings, *process.remarks))
     if draws < 2 or not isinstance(tip, UncertainReceptance) or not tip.complete:
         return found
     if isinstance(method, ZeroOrder):

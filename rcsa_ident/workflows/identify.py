@@ -94,8 +94,8 @@ def identify(
 
 
 def of_campaign(found: Identification, campaign: Campaign) -> Identification:
-    """Return the identification with what its machine has to know of the campaign: name, workpiece, sensors, and shapes of cutters."""
-    notes = (*found.notes, *campaign.cylinder_remarks(found.cut_ids))
+    """Return the identification with what its machine has to know of the campaign, what is unusual about that, and shapes of cutters."""
+    notes = tuple(dict.fromkeys((*found.notes, *campaign.remarks, *campaign.cylinder_remarks(found.cut_ids))))
     return replace(found, campaign=campaign.name, workpiece=campaign.workpiece, sensors=campaign.sensors, notes=notes)
 
 

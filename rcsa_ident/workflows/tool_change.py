@@ -11,10 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.cutting.process import MillingProcess
+from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
+from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
-from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
+from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine, TipSource
 from rcsa_ident.machine.speed_dependence import tips_over_speed
 from rcsa_ident.machining_setup import CutSpec, Tooling
 from rcsa_ident.stability.advice import Advice, highest_removal, planned_cut, speed_windows, usable_depths
@@ -28,10 +31,15 @@ from rcsa_ident.stability.surface_error import SurfaceError, surface_location_er
 from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, tally
 from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes
 from rcsa_ident.stability.zero_order import ZeroOrder
-from rcsa_ident.units import to_hz, to_rpm
+from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.tool_holder.proportions import edge_length
+from rcsa_ident.units import from_hz, to_hz, to_rpm
 
 #: How far beyond the identified band receptances are computed where a method fits modes to them: those above it are the tool's own.
 BEYOND = 1.5
+#: Modes of a tool-holder are looked for up to so many times the highest frequency of the limits, so far apart [rad/s], and told from
+#: that share of the flexibility below on, for which every fourth frequency is enough.
+ABOVE, _ABOVE_STEP, CRITICAL, _ABOVE_EVERY = 2.5, from_hz(10.0), 0.7, 4
 #: Seconds for a line and an unknown of the posterior, those of planes that feel each other, and further seconds for a speed with bands.
 _SPREAD_SECONDS, _SPREAD_SECONDS_OF_BOTH, _BAND_SECONDS = 1e-6, 9e-6, 2e-4
 #: Unequal pitch costs the zero-order method so many times as much; a machine that changes with speed so many further seconds.
@@ -85,7 +93,7 @@ def tooltip(
     if isinstance(tip, TipModes):
         lines = tip.receptance().omega if omega is None else omega
         tip = UncertainReceptance(lines, tip.response(lines), TIP, TIP)
-    remarks = [*machine.remarks, *([] if speed is None else _outside(machine, np.array([speed])))]
+    remarks = [*tooling.remarks, *machine.remarks, *([] if speed is None else _outside(machine, np.array([speed])))]
     if machine.band is not None and tip.omega.max() > 1.001 * machine.band[1]:
         top = to_hz(machine.band[1])
         remarks.append(f"the machine is known up to {top:.0f} Hz; above that the receptance is extrapolated")
@@ -160,8 +168,22 @@ class ToolChange:
         """Return what speaks against limits."""
         band = self.machine.band
         outside = None if band is None else _outside_band(lobes, band)
-        said = [*self.machine.remarks, *lobes.warnings, *([outside] if outside else []), *_outside(self.machine, self.speeds)]
+        said = [
+            *self.tooling.remarks,
+            *self.machine.remarks,
+            *lobes.warnings,
+            *self._beyond(lobes),
+            *([outside] if outside else []),
+            *_outside(self.machine, self.speeds),
+        ]
         return tuple(dict.fromkeys(said))
+
+    def _beyond(self, lobes: StabilityLobes) -> list[str]:
+        """Sentences where the limits leave out what is there: the end of the tool's edges, a mode above the frequencies."""
+        longest, where = edge_length(self.tooling.assembly, self.tooling.cutter)
+        deeper = int(np.sum(np.minimum(lobes.limit_depth, self.max_depth) > longest * (1.0 + 1e-9)))
+        told = f"at {deeper} of {lobes.spindle_speed.size} speeds the limit is deeper than the tool's {where} of {1e3 * longest:.4g} mm"
+        return [*([told] if deeper else []), *_modes_above(self.machine, self.tooling, self.omega)]
 
 
 def advise(
@@ -266,6 +288,40 @@ def surface_of(change: ToolChange, depth: float) -> SurfaceError:
 def spread_seconds(machine: TipSource, omega: FloatArray) -> float:
     """Return about how long the spread of a tip at some frequencies takes where nothing is worked out before [s]."""
     return (_SPREAD_SECONDS_OF_BOTH if machine.coupled_planes else _SPREAD_SECONDS) * machine.unknowns * omega.size
+
+
+def _modes_above(machine: TipSource, tooling: Tooling, omega: FloatArray) -> list[str]:
+    """A sentence where the tip is as flexible above the frequencies of the limits as below: the tool's own modes, of its elements.
+
+    What a limit depends on is how negative the real part of the tip's receptance is. A measurement says nothing beyond its end: the
+    flange is then held at rest, which leaves the tool-holder's modes about where they are.
+    """
+    if not isinstance(machine, Machine):
+        return []
+    source, top = machine.at(None), float(omega[-1])
+    above = np.arange(top, ABOVE * top, _ABOVE_STEP)
+    known = _lowest_real_part(source.tip(tooling, omega[::-_ABOVE_EVERY][::-1], spread=False))[1]
+    if machine.ends:
+        rest = Receptance(above, np.zeros((above.size, 2, 2)), plane("flange"), plane("flange"))
+        beyond = couple(tool_holder_receptance(tooling.assembly, above), rest, None).block((Coordinate("tip", Dof.X),))
+    else:
+        beyond = source.tip(tooling, above, spread=False)
+    where, least = _lowest_real_part(beyond)
+    # at the top itself it is the flank of a mode that the limits see
+    if where == top or least >= min(CRITICAL * known, 0.0):
+        return []
+    share = f"{least / known:.2g}" if 100.0 * known < least else "more than 100"
+    return [
+        f"a mode of this tool-holder at about {to_hz(where):.0f} Hz lies above the {to_hz(top):.0f} Hz up to which limits are computed, "
+        f"and there the tip is {share} times as flexible as below: true limits may be lower"
+    ]
+
+
+def _lowest_real_part(tip: Receptance) -> tuple[float, float]:
+    """Frequency [rad/s] and value [m/N] of the most negative real part along a direction of the tip."""
+    least = np.einsum("nii->ni", tip.values).real.min(axis=1)
+    worst = int(np.argmin(least))
+    return float(tip.omega[worst]), float(least[worst])
 
 
 def _outside_band(lobes: StabilityLobes, band: tuple[float, float]) -> str | None:

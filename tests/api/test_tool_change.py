@@ -291,3 +291,59 @@ def test_a_posterior_that_is_too_large_to_keep_is_weighed(shop, monkeypatch):
     assert refused(422, client.tooltip, id, "T1").errors[0].field == "step_hz"
     assert refused(422, client.frf, id).errors[0].field == "step_hz"
     assert client.tooltip(id, "T1", bands=False).axes["X"].re_std is None
+
+
+@pytest.mark.parametrize(
+    ("part", "value", "field", "words"),
+    [
+        ("contact", {"translational_stiffness": 2e4}, "contact.translational_stiffness", "N/um per m (2e+10"),
+        ("tool", {"stickout_mm": 0.06}, "tool.stickout_mm", "metres (60 mm)"),
+        ("cutter", {"diameter_mm": 0.012}, "cutter.diameter_mm", "metres (12 mm)"),
+        ("cutter", {"diameter_mm": 200.0}, "cutter.diameter_mm", "times that diameter"),
+        ("holder", {"inner_diameter_mm": 40.0}, "holder.segments[0].inner_diameter_mm", "the tool's own diameter"),
+        ("tool", {"inner_diameter_mm": 11.9}, "tool.segments[0].inner_diameter_mm", "0.6 times the outer diameter"),
+    ],
+)
+def test_a_tooling_that_is_impossible_is_refused_with_the_likely_slip(shop, part, value, field, words):
+    client, id = shop
+    tooling = example()
+    (tooling[part]["segments"][0] if "inner_diameter_mm" in value else tooling[part]).update(value)
+    (error,) = refused(422, client.lobes, id, tooling, speeds=SPEEDS).errors
+    assert error.field == field
+    assert words in error.allowed
+
+
+def test_unusual_values_are_warned_of_in_every_answer(shop):
+    client, id = shop
+    tooling = example()
+    tooling["holder"]["segments"][0]["inner_diameter_mm"] = 0.0
+    cut = {"immersion": 0.005, "ktc_mpa": 30.0, "krc": 0.3, "feed_per_tooth_mm": 0.1}
+    told = (
+        "holder.segments[0].inner_diameter_mm is 0, but",
+        "tangential coefficient is 30 MPa, but usual are",
+        "radial immersion is 0.5 %, but usual are 1.5 to 100 %: was 50 % meant?",
+    )
+    for found in (
+        client.lobes(id, tooling, speeds=SPEEDS, cut=cut).toolings[0],
+        client.advice(id, tooling, speeds=SPEEDS, cut=cut).toolings[0],
+    ):
+        assert [any(warning.startswith(words) for warning in found.warnings) for words in told] == [True] * 3
+    assert any(warning.startswith(told[0]) for warning in client.tooltip(id, tooling).warnings)
+    usual = client.lobes(id, example(), speeds=SPEEDS).toolings[0]
+    assert not [warning for warning in usual.warnings if "usual" in warning]
+
+
+@pytest.mark.parametrize(
+    ("cut", "field", "words"),
+    [
+        ({"ktc_mpa": 2.1, "krc": 0.3}, "cut.ktc_mpa", "GPa (2100 MPa)"),
+        ({"ktc_mpa": 900, "krc": 26.0}, "cut.krc", "percent (0.26)"),
+        ({"kte_n_per_mm": 12e3}, "cut.kte_n_per_mm", "N/m (12 N/mm)"),
+        ({"feed_per_tooth_mm": 100.0}, "cut.feed_per_tooth_mm", "um (0.1 mm)"),
+    ],
+)
+def test_a_cut_that_is_impossible_is_refused_with_the_likely_slip(shop, cut, field, words):
+    client, id = shop
+    (error,) = refused(422, client.lobes, id, "T1", speeds=SPEEDS, cut=cut).errors
+    assert error.field == field
+    assert words in error.allowed

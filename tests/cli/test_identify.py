@@ -18,6 +18,7 @@ from rcsa_ident.io.results import read_result
 from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.remarks import Remark
 from tests.fixtures import by_hand
+from tests.fixtures.campaign import part_of_the_sample_runs
 
 
 def run(*arguments, code=0):
@@ -185,3 +186,17 @@ def test_the_exit_code_follows_the_code_and_not_the_words(tmp_path, small_campai
     assert data["status"] == ("failed" if change is None else "suspect")
     assert data["reasons"]
     assert (data["axes"] == {}) is (change is None)
+
+
+@pytest.mark.slow
+def test_check_warns_of_what_is_unusual_about_a_campaign(tmp_path):
+    campaign = part_of_the_sample_runs(tmp_path, 40)
+    for path in campaign.rglob("toolings/S1-ER32.toml"):
+        path.write_text(
+            path.read_text(encoding="utf-8").replace("inner_diameter_mm = 12.0", "inner_diameter_mm = 20.0", 1), encoding="utf-8"
+        )
+    found = run("check", campaign, "--processes", 1)
+    words = "S1-ER32: holder.segments[0].inner_diameter_mm is 20 mm around a tool that is 12 mm thick there"
+    assert f"warning: {words}" in found.stderr
+    (told,) = json.loads(run("check", campaign, "--processes", 1, "--json").stdout)["warnings"]
+    assert told.startswith(words)

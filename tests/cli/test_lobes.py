@@ -12,7 +12,9 @@ import typer
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import advice, cases, export, lobes
+from rcsa_ident.cli.conditions import immersion_of
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import read_lobes_csv, write_frf_csv
 from rcsa_ident.io.frf_files import Source, read_tap_tests
 from rcsa_ident.io.identifications import machine_from_json
@@ -384,3 +386,47 @@ def test_a_ball_of_unequal_pitch_is_told_as_both(shop):
     assert right["withheld"] is None
     assert right["recommended"][0]["recommended_depth_mm"] > 0.0
     assert any(warning.startswith(shape) for warning in right["warnings"])
+
+
+@pytest.mark.parametrize(("text", "share"), [("50%", 0.5), ("0.5", 0.5), (" 25 % ", 0.25), ("1", 1.0), ("100%", 1.0)])
+def test_immersion_is_a_share_or_percent(text, share):
+    assert immersion_of(text) == share
+
+
+@pytest.mark.parametrize("text", ["50", "0", "0%", "101%", "half", "-1%", "nan", "%"])
+def test_an_immersion_that_is_none_is_refused(text):
+    with pytest.raises(InputError, match=r"--immersion.*0\.5 or 50%"):
+        immersion_of(text)
+
+
+def test_half_a_percent_is_asked_about(shop):
+    """Both spellings of the same slip; the sentence is that of the service."""
+    for immersion in ("0.5%", "0.005"):
+        found = answer_of(
+            "lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, *SPEEDS, "--immersion", immersion, "--out", shop / "L.csv"
+        )
+        assert "radial immersion is 0.5 %, but usual are 1.5 to 100 %: was 50 % meant?" in found["warnings"]
+    found = answer_of("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, *SPEEDS, "--immersion", "50%", "--out", shop / "L.csv")
+    assert not [warning for warning in found["warnings"] if "usual" in warning]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--ktc-mpa", 2.1, "--krc", 0.3), "--ktc-mpa: found 2.1 MPa, allowed is a number at least 5"),
+        (("--ktc-mpa", 900, "--krc", 26), "--krc: found 26, allowed is"),
+        ((*KNOWN, "--feed-per-tooth-mm", 100), "--feed-per-tooth-mm: found 100 mm"),
+        ((*KNOWN, "--kre-n-per-mm", 12000), "--kre-n-per-mm: found 12000 N/mm"),
+    ],
+)
+def test_a_cut_that_is_impossible_is_refused(shop, options, words):
+    found = run("lobes", "--modes", shop / "M.toml", shop / "T.toml", *options, *SPEEDS, "--out", shop / "L.csv", code=2)
+    assert words in found.stderr
+    assert "usual are" in found.stderr
+
+
+def test_an_unusual_tooling_is_warned_of(shop):
+    odd = (shop / "T.toml").read_text(encoding="utf-8").replace("inner_diameter_mm = 12.0", "inner_diameter_mm = 20.0")
+    (shop / "T.toml").write_text(odd, encoding="utf-8")
+    found = run("lobes", "--modes", shop / "M.toml", shop / "T.toml", *KNOWN, *SPEEDS, "--out", shop / "L.csv")
+    assert "warning: holder.segments[0].inner_diameter_mm is 20 mm around a tool that is 12 mm thick there" in found.stderr

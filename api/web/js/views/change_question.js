@@ -11,16 +11,17 @@ export async function methods() {
   return names.map((name) => [name, name[0].toUpperCase() + name.slice(1) + (name === QUICK ? ": at once" : "")]);
 }
 
-// what an address may say: name in the query, kind, default, where it goes in the body
+// what an address may say: name in the query, kind, default, where it goes in the body, least and most; without an end the service
+// knows what is possible, and says what is usual beside it
 export const NUMBERS = [
   ["im", "percent", 50, "cut.immersion", 0.1, 100, "Radial immersion"],
-  ["fz", "feed", 0.1, "cut.feed_per_tooth_mm", 1e-4, 10, "Feed per tooth"],
+  ["fz", "feed", 0.1, "cut.feed_per_tooth_mm", 0, Infinity, "Feed per tooth"],
   ["from", "speed", 4000, "speeds.from_rpm", 100, 200_000, "From"],
   ["to", "speed", 20_000, "speeds.to_rpm", 100, 200_000, "To"],
   ["step", "speed", 50, "speeds.step_rpm", 0.1, 100_000, "Step"],
   ["deep", "depth", 10, "max_depth_mm", 1e-3, 500, "Deepest that is asked for"],
-  ["ktc", "pressure", null, "cut.ktc_mpa", 1, 50_000, "Tangential coefficient"],
-  ["krc", "none", null, "cut.krc", -1, 5, "Radial over tangential"],
+  ["ktc", "pressure", null, "cut.ktc_mpa", 0, Infinity, "Tangential coefficient"],
+  ["krc", "none", null, "cut.krc", -Infinity, Infinity, "Radial over tangential"],
   ["land", "displacement", null, "cut.wear_land_um", 0.01, 1000, "Wear land"],
   ["dent", "indentation", null, "cut.indentation", 1e9, 1e17, "Indentation"],
   ["power", "power", null, "max_power_kw", 1e-3, 10_000, "Spindle power, at most"],

@@ -1,0 +1,181 @@
+"""What values a quantity usually has, what values it can have at all, and which slip of the unit explains others.
+
+Every range that a tooling, a workpiece or a cut is held to stands here: nouns refuse what is impossible and remark on what is unusual,
+so that library, command line and service say the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+
+from rcsa_ident.errors import InputError, finite
+from rcsa_ident.remarks import Remark
+from rcsa_ident.units import from_rpm
+
+
+class PlausibilityCode(StrEnum):
+    """What a remark on somebody's input is about."""
+
+    UNUSUAL = "unusual"
+    """A value outside its usual range."""
+    PROPORTION = "proportion"
+    """Two values that do not fit each other."""
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Where the values of a quantity lie.
+
+    Parameters
+    ----------
+    unit : str
+        Of the limits, as a file has it.
+    size : float
+        Of the unit in SI.
+    usual, possible : (float, float) [unit]
+        Outside the first is a remark, outside the second an error; both ends belong to them.
+    slips : tuple of (str, float)
+        Questions with a place for the value that may have been meant, and what leads to it from the one that was given.
+
+    Examples
+    --------
+    >>> print(DIAMETER.remark("cutter.diameter_mm", 300e-3))
+    cutter.diameter_mm is 300 mm, but usual are 0.5 to 250 mm
+    >>> DIAMETER.remark("cutter.diameter_mm", 12e-3) is None
+    True
+    """
+
+    unit: str
+    size: float
+    usual: tuple[float, float]
+    possible: tuple[float, float]
+    slips: tuple[tuple[str, float], ...] = ()
+
+    def checked(self, field: str, value: float) -> float:
+        """Return a value [SI] that is possible.
+
+        Raises
+        ------
+        InputError
+            With what is usual, and the slip that would explain the value.
+        """
+        value, (low, high) = finite(field, value, self.unit), self.possible
+        if not low <= self._given(value) <= high:
+            allowed = f"a number at least {low:g} and at most {high:g}" + (f" [{self.unit}]" if self.unit else "")
+            raise InputError(field, self.told(value), f"{allowed}; usual are {self._usual()}{self._slip(value)}")
+        return value
+
+    def remark(self, field: str, value: float) -> Remark | None:
+        """Return a remark where a value [SI] is not usual, else None."""
+        low, high = self.usual
+        if low <= self._given(value) <= high:
+            return None
+        return Remark(PlausibilityCode.UNUSUAL, f"{field} is {self.told(value)}, but usual are {self._usual()}{self._slip(value)}")
+
+    def told(self, value: float) -> str:
+        """Return a value [SI] in the unit of files."""
+        return f"{self._given(value):.6g} {self.unit}".rstrip()
+
+    def _given(self, value: float) -> float:
+        # 1e-3 x 12 / 1e-3 is not 12, and nobody wrote the last digit
+        return float(f"{value / self.size:.12g}")
+
+    def _usual(self) -> str:
+        return f"{self.usual[0]:g} to {self.usual[1]:g} {self.unit}".rstrip()
+
+    def _slip(self, value: float) -> str:
+        for question, factor in self.slips:
+            meant = self._given(value) * factor
+            if self.usual[0] <= meant <= self.usual[1]:
+                return ": " + question.format(f"{meant:.6g} {self.unit}".rstrip())
+        return ""
+
+
+def remarks_of(values: Iterable[tuple[str, Range, float]]) -> list[Remark]:
+    """Return what is not usual among values, each a field, its range and the value [SI].
+
+    Raises
+    ------
+    InputError
+        If one of them is not possible.
+    """
+    found = [kind.remark(field, kind.checked(field, value)) for field, kind, value in values]
+    return [remark for remark in found if remark is not None]
+
+
+def proportion(
+    field: str, value: float, usual: tuple[float, float], possible: tuple[float, float], found: str, wanted: str
+) -> Remark | None:
+    """Return a remark where the ratio of two values is not usual, else None.
+
+    Parameters
+    ----------
+    field : str
+    value : float [-]
+    usual, possible : (float, float) [-]
+    found, wanted : str
+        Both values, and what is asked of them, in words.
+
+    Raises
+    ------
+    InputError
+        If the ratio is not possible.
+    """
+    if not possible[0] - 1e-9 <= value <= possible[1] + 1e-9:
+        raise InputError(field, found, wanted)
+    if usual[0] - 1e-9 <= value <= usual[1] + 1e-9:
+        return None
+    return Remark(PlausibilityCode.PROPORTION, f"{field} is {found}, but usual is {wanted}")
+
+
+def _length(usual: tuple[float, float], possible: tuple[float, float]) -> Range:
+    slips = (("was it given in metres ({})?", 1e3), ("was it given in inches ({})?", 25.4), ("was it given in um ({})?", 1e-3))
+    return Range("mm", 1e-3, usual, possible, slips)
+
+
+# -- tool and holder ---------------------------------------------------------------------------------------------------------------
+
+TEETH = Range("", 1.0, (1.0, 30.0), (1.0, 100.0))
+DIAMETER = _length((0.5, 250.0), (0.05, 1000.0))
+HELIX = Range("deg", math.radians(1.0), (0.0, 65.0), (0.0, 81.0))
+STICKOUT = _length((2.0, 500.0), (0.5, 5000.0))
+SEGMENT_DIAMETER = _length((0.1, 400.0), (0.001, 1000.0))
+MODULUS = Range("GPa", 1e9, (40.0, 750.0), (0.5, 2000.0), (("was it given in MPa ({})?", 1e-3), ("was it given in TPa ({})?", 1e3)))
+DENSITY = Range("kg/m^3", 1.0, (1200.0, 20_000.0), (100.0, 30_000.0), (("was it given in g/cm^3 ({})?", 1e3),))
+LOSS_FACTOR = Range("", 1.0, (0.0, 0.1), (0.0, 1.0), (("was it given in percent ({})?", 1e-2),))
+_SOFTER = (
+    ("was it given in N/m per mm ({})?", 1e3),
+    ("was it given in N/um per m ({})?", 1e6),
+    ("was it given in N/um per mm ({})?", 1e9),
+)
+CONTACT = {
+    "translational_stiffness": Range("N/m per m", 1.0, (2e8, 2e13), (1e6, 1e17), _SOFTER),
+    # 0 leaves the moment to the springs along the insertion
+    "rotational_stiffness": Range("N m/rad per m", 1.0, (0.0, 1e10), (0.0, 1e14)),
+    "translational_damping": Range("N s/m per m", 1.0, (0.0, 1e8), (0.0, 1e12)),
+    "rotational_damping": Range("N m s/rad per m", 1.0, (0.0, 1e5), (0.0, 1e9)),
+}
+
+# -- the cut -----------------------------------------------------------------------------------------------------------------------
+
+TANGENTIAL = Range(
+    "MPa",
+    1e6,
+    (50.0, 10_000.0),
+    (5.0, 50_000.0),
+    (
+        ("was it given in GPa ({})?", 1e3),
+        ("was it given in Pa ({})?", 1e-6),
+        ("was it given in MPa where Pa is asked for ({})?", 1e6),
+    ),
+)
+RADIAL_RATIO = Range("", 1.0, (-0.1, 1.5), (-1.0, 5.0), (("was it given in percent ({})?", 1e-2),))
+AXIAL_RATIO = Range("", 1.0, (-1.0, 1.5), (-1.0, 5.0), (("was it given in percent ({})?", 1e-2),))
+EDGE = Range("N/mm", 1e3, (0.0, 150.0), (0.0, 1000.0), (("was it given in N/m ({})?", 1e-3),))
+FEED_PER_TOOTH = Range("mm", 1e-3, (0.001, 2.0), (1e-5, 10.0), (("was it given in metres ({})?", 1e3), ("was it given in um ({})?", 1e-3)))
+IMMERSION = Range("%", 1e-2, (1.5, 100.0), (0.0, 100.0), (("was {} meant?", 1e2),))
+SPINDLE_SPEED = Range("rev/min", from_rpm(1.0), (150.0, 80_000.0), (1.0, 500_000.0))
+AXIAL_DEPTH = _length((0.01, 60.0), (1e-4, 500.0))
