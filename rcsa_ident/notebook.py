@@ -249,7 +249,7 @@ def _(advice: Advice) -> str:
 
 @html.register
 def _(cut: MonitoredCut) -> str:
-    return _page(cut, _list(cut.notes), _svg(figure_of(cut)))
+    return _page(cut, _list(cut.remarks), _svg(figure_of(cut)))
 
 
 @html.register

@@ -31,7 +31,7 @@ from rcsa_ident.io.identifications import identification_to_json
 from rcsa_ident.io.results import check_result, layout, plain
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.scaleout import Map
-from rcsa_ident.signals.measurement import Reading
+from rcsa_ident.signals.measurement import Reading, among_fellows
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.units import to_hz
 from rcsa_ident.workflows.identify import ReadCut, data_of, judge_cut, left_out, mode_deviations, of_campaign
@@ -116,7 +116,7 @@ def _readings(campaign: Campaign, read: ReadCut, context: JobContext) -> list[Re
         context.progress("recordings", first, len(campaign.cuts))
         readings += context.remember(f"recordings.{first}", partial(_all, reading, cuts))
     context.progress("recordings", len(campaign.cuts), len(campaign.cuts))
-    return readings
+    return among_fellows(readings)
 
 
 def _all(reading: Callable[[Cut], Reading], cuts: Iterable[Cut]) -> list[Reading]:

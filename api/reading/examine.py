@@ -14,7 +14,7 @@ from rcsa_ident.io.recordings import in_si, read_signals
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.remarks import Remark
 from rcsa_ident.report.summaries import recording_rows
-from rcsa_ident.signals.measurement import Reading, judge_air, measure_cut
+from rcsa_ident.signals.measurement import Reading, fits_by_chance, judge_air, measure_cut
 from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.signals.steady import measured_axes
 from rcsa_ident.signals.verdict import RecordCode, Verdict
@@ -80,6 +80,18 @@ def judge(text: str, cut_id: str, cut: Path, air: Path | None) -> dict[str, Any]
     return judged(campaign, declared, read_normalised(cut), None if air is None else read_normalised(air), "cut")[0]
 
 
+def among_fellows(toolings: list[str], alone: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the verdicts of a campaign's cuts, given those on each for itself: one that fits a wrong tooth count by chance is no good."""
+    wrong = [RecordCode.TOOTH_COUNT in verdict.get("codes", ()) for verdict in alone]
+    fits = [True if verdict["usable"] else False if contradicts else None for verdict, contradicts in zip(alone, wrong, strict=True)]
+    reasons = fits_by_chance(list(zip(toolings, fits, strict=True)))
+    left_out: dict[str, Any] = {"usable": False, "lines": 0, "signal_to_noise_db": {}}
+    return [
+        own if reason is None else own | left_out | {"reasons": [str(reason)], "codes": [str(reason.code)]}
+        for own, reason in zip(alone, reasons, strict=True)
+    ]
+
+
 def described(recording: Recording) -> dict[str, Any]:
     """Return rate, duration and channels of a recording."""
     return {
@@ -108,6 +120,7 @@ def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | 
     verdict = {
         "usable": row.usable,
         "reasons": list(row.reasons),
+        "codes": [str(reason.code) for reason in reading.verdict.reasons],
         "notes": list(row.notes),
         "spindle_speed_rpm": row.found_rpm,
         "lines": row.lines,

@@ -44,6 +44,13 @@ def judge(text: str, cut_id: str, cut: Path, air: Path | None) -> dict[str, Any]
     return examine.judge(text, cut_id, cut, air)
 
 
+def among_fellows(toolings: list[str], alone: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the verdicts of a campaign's cuts, see `examine.among_fellows`."""
+    from api.reading import examine
+
+    return examine.among_fellows(toolings, alone)
+
+
 def envelope(path: Path, points: int) -> dict[str, Any]:
     """Return the envelope of a recording, see `previews.envelope`."""
     from api.reading import previews

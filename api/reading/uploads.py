@@ -148,12 +148,14 @@ class Uploads:
             for _ in range(10):
                 changes = await asyncio.to_thread(self.store.campaigns.changes, campaign.group, campaign.id)
                 stale = await asyncio.to_thread(self._stale, campaign)
-                for cut, recording, air in stale:
-                    try:
+                try:
+                    for cut, recording, air in stale:
                         await self._judge(campaign, cut, recording, air)
-                    except Busy:
-                        # the recording stays; the next maintenance judges it
-                        return
+                    if not stale:
+                        await self._among_fellows(campaign)
+                except Busy:
+                    # the recordings stay; the next maintenance judges them
+                    return
                 if not stale:
                     await asyncio.to_thread(self.store.campaigns.settle, campaign.group, campaign.id, changes)
                     return
@@ -167,6 +169,19 @@ class Uploads:
                 found.append((cut["id"], row, air))
         return found
 
+    async def _among_fellows(self, campaign: Campaign) -> None:
+        """Judge the cuts beside those of their tooling, each after its verdict for itself (`alone`)."""
+        listed = await asyncio.to_thread(self.store.recordings.list, campaign.group, campaign.id, "", 1_000_000)
+        rows = {row.name: row for row in listed}
+        there = [(cut["tooling"], rows[cut["cut"]]) for cut in json.loads(campaign.text)["cuts"] if cut["cut"] in rows]
+        found = [json.loads(row.found) for _, row in there]
+        alone = [each.get("alone", each["verdict"]) for each in found]
+        verdicts = await self.reader.run(reader_tasks.among_fellows, [tooling for tooling, _ in there], alone)
+        for (_, row), data, own, verdict in zip(there, found, alone, verdicts, strict=True):
+            if verdict != data["verdict"]:
+                text = json.dumps(data | {"verdict": verdict, "alone": own}, allow_nan=False)
+                await asyncio.to_thread(self.store.recordings.judge, row, replace(row, found=text))
+
     async def _judge(self, campaign: Campaign, cut: str, recording: Recording, air: Recording | None) -> None:
         path = self._path(recording)
         assert path is not None
@@ -174,7 +189,7 @@ class Uploads:
             verdict = await self.reader.run(reader_tasks.judge, campaign.text, cut, path, self._path(air))
         except InputError as error:
             verdict = refused_verdict(str(error))
-        text = json.dumps(json.loads(recording.found) | {"verdict": verdict}, allow_nan=False)
+        text = json.dumps(json.loads(recording.found) | {"verdict": verdict, "alone": verdict}, allow_nan=False)
         after = replace(recording, found=text, judged_with="" if air is None else air.normalised)
         await asyncio.to_thread(self.store.recordings.judge, recording, after)
 

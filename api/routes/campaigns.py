@@ -17,7 +17,7 @@ from api.conventions import BODY, After, CampaignId, Limit, MachineId, Repeat, g
 from api.files import UPLOADS
 from api.lookups import known_campaign, machine_of
 from api.problems import Problem
-from api.reading.campaign_text import LARGEST, declare, toml_text
+from api.reading.campaign_text import LARGEST, declare, files_of, toml_text
 from api.schemas.campaigns import EXAMPLE, CampaignAnswer, CampaignSummary, CutAnswer, FileState, NewCampaign, VerdictAnswer
 from api.schemas.common import Page, body_of
 from api.security import Guarded, WhoAsks, new_id, now
@@ -89,7 +89,9 @@ def list_campaigns(id: MachineId, components: ThisService, caller: WhoAsks, afte
     for row in rows:
         count = counts.get(row.id, Counts(0, 0))
         common = {name: getattr(row, name) for name in ("id", "machine", "name", "created", "cuts")}
-        items.append(CampaignSummary(**common, uploaded=count.uploaded, usable=count.usable))
+        missing = len(files_of(row.text)) - count.uploaded - count.air
+        without = sum("air" not in cut for cut in json.loads(row.text)["cuts"])
+        items.append(CampaignSummary(**common, uploaded=count.uploaded, usable=count.usable, missing=missing, without_air=without))
     return Page(items=items, next=following)
 
 

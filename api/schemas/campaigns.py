@@ -185,6 +185,8 @@ class CampaignSummary(Answer):
     cuts: int
     uploaded: int = Field(description="Number of cuts with a recording.")
     usable: int
+    missing: int = Field(description="Number of recordings, of cuts and in the air, that the campaign names and nobody has uploaded.")
+    without_air: int = Field(description="Number of cuts for which the campaign names no air cut.")
 
 
 class RecordingAnswer(Answer):

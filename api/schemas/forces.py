@@ -152,7 +152,8 @@ class ForceAnswer(Answer):
     band_hz: list[float]
     notes: list[str]
     axes: dict[str, AxisForces]
-    time_s: list[float] = Field(description="Time of each bucket's first sample.")
+    left_out_s: float = Field(description="Beginning of the recording in which the observer settles: without forces, nowhere counted.")
+    time_s: list[float] = Field(description="Time of each bucket's first sample in the recording.")
     harmonics: dict[str, list[Harmonic]]
     wear: Wear | None
 

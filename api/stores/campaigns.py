@@ -67,10 +67,11 @@ class Recording:
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """Uploads of a campaign: numbers of cuts with a recording, and of those that are usable."""
+    """Uploads of a campaign: numbers of cuts with a recording, of those that are usable, and of air cuts."""
 
     uploaded: int
     usable: int
+    air: int = 0
 
 
 #: Kind of a file (upload or samples) and its key.

@@ -65,10 +65,11 @@ class SqlCampaigns:
         return [Campaign(**row._asdict()) for row in rows]
 
     def counts(self, group: str, ids: Sequence[str]) -> dict[str, Counts]:
-        found = select(_R.c.campaign, func.count(), func.sum(_R.c.usable)).group_by(_R.c.campaign)
+        found = select(_R.c.campaign, _R.c.role, func.count(), func.sum(_R.c.usable)).group_by(_R.c.campaign, _R.c.role)
         with self.store.reading() as connection:
-            rows = connection.execute(found.where(_R.c.group == group, _R.c.campaign.in_(ids), _R.c.role == "cut")).all()
-        return {campaign: Counts(int(uploaded), int(usable)) for campaign, uploaded, usable in rows}
+            rows = connection.execute(found.where(_R.c.group == group, _R.c.campaign.in_(ids))).all()
+        each = {(campaign, role): (int(count), int(usable)) for campaign, role, count, usable in rows}
+        return {id: Counts(*each.get((id, "cut"), (0, 0)), each.get((id, "air"), (0, 0))[0]) for id in {id for id, _ in each}}
 
     def delete(self, group: str, id: str) -> bool:
         with self.store.writing() as connection:

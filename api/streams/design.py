@@ -104,7 +104,9 @@ def _planned(
     gap = tuple(c for c in (column(Quantity.DISPLACEMENT, axis) for axis in axes) if c is not None)
     shaken = tuple(column(Quantity.ACCELERATION, axis) for axis in axes)
     order = tuple(axes.index(axis) for axis in question.axes)
-    plan = Plan(live_observer(found, recording, follow), gap, shaken, len(kinds), first, order)
+    # a replay tells what an upload of the recording does
+    settling = found.observer.settling if follow else round(found.estimate.start * recording.rate)
+    plan = Plan(live_observer(found, recording, follow), gap, shaken, len(kinds), first, order, settling)
     deviation = found.estimate.standard_deviation
     delay = max(found.response[axis].delay_at_lines for axis in found.response) * recording.rate
     ready = {
@@ -114,7 +116,8 @@ def _planned(
         "band_hz": [to_hz(w) for w in found.band],
         "delay_samples": round(float(delay), 3),
         "std_n": {axis: float(deviation[-1, axes.index(axis)]) for axis in question.axes},
-        "first": first,
-        "notes": [*tool.remarks, *known.remarks, *found.notes],
+        "first": first + settling,
+        "left_out_s": settling / recording.rate,
+        "notes": [*tool.remarks, *known.remarks, *(found.notes if follow else found.remarks)],
     }
     return pickle.dumps(plan), ready

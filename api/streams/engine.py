@@ -35,8 +35,9 @@ class Message:
     ----------
     kind : int
         OPEN: content is a `Plan`, pickled by one of the service's own workers. BLOCK: content is float64[samples, channels], `first`
-        its index. FORCES: content is float64[samples, axes], `drift` of the spindle's speed as a share, `known` 1 where the
-        spindle's angle was. REFUSED: forces are not finite. FAILED: content is what is logged.
+        its index. FORCES: content is float64[samples, axes] of the block from `first` on, without those in which the observer
+        settles, `drift` of the spindle's speed as a share, `known` 1 where the spindle's angle was. REFUSED: forces are not
+        finite. FAILED: content is what is logged.
     session : int
     first : int
     arrived : float [s]
@@ -83,6 +84,8 @@ class Plan:
         Index of the sample at which the observer begins.
     order : tuple of int
         Indices of the observer's axes, in the order of the answer's columns.
+    settling : int
+        Samples behind each start of the observer whose forces are not told.
     """
 
     observer: LiveObserver
@@ -91,6 +94,7 @@ class Plan:
     channels: int
     origin: int
     order: tuple[int, ...]
+    settling: int = 0
 
     def signals(self, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return gaps [m] and accelerations [m/s^2] of a block, shape (n, a) each."""
@@ -130,11 +134,12 @@ class Engine:
         missing = message.first - plan.origin - state.count
         if missing > 0:
             state = plan.observer.bridge(state, missing)
+        settling = min(max(plan.settling - state.observer.filtered, 0), samples.shape[0])
         with np.errstate(all="ignore"):
             state, block = plan.observer.run(state, *plan.signals(samples))
-        force = block.force[:, list(plan.order)]
-        if not np.all(np.isfinite(force)):
+        if not np.all(np.isfinite(block.force)):
             raise Endless
+        force = block.force[settling:, list(plan.order)]
         self.sessions[message.session] = plan, state
         drift, known = plan.observer.drift(state), float(state.angle.known)
-        return Message(FORCES, message.session, message.first, message.arrived, drift, known, force.astype("<f8").tobytes())
+        return Message(FORCES, message.session, message.first + settling, message.arrived, drift, known, force.astype("<f8").tobytes())

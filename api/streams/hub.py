@@ -156,8 +156,7 @@ class Hub:
             values = np.frombuffer(message.content, "<f8").reshape(-1, len(session.about.axes))
             delay = time.monotonic() - message.arrived
             session.drift, session.known = message.drift, message.known > 0.0
-            session.forces(message.first, values, delay)
-            self.metrics.streamed(values.shape[0], delay)
+            self.metrics.streamed(session.forces(message.first, values, delay), delay)
             self._feed(session)
 
     def _anew(self) -> None:

@@ -120,7 +120,7 @@ class Session:
         self.second = Second.of(len(about.axes))
         self.room, self.over, self.drained, self.arrived = (asyncio.Event() for _ in range(4))
         self.room.set()
-        self.finishing, self.frames = False, 0
+        self.finishing, self.frames, self.settling = False, 0, 0
 
     @property
     def held(self) -> int:
@@ -187,17 +187,20 @@ class Session:
             self.room.set()
         return first, whole, arrived
 
-    def forces(self, first: int, values: FloatArray, delay: float) -> None:
-        """Take the forces of the oldest block under computation."""
-        self.counts.done(self.flying.popleft())
+    def forces(self, first: int, values: FloatArray, delay: float) -> int:
+        """Take the forces of the oldest block under computation, and return its samples: in those without a force the observer settles."""
+        computed = self.flying.popleft()
+        self.counts.done(computed)
+        self.settling += computed - values.shape[0]
         self.second.delays.append(delay)
         self.second.count += values.shape[0]
         self.second.total += values.sum(axis=0)
         self.second.square += (values**2).sum(axis=0)
-        for listener in self.listeners:
+        for listener in self.listeners if values.shape[0] else ():
             listener.forces(first, values)
         if self.finishing and self.counts.backlog == 0:
             self.drained.set()
+        return computed
 
     def lost_process(self) -> int:
         """Count the samples under computation in a dead process as dropped, and return their number."""
@@ -209,11 +212,12 @@ class Session:
     def status(self) -> dict[str, Any]:
         """Return the status of the last second, and reset the statistics."""
         seen, self.second = self.second, Second.of(len(self.about.axes))
-        n, counts, delays = max(seen.count, 1), self.counts, np.array(seen.delays or [0.0]) * 1e3
-        rms = np.sqrt(np.maximum(seen.square / n - (seen.total / n) ** 2, 0.0))
+        n, counts, delays = seen.count, self.counts, np.array(seen.delays or [0.0]) * 1e3
+        rms = np.sqrt(np.maximum(seen.square / n - (seen.total / n) ** 2, 0.0)).round(6).tolist() if n else [None] * len(self.about.axes)
         return {
             "stage": str(self.stage),
             "samples": counts.samples,
+            "settling": self.settling,
             "lost": counts.lost,
             "late": counts.late,
             "dropped": counts.dropped,
@@ -222,7 +226,7 @@ class Session:
             "delay_max_ms": round(float(delays.max()), 3),
             "speed_drift_percent": round(100.0 * self.drift, 5),
             "angle_known": self.known,
-            "rms_n": dict(zip(self.about.axes, rms.round(6).tolist(), strict=True)),
+            "rms_n": dict(zip(self.about.axes, rms, strict=True)),
             "notes": self.notes,
         }
 

@@ -89,9 +89,8 @@ def forces(machine: MachineText, tooling: ToolingSource, question: ForceQuestion
     cut, air = source()
     found = observed(known, tool, cut, air, question.speed, question.method, question.smooth)
     estimate, level = found.estimate, None
-    settled = min(found.observer.settling, estimate.force.shape[0] // 2)
     if question.idle is not None:
-        estimate, level = restore_mean_force(estimate, question.idle, settled)
+        estimate, level = restore_mean_force(estimate, question.idle)
     if csv is not None:
         columns = (
             {axis.upper(): values[:, i] for i, axis in enumerate(estimate.axes)} for values in (estimate.force, estimate.standard_deviation)
@@ -103,9 +102,9 @@ def forces(machine: MachineText, tooling: ToolingSource, question: ForceQuestion
     low, high = np.minimum.reduceat(estimate.force, begin), np.maximum.reduceat(estimate.force, begin)
     axes, lines = {}, {}
     for i, axis in enumerate(estimate.axes):
-        force = estimate.force[settled:, i]
+        force = estimate.force[:, i]
         axes[axis.upper()] = {
-            "std_n": float(np.median(estimate.standard_deviation[settled:, i])),
+            "std_n": float(np.median(estimate.standard_deviation[:, i])),
             "mean_n": None if level is None else float(level[i]),
             "rms_n": float(np.std(force)),
             "peak_n": float(np.max(np.abs(force))),
@@ -117,9 +116,10 @@ def forces(machine: MachineText, tooling: ToolingSource, question: ForceQuestion
         "spindle_speed_rpm": to_rpm(found.spindle_speed),
         "sampling_rate_hz": cut.rate,
         "band_hz": [to_hz(w) for w in found.band],
-        "notes": [*tool.remarks, *known.remarks, *found.notes],
+        "notes": [*tool.remarks, *known.remarks, *found.remarks],
         "axes": axes,
-        "time_s": (begin * estimate.step).tolist(),
+        "left_out_s": estimate.start,
+        "time_s": estimate.time[begin].tolist(),
         "harmonics": lines,
         "wear": None if question.wear is None else _wear(found, tool, question.wear),
     }

@@ -118,8 +118,7 @@ def forces(
             raise error if error.where else error.at(str(result if error.field == "machine" else recording)) from None
     level = None
     if idle_percent is not None:
-        settled = found.observer.settling
-        raised, level = restore_mean_force(found.estimate, idle_percent / 100.0, min(settled, found.estimate.force.shape[0] // 2))
+        raised, level = restore_mean_force(found.estimate, idle_percent / 100.0)
         found = replace(found, estimate=raised)
     estimate = found.estimate
     write_forces(out, estimate)
@@ -143,7 +142,7 @@ def forces(
             f"{axis}: rms {row['rms_n']:.1f} N, peaks {row['lowest_n']:.0f} to {row['highest_n']:.0f} N, ± {row['std_n']:.2g} N; "
             f"within 1 dB at the spindle's orders: {flat}; delay {round(1e6 * row['delay_s'])} µs"
         )
-    for note in found.notes:
+    for note in found.remarks:
         warn(note)
     low_hz, high_hz = summary["band_hz"]
     mean = "without their mean" if level is None else "with their mean"
@@ -153,6 +152,7 @@ def forces(
         say(f"{name}: {row['mean']:.4g} ± {row['std']:.2g} {row['unit']}, {trend}")
     if worn and not worn["separable"]:
         warn("the harmonics in the band do not separate the coefficients: only their sum is meaningful")
+    say(f"left out: the first {estimate.start:.3f} s, in which the observer settles")
     say(f"written: {out} ({estimate.force.shape[0]} samples, {stages.seconds['forces']:.2f} s)")
 
 
@@ -173,16 +173,15 @@ def _summary(found: MonitoredCut, observer: str, smooth: bool) -> dict[str, Any]
     import numpy as np
 
     estimate, axes = found.estimate, {}
-    settled = slice(min(estimate.force.shape[0] // 4, 4096), None)
     for i, axis in enumerate(estimate.axes):
-        force, response = estimate.force[settled, i], found.response[axis]
+        force, response = estimate.force[:, i], found.response[axis]
         hz = [to_hz(float(w)) if w == w else None for w in response.usable(float(response.line[0]), at_lines=True)]
         anywhere = [to_hz(float(w)) if w == w else None for w in response.usable(1.3 * found.band[0])]
         axes[axis.upper()] = {
             "rms_n": float(np.std(force)),
             "lowest_n": float(force.min()),
             "highest_n": float(force.max()),
-            "std_n": float(np.median(estimate.standard_deviation[settled, i])),
+            "std_n": float(np.median(estimate.standard_deviation[:, i])),
             "model_std_n": found.model_error[axis],
             "innovation_over_expected": None if estimate.consistency is None else float(estimate.consistency[i]),
             "usable_at_lines_hz": hz,
@@ -198,8 +197,9 @@ def _summary(found: MonitoredCut, observer: str, smooth: bool) -> dict[str, Any]
         "spindle_speed_rpm": to_rpm(found.spindle_speed),
         "band_hz": [to_hz(w) for w in found.band],
         "samples": int(estimate.force.shape[0]),
+        "left_out_s": estimate.start,
         "axes": axes,
-        "warnings": list(found.notes),
+        "warnings": list(found.remarks),
     }
 
 

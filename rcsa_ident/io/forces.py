@@ -78,7 +78,8 @@ def read_forces(path: str | Path) -> ForceEstimate:
     if step <= 0.0 or np.any(np.abs(np.diff(time) - step) > 1e-3 * step):
         raise InputError(f"column {TIME}", "steps that differ", "two equal steps or more that rise [s]", str(path))
     columns = [np.stack([each.get(axis, np.zeros_like(time)) for axis in force], axis=1) for each in (force, deviation)]
-    return ForceEstimate(tuple(Dof(axis.lower()) for axis in force), step, *(frozen(each) for each in columns))
+    axes = tuple(Dof(axis.lower()) for axis in force)
+    return ForceEstimate(axes, step, frozen(columns[0]), frozen(columns[1]), start=float(time[0]))
 
 
 def sensors_of_result(data: Mapping[str, Any], where: str) -> tuple[Sensor, ...]:

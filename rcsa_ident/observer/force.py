@@ -16,6 +16,9 @@ from rcsa_ident.observer.kalman import FilterState, KalmanFilter
 from rcsa_ident.observer.transfer_function import SampledModes, TransferFunction
 from rcsa_ident.shown import Saved
 
+#: What is left of the observer's start when it has settled: the settling time to 2 %.
+LEFT = 0.02
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunOut:
@@ -132,6 +135,11 @@ class ObserverState:
     axes: tuple[AxisState, ...]
     together: FilterState | None = None
 
+    @property
+    def filtered(self) -> int:
+        """Samples since the observer began, or began anew behind a gap."""
+        return max(each.count for each in (self.together, *(axis.filter for axis in self.axes)) if each is not None)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForceBlock:
@@ -154,7 +162,7 @@ class ForceBlock:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class ForceEstimate(Saved):
-    """Forces of a whole record.
+    """Forces of a record.
 
     Parameters
     ----------
@@ -166,6 +174,8 @@ class ForceEstimate(Saved):
     consistency : array, shape (a,) [-], or None
         Scatter of the innovations in the band over the expected; 1 where model, noise and force agree, more where they are too
         sure of themselves. None of forces from a file.
+    start : float [s]
+        Time of the first force from the record's first sample: 0 where the observer's start is among them.
     """
 
     axes: tuple[Dof, ...]
@@ -173,15 +183,20 @@ class ForceEstimate(Saved):
     force: FloatArray
     standard_deviation: FloatArray
     consistency: FloatArray | None = None
+    start: float = 0.0
 
     @property
     def time(self) -> FloatArray:
-        """Time from the first sample, shape (n,) [s]."""
-        return np.arange(self.force.shape[0]) * self.step
+        """Time from the record's first sample, shape (n,) [s]."""
+        return self.start + np.arange(self.force.shape[0]) * self.step
+
+    def after(self, count: int) -> ForceEstimate:
+        """Return the forces without the first `count` samples."""
+        rest = frozen(self.force[count:]), frozen(self.standard_deviation[count:])
+        return replace(self, force=rest[0], standard_deviation=rest[1], start=self.start + count * self.step)
 
     def __str__(self) -> str:
-        later = slice(self.force.shape[0] // 2, None)
-        size, std = np.std(self.force[later], axis=0), np.median(self.standard_deviation[later], axis=0)
+        size, std = np.std(self.force, axis=0), np.median(self.standard_deviation, axis=0)
         rows = [f"{axis.upper()} {a:.3g} N rms (± {b:.2g} N)" for axis, a, b in zip(self.axes, size, std, strict=True)]
         return f"{', '.join(rows)} over {self.force.shape[0] * self.step:.3g} s"
 
@@ -207,9 +222,16 @@ class ForceObserver:
 
     @property
     def settling(self) -> int:
-        """Samples from the first after which all gains are steady."""
-        filters = [self.together, *(each.kalman for each in self.axes)]
-        return max(each.gain.shape[0] for each in filters if each is not None)
+        """Samples from the first after which the start has died out: forces before them are those of the observer, not of the cut.
+
+        The estimate's error dies out with the closed-loop poles z of the Kalman filter, and of the filters before it: to 2 % within
+        ln 50 / -ln max |z| samples. By then all gains are steady, too.
+        """
+        kalman = [each for each in (self.together, *(axis.kalman for axis in self.axes)) if each is not None]
+        before = [each for axis in self.axes for each in (axis.gap_filter, axis.acceleration_filter) if each is not None]
+        poles = [*(np.linalg.eigvals(each.state_space().A) for each in kalman), *(each.decay for each in before)]
+        slowest = max(float(np.max(np.abs(each))) for each in poles if each.size)
+        return max(int(np.ceil(np.log(LEFT) / np.log(slowest))), *(each.gain.shape[0] for each in kalman))
 
     def init(self) -> ObserverState:
         """Return the state before the first sample."""
@@ -317,28 +339,34 @@ class ForceObserver:
             Acceleration of the sensors' fixture.
         smooth : bool
             Each sample given all others; else given those before it, as live.
+
+        Returns
+        -------
+        ForceEstimate
+            From the first sample on: until `settling` it is the observer's start.
         """
         block = self.run(self.init(), gap, acceleration)[1]
         n = block.force.shape[0]
+        settled = min(self.settling, n // 2)
         force, deviation, consistency = np.array(block.force), np.empty_like(block.force), np.ones(len(self.axes))
         if self.together is not None:
             if smooth:
                 force = self.together.smooth(np.stack([block.force, block.walking, block.innovation], axis=1))
             deviation = self.together.standard_deviation(n, smooth)
         for i, each in enumerate(self.axes):
-            settling, variance = self.settling, None if self.together is None else float(self.together.variance[-1, i, i])
+            variance = None if self.together is None else float(self.together.variance[-1, i, i])
             if each.kalman is not None:
-                settling, variance = each.kalman.gain.shape[0], float(each.kalman.variance[-1])
+                variance = float(each.kalman.variance[-1])
                 if smooth:
                     force[:, i] = each.kalman.smooth(np.stack([block.force[:, i], block.walking[:, i], block.innovation[:, i]], axis=1))
                 deviation[:, i] = each.kalman.standard_deviation(n, smooth)
             assert variance is not None
-            consistency[i] = _scatter(block.innovation[min(settling - 1, n // 2) :, i], each.transfer, variance)
+            consistency[i] = _scatter(block.innovation[settled:, i], each.transfer, variance)
         deviation = deviation * np.maximum(consistency, 1.0)
         return ForceEstimate(tuple(each.axis for each in self.axes), self.step_time, frozen(force), frozen(deviation), frozen(consistency))
 
 
-def restore_mean_force(estimate: ForceEstimate, idle: float, first: int = 0) -> tuple[ForceEstimate, FloatArray]:
+def restore_mean_force(estimate: ForceEstimate, idle: float) -> tuple[ForceEstimate, FloatArray]:
     """Return the estimate with the mean that an interrupted cut gives away: between its teeth the force is zero.
 
     Parameters
@@ -346,8 +374,6 @@ def restore_mean_force(estimate: ForceEstimate, idle: float, first: int = 0) -> 
     estimate : ForceEstimate
     idle : float
         Share of the time in which no tooth cuts, at least.
-    first : int
-        Samples that are not looked at, while the observer settles.
 
     Returns
     -------
@@ -358,7 +384,7 @@ def restore_mean_force(estimate: ForceEstimate, idle: float, first: int = 0) -> 
     if not 0.0 < idle < 1.0:
         raise InputError("idle share", f"{100.0 * idle:g} %", "more than 0 % and less than 100 %: the time in which no tooth cuts")
     levels = []
-    for values in np.sort(estimate.force[first:], axis=0).T:
+    for values in np.sort(estimate.force, axis=0).T:
         held = max(int(0.5 * idle * values.size), 2)
         start = int(np.argmin(values[held - 1 :] - values[: values.size - held + 1]))
         levels.append(-float(np.mean(values[start : start + held])))

@@ -98,9 +98,9 @@ def wear_indicators(
     edges : bool
         Whether edge coefficients are found, too; else K_tc and K_rc alone.
     angle : float [rad], optional
-        Immersion of tooth 1 at the first sample; by default found from the forces themselves.
+        Immersion of tooth 1 at the record's first sample; by default found from the forces themselves.
     first : int
-        Samples left out at the start, while the observer settles.
+        Number of the first force's sample in its record: times and the angle count from the record's first sample.
     walk : float
         How far a coefficient may move in a revolution, as a share of itself.
 
@@ -120,7 +120,7 @@ def wear_indicators(
     positive("walk", walk)
     speed = conditions.spindle_speed
     period = 2.0 * np.pi / speed / step
-    turns = int((force.shape[0] - first) / period)
+    turns = int(force.shape[0] / period)
     if turns < 2:
         raise InputError("forces", f"{turns} whole revolutions", "two or more")
     harmonic = cutter.teeth * np.arange(1, int(band[1] / speed / cutter.teeth + 1e-9) + 1)
@@ -166,8 +166,8 @@ def _revolution_lines(force: FloatArray, first: int, period: float, turns: int, 
     highest = int(harmonic[-1])
     order = np.arange(highest + 1)
     for k in range(turns):
-        start, end = first + round(k * period), first + round((k + 1) * period)
-        phase = np.outer(np.arange(start, end) * turn, order)
+        start, end = round(k * period), round((k + 1) * period)
+        phase = np.outer((first + np.arange(start, end)) * turn, order)
         columns = np.hstack([np.cos(phase), -np.sin(phase[:, 1:])])
         found = np.linalg.lstsq(columns, force[start:end], rcond=None)[0]
         result[k] = found[harmonic] + 1j * found[highest + harmonic]

@@ -27,13 +27,13 @@ def force_history(
     spindle_speed : float [rad/s]
     revolutions : float
     start : float [s], optional
-        Time of the first one drawn; by default they lie in the middle of the record.
+        Time of the first one drawn; by default they lie in the middle of the forces.
     true : array, shape (n, a) [N], optional
         A measured or simulated force, with or without its mean as the estimate.
     """
     time = estimate.time
     length = revolutions * 2.0 * np.pi / spindle_speed
-    start = max(0.5 * (time[-1] - length), 0.0) if start is None else start
+    start = max(0.5 * (time[0] + time[-1] - length), time[0]) if start is None else start
     shown = (time >= start) & (time <= start + length)
     figure, grid = _grid(len(estimate.axes), 1, 1.2 + 2.2 * len(estimate.axes), sharey="none")
     with mpl.rc_context(_STYLE):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
-from rcsa_ident.remarks import Remark
+from rcsa_ident.remarks import Remark, says
 from rcsa_ident.shown import Shown
 from rcsa_ident.signals.alignment import angle_to_air, trigger_delay
 from rcsa_ident.signals.frf import AxisLines, Estimator, LineEstimator, turned_air
@@ -236,3 +237,36 @@ def _cut_faults(
     if air is not None and cutter.equally_spaced and reasons[0] is None:
         reasons.append(tooth_count_fault(np.sum(np.abs(difference) ** 2, axis=1), cutter.teeth))
     return tuple(reason for reason in reasons if reason is not None)
+
+
+def fits_by_chance(cuts: Sequence[tuple[str, bool | None]]) -> list[Remark | None]:
+    """Return the reason against each cut that fits a tooth count which most cuts of its tooling contradict, else None.
+
+    Parameters
+    ----------
+    cuts : sequence of (tooling, whether the tooth count fits)
+        None of a cut that was left out for another reason: it says nothing of the tooth count.
+    """
+    against, fitting = (Counter(tooling for tooling, fits in cuts if fits is each) for each in (False, True))
+
+    def reason(tooling: str, fits: bool | None) -> Remark | None:
+        wrong, right = against[tooling], fitting[tooling]
+        if not fits or wrong <= right:
+            return None
+        words = f"wrong tooth count (or chatter): {wrong} of {wrong + right} cuts with {tooling} contradict it, and this one fits by chance"
+        return Remark(RecordCode.TOOTH_COUNT, words)
+
+    return [reason(*cut) for cut in cuts]
+
+
+def among_fellows(readings: Sequence[Reading]) -> list[Reading]:
+    """Return the readings of a campaign, those left out that fit a wrong tooth count by chance (`fits_by_chance`)."""
+
+    def fits(verdict: Verdict) -> bool | None:
+        return True if verdict.usable else False if says(verdict.reasons, RecordCode.TOOTH_COUNT) else None
+
+    reasons = fits_by_chance([(each.tooling, fits(each.verdict)) for each in readings])
+    return [
+        each if reason is None else replace(each, verdict=replace(each.verdict, reasons=(reason,)), measurement=None)
+        for each, reason in zip(readings, reasons, strict=True)
+    ]

@@ -53,6 +53,7 @@ class MonitoredCut(Drawn):
     Parameters
     ----------
     estimate : ForceEstimate
+        Without the observer's start; of a recording that is too short for that, the second half.
     observer : ForceObserver
         As it was made for this machine, tooling, sensors and speed: ready to stream.
     spindle_speed : float [rad/s]
@@ -67,7 +68,7 @@ class MonitoredCut(Drawn):
     noise : mapping of Dof to float [m]
         Standard deviation of a displacement sample, found between the record's lines.
     notes : tuple of str
-        What the user should know.
+        What the user should know of recording and machine.
     """
 
     estimate: ForceEstimate
@@ -83,6 +84,19 @@ class MonitoredCut(Drawn):
     def __str__(self) -> str:
         low, high = (to_hz(w) for w in self.band)
         return f"{self.estimate}, {to_rpm(self.spindle_speed):.0f} rev/min, {low:.0f} to {high:.0f} Hz"
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The notes, and whether the recording ended before the observer could settle for good."""
+        estimate, needed = self.estimate, self.observer.settling * self.estimate.step
+        if estimate.start > needed - 0.5 * estimate.step:
+            return self.notes
+        length = estimate.start + estimate.force.shape[0] * estimate.step
+        return (
+            *self.notes,
+            f"the observer needs {needed:.2g} s to settle and the recording lasts {length:.2g} s: its first half is left out, "
+            "and forces soon behind it may still be wrong",
+        )
 
 
 def observe(
@@ -169,7 +183,8 @@ def observe(
     else:
         single = [transfer_function(omega, c[:, 0, 0], 1.0 / cut.rate, band, s[:, 0]) for c, s in zip(cross, shown, strict=True)]
         observer = force_observer([axis_observer(settings(transfer, i), transfer) for i, transfer in enumerate(single)])
-    estimate = observer.observe(*_signals(cut, axes), smooth=smooth)
+    whole = observer.observe(*_signals(cut, axes), smooth=smooth)
+    estimate = whole.after(min(observer.settling, whole.force.shape[0] // 2))
     if not method.colours_noise:
         estimate = replace(estimate, force=_above(estimate.force, band[0], estimate.step))
     errors: dict[Dof, float] = {}
@@ -398,9 +413,7 @@ def _model_error(
     Axes that feel each other share the error, dF = C31^-1 dC31 F, with the entries of C31 taken as independent.
     """
     columns = [estimate.axes.index(axis) for axis in axes]
-    # the second half: a live estimate has settled by then
-    force = estimate.force[estimate.force.shape[0] // 2 :, columns]
-    amplitude = line_spectrum(force, 1.0 / estimate.step, speed, to_hz(band[1])).amplitude
+    amplitude = line_spectrum(estimate.force[:, columns], 1.0 / estimate.step, speed, to_hz(band[1])).amplitude
     order = np.arange(amplitude.shape[0])
     order = order[(order * speed >= band[0]) & (order * speed <= band[1])]
     power = np.abs(amplitude[order]) ** 2
@@ -446,6 +459,5 @@ def wear_of(found: MonitoredCut, cutter: Cutter, conditions: CuttingConditions) 
     """
     estimate = found.estimate
     columns = [estimate.axes.index(axis) for axis in (Dof.X, Dof.Y)]
-    settled = min(found.observer.settling, estimate.force.shape[0] // 2)
     own = replace(conditions, spindle_speed=found.spindle_speed)
-    return wear_indicators(estimate.force[:, columns], estimate.step, cutter, own, found.band, first=settled)
+    return wear_indicators(estimate.force[:, columns], estimate.step, cutter, own, found.band, first=round(estimate.start / estimate.step))

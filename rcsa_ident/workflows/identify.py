@@ -20,7 +20,7 @@ from rcsa_ident.identification.result import Identification
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.remarks import Remark
 from rcsa_ident.scaleout import Map
-from rcsa_ident.signals.measurement import Reading, measure_cut
+from rcsa_ident.signals.measurement import Reading, among_fellows, measure_cut
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.tool_holder.model import tool_holder_receptance
@@ -49,11 +49,11 @@ def judge(campaign: Campaign, read: ReadCut, map: Map = map, progress: Callable[
         readings.append(reading)
         if progress is not None:
             progress(len(readings), len(campaign.cuts))
-    return readings
+    return among_fellows(readings)
 
 
 def judge_cut(campaign: Campaign, read: ReadCut, cut: Cut) -> Reading:
-    """Return verdict and measurement of one cut."""
+    """Return verdict and measurement of one cut, for itself (see `among_fellows`)."""
     try:
         recording, air = read(cut)
         cutter = campaign.toolings[cut.tooling].cutter

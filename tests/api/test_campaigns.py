@@ -23,6 +23,7 @@ from rcsa_ident.io.toolings import tooling_keys
 from rcsa_ident.workflows.identify import judge_cut
 from tests.api.in_process import refused
 from tests.api.recordings import TOOLING, content, declared
+from tests.fixtures.paths import SAMPLES
 
 TOML = {"Content-Type": "application/toml"}
 
@@ -246,6 +247,42 @@ def uploaded(client, machine, tmp_path):
         path.write_bytes(content(tmp_path, k, air))
         client.upload(made.id, path)
     return client, made.id
+
+
+@pytest.mark.slow
+def test_a_cut_is_judged_among_its_fellows(client, machine):
+    """The sample runs with three teeth for four: one that fits by chance is left out as soon as others contradict it, and comes back."""
+    data = tomllib.loads((SAMPLES / "campaign.toml").read_text(encoding="utf-8"))
+    tooling = (SAMPLES / "toolings" / "S1-ER32.toml").read_text(encoding="utf-8").replace("teeth = 4", "teeth = 3")
+    cuts = [data["cuts"][k] for k in (15, 16, 14)]
+    made = client.make_campaign(machine, data | {"cuts": cuts, "toolings": {"S1-ER32": tomllib.loads(tooling)}})
+
+    def usable():
+        found = client.campaign(made.id)
+        assert [each.usable for each in client.campaigns(machine)] == [found.usable]
+        return [cut.verdict and cut.verdict.usable for cut in found.cuts]
+
+    for cut, told in zip(made.cuts, ([True, None, None], [True, False, None], [False, False, False]), strict=True):
+        for file in (cut.air, cut.cut):
+            client.upload(made.id, SAMPLES / "recordings" / file.name)
+        assert usable() == told
+    verdict = client.campaign(made.id).cuts[0].verdict
+    assert verdict.lines == 0
+    assert "2 of 3 cuts with S1-ER32 contradict it" in verdict.reasons[0]
+    client.send("DELETE", f"/campaigns/{made.id}/recordings/{made.cuts[2].cut.name}")
+    assert usable() == [True, False, None]
+    assert client.campaign(made.id).cuts[0].verdict.lines > 0
+
+
+def test_a_campaign_without_its_air_cuts_is_not_complete(uploaded, machine):
+    client, _ = uploaded
+    (told,) = client.campaigns(machine)
+    # one cut and two air cuts
+    assert (told.uploaded, told.missing, told.without_air) == (2, 3, 0)
+    bare = declared(2)
+    del bare["cuts"][0]["air"]
+    client.make_campaign(machine, bare)
+    assert [(each.missing, each.without_air) for each in client.campaigns(machine)] == [(3, 0), (3, 1)]
 
 
 def test_the_archive_is_the_folder_that_identify_takes(uploaded, tmp_path):

@@ -91,7 +91,8 @@ def test_forces_of_an_upload_are_true(shop):
     assert low < 400.0 < 4000.0 < high
     assert found["wear"] is None
     assert len(found["time_s"]) <= 2000
-    assert np.diff(found["time_s"]) == pytest.approx(found["time_s"][1])
+    assert found["left_out_s"] == found["time_s"][0] > 0.0
+    assert np.diff(found["time_s"]) == pytest.approx(found["time_s"][1] - found["time_s"][0])
     amplitude = np.abs(line_spectrum(true, RATE, 400.0 * np.pi, 4200.0).amplitude)
     for i, axis in enumerate("XY"):
         own = found["axes"][axis]
@@ -114,7 +115,8 @@ def test_every_sample_as_a_file(shop, tmp_path):
     assert answer.headers["content-type"].startswith("text/csv")
     (tmp_path / "FORCES.csv").write_bytes(answer.content)
     time, force, deviation = read_forces_csv(tmp_path / "FORCES.csv")
-    assert time[1] == pytest.approx(1.0 / RATE)
+    assert time[1] - time[0] == pytest.approx(1.0 / RATE)
+    assert time[-1] == pytest.approx((len(true_force()) - 1) / RATE)
     both = np.stack([force["X"], force["Y"]], axis=1)
     assert np.all(relative_error(both, true_force(), RATE) < 0.05)
     assert set(deviation) == {"X", "Y"}
@@ -265,7 +267,8 @@ def test_a_replay_gives_the_forces_of_the_recording(shop, campaign, tmp_path):
         end, frames = until(socket, "end")
         assert closed(socket) == (1000, {})
     assert (end["lost"], end["dropped"]) == (0, 0)
-    assert end["samples"] == len(force["X"])
+    assert end["settling"] == ready["first"] > 0
+    assert end["samples"] == end["settling"] + len(force["X"])
     expected = np.stack([force["X"], force["Y"]], axis=1)
     np.testing.assert_allclose(joined(frames), expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 

@@ -200,7 +200,7 @@ def test_what_is_counted_of_a_campaign(store, kept):
     assert store.campaigns.counts("A", [kept.id]) == {}
     for name, role, usable in (("a", "cut", True), ("b", "cut", False), ("c", "air", True)):
         store.recordings.put(recording(kept, name, role=role, usable=usable), False)
-    assert store.campaigns.counts("A", [kept.id, "none"]) == {kept.id: Counts(2, 1)}
+    assert store.campaigns.counts("A", [kept.id, "none"]) == {kept.id: Counts(2, 1, 1)}
     assert store.campaigns.counts("B", [kept.id]) == {}
     assert [row.name for row in store.recordings.list("A", kept.id, "a", 9)] == ["b", "c"]
     assert [row.name for row in store.recordings.list("A", kept.id, "", 1)] == ["a"]

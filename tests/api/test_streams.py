@@ -16,6 +16,7 @@ from api.work.machine_cache import read
 from api.work.toolings import tooling_of
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+from rcsa_ident.workflows.estimate_forces import MonitoredCut
 from tests.api.in_process import Near
 from tests.api.streaming import STREAM, closed, send, streaming, until
 from tests.fixtures.force_stream import CHANNELS, RATE, SENSITIVITY, hello, result, signals, streamed, tooling
@@ -36,14 +37,20 @@ def hub_of(http):
     return http.app.state.components.streams
 
 
-def batch(raw: np.ndarray) -> np.ndarray:
-    """What the commands' observer gives of the same samples, made from the first 0.2 s of them."""
+def offline(raw: np.ndarray, design: int) -> tuple[MonitoredCut, np.ndarray]:
+    """What the commands make of the first samples, and what the observer of these gives of all of them."""
     kinds = [(q, a) for q in (Quantity.DISPLACEMENT, Quantity.ACCELERATION) for a in (Dof.X, Dof.Y)]
     sensors = tuple(Sensor(n, q, a, s) for n, (q, a), s in zip(CHANNELS, kinds, SENSITIVITY, strict=True))
     samples = raw / SENSITIVITY
-    first = Recording(RATE, samples[:SETTLE], sensors)
-    observer = observed(read(result()), tooling_of(tooling()), first, None, 12000.0 * np.pi / 30.0, "resonators").observer
-    return observer.run(observer.init(), samples[:, :2], samples[:, 2:])[1].force
+    first = Recording(RATE, samples[:design], sensors)
+    found = observed(read(result()), tooling_of(tooling()), first, None, 12000.0 * np.pi / 30.0, "resonators")
+    return found, found.observer.run(found.observer.init(), samples[:, :2], samples[:, 2:])[1].force
+
+
+def batch(raw: np.ndarray) -> np.ndarray:
+    """Forces of the commands' observer, made from the first 0.2 s, without those in which it settles."""
+    found, force = offline(raw, SETTLE)
+    return force[found.observer.settling :]
 
 
 def joined(frames) -> np.ndarray:
@@ -69,6 +76,7 @@ def test_what_speaks_against_the_machine_is_said_when_the_stream_is_ready(shop):
 def test_live_forces_are_those_of_the_batch(shop, text):
     http, id = shop
     raw = signals(2.0, 2.6)
+    expected = batch(raw)
     cuts = np.cumsum([1, 700, 13, 2048, 1, 4000, 900, 3000])
     with http.websocket_connect(STREAM) as socket:
         socket.send_json(hello(id, format="json" if text else "float32"))
@@ -78,19 +86,47 @@ def test_live_forces_are_those_of_the_batch(shop, text):
             send(socket, int(first) + 5, part, text)
         ready = until(socket, "ready")[0]
         assert ready["session"] == opened["session"]
-        assert ready["first"] == 5
+        settling = len(raw) - len(expected)
+        assert ready["first"] == 5 + settling
+        assert ready["left_out_s"] == pytest.approx(settling / RATE)
         assert ready["spindle_speed_rpm"] == pytest.approx(12000.0, rel=1e-5)
         assert abs(ready["delay_samples"]) < 0.5
         assert any("no air cut" in note for note in ready["notes"])
         socket.send_json({"event": "end"})
         end, frames = until(socket, "end")
         assert (end["samples"], end["lost"], end["late"], end["dropped"], end["backlog"]) == (len(raw), 0, 0, 0, 0)
+        assert end["settling"] == settling
         assert closed(socket) == (1000, {})
-    expected = batch(raw)
     starts = [unpacked(f)[0] if isinstance(f, bytes) else f["first"] for f in frames]
-    assert starts[0] == 5
+    assert starts[0] == 5 + settling
     assert starts == sorted(starts)
     np.testing.assert_allclose(joined(frames), expected, rtol=0, atol=(1e-9 if text else 1e-6) * np.abs(expected).max())
+
+
+@pytest.mark.slow
+def test_the_first_forces_are_as_large_as_offline(shop):
+    """No start of the observer in the first blocks, nor in their RMS: offline, of the whole record, the same samples have the same."""
+    http, id = shop
+    raw = signals(2.0, 2.9)
+    with http.websocket_connect(STREAM) as socket:
+        socket.send_json(hello(id))
+        for first in range(0, len(raw), 512):
+            send(socket, first, raw[first : first + 512])
+        first = until(socket, "ready")[0]["first"]
+        socket.send_json({"event": "end"})
+        end, frames = until(socket, "status", "end")
+        told = [end["rms_n"]]
+        while end["event"] != "end":
+            end, more = until(socket, "status", "end")
+            frames += more
+            told.append(end["rms_n"])
+    live, whole = joined(frames), offline(raw, len(raw))[1][first:]
+    assert end["settling"] == first == len(raw) - len(live)
+    for part in (slice(0, 512), slice(0, 4096), slice(None)):
+        np.testing.assert_allclose(np.std(live[part], axis=0), np.std(whole[part], axis=0), rtol=0.03)
+    told = np.array([[each["X"], each["Y"]] for each in told if each["X"] is not None])
+    assert len(told)
+    np.testing.assert_allclose(told, np.broadcast_to(np.std(whole, axis=0), told.shape), rtol=0.05)
 
 
 @pytest.mark.slow
@@ -106,8 +142,7 @@ def test_forces_are_true(shop):
         socket.send_json({"event": "end"})
         end, frames = until(socket, "end")
     force = joined(frames)[:, ::-1]
-    later = slice(round(2.0 * RATE), None)
-    assert np.all(relative_error(force[later], true[later], RATE) < 0.06)
+    assert np.all(relative_error(force[-SETTLE * 5 :], true, RATE) < 0.06)
     assert end["speed_drift_percent"] == pytest.approx(-0.1, abs=0.04)
     assert end["angle_known"]
 
@@ -137,17 +172,18 @@ def test_counters_are_true(shop):
         socket.send_json(hello(id))
         for first, count in sent:
             send(socket, first, raw[first : first + count])
-        until(socket, "ready")
+        first = until(socket, "ready")[0]["first"]
         socket.send_json({"event": "end"})
         end, frames = until(socket, "end")
     assert (end["lost"], end["late"], end["dropped"], end["backlog"]) == (100 + 5000, 2000 + 100 + 500, 0, 0)
-    assert end["samples"] == 8000 + 2000 + 500 + 400 + 1 == len(joined(frames))
+    assert end["samples"] == 8000 + 2000 + 500 + 400 + 1 == len(joined(frames)) + end["settling"]
     covered = sorted({i for f in frames for i in range(unpacked(f)[0], unpacked(f)[0] + len(unpacked(f)[1]))})
-    assert covered == [*range(8000), *range(8100, 10600), *range(15600, 16001)]
+    # behind the large gap the observer settles again
+    assert covered == [*range(first, 8000), *range(8100, 10600)]
     # bridged: as good behind the small gap as without it
     whole = batch(raw[:10000])
-    apart = np.std(joined(frames)[8000:8200] - whole[8100:8300], axis=0)
-    assert np.all(apart < 0.05 * np.std(whole[5000:], axis=0))
+    apart = np.std(joined(frames)[8000 - first : 8200 - first] - whole[8100 - first : 8300 - first], axis=0)
+    assert np.all(apart < 0.05 * np.std(whole, axis=0))
     text = http.get("/metrics").text
     assert "rcsa_ident_stream_lost_samples_total 5100.0" in text
     assert f"rcsa_ident_stream_samples_total {end['samples']}.0" in text
@@ -210,9 +246,12 @@ def test_a_viewer_sees_the_same_in_buckets(shop):
         seen = until(viewer, "end")[1]
         assert closed(viewer) == (1000, {})
     force = joined(frames)
-    assert force.shape == (*raw.shape[:1], 2)
-    rows = joined(seen)
-    assert [f["first"] for f in seen] == np.cumsum([0, *(64 * len(f["samples"]) for f in seen)])[:-1].tolist()
+    begin = ready["first"]
+    assert force.shape == (len(raw) - begin, 2)
+    assert seen[0]["first"] == begin // 64 * 64
+    # the first bucket holds less than the others
+    force, rows = force[-begin % 64 :], joined(seen)[1 if begin % 64 else 0 :]
+    assert [f["first"] for f in seen] == (seen[0]["first"] + np.cumsum([0, *(64 * len(f["samples"]) for f in seen)])[:-1]).tolist()
     whole = force[: len(rows) * 64].reshape(-1, 64, 2)
     np.testing.assert_allclose(rows[:, :, 0], whole.min(axis=1), rtol=1e-5)
     np.testing.assert_allclose(rows[:, :, 1], whole.max(axis=1), rtol=1e-5)
@@ -286,11 +325,11 @@ def test_the_observer_waits_for_a_steady_part(shop):
             told = until(socket, "settling")[0]
             assert "spindle_speed_rpm" in told["detail"] or "recording" in told["detail"]
         ready = until(socket, "ready")[0]
-        assert ready["first"] == 2 * SETTLE
+        assert ready["first"] == 2 * SETTLE + round(ready["left_out_s"] * RATE)
         socket.send_json({"event": "end"})
         end, frames = until(socket, "end")
     assert end["dropped"] == 2 * SETTLE
-    assert end["samples"] == len(raw) - 2 * SETTLE == len(joined(frames))
+    assert end["samples"] == len(raw) - 2 * SETTLE == len(joined(frames)) + end["settling"]
 
 
 def test_an_end_before_there_is_an_observer(shop):
@@ -308,7 +347,7 @@ def test_an_end_before_there_is_an_observer(shop):
         # with enough for one it is made, and everything is answered
         socket.send_json({"event": "end"})
         end, frames = until(socket, "end")
-        assert end["samples"] == len(joined(frames)) == round(0.3 * RATE)
+        assert end["samples"] == len(joined(frames)) + end["settling"] == round(0.3 * RATE)
 
 
 def test_a_client_that_vanishes_leaves_nothing_behind(shop):
@@ -381,8 +420,9 @@ def test_the_process_of_the_streams_is_replaced_when_it_dies(tmp_path):
         assert end["samples"] + end["dropped"] == len(raw)
         assert end["dropped"] <= 5000
         # settled again: the forces of the batch
-        expected = batch(raw)[-5000:]
-        np.testing.assert_allclose(joined(frames)[-5000:], expected, atol=0.1 * np.abs(expected).max())
+        expected, force = batch(raw), joined(frames)
+        last = len(raw) - 10_000 - end["settling"] // 2
+        np.testing.assert_allclose(force[-last:], expected[-last:], atol=0.1 * np.abs(expected).max())
         second = host.process.pid
     until_true(lambda: ended(second))
 

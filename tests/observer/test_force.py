@@ -74,7 +74,29 @@ def test_bands_hold_the_error(oscillating):
     scatter = error(oscillating) * np.std(made.force, axis=0)
     assert np.all(scatter < 1.2 * told)
     assert np.all(told < 0.15 * np.std(made.force, axis=0))
-    assert np.all(told < 0.02 * oscillating.estimate.standard_deviation[0])
+    assert np.all(told < 0.02 * np.array([each.kalman.standard_deviation(1)[0] for each in oscillating.observer.axes]))
+
+
+@pytest.mark.slow
+def test_the_start_dies_out_while_the_observer_settles(oscillating, signals):
+    """Begun anew within the record, it shows hundreds of times the force, and after its settling time the same as one begun before."""
+    observer, begin = oscillating.observer, 2000
+    whole = observer.run(observer.init(), *signals)[1].force[begin:]
+    later = observer.run(replace(observer.init(), count=begin), *(each[begin:] for each in signals))[1].force
+    rest = slice(observer.settling, None)
+    size = np.std(whole[rest], axis=0)
+    assert np.all(np.max(np.abs(later), axis=0) > 50.0 * size)
+    assert np.all(np.std((later - whole)[rest], axis=0) < 0.03 * size)
+    assert np.all(np.std((later - whole)[: rest.start // 2], axis=0) > size)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", [Resonators(), PaperWalk()])
+def test_the_settling_time_is_that_of_the_slowest_pole(method):
+    """Of python-control's observer, filters and all."""
+    observer = monitored(method).observer
+    slowest = max(np.abs(each.to_control().poles()).max() for each in observer.axes)
+    assert slowest**observer.settling < 0.02 < slowest ** (observer.settling - 1) * 1.0001
 
 
 @pytest.mark.slow
@@ -213,12 +235,12 @@ def test_oscillators_follow_a_change_within_the_response_time(oscillating, signa
 @pytest.mark.slow
 def test_the_mean_comes_from_the_time_between_the_teeth(oscillating):
     """Two teeth, half immersed: for a third of the time no edge cuts (the helix lags a little)."""
-    made, first = paper_cut(), 2000
-    raised, level = restore_mean_force(oscillating.estimate, 0.4, first)
-    mean = np.mean(made.force[first:], axis=0)
+    made = paper_cut()
+    raised, level = restore_mean_force(oscillating.estimate, 0.4)
+    mean = np.mean(made.force, axis=0)
     np.testing.assert_allclose(level, mean, atol=0.04 * np.std(made.force, axis=0).max())
     np.testing.assert_allclose(raised.force, oscillating.estimate.force + level)
-    again, more = restore_mean_force(raised, 0.4, first)
+    again, more = restore_mean_force(raised, 0.4)
     np.testing.assert_allclose(more, 0.0, atol=1e-9)
     np.testing.assert_allclose(again.force, raised.force, atol=1e-9)
     with pytest.raises(InputError, match="idle"):

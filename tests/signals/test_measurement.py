@@ -1,4 +1,5 @@
 import dataclasses
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -8,11 +9,15 @@ from rcsa_ident.cutting.force import SLOPES, force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.machines import read_machine
-from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.signals.measurement import measure_cut
+from rcsa_ident.io.recordings import read_cut
+from rcsa_ident.io.setups import read_campaign, read_tooling
+from rcsa_ident.signals.measurement import among_fellows, fits_by_chance, measure_cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+from rcsa_ident.signals.verdict import RecordCode
 from rcsa_ident.virtual.rotor import frequency_response, rotor
+from rcsa_ident.workflows.identify import judge, judge_cut
 from rcsa_ident.workflows.simulate import simulate
+from tests.fixtures.paths import SAMPLES
 from tests.fixtures.synthetic import COEFFICIENTS, FIXTURE, RPM, conditions, pair
 
 AXES = (Dof.X, Dof.Y)
@@ -272,3 +277,52 @@ def test_the_virtual_machines_cross_frf(virtual):
             response = frequency_response(model, lines.omega, truth.spindle_speed, outputs=outputs)[:, column, column]
             expected = response * np.exp(1j * lines.order * truth.tooth_angle) * lines.force
             assert np.linalg.norm(lines.receptance * lines.force - expected) < 1e-2 * np.linalg.norm(expected)
+
+
+#: Cuts of both toolings; with three teeth for four, three of the first ones fit by chance.
+SOME = (14, 15, 16, 17, 18, 19, 20, 46, 47, 48)
+CHANCE = ("S1-ER32-15", "S1-ER32-17", "S1-ER32-18")
+
+
+def with_teeth(teeth):
+    """Some of the sample runs, the first tooling with another number of teeth."""
+    campaign = read_campaign(SAMPLES)
+    toolings = dict(campaign.toolings)
+    if teeth is not None:
+        own = toolings["S1-ER32"]
+        toolings["S1-ER32"] = dataclasses.replace(own, cutter=dataclasses.replace(own.cutter, teeth=teeth, pitch=None, runout=None))
+    return dataclasses.replace(campaign, toolings=toolings, cuts=tuple(campaign.cuts[k] for k in SOME))
+
+
+def reader(campaign):
+    return partial(read_cut, campaign.sensors, campaign.sampling_rate)
+
+
+@pytest.mark.slow
+def test_what_fits_a_wrong_tooth_count_by_chance_is_left_out():
+    campaign = with_teeth(3)
+    alone = [judge_cut(campaign, reader(campaign), cut) for cut in campaign.cuts]
+    assert [each.cut_id for each in alone[:7] if each.verdict.usable] == list(CHANCE)
+    found = {each.cut_id: each for each in judge(campaign, reader(campaign))}
+    for id in CHANCE:
+        verdict = found[id].verdict
+        assert not verdict.usable
+        assert found[id].measurement is None
+        assert [reason.code for reason in verdict.reasons] == [RecordCode.TOOTH_COUNT]
+        assert "4 of 7 cuts with S1-ER32 contradict it, and this one fits by chance" in verdict.reasons[0]
+    # what speaks against one tooling is nothing to the other
+    assert [each.verdict.usable for each in found.values()] == [False] * 7 + [True] * 3
+
+
+@pytest.mark.slow
+def test_with_the_right_tooth_count_nothing_is_left_out():
+    campaign = with_teeth(None)
+    assert all(each.verdict.usable for each in judge(campaign, reader(campaign)))
+
+
+def test_the_most_cuts_decide_and_others_have_no_say():
+    cuts = [("A", True), ("A", False), ("A", None), ("A", None), ("B", False), ("B", True), ("B", False)]
+    reasons = fits_by_chance(cuts)
+    assert [reason is not None for reason in reasons] == [False] * 5 + [True, False]
+    assert "2 of 3 cuts with B" in reasons[5]
+    assert fits_by_chance([]) == among_fellows([]) == []

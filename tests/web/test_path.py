@@ -81,8 +81,10 @@ def test_from_dropping_recordings_to_the_best_speed(opened, client: Client, tmp_
     expect(page.get_by_role("img", name=re.compile("^Spectrum with [0-9]+ multiples"))).to_be_visible()
     expect(page.locator(".chart .main-svg").first).to_be_visible()
 
-    # the identification, watched
-    page.get_by_role("button", name="Identify the machine").click()
+    # the identification, watched; there are enough cuts for it to be the next step
+    identify = page.get_by_role("button", name="Identify the machine")
+    expect(identify).to_have_class("primary")
+    identify.click()
     expect(page.locator(".mark.busy")).to_be_visible()
     expect(page.get_by_role("img", name=re.compile("^Misfit over time: X"))).to_be_visible(timeout=60_000)
     expect(page.get_by_role("img", name=re.compile("^Measured points and model, X"))).to_be_visible(timeout=60_000)
@@ -148,7 +150,11 @@ def test_an_identification_is_cancelled_from_the_page(opened, client: Client):
     raw = (SAMPLES / "recordings" / name).read_bytes()
     client.send("PUT", f"/campaigns/{campaign}/recordings/{name}", content=raw, headers={"Content-Type": "application/octet-stream"})
     page = opened(f"#/campaigns/{campaign}")
-    page.get_by_role("button", name="Identify the machine").click()
+    identify = page.get_by_role("button", name="Identify the machine")
+    # one cut is too few for it to be the next step
+    expect(identify).not_to_have_class("primary")
+    expect(page.locator("main")).to_contain_text("two toolings with 8 usable cuts each")
+    identify.click()
     page.get_by_role("button", name="Cancel").click()
     state = page.locator(".mark", has_text=re.compile("cancelled|failed"))
     expect(state).to_be_visible(timeout=60_000)

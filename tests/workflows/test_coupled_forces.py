@@ -97,7 +97,7 @@ def test_a_stream_follows_the_spindle_and_bridges_what_was_lost():
     state = live.bridge(state, 37)
     state, second = live.run(state, gap[5037:], acceleration[5037:])
     force = np.concatenate([first.force, np.zeros((37, 2)), second.force])
-    settled = slice(6000, -600)
+    settled = slice(-4240, -600)
     off = force[settled] - found().estimate.force[settled]
     assert np.all(np.std(off, axis=0) < 0.02 * np.std(oblique_cut().force, axis=0))
 

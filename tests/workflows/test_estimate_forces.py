@@ -20,6 +20,7 @@ from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.workflows.estimate_forces import observe, trigger_speed, wear_of
 from tests.fixtures import by_hand
 from tests.fixtures.flange_machine import BAND, decoupled_file, flange_machine, paper_cut
+from tests.fixtures.force_stream import SECOND, streamed, turning
 from tests.fixtures.virtual_cut import relative_error, virtual_cut
 
 RPM = np.pi / 30.0
@@ -70,13 +71,13 @@ def test_a_missing_air_cut_is_said():
 @pytest.mark.parametrize("place", [0, 1])
 def test_one_axis_alone_is_watched(place):
     """Its own sensors and its own machine, whatever stands beside it in the record."""
-    whole, settled = flange_machine(), slice(2000, None)
+    whole = flange_machine()
     one = replace(whole, flanges=whole.flanges[place : place + 1])
     only = watch(paper_cut().cut, paper_cut().air, machine=one)
     assert only.estimate.axes == (Dof.X, Dof.Y)[place : place + 1]
     assert relative_error(only.estimate.force, paper_cut().force[:, place : place + 1], paper_cut().cut.rate) < 0.05
     # without an air cut, whose angle comes from fewer channels then, only the last digits of the speed differ
-    alone, both = (watch(paper_cut().cut, machine=machine).estimate.force[settled] for machine in (one, whole))
+    alone, both = (watch(paper_cut().cut, machine=machine).estimate.force[-4096:] for machine in (one, whole))
     assert np.std(alone[:, 0] - both[:, place]) < 1e-4 * np.std(both[:, place])
 
 
@@ -95,7 +96,7 @@ def test_a_measured_flange_gives_the_forces_of_its_modes(found):
     for response in alone.response.values():
         assert response.omega[0] >= 2.0 * np.pi * 373.0
         assert response.omega[-1] <= 2.0 * np.pi * 4400.0
-    settled = slice(4000, None)
+    settled = slice(-4096, None)
     difference = np.std(alone.estimate.force[settled] - found.estimate.force[settled], axis=0)
     assert np.all(difference < 0.01 * np.std(found.estimate.force[settled], axis=0))
     assert np.all(relative_error(alone.estimate.force, paper_cut().force, paper_cut().cut.rate) < 0.03)
@@ -135,7 +136,7 @@ def test_sensors_that_lag_and_lose_are_undone():
 @pytest.mark.slow
 def test_a_narrow_bandwidth_keeps_few_harmonics():
     narrow = watch(paper_cut().cut, paper_cut().air, bandwidth=2.0 * np.pi * 1000.0)
-    spectrum = np.abs(np.fft.rfft(narrow.estimate.force[4096:8192] * np.hanning(4096)[:, None], axis=0))
+    spectrum = np.abs(np.fft.rfft(narrow.estimate.force[-4096:] * np.hanning(4096)[:, None], axis=0))
     frequency = np.fft.rfftfreq(4096, 1.0 / 25600.0)
     assert spectrum[frequency > 2500.0].max() < 0.05 * spectrum[frequency < 1100.0].max()
 
@@ -203,6 +204,21 @@ def test_bad_records_are_refused_in_a_sentence():
 
 
 @pytest.mark.slow
+def test_the_observers_start_is_left_out(found):
+    """Of a long recording as much as the observer needs, and of a short one half, with a word."""
+    long = streamed()[0][SECOND + SECOND // 2 :]
+    estimate, observer = watch(turning().recording(long)).estimate, found.observer
+    assert estimate.force.shape[0] < len(long)
+    assert estimate.time[0] == estimate.start == pytest.approx((len(long) - estimate.force.shape[0]) * estimate.step)
+    assert np.abs(estimate.force).max() < 6.0 * np.std(estimate.force[-SECOND // 2 :], axis=0).max()
+    count = paper_cut().cut.samples.shape[0]
+    assert observer.settling > count // 2
+    assert found.estimate.start == pytest.approx(count // 2 * found.estimate.step)
+    assert any("its first half is left out" in remark for remark in found.remarks)
+    assert set(found.notes) < set(found.remarks)
+
+
+@pytest.mark.slow
 def test_figures_have_units_and_bands(found):
     history = force_history(found.estimate, found.spindle_speed)
     assert [ax.get_ylabel() for ax in history.axes] == ["force X [N]", "force Y [N]"]
@@ -212,7 +228,7 @@ def test_figures_have_units_and_bands(found):
     responses = observer_frf(found.response, found.band)
     assert "dB" in responses.axes[0].get_ylabel()
     assert responses.axes[-1].get_xlabel() == "frequency [Hz]"
-    with_truth = force_history(found.estimate, found.spindle_speed, true=paper_cut().force - paper_cut().force.mean(axis=0))
+    with_truth = force_history(found.estimate, found.spindle_speed, true=paper_cut().force[-found.estimate.force.shape[0] :])
     assert len(with_truth.axes[0].lines) == len(history.axes[0].lines) + 1
 
 

@@ -101,7 +101,7 @@ function columnsOf(time, low, high, step, x, y) {
   return found;
 }
 
-/** A range for all columns behind the first; the few moments in which an observer finds its feet do not set it. */
+/** A range for all columns behind the first; a few moments do not set it. */
 function reach(columns) {
   const values = Float64Array.from(
     columns

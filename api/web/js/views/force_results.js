@@ -4,6 +4,9 @@ import { axis, chart, colour, legend, safe, SERIES } from "../charts.js";
 import { busy, failed } from "../forms.js";
 import { factor, plain, q, significant, unit } from "../units.js";
 
+/** The start of a recording or a stream that has no forces. */
+export const leftOut = (seconds) => `The first ${plain(seconds, 2, 2)} s are left out: the observer settles in them.`;
+
 export function forceResults(place, found, name, download) {
   const axes = Object.keys(found.axes);
   const keys = legend(axes.map((a, k) => ({ name: `F${a.toLowerCase()}`, series: SERIES[k] })));
@@ -22,7 +25,7 @@ export function forceResults(place, found, name, download) {
     card(
       `Forces of ${name}`,
       csv,
-      h("p", { class: "soft" }, `${plain(found.spindle_speed_rpm, 1)} rev/min; forces up to ${plain(found.band_hz[1])} Hz.`),
+      h("p", { class: "soft" }, `${plain(found.spindle_speed_rpm, 1)} rev/min; forces up to ${plain(found.band_hz[1])} Hz. ${leftOut(found.left_out_s)}`),
       keys,
       time,
     ),

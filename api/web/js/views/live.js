@@ -7,6 +7,7 @@ import { field, select } from "../forms.js";
 import { to } from "../router.js";
 import { open, Window } from "../stream.js";
 import { factor, plain, q } from "../units.js";
+import { leftOut } from "./force_results.js";
 import { ground, recordingPicker, tabs } from "./forces.js";
 
 /** The seconds that the chart shows. */
@@ -72,7 +73,8 @@ export async function view(_args, query, place) {
       if (event.event === "ready") {
         const bucket = event.envelope ?? hello.envelope;
         data = new Window(event.axes, event.sampling_rate_hz, bucket, seconds);
-        fill(keys, legend(event.axes.map((a, k) => ({ name: `F${a.toLowerCase()}`, series: SERIES[k] }))));
+        const names = legend(event.axes.map((a, k) => ({ name: `F${a.toLowerCase()}`, series: SERIES[k] })));
+        fill(keys, h("p", { class: "soft" }, leftOut(event.left_out_s)), names);
         plot?.destroy();
         plot = liveChart(uPlot, chartBox, event.axes, () => data);
       } else if (event.event === "status" || event.event === "end") fill(board, status(event, about));
@@ -197,7 +199,7 @@ function status(event, about) {
   return [
     fact("State", mark(live ? "good" : event.stage === "ended" ? "idle" : "busy", event.stage)),
     fact("Of", about),
-    ...Object.entries(event.rms_n).map(([axis, n]) => fact(`F${axis.toLowerCase()}, RMS`, q("force", n))),
+    ...Object.entries(event.rms_n).map(([axis, n]) => fact(`F${axis.toLowerCase()}, RMS`, n === null ? "none yet" : q("force", n))),
     fact("Samples", plain(event.samples)),
     fact("Lost", h("span", { class: event.lost ? "fault" : null }, plain(event.lost))),
     fact("Dropped", h("span", { class: event.dropped ? "fault" : null }, plain(event.dropped))),

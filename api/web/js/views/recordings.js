@@ -44,10 +44,11 @@ function campaignTable(campaigns) {
         { name: "Usable", number: true, cell: (c) => String(c.usable) },
         {
           name: "",
-          cell: (c) =>
-            c.uploaded < c.cuts
-              ? mark("idle", "files are missing")
-              : mark(c.usable ? "good" : "bad", c.usable ? "complete" : "nothing usable"),
+          cell: (c) => {
+            if (c.missing) return mark("idle", c.uploaded < c.cuts ? "files are missing" : "air cuts are missing");
+            if (!c.usable) return mark("bad", "nothing usable");
+            return c.without_air ? mark("doubt", "no air cuts") : mark("good", "complete");
+          },
         },
       ],
       campaigns,
