@@ -59,6 +59,10 @@ class AccessMonitor:
 
         try:
             await self.app(scope, body.receive, observed)
+        except asyncio.CancelledError:
+            # the server ends, and gives up what still runs
+            if status == 0:
+                await document(request, Problem(503, "the service is shutting down", headers=RETRY))(scope, receive, observed)
         except Exception as error:
             problem = _problem(error)
             log.error("unexpected" if problem.status == 500 else "unavailable", exc_info=error, extra={"fields": {"request_id": id}})

@@ -186,7 +186,7 @@ def _run(settings: object) -> None:
         log.warning("no keys are asked for: everybody on this machine may do everything (RCSA_IDENT_KEYS=on asks for them)")
     # open streams of events and forces would delay the end
     # no compression: measured samples do not shrink
-    limits: dict[str, Any] = {"timeout_graceful_shutdown": 3, "ws_per_message_deflate": False, "http": TimedHeadProtocol}
+    limits: dict[str, Any] = {"timeout_graceful_shutdown": 1, "ws_per_message_deflate": False, "http": TimedHeadProtocol}
     uvicorn.run(service, host=settings.host, port=settings.port, log_config=None, access_log=False, server_header=False, **limits)
 
 

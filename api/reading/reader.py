@@ -11,16 +11,14 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Any
 
-from api.processes import Child, spawn_context
+from api.processes import Child, limit_memory, spawn_context
 from api.reading import reader_tasks
 from api.work.pool import Busy
 from rcsa_ident.errors import InputError
 
 log = logging.getLogger("rcsa_ident.reading")
-MEBIBYTE = 1 << 20
 #: Time limit for the start of the process, including imports and compilation [s].
 _START = 300.0
 
@@ -172,10 +170,8 @@ def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None]) -> Non
     from rcsa_ident.io.hdf5 import LARGEST_DATA
 
     prepare()
-    taken = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (taken + limits.memory * MEBIBYTE,) * 2)
-    # no core dump of a client's data, and no file larger than the largest result
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    limit_memory(limits.memory)
+    # no file larger than the largest result
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_DATA + LARGEST_DATA // 8,) * 2)
     pipe.send_bytes(b"{}")
     while True:

@@ -13,7 +13,7 @@ from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
 from api.components import Components, ThisService
-from api.conventions import BODY, guard, problems
+from api.conventions import BODY, guard, problems, while_there
 from api.lookups import known_machine, pair_reader, tooling_source, uploaded
 from api.problems import Problem
 from api.reading import reader_tasks
@@ -69,7 +69,8 @@ async def estimate(request: Request, components: ThisService, caller: WhoAsks) -
     csv = CSV in request.headers.get("accept", "")
     if request.headers["content-type"].split(";")[0].strip().lower() == JSON:
         query = body_of(ForceQuery, await request.body())
-        return await _answered(components, caller.group, *await run_in_threadpool(_of_campaign, components, caller.group, query), csv)
+        found = await run_in_threadpool(_of_campaign, components, caller.group, query)
+        return await _answered(request, components, caller.group, *found, csv)
     with components.uploads.admitted():
         async with form(request, components, caller.group, ("query",), ("recording", "air")) as (texts, files):
             missing = "query" if "query" not in texts else "recording" if "recording" not in files else ""
@@ -80,7 +81,7 @@ async def estimate(request: Request, components: ThisService, caller: WhoAsks) -
             upload = body_of(ForceUpload, texts["query"])
             machine, tooling, question, sensors = await run_in_threadpool(_of_upload, components, caller.group, upload)
             async with _read(components, caller.group, files, sensors, upload.sampling_rate_hz) as source:
-                return await _answered(components, caller.group, machine, tooling, question, source, csv)
+                return await _answered(request, components, caller.group, machine, tooling, question, source, csv)
 
 
 def _of_campaign(components: Components, group: str, query: ForceQuery) -> tuple[MachineText, ToolingSource, ForceQuestion, ReadPair]:
@@ -116,13 +117,21 @@ async def _read(
 
 
 async def _answered(
-    components: Components, group: str, machine: MachineText, tooling: ToolingSource, question: ForceQuestion, source: ReadPair, csv: bool
+    request: Request,
+    components: Components,
+    group: str,
+    machine: MachineText,
+    tooling: ToolingSource,
+    question: ForceQuestion,
+    source: ReadPair,
+    csv: bool,
 ) -> Any:
+    run = components.work.run
     if not csv:
-        return ForceAnswer.model_validate(await components.work.run(forces, machine, tooling, question, source))
+        return ForceAnswer.model_validate(await while_there(request, run(forces, machine, tooling, question, source)))
     path: Path = await run_in_threadpool(components.files.spare, group)
     try:
-        await components.work.run(forces, machine, tooling, question, source, path)
+        await while_there(request, run(forces, machine, tooling, question, source, path))
     except BaseException:
         path.unlink(missing_ok=True)
         raise
