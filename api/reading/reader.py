@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
+from api.files import Full, no_room
 from api.processes import Child, limit_memory, spawn_context
 from api.reading import reader_tasks
 from api.work.pool import Busy
@@ -98,6 +99,8 @@ class Reader:
                 return answer
             if kind == "costly":
                 raise self.limits.costly
+            if kind == "full":
+                raise Full
             if kind == "refused":
                 raise InputError(*answer)
             if kind == "failed":
@@ -132,7 +135,7 @@ class _Reading:
         theirs.close()
 
     def ask(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
-        """Return the outcome of a call (answer, refused, failed, costly, or killed from outside) and its content."""
+        """Return the outcome of a call (answer, refused, failed, costly, full disk, or killed from outside) and its content."""
         try:
             if not self.ready:
                 self._receive(_START)
@@ -194,5 +197,7 @@ def _answer(call: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
     except MemoryError:
         kind = "costly"
     except Exception as error:
+        if no_room(error):
+            return json.dumps(["full", ""]).encode()
         kind, answer = "failed", f"{type(error).__name__}: {error}"[:1000]
     return json.dumps([kind, answer]).encode()

@@ -23,6 +23,7 @@ from api.schemas.campaigns import given_sensors
 from api.schemas.common import body_of
 from api.schemas.forces import ForceAnswer, ForceQuery, ForceUpload
 from api.security import Guarded, WhoAsks
+from api.transfer.body_stream import storage_problems
 from api.transfer.multipart import FORM, form
 from api.work.forces import ForceQuestion, ReadPair, forces, sensors_of
 from api.work.requests import MachineText, ToolingSource
@@ -109,7 +110,8 @@ async def _read(
             if not file.lower().endswith(FORMATS):
                 raise InputError(name, file[-80:], f"a file name that ends in one of {', '.join(FORMATS)}")
             targets[name] = await run_in_threadpool(components.files.spare, group)
-            await components.reader.run(reader_tasks.read_alone, Upload(received.path, file, targets[name]), sensors, rate)
+            with storage_problems():
+                await components.reader.run(reader_tasks.read_alone, Upload(received.path, file, targets[name]), sensors, rate)
         yield pair_reader(targets["recording"], targets.get("air"))
     finally:
         for path in targets.values():

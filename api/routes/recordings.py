@@ -34,6 +34,7 @@ from api.transfer.body_stream import (
     complete,
     new_part,
     refuse_encoded,
+    storage_problems,
 )
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
@@ -85,7 +86,8 @@ async def put(
 async def take(components: Components, campaign: Campaign, name: str, received: Received, replacing: bool) -> tuple[int, Recording]:
     """Store a received file, or raise a problem with the reason."""
     try:
-        return await components.uploads.take(campaign, name, received, replacing)
+        with storage_problems():
+            return await components.uploads.take(campaign, name, received, replacing)
     except Taken:
         fault = {"field": "name", "found": name[:120], "allowed": "the same content, or ?replace=true"}
         raise Problem(409, "a recording with other content exists under this name", [fault]) from None

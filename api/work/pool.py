@@ -151,14 +151,15 @@ class _Call:
 
     def __init__(self, call: Callable[..., Any] | None = None, arguments: tuple[Any, ...] = ()) -> None:
         self.call, self.arguments = call, arguments
-        self.lock, self.member, self.withdrawn = threading.Lock(), None, False
+        self.lock, self.withdrawn = threading.Lock(), False
+        self.member: Worker | None = None
 
     def answer(self, member: Worker) -> Any:
         """Return what a process answers, unless nobody waits for it any more."""
         with self.lock:
             if self.call is None or self.withdrawn:
                 return None
-            self.member: Worker | None = member
+            self.member = member
         try:
             return member.ask(self.call, self.arguments)
         finally:

@@ -100,7 +100,9 @@ class Worker:
             self.process.kill()
         if kind == "answer":
             return answer
-        raise {"too long": self.limits.too_long, "too large": self.limits.too_large, "killed": Killed()}.get(kind, answer)
+        reasons = {"too long": self.limits.too_long, "too large": self.limits.too_large, "killed": Killed()}
+        reason: Exception = reasons.get(kind, answer)
+        raise reason
 
     def end(self) -> None:
         """End the process at once."""
