@@ -89,7 +89,9 @@ class Worker:
         try:
             self.pipe.send((call, arguments))
             self.asked += 1
-            kind, answer = self.pipe.recv() if self.pipe.poll(self.limits.seconds) else ("too long", None)
+            # what the process still prepares is not the call's time
+            if self.pipe.poll(_START) and self.pipe.recv():
+                kind, answer = self.pipe.recv() if self.pipe.poll(self.limits.seconds) else ("too long", None)
         except (EOFError, OSError):
             self.process.join(10.0)
             if self.process.exitcode != -signal.SIGKILL:
@@ -100,9 +102,14 @@ class Worker:
             self.process.kill()
         if kind == "answer":
             return answer
-        reasons = {"too long": self.limits.too_long, "too large": self.limits.too_large, "killed": Killed()}
-        reason: Exception = reasons.get(kind, answer)
-        raise reason
+        if kind == "too long":
+            raise self.limits.too_long
+        if kind == "too large":
+            raise self.limits.too_large
+        if kind == "killed":
+            raise Killed
+        assert isinstance(answer, Exception)
+        raise answer
 
     def end(self) -> None:
         """End the process at once."""
@@ -123,6 +130,8 @@ def _serve(pipe: Connection, memory: int, prepare: Callable[[], None], spare: Ca
             call, arguments = pipe.recv()
         except EOFError:
             return
+        # it has begun
+        pipe.send(True)
         pipe.send(_answer(call, arguments))
 
 

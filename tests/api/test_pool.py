@@ -14,7 +14,7 @@ import pytest
 
 from api.work.pool import Busy, Pool, guarded
 from api.work.requests import TooLong
-from api.work.worker import QueryLimits
+from api.work.worker import QueryLimits, Worker
 from rcsa_ident.errors import InputError
 from tests.fixtures.waiting import ended, until
 
@@ -73,15 +73,15 @@ def test_a_killed_worker_is_replaced(pool):
 
 @pytest.fixture(scope="module")
 def strict():
-    """One process, whose queries may take a second and 500 MiB."""
-    found = Pool(1, 1, 2, QueryLimits(1.0, 500))
+    """One process, whose queries may take 3 s and 500 MiB."""
+    found = Pool(1, 1, 2, QueryLimits(3.0, 500))
     found.start()
     yield found
     found.stop()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("call", "words"), [(forever, "more than 1 s"), (too_much, "more than 500 MiB of memory")])
+@pytest.mark.parametrize(("call", "words"), [(forever, "more than 3 s"), (too_much, "more than 500 MiB of memory")])
 def test_a_query_that_costs_too_much_ends_with_its_process(strict, call, words):
     before = asyncio.run(strict.run(os.getpid))
     with pytest.raises(InputError, match=words) as error:
@@ -90,6 +90,22 @@ def test_a_query_that_costs_too_much_ends_with_its_process(strict, call, words):
     # nobody computes any more, and the next is answered
     until(lambda: ended(before))
     assert asyncio.run(strict.run(os.getpid)) != before
+
+
+def nothing():
+    pass
+
+
+def slowly():
+    time.sleep(5.0)
+
+
+@pytest.mark.slow
+def test_what_a_process_still_prepares_is_not_the_time_of_a_query():
+    member = Worker(QueryLimits(2.5, 500), nothing, slowly)
+    member.begin()
+    assert member.ask(pow, (2, 5)) == 32
+    member.end()
 
 
 @pytest.mark.slow
