@@ -34,6 +34,8 @@ class Settings:
         Processes that compute.
     queue : int
         Queries that may wait for one.
+    connections, connections_per_address : int
+        Open at once; fewer than the files that the process may open (``ulimit -n``).
     max_body_bytes : int
     requests_per_minute, burst : int
         Per key.
@@ -96,6 +98,8 @@ class Settings:
     keys: bool | None = None
     workers: int = field(default_factory=lambda: max(1, min(os.cpu_count() or 1, 8)))
     queue: int = 64
+    connections: int = 800
+    connections_per_address: int = 400
     max_body_bytes: int = 16 * MEGABYTE
     requests_per_minute: int = 6000
     burst: int = 600
@@ -131,7 +135,8 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name, least, most in (
-            ("port", 0, 65535), ("workers", 1, 256), ("queue", 0, 100_000), ("max_body_bytes", 1000, 10**9),
+            ("port", 0, 65535), ("workers", 1, 256), ("queue", 0, 100_000),
+            ("connections", 1, 10**6), ("connections_per_address", 1, 10**6), ("max_body_bytes", 1000, 10**9),
             ("requests_per_minute", 1, 10**9), ("burst", 1, 10**9), ("work_seconds", 0.1, 3600.0),
             ("query_seconds", 0.1, 7200.0), ("query_memory", 256, 10**6), ("kept_machines", 1, 1000),
             ("streams", 0, 1000), ("streams_per_group", 0, 1000), ("stream_listeners", 0, 1000), ("stream_idle_seconds", 1.0, 3600.0),
