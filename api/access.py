@@ -17,6 +17,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
 from api.components import Components
+from api.connections import Connections
 from api.problems import Problem, document
 from api.stores.entities import Unavailable
 from api.work.pool import Busy
@@ -59,6 +60,10 @@ class AccessMonitor:
 
         try:
             await self.app(scope, body.receive, observed)
+        except asyncio.CancelledError:
+            # the server ends, and gives up what still runs
+            if status == 0:
+                await document(request, Problem(503, "the service is shutting down", headers=RETRY))(scope, receive, observed)
         except Exception as error:
             problem = _problem(error)
             log.error("unexpected" if problem.status == 500 else "unavailable", exc_info=error, extra={"fields": {"request_id": id}})
@@ -110,13 +115,15 @@ class _Body:
 
 
 class TimedHeadProtocol(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
-    """HTTP connection that is closed when the head of a request takes too long or grows too large."""
+    """HTTP connection, one of so many, that is closed when the head of a request takes too long or grows too large."""
 
-    seconds, most = HEAD_SECONDS, HEAD_BYTES
+    seconds, most, counted = HEAD_SECONDS, HEAD_BYTES, Connections()
 
     def connection_made(self, transport: Any) -> None:
         super().connection_made(transport)
         self.waiting, self.came = self.loop.call_later(self.seconds, self._over), 0
+        if not self.counted.admit(transport):
+            transport.abort()
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
@@ -138,6 +145,7 @@ class TimedHeadProtocol(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
 
     def connection_lost(self, exc: Exception | None) -> None:
         self.waiting.cancel()
+        self.counted.release(self.transport)
         super().connection_lost(exc)
 
 

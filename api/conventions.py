@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import asyncio
+from collections.abc import Callable, Coroutine, Sequence
 from typing import Annotated, Any, TypeVar
 
 from fastapi import Header, Path, Query, Request
@@ -109,6 +110,32 @@ def in_use(taken: Taken, name: str | None, repeat: str | None) -> Problem:
     what = str(taken)
     found = str(name if what == "name" else repeat)
     return Problem(409, f"the {what} is already in use", [{"field": what, "found": found, "allowed": f"another {what}"}])
+
+
+async def while_there(request: Request, answer: Coroutine[Any, Any, Item]) -> Item:
+    """Return an answer, which is given up as soon as the client of the request has left.
+
+    Parameters
+    ----------
+    request : Request
+        Whose body has been read.
+    answer : coroutine
+    """
+
+    async def leaving() -> None:
+        while (await request.receive())["type"] != "http.disconnect":
+            pass
+
+    asked, left = asyncio.ensure_future(answer), asyncio.ensure_future(leaving())
+    try:
+        await asyncio.wait((asked, left), return_when=asyncio.FIRST_COMPLETED)
+        if not asked.done():
+            raise Problem(400, "the client has disconnected")
+        return asked.result()
+    finally:
+        for each in (asked, left):
+            each.cancel()
+        await asyncio.gather(asked, left, return_exceptions=True)
 
 
 def utf8(raw: bytes) -> str:

@@ -6,6 +6,7 @@ of its content by one rename, so that a file that is there is whole. A row of th
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import os
@@ -14,7 +15,7 @@ import secrets
 import shutil
 import threading
 import time
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -44,10 +45,23 @@ class Partial:
         Received and on the disk.
     length : int [bytes]
         Of the whole.
+    group, campaign, name : str
+        Where the whole belongs.
+    replacing : bool
+        Whether it takes the place of other content.
     """
 
     offset: int
     length: int
+    group: str = ""
+    campaign: str = ""
+    name: str = ""
+    replacing: bool = False
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing is missing, though it may not have been read yet."""
+        return self.offset == self.length
 
 
 class Part:
@@ -172,12 +186,15 @@ class Files:
     def partial(self, group: str, name: str) -> tuple[Path, Partial | None]:
         """Return the path of a resumable upload, and its state."""
         path = self.of_group(group, PARTS) / f"{hashlib.sha256(name.encode()).hexdigest()}.part"
-        try:
-            state = Partial(**json.loads(path.with_suffix(".json").read_text(encoding="utf-8")))
-            there = path.stat().st_size >= state.offset
-        except (OSError, ValueError, TypeError):
-            return path, None
-        return path, state if there else None
+        return path, _noted(path)
+
+    def complete(self) -> Iterator[tuple[Path, Partial]]:
+        """Yield the resumable uploads of all groups that are complete, but not stored."""
+        for note in list(self.folder.glob(f"*/{PARTS}/*.json")):
+            path = note.with_suffix(".part")
+            state = _noted(path)
+            if state is not None and state.complete:
+                yield path, state
 
     def note(self, path: Path, state: Partial) -> None:
         """Record the state of a resumable upload, whose bytes have been synced."""
@@ -213,6 +230,20 @@ class Files:
                         Path(entry.path).unlink(missing_ok=True)
                         count += 1
         return count
+
+
+def _noted(path: Path) -> Partial | None:
+    """State of a resumable upload, None where none is noted or its bytes are missing."""
+    try:
+        state = Partial(**json.loads(path.with_suffix(".json").read_text(encoding="utf-8")))
+        return state if path.stat().st_size >= state.offset else None
+    except (OSError, ValueError, TypeError):
+        return None
+
+
+def no_room(error: BaseException) -> bool:
+    """Whether an error says that a disk, or a quota on it, is full."""
+    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
 def _folder_name(group: str) -> str:

@@ -48,6 +48,7 @@ from api.stores.sql import open_store
 from api.streams.hub import Hub, StreamLimits
 from api.streams.process import Host, StreamProcess
 from api.work.pool import Pool, Work
+from api.work.worker import QueryLimits
 from rcsa_ident.version import __version__
 
 V1 = "/v1"
@@ -76,7 +77,8 @@ def create_app(
     if store is None and not settings.database:
         settings.data.mkdir(parents=True, exist_ok=True)
     kept = open_store(settings.database_url) if store is None else store
-    workers = Pool(settings.workers, settings.queue, settings.kept_machines) if work is None else work
+    most = QueryLimits(settings.query_seconds, settings.query_memory)
+    workers = Pool(settings.workers, settings.queue, settings.kept_machines, most) if work is None else work
     files = Files(settings.data / "files", settings.group_bytes, settings.free_bytes)
     limits = Limits(settings.reader_memory, settings.reader_seconds, settings.reader_wall_seconds, settings.reader_calls)
     readers = Reader(limits, 2 * settings.uploads) if reader is None else reader
@@ -98,13 +100,10 @@ def create_app(
             supervisor.start()
         maintenance = asyncio.create_task(uploads.maintain())
         yield
-        await hub.stop()
         maintenance.cancel()
-        await asyncio.gather(maintenance, return_exceptions=True)
-        if supervisor is not None:
-            await asyncio.to_thread(supervisor.stop)
-        readers.stop()
-        workers.stop()
+        # beside each other: every one of them gives its processes time
+        ends = [asyncio.to_thread(each.stop) for each in (readers, workers, *([] if supervisor is None else [supervisor]))]
+        await asyncio.gather(hub.stop(), *ends, maintenance, return_exceptions=True)
         kept.close()
 
     app = FastAPI(

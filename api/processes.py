@@ -9,10 +9,12 @@ import threading
 import time
 from collections.abc import Callable
 from multiprocessing.context import SpawnContext, SpawnProcess
+from pathlib import Path
 from typing import Any
 
 #: A child that has lived this long [s] is not counted as one that fails at once.
 LIVED = 60.0
+MEBIBYTE = 1 << 20
 
 
 def spawn_context() -> SpawnContext:
@@ -33,6 +35,16 @@ def follow_parent() -> None:
         os._exit(1)
 
     threading.Thread(target=follow, daemon=True).start()
+
+
+def limit_memory(mebibytes: int) -> None:
+    """In a child: let it take so much address space beyond what it has now."""
+    import resource
+
+    taken = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (taken + mebibytes * MEBIBYTE,) * 2)
+    # no core dump of a client's data
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 class Child(SpawnProcess):

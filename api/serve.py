@@ -167,6 +167,7 @@ def _run(settings: object) -> None:
     import uvicorn
 
     from api.access import TimedHeadProtocol
+    from api.connections import Connections, SmallHelloProtocol
     from api.jobs.supervisor import Supervisor
     from api.main import create_app
     from api.settings import Settings
@@ -186,7 +187,11 @@ def _run(settings: object) -> None:
         log.warning("no keys are asked for: everybody on this machine may do everything (RCSA_IDENT_KEYS=on asks for them)")
     # open streams of events and forces would delay the end
     # no compression: measured samples do not shrink
-    limits: dict[str, Any] = {"timeout_graceful_shutdown": 3, "ws_per_message_deflate": False, "http": TimedHeadProtocol}
+    limits: dict[str, Any] = {"timeout_graceful_shutdown": 1, "ws_per_message_deflate": False}
+    counted = {"counted": Connections(settings.connections, settings.connections_per_address)}
+    # all that wait are accepted at once, before one of them is closed: fewer than the files that are left
+    limits["backlog"] = 128
+    limits |= {"http": type("Http", (TimedHeadProtocol,), counted), "ws": type("WebSocket", (SmallHelloProtocol,), counted)}
     uvicorn.run(service, host=settings.host, port=settings.port, log_config=None, access_log=False, server_header=False, **limits)
 
 

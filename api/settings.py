@@ -34,11 +34,17 @@ class Settings:
         Processes that compute.
     queue : int
         Queries that may wait for one.
+    connections, connections_per_address : int
+        Open at once; fewer than the files that the process may open (``ulimit -n``).
     max_body_bytes : int
     requests_per_minute, burst : int
         Per key.
     work_seconds : float [s]
         Estimated work of one query; a longer one is refused.
+    query_seconds : float [s]
+        Of one query by the clock, once a process works on it; the process is ended then.
+    query_memory : int [MiB]
+        For one query.
     kept_machines : int
         Machines whose receptances each worker keeps.
     streams, streams_per_group, stream_listeners : int
@@ -92,10 +98,14 @@ class Settings:
     keys: bool | None = None
     workers: int = field(default_factory=lambda: max(1, min(os.cpu_count() or 1, 8)))
     queue: int = 64
+    connections: int = 800
+    connections_per_address: int = 400
     max_body_bytes: int = 16 * MEGABYTE
     requests_per_minute: int = 6000
     burst: int = 600
     work_seconds: float = 20.0
+    query_seconds: float = 60.0
+    query_memory: int = 2048
     kept_machines: int = 4
     streams: int = 16
     streams_per_group: int = 8
@@ -125,8 +135,10 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name, least, most in (
-            ("port", 0, 65535), ("workers", 1, 256), ("queue", 0, 100_000), ("max_body_bytes", 1000, 10**9),
-            ("requests_per_minute", 1, 10**9), ("burst", 1, 10**9), ("work_seconds", 0.1, 3600.0), ("kept_machines", 1, 1000),
+            ("port", 0, 65535), ("workers", 1, 256), ("queue", 0, 100_000),
+            ("connections", 1, 10**6), ("connections_per_address", 1, 10**6), ("max_body_bytes", 1000, 10**9),
+            ("requests_per_minute", 1, 10**9), ("burst", 1, 10**9), ("work_seconds", 0.1, 3600.0),
+            ("query_seconds", 0.1, 7200.0), ("query_memory", 256, 10**6), ("kept_machines", 1, 1000),
             ("streams", 0, 1000), ("streams_per_group", 0, 1000), ("stream_listeners", 0, 1000), ("stream_idle_seconds", 1.0, 3600.0),
             ("stream_buffer_seconds", 6.0, 120.0),
             ("max_upload_bytes", 1000, 10**12), ("uploads", 1, 1000), ("group_bytes", 1000, 10**15), ("free_bytes", 0, 10**15),
@@ -138,6 +150,8 @@ class Settings:
         ):  # fmt: skip
             if not least <= getattr(self, name) <= most:
                 raise InputError(PREFIX + name.upper(), getattr(self, name), f"a number from {least:g} to {most:g}")
+        if self.query_seconds < self.work_seconds:
+            raise InputError(f"{PREFIX}QUERY_SECONDS", self.query_seconds, f"at least {PREFIX}WORK_SECONDS, {self.work_seconds:g} s")
         if self.dask and not ADDRESS.fullmatch(self.dask):
             raise InputError(f"{PREFIX}DASK", self.dask, "the address of a Dask scheduler, as tcp://host:8786")
         if self.keys is False and not self.loopback:

@@ -106,21 +106,23 @@ class Uploads(Asking):
         path, size = _recording(campaign, name or file.name), file.stat().st_size
         with file.open("rb") as opened:
             digest = hashlib.file_digest(opened, "sha256").digest()
-            failed, offset = 0, self._offset(path, size)
+            failed, offset = 0, -1
             while True:
-                if offset == size and (kept := self._kept(path)) is not None:
-                    if kept.sha256 == digest.hex():
-                        return kept
-                    offset = 0
-                opened.seek(offset)
-                data = opened.read(part)
-                headers = {
-                    "Content-Type": "application/octet-stream",
-                    "Upload-Offset": str(offset),
-                    "Upload-Length": str(size),
-                    **_digest(digest),
-                }
                 try:
+                    if offset < 0:
+                        offset = self._offset(path, size)
+                    if offset == size and (kept := self._kept(path)) is not None:
+                        if kept.sha256 == digest.hex():
+                            return kept
+                        offset = 0
+                    opened.seek(offset)
+                    data = opened.read(part)
+                    headers = {
+                        "Content-Type": "application/octet-stream",
+                        "Upload-Offset": str(offset),
+                        "Upload-Length": str(size),
+                        **_digest(digest),
+                    }
                     answer = self.send(
                         "PATCH", path, content=data, headers=headers, params={"replace": "true"} if replace else {}, **self.long_timeout
                     )
@@ -130,7 +132,7 @@ class Uploads(Asking):
                     if failed >= attempts or not lost:
                         raise
                     time.sleep(min(0.2 * 2**failed, 5.0))
-                    offset = self._offset(path, size)
+                    offset = -1
                     continue
                 if answer.status_code != 204:
                     return read(RecordingAnswer, answer)

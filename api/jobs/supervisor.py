@@ -14,7 +14,7 @@ from api.processes import BackOff, Child, spawn_context
 
 log = logging.getLogger("rcsa_ident.jobs")
 #: Interval between two checks of the workers, and time for one to end before it is killed [s].
-LOOK, FAREWELL = 0.2, 5.0
+LOOK, FAREWELL = 0.2, 3.0
 #: Takes the settings and a function that reports readiness, and works until the event is set.
 Work = Callable[[Any, Callable[[], None], threading.Event], None]
 

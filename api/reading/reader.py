@@ -11,16 +11,15 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Any
 
-from api.processes import Child, spawn_context
+from api.files import Full, no_room
+from api.processes import Child, limit_memory, spawn_context
 from api.reading import reader_tasks
 from api.work.pool import Busy
 from rcsa_ident.errors import InputError
 
 log = logging.getLogger("rcsa_ident.reading")
-MEBIBYTE = 1 << 20
 #: Time limit for the start of the process, including imports and compilation [s].
 _START = 300.0
 
@@ -100,6 +99,8 @@ class Reader:
                 return answer
             if kind == "costly":
                 raise self.limits.costly
+            if kind == "full":
+                raise Full
             if kind == "refused":
                 raise InputError(*answer)
             if kind == "failed":
@@ -134,7 +135,7 @@ class _Reading:
         theirs.close()
 
     def ask(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
-        """Return the outcome of a call (answer, refused, failed, costly, or killed from outside) and its content."""
+        """Return the outcome of a call (answer, refused, failed, costly, full disk, or killed from outside) and its content."""
         try:
             if not self.ready:
                 self._receive(_START)
@@ -172,10 +173,8 @@ def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None]) -> Non
     from rcsa_ident.io.hdf5 import LARGEST_DATA
 
     prepare()
-    taken = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (taken + limits.memory * MEBIBYTE,) * 2)
-    # no core dump of a client's data, and no file larger than the largest result
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    limit_memory(limits.memory)
+    # no file larger than the largest result
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_DATA + LARGEST_DATA // 8,) * 2)
     pipe.send_bytes(b"{}")
     while True:
@@ -198,5 +197,7 @@ def _answer(call: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
     except MemoryError:
         kind = "costly"
     except Exception as error:
+        if no_room(error):
+            return json.dumps(["full", ""]).encode()
         kind, answer = "failed", f"{type(error).__name__}: {error}"[:1000]
     return json.dumps([kind, answer]).encode()

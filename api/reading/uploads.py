@@ -8,13 +8,13 @@ import json
 import logging
 import weakref
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from api.files import NORMALISED, UPLOADS, Files
+from api.files import NORMALISED, UPLOADS, Files, Full, Partial
 from api.reading import reader_tasks
 from api.reading.campaign_text import Upload, files_of
 from api.stores.campaigns import Campaign, FileKey, Recording
@@ -90,6 +90,43 @@ class Uploads:
         await self.settle(campaign)
         again = await asyncio.to_thread(self.store.recordings.get, campaign.group, campaign.id, name)
         return status, again or kept
+
+    async def finish(self, path: Path, state: Partial) -> None:
+        """Store a resumable upload that is complete; its bytes stay unless they are at fault.
+
+        Raises
+        ------
+        Taken, InputError
+            As `take`.
+        """
+        key = (state.campaign, state.name)
+        if key in self.writing:
+            raise Busy
+        self.writing.add(key)
+        try:
+            campaign = await asyncio.to_thread(self.store.campaigns.get, state.group, state.campaign)
+            if campaign is not None and state.name in files_of(campaign.text):
+                received = await asyncio.to_thread(_received, path)
+                with suppress(KeyError):
+                    # else the campaign has gone meanwhile
+                    await self.take(campaign, state.name, received, state.replacing)
+            await asyncio.to_thread(self.files.forget, path)
+        except InputError:
+            await asyncio.to_thread(self.files.forget, path)
+            raise
+        finally:
+            self.writing.discard(key)
+
+    async def _finish_all(self) -> None:
+        """Store what a crash, or a full disk, has left complete but not stored."""
+        for path, state in await asyncio.to_thread(lambda: list(self.files.complete())):
+            try:
+                await self.finish(path, state)
+            except (Taken, Busy, Full):
+                # the client may still replace the other content; the next round takes the others
+                continue
+            except InputError as error:
+                log.warning("a complete upload cannot be read", extra={"fields": {"recording": state.name, "error": str(error)}})
 
     async def _read(self, campaign: Campaign, name: str, role: str, cut: str, received: Received, replacing: bool) -> tuple[int, Recording]:
         air = await asyncio.to_thread(self._air, campaign, cut) if role == "cut" else None
@@ -235,12 +272,13 @@ class Uploads:
             return self.files.sweep(kept)
 
     async def maintain(self) -> None:
-        """At the start and every hour: remove orphaned files, and judge recordings that a crash has left without a verdict."""
+        """At the start and every hour: remove orphaned files, store uploads that are complete, and judge recordings without a verdict."""
         while True:
             try:
                 swept = await asyncio.to_thread(self.sweep)
                 if swept:
                     log.info("orphaned files removed", extra={"fields": {"files": swept}})
+                await self._finish_all()
                 for group, id in await asyncio.to_thread(self.store.campaigns.unsettled):
                     campaign = await asyncio.to_thread(self.store.campaigns.get, group, id)
                     if campaign is not None:
@@ -248,6 +286,11 @@ class Uploads:
             except (Unavailable, OSError) as error:
                 log.warning("maintenance of uploads is postponed", extra={"fields": {"error": type(error).__name__}})
             await asyncio.sleep(_ROUND)
+
+
+def _received(path: Path) -> Received:
+    with path.open("rb") as file:
+        return Received(path, path.stat().st_size, hashlib.file_digest(file, "sha256").hexdigest())
 
 
 def files_named(recording: Recording) -> list[FileKey]:

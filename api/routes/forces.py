@@ -13,7 +13,7 @@ from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
 from api.components import Components, ThisService
-from api.conventions import BODY, guard, problems
+from api.conventions import BODY, guard, problems, while_there
 from api.lookups import known_machine, pair_reader, tooling_source, uploaded
 from api.problems import Problem
 from api.reading import reader_tasks
@@ -23,6 +23,7 @@ from api.schemas.campaigns import given_sensors
 from api.schemas.common import body_of
 from api.schemas.forces import ForceAnswer, ForceQuery, ForceUpload
 from api.security import Guarded, WhoAsks
+from api.transfer.body_stream import storage_problems
 from api.transfer.multipart import FORM, form
 from api.work.forces import ForceQuestion, ReadPair, forces, sensors_of
 from api.work.requests import MachineText, ToolingSource
@@ -69,7 +70,8 @@ async def estimate(request: Request, components: ThisService, caller: WhoAsks) -
     csv = CSV in request.headers.get("accept", "")
     if request.headers["content-type"].split(";")[0].strip().lower() == JSON:
         query = body_of(ForceQuery, await request.body())
-        return await _answered(components, caller.group, *await run_in_threadpool(_of_campaign, components, caller.group, query), csv)
+        found = await run_in_threadpool(_of_campaign, components, caller.group, query)
+        return await _answered(request, components, caller.group, *found, csv)
     with components.uploads.admitted():
         async with form(request, components, caller.group, ("query",), ("recording", "air")) as (texts, files):
             missing = "query" if "query" not in texts else "recording" if "recording" not in files else ""
@@ -80,7 +82,7 @@ async def estimate(request: Request, components: ThisService, caller: WhoAsks) -
             upload = body_of(ForceUpload, texts["query"])
             machine, tooling, question, sensors = await run_in_threadpool(_of_upload, components, caller.group, upload)
             async with _read(components, caller.group, files, sensors, upload.sampling_rate_hz) as source:
-                return await _answered(components, caller.group, machine, tooling, question, source, csv)
+                return await _answered(request, components, caller.group, machine, tooling, question, source, csv)
 
 
 def _of_campaign(components: Components, group: str, query: ForceQuery) -> tuple[MachineText, ToolingSource, ForceQuestion, ReadPair]:
@@ -108,7 +110,8 @@ async def _read(
             if not file.lower().endswith(FORMATS):
                 raise InputError(name, file[-80:], f"a file name that ends in one of {', '.join(FORMATS)}")
             targets[name] = await run_in_threadpool(components.files.spare, group)
-            await components.reader.run(reader_tasks.read_alone, Upload(received.path, file, targets[name]), sensors, rate)
+            with storage_problems():
+                await components.reader.run(reader_tasks.read_alone, Upload(received.path, file, targets[name]), sensors, rate)
         yield pair_reader(targets["recording"], targets.get("air"))
     finally:
         for path in targets.values():
@@ -116,13 +119,21 @@ async def _read(
 
 
 async def _answered(
-    components: Components, group: str, machine: MachineText, tooling: ToolingSource, question: ForceQuestion, source: ReadPair, csv: bool
+    request: Request,
+    components: Components,
+    group: str,
+    machine: MachineText,
+    tooling: ToolingSource,
+    question: ForceQuestion,
+    source: ReadPair,
+    csv: bool,
 ) -> Any:
+    run = components.work.run
     if not csv:
-        return ForceAnswer.model_validate(await components.work.run(forces, machine, tooling, question, source))
+        return ForceAnswer.model_validate(await while_there(request, run(forces, machine, tooling, question, source)))
     path: Path = await run_in_threadpool(components.files.spare, group)
     try:
-        await components.work.run(forces, machine, tooling, question, source, path)
+        await while_there(request, run(forces, machine, tooling, question, source, path))
     except BaseException:
         path.unlink(missing_ok=True)
         raise

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query, Request
 from fastapi.concurrency import run_in_threadpool
 
 from api.components import ThisService
-from api.conventions import BODY, found_or_404, guard, problems
+from api.conventions import BODY, found_or_404, guard, problems, while_there
 from api.problems import Problem
 from api.routes.toolings import summary
 from api.schemas.common import NAME_PATTERN
@@ -74,7 +74,7 @@ async def import_library(
     if contact is not None:
         joint = found_or_404(await run_in_threadpool(components.store.toolings.get, caller.group, contact), f"tooling {contact}").text
     given = Assumptions(flute_ratio, helix_deg, stickout_mm, insertion_mm, material, None, holder)
-    entries = await components.work.run(imported, raw, given, joint)
+    entries = await while_there(request, components.work.run(imported, raw, given, joint))
 
     def keep() -> list[ImportedTool]:
         return [_kept(components, caller.group, *entry, replace) for entry in entries]

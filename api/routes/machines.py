@@ -10,7 +10,22 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from api.components import Components, ThisService
-from api.conventions import BODY, After, Limit, MachineId, Repeat, expected, guard, in_use, page, problems, tagged, unchanged, utf8
+from api.conventions import (
+    BODY,
+    After,
+    Limit,
+    MachineId,
+    Repeat,
+    expected,
+    guard,
+    in_use,
+    page,
+    problems,
+    tagged,
+    unchanged,
+    utf8,
+    while_there,
+)
 from api.lookups import identification_of, known_machine, machine_of
 from api.problems import Problem
 from api.schemas.common import Page
@@ -74,7 +89,7 @@ def forget(id: MachineId, components: ThisService, caller: WhoAsks) -> Response:
 async def identify(id: MachineId, request: Request, response: Response, components: ThisService, caller: WhoAsks) -> IdentificationSummary:
     await run_in_threadpool(machine_of, components, caller.group, id)
     text = utf8(await request.body())
-    summary = await components.work.run(tasks.check, text)
+    summary = await while_there(request, components.work.run(tasks.check, text))
     document = Document(caller.group, id, text, json.dumps(summary), digest_of(text), now())
     kept = components.store.identifications
 
@@ -123,6 +138,7 @@ def modes(id: MachineId, components: ThisService, caller: WhoAsks) -> Modes:
 )
 async def frf(
     id: MachineId,
+    request: Request,
     components: ThisService,
     caller: WhoAsks,
     from_hz: Annotated[float | None, Query(ge=1.0, le=20_000.0, allow_inf_nan=False)] = None,
@@ -130,9 +146,8 @@ async def frf(
     step_hz: Annotated[float, Query(ge=0.01, le=1000.0, allow_inf_nan=False)] = 2.0,
 ) -> Frf:
     machine = await run_in_threadpool(known_machine, components, caller.group, id)
-    return Frf.model_validate(
-        await components.work.run(tasks.flange_frf, machine, (from_hz, to_hz, step_hz), components.settings.work_seconds)
-    )
+    found = components.work.run(tasks.flange_frf, machine, (from_hz, to_hz, step_hz), components.settings.work_seconds)
+    return Frf.model_validate(await while_there(request, found))
 
 
 def _digest(document: Document | None) -> str | None:

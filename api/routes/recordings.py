@@ -13,7 +13,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 from api.components import Components, ThisService
-from api.conventions import BODY, CampaignId, Limit, found_or_404, guard, page, problems, tagged, unchanged
+from api.conventions import BODY, CampaignId, Limit, found_or_404, guard, page, problems, tagged, unchanged, while_there
 from api.files import NORMALISED, UPLOADS
 from api.lookups import known_campaign
 from api.problems import Problem
@@ -34,6 +34,7 @@ from api.transfer.body_stream import (
     complete,
     new_part,
     refuse_encoded,
+    storage_problems,
 )
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
@@ -85,7 +86,8 @@ async def put(
 async def take(components: Components, campaign: Campaign, name: str, received: Received, replacing: bool) -> tuple[int, Recording]:
     """Store a received file, or raise a problem with the reason."""
     try:
-        return await components.uploads.take(campaign, name, received, replacing)
+        with storage_problems():
+            return await components.uploads.take(campaign, name, received, replacing)
     except Taken:
         fault = {"field": "name", "found": name[:120], "allowed": "the same content, or ?replace=true"}
         raise Problem(409, "a recording with other content exists under this name", [fault]) from None
@@ -142,18 +144,22 @@ def _read(path: FilePath) -> Iterator[bytes]:
 
 
 @router.get("/{name}/spectrum", summary="Amplitude spectrum", openapi_extra=guard("read"), responses=problems(404, 422))
-async def spectrum(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks, points: Points = 2000) -> SpectrumAnswer:
+async def spectrum(
+    id: CampaignId, name: RecordingName, request: Request, components: ThisService, caller: WhoAsks, points: Points = 2000
+) -> SpectrumAnswer:
     _, row = await run_in_threadpool(_kept, components, caller.group, id, name)
     path = components.files.path(caller.group, NORMALISED, row.normalised)
     speed = json.loads(row.found)["spindle_speed_rpm"]
-    return SpectrumAnswer.model_validate(await components.work.run(reader_tasks.spectrum, path, speed, points))
+    return SpectrumAnswer.model_validate(await while_there(request, components.work.run(reader_tasks.spectrum, path, speed, points)))
 
 
 @router.get("/{name}/signal", summary="Envelope over time", openapi_extra=guard("read"), responses=problems(404, 422))
-async def signal(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks, points: Points = 1000) -> SignalAnswer:
+async def signal(
+    id: CampaignId, name: RecordingName, request: Request, components: ThisService, caller: WhoAsks, points: Points = 1000
+) -> SignalAnswer:
     _, row = await run_in_threadpool(_kept, components, caller.group, id, name)
     path = components.files.path(caller.group, NORMALISED, row.normalised)
-    return SignalAnswer.model_validate(await components.work.run(reader_tasks.envelope, path, points))
+    return SignalAnswer.model_validate(await while_there(request, components.work.run(reader_tasks.envelope, path, points)))
 
 
 @router.delete(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+from contextlib import suppress
+from dataclasses import replace as replaced
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,6 +21,7 @@ from api.routes.recordings import BINARY, RecordingName, Replace, answer, named,
 from api.schemas.campaigns import RecordingAnswer
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign
+from api.stores.entities import Taken
 from api.transfer.body_stream import (
     LOOK,
     announced_digest,
@@ -51,11 +54,17 @@ Length = Annotated[
     status_code=204,
     summary="State of an upload",
     openapi_extra=guard("upload"),
+    description="An offset as large as the length says that the recording is stored.",
     responses={204: {"description": "The state of the upload.", "headers": _OFFSET | _LENGTH}, **problems(404, 422)},
 )
-def head(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks) -> Response:
-    campaign, name, _ = named(components, caller.group, id, name)
-    state = _state(components, campaign, name)
+async def head(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks) -> Response:
+    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
+    path, state = await run_in_threadpool(components.files.partial, caller.group, partial_name(campaign.id, name))
+    if state is not None and state.complete:
+        # to a client, an upload without a missing byte is one that is kept
+        with storage_problems(), suppress(Taken):
+            await components.uploads.finish(path, replaced(state, group=caller.group, campaign=campaign.id, name=name))
+    state = await run_in_threadpool(_state, components, campaign, name)
     if state is None:
         raise Problem(404, "no part of this recording has been uploaded")
     return Response(
@@ -98,6 +107,7 @@ async def patch(
     try:
         with components.uploads.admitted():
             state = await _go_on(components, campaign, name, offset, length)
+            state = replaced(state, group=caller.group, campaign=campaign.id, name=name, replacing=replace)
             path = components.files.partial(caller.group, partial_name(campaign.id, name))[0]
             part = await _append(request, components, caller.group, path, state, content)
             try:
@@ -107,8 +117,8 @@ async def patch(
                 check_digest(whole, received.sha256)
                 response.status_code, kept = await take(components, campaign, name, received, replace)
             except (InputError, Problem) as error:
-                # kept on a conflict: the client may still replace the other content
-                if not (isinstance(error, Problem) and error.status == 409):
+                # kept unless they are at fault: the disk may have room again, or the client may replace the other content
+                if isinstance(error, InputError) or error.status in (404, 422):
                     await run_in_threadpool(components.files.forget, path)
                 raise
             finally:
@@ -160,19 +170,19 @@ async def _append(request: Request, components: Components, group: str, path: Pa
             digest.update(block)
             if content is None and (part.size - state.offset) // LOOK > noted:
                 noted += 1
-                await run_in_threadpool(_note, components, part, part.size, state.length)
+                await run_in_threadpool(_note, components, part, part.size, state)
         check_digest(content, digest.hexdigest(), "Content-Digest")
     except (Problem, InputError, HTTPException) as error:
         # a part with a digest counts only when it is complete
         kept = state.offset if content is not None or isinstance(error, InputError) else part.size
-        await run_in_threadpool(_note, components, part, kept, state.length)
+        await run_in_threadpool(_note, components, part, kept, state)
         part.close()
         raise
-    await run_in_threadpool(_note, components, part, part.size, state.length)
+    await run_in_threadpool(_note, components, part, part.size, state)
     return part
 
 
-def _note(components: Components, part: Part, offset: int, length: int) -> None:
+def _note(components: Components, part: Part, offset: int, state: Partial) -> None:
     with storage_problems():
         part.sync()
-        components.files.note(part.path, Partial(offset, length))
+        components.files.note(part.path, replaced(state, offset=offset))

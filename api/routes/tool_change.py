@@ -11,7 +11,7 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 from api.components import Components, ThisService
-from api.conventions import BODY, Repeat, guard, problems
+from api.conventions import BODY, Repeat, guard, problems, while_there
 from api.jobs.lobes import asked
 from api.live import jobs
 from api.lookups import known_machine, tooling_source
@@ -38,7 +38,8 @@ Later = Annotated[str | None, Header(alias="Prefer", max_length=200, description
 async def tooltip(body: TipQuery, request: Request, parts: ThisService, caller: WhoAsks) -> Any:
     machine, (tooling,) = await _subject(parts, caller.group, body.machine, [body.tooling])
     csv = CSV in request.headers.get("accept", "")
-    answer = await parts.work.run(tasks.tooltip, machine, tooling, body.request(parts.settings.work_seconds), csv)
+    found = parts.work.run(tasks.tooltip, machine, tooling, body.request(parts.settings.work_seconds), csv)
+    answer = await while_there(request, found)
     return Response(answer, media_type=CSV) if csv else TipAnswer.model_validate(answer)
 
 
@@ -50,21 +51,21 @@ async def tooltip(body: TipQuery, request: Request, parts: ThisService, caller: 
     response_model=LobeAnswer,
     responses={202: jobs.ACCEPTED, **problems(404, 409, *BODY)},
 )
-async def lobes(body: LobeQuery, parts: ThisService, caller: WhoAsks, prefer: Later = None, repeat: Repeat = None) -> Any:
+async def lobes(body: LobeQuery, request: Request, parts: ThisService, caller: WhoAsks, prefer: Later = None, repeat: Repeat = None) -> Any:
     question = body.request(parts.settings.work_seconds)
     machine, toolings = await _subject(parts, caller.group, body.machine, body.toolings)
     most = parts.settings.job_work_seconds
     if "respond-async" not in (prefer or "").lower():
         try:
-            found = await _each(parts, tasks.lobes, machine, toolings, question)
+            found = await while_there(request, _each(parts, tasks.lobes, machine, toolings, question))
             return LobeAnswer.model_validate({"machine": body.machine, "toolings": found})
         except TooLong as error:
             if error.seconds * len(toolings) > most:
                 raise
     text = asked(machine, toolings, body.request(most))
-    request = body.model_dump_json()
-    job = Job(new_id(), caller.group, LOBES, body.machine, None, request, "queued", now())
-    digest = hashlib.sha256(request.encode()).hexdigest()
+    words = body.model_dump_json()
+    job = Job(new_id(), caller.group, LOBES, body.machine, None, words, "queued", now())
+    digest = hashlib.sha256(words.encode()).hexdigest()
     again = None if repeat is None else (repeat, digest)
     return jobs.accepted(await run_in_threadpool(jobs.submit, parts, job, {"question": text}, again))
 
@@ -111,10 +112,10 @@ def cancel_lobes(id: jobs.JobId, parts: ThisService, caller: WhoAsks, response: 
     openapi_extra=guard("run"),
     responses=problems(404, *BODY),
 )
-async def advice(body: AdviceQuery, parts: ThisService, caller: WhoAsks) -> AdviceAnswer:
+async def advice(body: AdviceQuery, request: Request, parts: ThisService, caller: WhoAsks) -> AdviceAnswer:
     question = body.advice(parts.settings.work_seconds)
     machine, toolings = await _subject(parts, caller.group, body.machine, body.toolings)
-    found = await _each(parts, tasks.advice, machine, toolings, question)
+    found = await while_there(request, _each(parts, tasks.advice, machine, toolings, question))
     return AdviceAnswer.model_validate({"machine": body.machine, "toolings": found})
 
 

@@ -14,7 +14,7 @@ from api.streams.engine import HEADER, READY, Engine, Message
 
 log = logging.getLogger("rcsa_ident.service")
 #: Restarts in succession without a pause, and time for the process to end by itself [s].
-AT_ONCE, FAREWELL = 4, 5.0
+AT_ONCE, FAREWELL = 4, 3.0
 
 
 class Host(Protocol):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import base64
 import binascii
-import errno
 import re
 import time
 from collections.abc import AsyncIterator, Iterator
@@ -16,7 +15,7 @@ from fastapi.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
 from api.components import Components
-from api.files import Full, Part, TooLarge
+from api.files import Full, Part, TooLarge, no_room
 from api.problems import Problem
 from api.reading.uploads import Received
 
@@ -97,7 +96,7 @@ def storage_problems() -> Iterator[None]:
     except Full:
         raise Problem(503, "the disk has too little free space left", headers={"Retry-After": "600"}) from None
     except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+        if not no_room(error):
             raise
         raise Problem(503, "the disk is full", headers={"Retry-After": "600"}) from None
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from queue import SimpleQueue
 from typing import Any, Protocol, TypeVar
 
-from api.processes import follow_parent, spawn_context
+from api.work.worker import Killed, QueryLimits, Worker
 
 T = TypeVar("T")
 
@@ -41,6 +43,8 @@ class Work(Protocol):
 class Pool:
     """Pool of spawned worker processes.
 
+    A process is replaced when its query exceeds a limit or is withdrawn: nothing else ends a computation that has begun.
+
     Parameters
     ----------
     workers : int
@@ -48,60 +52,135 @@ class Pool:
         Calls that may wait beyond the running ones.
     machines : int
         Machines that each worker caches.
+    limits : QueryLimits
+        Of each call.
     """
 
-    def __init__(self, workers: int, queue: int, machines: int) -> None:
-        self.workers, self.queue, self.machines = workers, queue, machines
-        self.executor: ProcessPoolExecutor | None = None
+    def __init__(self, workers: int, queue: int, machines: int, limits: QueryLimits = QueryLimits()) -> None:  # noqa: B008 - frozen
+        self.workers, self.queue, self.machines, self.limits = workers, queue, machines, limits
+        self.threads: ThreadPoolExecutor | None = None
+        self.members: list[Worker] = []
+        self.free: SimpleQueue[Worker] = SimpleQueue()
+        self.lock = threading.Lock()
         self.waiting = 0
-        self.warm = 0
 
     @property
     def ready(self) -> bool:
-        return self.warm > 0
+        return any(member.ready for member in self.members)
 
     def start(self) -> None:
-        self.executor = ProcessPoolExecutor(self.workers, spawn_context(), initializer=_begin, initargs=(self.machines,))
-        self.warm = 0
-        for _ in range(self.workers):
-            self.executor.submit(warm).add_done_callback(self._warmed)
-        # queued last, so that nobody waits for it
-        for _ in range(self.workers):
-            self.executor.submit(warm_observer)
+        # a thread for each process: a call waits for both at once
+        self.threads = ThreadPoolExecutor(self.workers, "work")
+        self.members = [self._worker() for _ in range(self.workers)]
+        for member in self.members:
+            self.free.put(member)
+            self.threads.submit(self._answer, _Call())
 
-    def _warmed(self, future: Any) -> None:
-        if not future.cancelled() and future.exception() is None:
-            self.warm += 1
+    def _worker(self) -> Worker:
+        return Worker(self.limits, partial(_begin, self.machines), warm_observer)
 
     async def run(self, call: Callable[..., T], *arguments: Any) -> T:
-        if self.executor is None or self.waiting >= self.workers + self.queue:
+        """Return the answer of a call; where the caller is cancelled, the call ends with its process.
+
+        Raises
+        ------
+        Busy
+            The queue is full, or a worker was killed from outside.
+        TooLong, InputError
+            The call has exceeded the limit of time, or of memory.
+        """
+        if self.threads is None or self.waiting >= self.workers + self.queue:
             raise Busy
-        executor = self.executor
         self.waiting += 1
+        asked = _Call(guarded, (call, *arguments))
         try:
-            return await asyncio.wrap_future(executor.submit(guarded, call, *arguments))
-        except BrokenProcessPool as error:
-            # a worker was killed, perhaps for its memory: all waiting calls fail, and the pool is replaced
-            if self.executor is executor:
-                executor.shutdown(wait=False, cancel_futures=True)
-                self.start()
-            raise Busy from error
+            answer: T = await asyncio.wrap_future(self.threads.submit(self._answer, asked))
+            return answer
+        except Killed:
+            raise Busy from None
+        except asyncio.CancelledError:
+            asked.withdraw()
+            raise
         finally:
             self.waiting -= 1
 
+    def _answer(self, asked: _Call) -> Any:
+        """In a thread: have a free process answer, and replace it where it is of no further use."""
+        member = self.free.get()
+        try:
+            member = self._fit(member)
+            member.begin()
+            return asked.answer(member)
+        finally:
+            try:
+                member = self._fit(member)
+            finally:
+                self.free.put(member)
+
+    def _fit(self, member: Worker) -> Worker:
+        """Return a member that takes calls, or another in its place; the same where the pool ends."""
+        with self.lock:
+            if self.threads is None or (member.fit and member.process.is_alive()):
+                return member
+            member.end()
+            self.members[self.members.index(member)] = other = self._worker()
+            return other
+
     def stop(self) -> None:
-        if self.executor is not None:
-            self.executor.shutdown(wait=True, cancel_futures=True)
-            self.executor = None
-            self.warm = 0
+        with self.lock:
+            threads, self.threads = self.threads, None
+        for member in self.members:
+            # a running call ends with its process
+            member.process.kill()
+        if threads is not None:
+            threads.shutdown(wait=True, cancel_futures=True)
+        for member in self.members:
+            member.end()
+        self.members.clear()
+        self.free = SimpleQueue()
+
+
+class _Call:
+    """A call on its way to a process; without one it only waits until a process is ready.
+
+    Parameters
+    ----------
+    call : callable or None
+    arguments : tuple
+    """
+
+    def __init__(self, call: Callable[..., Any] | None = None, arguments: tuple[Any, ...] = ()) -> None:
+        self.call, self.arguments = call, arguments
+        self.lock, self.withdrawn = threading.Lock(), False
+        self.member: Worker | None = None
+
+    def answer(self, member: Worker) -> Any:
+        """Return what a process answers, unless nobody waits for it any more."""
+        with self.lock:
+            if self.call is None or self.withdrawn:
+                return None
+            self.member = member
+        try:
+            return member.ask(self.call, self.arguments)
+        finally:
+            with self.lock:
+                self.member = None
+
+    def withdraw(self) -> None:
+        """End the process that works on this call, if one does."""
+        with self.lock:
+            self.withdrawn = True
+            if self.member is not None:
+                self.member.fit = False
+                self.member.process.kill()
 
 
 def _begin(machines: int) -> None:
-    """In a new worker: follow the service, and import the tasks."""
-    follow_parent()
+    """In a new worker: import the tasks and compile what quick answers need."""
     from api.work import tasks
 
     tasks.keep(machines)
+    warm()
 
 
 def guarded(call: Callable[..., T], *arguments: Any) -> T:

@@ -23,7 +23,7 @@ from rcsa_ident.machining_setup import CutSpec, Tooling
 from rcsa_ident.stability.advice import Advice, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import DRAWS, both_directions, stability_lobes
-from rcsa_ident.stability.methods import StabilityMethod
+from rcsa_ident.stability.methods import MethodName, StabilityMethod
 from rcsa_ident.stability.pockets import pad_speeds
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, StabilityLobes
 from rcsa_ident.stability.stability_map import MonodromyMethod, StabilityMap, stability_map
@@ -44,6 +44,9 @@ ABOVE, _ABOVE_STEP, CRITICAL, _ABOVE_EVERY = 2.5, from_hz(10.0), 0.7, 4
 _SPREAD_SECONDS, _SPREAD_SECONDS_OF_BOTH, _BAND_SECONDS = 1e-6, 9e-6, 2e-4
 #: Unequal pitch costs the zero-order method so many times as much; a machine that changes with speed so many further seconds.
 _PITCH_FACTOR, _CHANGING_SECONDS = 30.0, 4.0
+#: Where teeth differ, methods that follow a period follow a revolution: so many teeth cost once more. A simulation asks every tooth
+#: in every step, which counts from so many on.
+_TEETH_OF_PERIOD, _TEETH_OF_STEP = 2.0, 40.0
 _UNLIMITED = SpindleDrive.flat(None, None, None)
 
 
@@ -142,17 +145,25 @@ class ToolChange:
 
     @property
     def seconds(self) -> float:
-        """About how long the limits take on one core of a plain server [s]."""
+        """About how long an advice takes on one core of a plain server [s], with the speeds beside those that are asked for."""
         zero_order = isinstance(self.method, ZeroOrder)
         each = self.method.seconds_per_speed + (_BAND_SECONDS if self.draws else 0.0)
         # lobes come closer as a spindle turns slower
-        found = each * float(np.sum(4000.0 / to_rpm(self.speeds)))
-        if zero_order and np.ptp(self.process.cutter.pitch) > 1e-9:
-            found *= _PITCH_FACTOR
+        found = each * self._teeth_factor * float(np.sum(4000.0 / to_rpm(pad_speeds(self.speeds, TOLERANCE))))
         if not (zero_order and self.machine.prepared):
             found += _CHANGING_SECONDS if self.machine.speed_range is not None else 0.0
             found += spread_seconds(self.machine, self.omega) if self.draws else 0.0
         return found
+
+    @property
+    def _teeth_factor(self) -> float:
+        """How many times as long it takes as with few equal teeth."""
+        cutter = self.process.cutter
+        uneven = np.ptp(cutter.pitch) > 1e-9
+        if self.method.name == MethodName.ZERO_ORDER:
+            return _PITCH_FACTOR if uneven else 1.0
+        factor = 1.0 + cutter.teeth / _TEETH_OF_PERIOD if uneven or np.ptp(cutter.runout) > 0.0 else 1.0
+        return factor * max(1.0, (cutter.teeth / _TEETH_OF_STEP) ** 2) if self.method.name == MethodName.TIME_DOMAIN else factor
 
     def limits(self, speeds: FloatArray | None = None, max_depth: float | None = None, draws: int | None = None) -> StabilityLobes:
         """Return the stability limits at rising speeds, each asked of the machine as it is at that speed; by default as asked for."""

@@ -6,13 +6,14 @@ import select
 import socket
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import pytest
 import uvicorn
 
 from api import access
 from api.access import TimedHeadProtocol
+from api.connections import FIRST_MESSAGE, Connections, SmallHelloProtocol
 from api.main import create_app
 from api.settings import Settings
 from tests.api.in_process import Here, Near
@@ -24,12 +25,12 @@ class Hasty(TimedHeadProtocol):
 
 
 @contextmanager
-def listening(app):
+def listening(app, http=Hasty, ws=SmallHelloProtocol):
     """A server on a free port."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    server = uvicorn.Server(uvicorn.Config(app, port=port, http=Hasty, log_config=None, lifespan="on"))
+    server = uvicorn.Server(uvicorn.Config(app, port=port, http=http, ws=ws, log_config=None, lifespan="on"))
     thread = threading.Thread(target=server.run)
     thread.start()
     try:
@@ -96,6 +97,78 @@ def test_a_second_head_that_stops(port):
 
 def test_a_head_without_an_end(port):
     assert b"200" not in told(port, GET, *[b"X-A: " + b"a" * 5000 + b"\r\n"] * 200)
+
+
+@pytest.fixture
+def few(store, tmp_path):
+    """A server that takes three connections."""
+    counted = Connections(3, 3)
+    http, ws = (type("Few", (kind,), {"counted": counted}) for kind in (TimedHeadProtocol, SmallHelloProtocol))
+    with listening(create_app(Settings(data=tmp_path), store, Here(), Here(), Near()), http, ws) as found:
+        yield found, counted
+
+
+def test_connections_beyond_the_limit_are_closed_and_hardly_told(few, caplog):
+    port, counted = few
+    links = [socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) for _ in range(3)]
+    until(lambda: len(counted.open) == 3)
+    for _ in range(20):
+        assert told(port, GET + b"\r\n") == b""
+    assert sum("too many connections" in each.message for each in caplog.records) == 1
+    links.pop().close()
+    until(lambda: len(counted.open) == 2)
+    assert told(port, GET + b"Connection: close\r\n\r\n").startswith(b"HTTP/1.1 200")
+    for each in links:
+        each.close()
+    until(lambda: not counted.open and not counted.of_address)
+
+
+def test_an_address_has_a_share_of_all_connections():
+    class Link:
+        def __init__(self, address):
+            self.address = address
+
+        def get_extra_info(self, _):
+            return (self.address, 1)
+
+    counted = Connections(5, 2)
+    assert [counted.admit(Link(each)) for each in "aaabbbccc"] == [True, True, False, True, True, False, True, False, False]
+
+
+def test_a_websocket_without_a_small_first_message_is_closed(few):
+    """By its announced length, before it has come."""
+    from websockets.exceptions import ConnectionClosedError
+    from websockets.sync.client import connect
+
+    port, counted = few
+    with connect(f"ws://127.0.0.1:{port}/v1/forces/stream", compression=None) as link:
+        with suppress(ConnectionClosedError):
+            link.send("x" * (FIRST_MESSAGE + 1))
+        with pytest.raises(ConnectionClosedError) as error:
+            link.recv(PATIENCE)
+    assert error.value.rcvd.code == 1009
+    until(lambda: not counted.open)
+
+
+@pytest.mark.slow
+def test_a_later_message_may_be_large(tmp_path):
+    from websockets.sync.client import connect
+
+    async def count(scope, receive, send):
+        if scope["type"] == "lifespan":
+            for kind in ("startup", "shutdown"):
+                await receive()
+                await send({"type": f"lifespan.{kind}.complete"})
+            return
+        await receive()
+        await send({"type": "websocket.accept"})
+        while (message := await receive())["type"] == "websocket.receive":
+            await send({"type": "websocket.send", "text": str(len(message["text"]))})
+
+    with listening(count) as port, connect(f"ws://127.0.0.1:{port}/", compression=None) as link:
+        for size in (10, 5 * FIRST_MESSAGE):
+            link.send("x" * size)
+        assert [link.recv(PATIENCE), link.recv(PATIENCE)] == ["10", str(5 * FIRST_MESSAGE)]
 
 
 def test_requests_behind_each_other_are_all_answered(port):

@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 
 from api.work.pool import Busy, Pool, guarded
+from api.work.requests import TooLong
+from api.work.worker import QueryLimits, Worker
 from rcsa_ident.errors import InputError
 from tests.fixtures.waiting import ended, until
 
@@ -31,6 +33,15 @@ def pool():
     found.start()
     yield found
     found.stop()
+
+
+def too_much():
+    return len(bytearray(3 << 30))
+
+
+def forever():
+    while True:
+        pass
 
 
 @pytest.mark.slow
@@ -58,6 +69,87 @@ def test_a_killed_worker_is_replaced(pool):
     with pytest.raises(Busy):
         asyncio.run(pool.run(die))
     assert asyncio.run(pool.run(pow, 2, 5)) == 32
+
+
+@pytest.fixture(scope="module")
+def strict():
+    """One process, whose queries may take 3 s and 500 MiB."""
+    found = Pool(1, 1, 2, QueryLimits(3.0, 500))
+    found.start()
+    yield found
+    found.stop()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("call", "words"), [(forever, "more than 3 s"), (too_much, "more than 500 MiB of memory")])
+def test_a_query_that_costs_too_much_ends_with_its_process(strict, call, words):
+    before = asyncio.run(strict.run(os.getpid))
+    with pytest.raises(InputError, match=words) as error:
+        asyncio.run(strict.run(call))
+    assert isinstance(error.value, TooLong) == (call is forever)
+    # nobody computes any more, and the next is answered
+    until(lambda: ended(before))
+    assert asyncio.run(strict.run(os.getpid)) != before
+
+
+def nothing():
+    pass
+
+
+def slowly():
+    time.sleep(5.0)
+
+
+@pytest.mark.slow
+def test_what_a_process_still_prepares_is_not_the_time_of_a_query():
+    member = Worker(QueryLimits(2.5, 500), nothing, slowly)
+    member.begin()
+    assert member.ask(pow, (2, 5)) == 32
+    member.end()
+
+
+@pytest.mark.slow
+def test_a_query_that_nobody_waits_for_ends_with_its_process(pool):
+    async def left():
+        before = await pool.run(os.getpid)
+        count = pool.members[0].asked
+        asked = [asyncio.ensure_future(pool.run(forever)) for _ in range(2)]
+        # the second waits behind the first
+        while pool.members[0].asked == count:
+            await asyncio.sleep(0.01)
+        for each in reversed(asked):
+            each.cancel()
+        await asyncio.gather(*asked, return_exceptions=True)
+        return before, await pool.run(os.getpid)
+
+    before, after = asyncio.run(left())
+    assert before != after
+    assert ended(before)
+    assert pool.waiting == 0
+
+
+@pytest.mark.slow
+def test_a_process_that_was_killed_while_idle_costs_nothing(pool):
+    os.kill(asyncio.run(pool.run(os.getpid)), signal.SIGKILL)
+    until(lambda: not pool.members[0].process.is_alive())
+    assert asyncio.run(pool.run(pow, 2, 5)) == 32
+
+
+@pytest.mark.slow
+def test_a_pool_ends_at_once_whatever_it_computes():
+    """Else this test never ends."""
+    found = Pool(1, 1, 1)
+    found.start()
+
+    async def ended_meanwhile():
+        asked = asyncio.ensure_future(found.run(forever))
+        while not found.members[0].asked:
+            await asyncio.sleep(0.01)
+        await asyncio.to_thread(found.stop)
+        with pytest.raises(Busy):
+            await asked
+
+    asyncio.run(ended_meanwhile())
 
 
 def test_a_pool_that_has_not_begun_refuses():

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from api.files import Full
 from api.reading.previews import envelope, spectrum
 from api.reading.reader import Limits, Reader
 from api.reading.samples import blocks, length, read_normalised, write_normalised
@@ -118,6 +119,18 @@ def test_what_costs_too_much_is_refused_and_the_next_is_read(reader, call, argum
     with pytest.raises(InputError, match=COSTLY):
         ask(reader, call, *arguments)
     assert ask(reader, much, 100) == 100 << 20
+
+
+def full():
+    """As HDF5 tells it."""
+    write_normalised(Path("/dev/full"), 1000.0, [np.ones(1000)], ())
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
+def test_a_full_disk_is_no_fault_of_the_file(reader):
+    with pytest.raises(Full):
+        ask(reader, full)
 
 
 @pytest.mark.slow

@@ -7,8 +7,10 @@ import os
 import socket
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
+import httpx2
 import pytest
 
 from api.client import Client
@@ -17,7 +19,7 @@ from rcsa_ident.errors import InputError
 from tests.api.in_process import refused
 from tests.fixtures import by_hand
 from tests.fixtures.service import command, serving
-from tests.fixtures.waiting import PATIENCE
+from tests.fixtures.waiting import PATIENCE, until
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -115,6 +117,39 @@ def test_a_service_without_keys_says_so_and_cuts_off_a_body_without_an_end(tmp_p
         with Client(served.url) as client:
             assert list(client.machines()) == []
     assert any("no keys are asked for" in json.loads(line)["event"] for line in served.log.read_text().splitlines())
+
+
+@pytest.mark.slow(30)
+def test_a_long_question_ends_with_its_client_and_with_the_service(tmp_path, result):
+    """Both would compute for minutes."""
+    with (
+        serving(tmp_path / "data", RCSA_IDENT_WORK_SECONDS="3600", RCSA_IDENT_QUERY_SECONDS="7200") as served,
+        Client(served.url) as client,
+    ):
+        id = client.make_machine("m").id
+        client.identify(id, result)
+        client.write_tooling("T1", by_hand.TOOLING)
+        speeds = {"from_rpm": 4000.0, "to_rpm": 8000.0, "step_rpm": 10.0}
+        question = {"machine": id, "toolings": ["T1"], "speeds": speeds, "method": "time-domain", "bands": False}
+        answers = []
+
+        def told(status):
+            lines = (json.loads(line) for line in served.log.read_text().splitlines())
+            return any(line.get("route", "").endswith("/lobes") and line["status"] == status for line in lines)
+
+        with pytest.raises(httpx2.TimeoutException):
+            httpx2.post(f"{served.url}/v1/lobes", json=question, timeout=1.0)
+        until(lambda: told(400))
+        # its process is free for the next
+        assert client.lobes(id, "T1")
+        asked = threading.Thread(target=lambda: answers.append(httpx2.post(f"{served.url}/v1/lobes", json=question, timeout=PATIENCE)))
+        asked.start()
+        until(lambda: "rcsa_ident_work_waiting 1.0" in httpx2.get(f"{served.url}/metrics").text)
+        served.process.terminate()
+        assert served.process.wait(PATIENCE) in (0, -15)
+        asked.join()
+        assert answers[0].status_code == 503
+        assert answers[0].json()["detail"] == "the service is shutting down"
 
 
 @pytest.mark.slow

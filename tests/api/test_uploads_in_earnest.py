@@ -271,6 +271,50 @@ def test_no_room_is_told_in_words(store, tmp_path, monkeypatch):
         assert files_in(tmp_path) == before
 
 
+def test_parts_outlive_a_full_disk(http, client, tmp_path, monkeypatch):
+    """While a recording is read: nothing is wrong with it, and it need not be sent again."""
+    campaign = client.make_campaign(client.make_machine("m").id, declared(1)).id
+    url, raw = f"/v1/campaigns/{campaign}/recordings/c0_cut.h5", content(tmp_path)
+    headers = BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("api.reading.examine.write_normalised", full)
+    for sent in (http.patch(url, content=raw, headers=headers), http.put(url, content=raw, headers=BINARY)):
+        assert sent.status_code == 503
+        assert sent.json()["detail"] == "the disk is full"
+    # neither is it told to be there
+    assert http.head(url).status_code == 503
+    monkeypatch.undo()
+    answer = http.head(url)
+    assert (answer.status_code, answer.headers["upload-offset"]) == (204, str(len(raw)))
+    assert client.recording(campaign, "c0_cut.h5").sha256 == hashlib.sha256(raw).hexdigest()
+    assert len(files_in(tmp_path)) == 2
+
+
+@pytest.mark.parametrize("replacing", [False, True])
+def test_a_complete_upload_is_stored_after_a_kill(store, tmp_path, monkeypatch, replacing):
+    raw, other = content(tmp_path), content(tmp_path, 1)
+    headers = BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}
+    with service(store, tmp_path) as http:
+        machine = http.post("/v1/machines", json={"name": "m"}).json()["id"]
+        id = http.post(f"/v1/machines/{machine}/campaigns", json=declared()).json()["id"]
+        url = f"/v1/campaigns/{id}/recordings/c0_cut.h5"
+        if replacing:
+            assert http.put(url, content=other, headers=BINARY).status_code == 201
+
+        async def killed(*_):
+            raise RuntimeError("leaves what a kill leaves")
+
+        monkeypatch.setattr("api.reading.uploads.Uploads.take", killed)
+        assert http.patch(f"{url}?replace={str(replacing).lower()}", content=raw, headers=headers).status_code == 500
+        monkeypatch.undo()
+    with service(store, tmp_path) as http:
+        until(lambda: (http.get(url).json() if http.get(url).status_code == 200 else {}).get("sha256") == hashlib.sha256(raw).hexdigest())
+        until(lambda: len(files_in(tmp_path)) == 2)
+
+
 #: Where a process ends without a word: function, calls of it that are survived, and whether what has come is kept then.
 STEPS = [
     ("api.files.Part.sync", 0, False),

@@ -24,8 +24,10 @@ from rcsa_ident.machine.speed_dependence import BLOCK, tips_over_speed
 from rcsa_ident.machining_setup import CutSpec
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import DRAWS, both_directions, drawn_limits, stability_lobes
+from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.stability_map import stability_map
 from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict, tally
+from rcsa_ident.stability.time_domain import TimeDomain
 from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.tool_change import BEYOND, ToolChange, advise, classify_tested_cuts, map_of, spread_seconds, surface_of, tooltip
@@ -320,14 +322,17 @@ def test_a_known_tip_stands_in_for_a_machine():
 
 def test_seconds_are_those_of_the_speeds_the_spread_and_the_change():
     speeds = np.array([1000.0, 2000.0]) * np.pi / 30.0
-    # slower spindles have closer lobes: 4 + 2 times the cost at 4000 rev/min
+    # slower spindles have closer lobes: 4 + 2 times the cost at 4000 rev/min, and that of 1 % less and more
+    times = 6.0 + 4.0 / 0.99 + 2.0 / 1.01
     bare = change(by_hand.machine(known=False), speeds, draws=0)
-    assert bare.seconds == pytest.approx(6.0 * ZeroOrder.seconds_per_speed)
+    assert bare.seconds == pytest.approx(times * ZeroOrder.seconds_per_speed)
+    # of close speeds there are many within 1 %
+    close = replace(bare, speeds=np.array([1000.0, 1001.0]) * np.pi / 30.0)
+    assert close.seconds == pytest.approx(22.0 * 4.0 * ZeroOrder.seconds_per_speed, rel=0.05)
     known = change(by_hand.machine(), speeds)
     kept = replace(known, machine=known.machine.kept())
     drawn, spread = kept.seconds, spread_seconds(known.machine, known.omega)
     assert drawn > 2.0 * bare.seconds
-    assert replace(kept, speeds=np.repeat(speeds, 2)).seconds == pytest.approx(2.0 * drawn)
     assert known.seconds == pytest.approx(drawn + spread)
     # directions of the posterior, each at every line
     assert spread > 0.0
@@ -340,10 +345,18 @@ def test_seconds_are_those_of_the_speeds_the_spread_and_the_change():
     assert replace(changing, draws=0).seconds > 1.0
     # what is kept is kept for the zero-order method's lines alone
     assert replace(kept, method=FullDiscretisation()).seconds == replace(known, method=FullDiscretisation()).seconds
-    assert replace(known, method=FullDiscretisation(), draws=0).seconds == pytest.approx(6.0 * FullDiscretisation.seconds_per_speed)
+    assert replace(known, method=FullDiscretisation(), draws=0).seconds == pytest.approx(times * FullDiscretisation.seconds_per_speed)
     tooling = by_hand.tooling()
     uneven = replace(tooling, cutter=replace(tooling.cutter, pitch=np.array([0.4, 0.6, 0.4, 0.6]) * np.pi))
     assert replace(bare, tooling=uneven).seconds == pytest.approx(30.0 * bare.seconds)
+    for method in (FullDiscretisation(), SemiDiscretisation(), TimeDomain()):
+        # a revolution is followed in place of a tooth's period
+        exact = replace(bare, method=method)
+        assert replace(exact, tooling=uneven).seconds == pytest.approx(3.0 * exact.seconds)
+        off = replace(tooling, cutter=replace(tooling.cutter, runout=np.array([0.0, 1e-6, 0.0, 0.0])))
+        assert replace(exact, tooling=off).seconds == pytest.approx(3.0 * exact.seconds)
+        many = replace(tooling, cutter=replace(tooling.cutter, teeth=80, pitch=np.full(80, np.pi / 40.0), runout=np.zeros(80)))
+        assert replace(exact, tooling=many).seconds == pytest.approx((4.0 if method == TimeDomain() else 1.0) * exact.seconds)
 
 
 def test_modes_are_fitted_to_receptances_that_reach_beyond_the_band():
