@@ -36,6 +36,7 @@ from api.routes import (
     streams,
     tool_change,
     toolings,
+    versions,
 )
 from api.schemas.campaigns import NewCampaign
 from api.schemas.common import ProblemDocument
@@ -118,7 +119,7 @@ def create_app(
     problems.install(app)
     app.include_router(health.router)
     app.include_router(static_files.router)
-    about = (keys, machines, toolings, libraries, materials, examples)
+    about = (keys, machines, toolings, versions, libraries, materials, examples)
     for each in (*about, campaigns, recordings, resumable_upload, multi_upload, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(AccessMonitor, components=components)

@@ -19,6 +19,7 @@ from starlette.requests import HTTPConnection
 
 from api.components import Components, components_of
 from api.problems import Problem
+from api.stores.changes import Note
 from api.stores.entities import Key
 
 SCOPES = ("read", "upload", "run", "admin")
@@ -40,15 +41,22 @@ class Caller:
         Of the key.
     group : str
     scopes : tuple of str
+    name : str
+        Of the key, as people call it.
     """
 
     id: str
     group: str
     scopes: tuple[str, ...]
+    name: str
 
     def may(self, scope: str) -> bool:
         """Whether the caller has a scope; admin includes all others."""
         return scope in self.scopes or "admin" in self.scopes
+
+    def note(self, why: str = "", restores: int = 0) -> Note:
+        """Return what the caller leaves with a change."""
+        return Note(self.id, self.name, why, restores)
 
 
 def now() -> str:
@@ -86,7 +94,7 @@ def caller_of(request: HTTPConnection, components: Components, given: str | None
         # DNS rebinding: a foreign page may reach loopback through a host name of its own
         if not _LOCAL_NAME.fullmatch(request.headers.get("host", "")):
             raise Problem(403, "without an API key the service answers on localhost only")
-        return Caller(LOCAL_KEY, LOCAL_GROUP, SCOPES)
+        return Caller(LOCAL_KEY, LOCAL_GROUP, SCOPES, LOCAL_KEY)
     _, _, rest = text.partition("_")
     id, _, secret = rest.partition("_")
     key = components.store.keys.get(id) if text.startswith(f"{PREFIX}_") and id.isalnum() and id.isascii() and len(id) <= 64 else None
@@ -94,7 +102,7 @@ def caller_of(request: HTTPConnection, components: Components, given: str | None
     kept = key.secret_hash if key is not None else hash_of("")
     if not hmac.compare_digest(hash_of(secret), kept) or key is None:
         raise Problem(401, f"a valid API key is required in the header {HEADER}", headers={"WWW-Authenticate": "ApiKey"})
-    return Caller(key.id, key.group, key.scopes)
+    return Caller(key.id, key.group, key.scopes, key.label or key.id)
 
 
 class Guarded(APIRoute):

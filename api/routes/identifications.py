@@ -53,7 +53,7 @@ def identify(body: NewIdentification, components: ThisService, caller: WhoAsks, 
         starts(known.text)
         texts["start"] = known.text
     request = body.model_dump_json()
-    job = Job(new_id(), caller.group, KIND, campaign.machine, campaign.id, request, "queued", now())
+    job = Job(new_id(), caller.group, KIND, campaign.machine, campaign.id, request, "queued", now(), key=caller.id, who=caller.name)
     digest = hashlib.sha256(request.encode()).hexdigest()
     return jobs.accepted(jobs.submit(components, job, texts, None if repeat is None else (repeat, digest)))
 

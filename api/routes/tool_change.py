@@ -63,7 +63,7 @@ async def lobes(body: LobeQuery, parts: ThisService, caller: WhoAsks, prefer: La
                 raise
     text = asked(machine, toolings, body.request(most))
     request = body.model_dump_json()
-    job = Job(new_id(), caller.group, LOBES, body.machine, None, request, "queued", now())
+    job = Job(new_id(), caller.group, LOBES, body.machine, None, request, "queued", now(), key=caller.id, who=caller.name)
     digest = hashlib.sha256(request.encode()).hexdigest()
     again = None if repeat is None else (repeat, digest)
     return jobs.accepted(await run_in_threadpool(jobs.submit, parts, job, {"question": text}, again))

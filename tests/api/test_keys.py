@@ -27,6 +27,12 @@ CALLS = [
     ("GET", "/toolings/t", None, "read"),
     ("GET", "/toolings/t/drawing", None, "read"),
     ("DELETE", "/toolings/t", None, "upload"),
+    ("GET", "/changes", None, "read"),
+    ("POST", "/toolings/t/differences", example(), "read"),
+    ("GET", "/toolings/t/versions/v", None, "read"),
+    ("POST", "/toolings/t/versions/v/restore", None, "upload"),
+    ("GET", "/machines/m/identification/versions/v", None, "read"),
+    ("POST", "/machines/m/identification/versions/v/restore", None, "upload"),
     ("POST", "/toolings/drawing", example(), "read"),
     ("POST", "/toolings/import", {"data": []}, "upload"),
     ("GET", "/materials", None, "read"),
@@ -74,7 +80,7 @@ def test_every_call_is_in_the_list(http):
         for method in item
         if path.startswith("/v1")
     ]
-    patterns = {"m": "{id}", "k": "{id}", "c": "{id}", "j": "{id}", "t": "{name}", "n": "{name}"}
+    patterns = {"m": "{id}", "k": "{id}", "c": "{id}", "j": "{id}", "t": "{name}", "n": "{name}", "v": "{version}"}
     listed = [(m, "/".join(patterns.get(part, part) for part in p.split("/"))) for m, p, _, _ in CALLS]
     assert sorted(operations) == sorted(listed)
 
