@@ -10,7 +10,7 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
-from api import problems
+from api import data_folder, problems
 from api.access import AccessMonitor
 from api.components import Components, Rates
 from api.files import Files
@@ -74,7 +74,7 @@ def create_app(
         Of the job workers; without one, jobs wait for workers that run elsewhere.
     """
     if store is None and not settings.database:
-        settings.data.mkdir(parents=True, exist_ok=True)
+        data_folder.make(settings.data)
     kept = open_store(settings.database_url) if store is None else store
     workers = Pool(settings.workers, settings.queue, settings.kept_machines) if work is None else work
     files = Files(settings.data / "files", settings.group_bytes, settings.free_bytes)

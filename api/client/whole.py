@@ -182,9 +182,10 @@ class Client(Uploads, Jobs):
             files = {field: (path.name, opened.enter_context(path.open("rb"))) for field, path in named.items()}
             return self.send("POST", "/forces", data={"query": json.dumps(query)}, files=files, headers=dict(headers or {}))
 
-    def make_key(self, *scopes: str, label: str = "") -> MadeKey:
-        """Make an API key."""
-        return read(MadeKey, self.send("POST", "/keys", json={"scopes": list(scopes), "label": label}))
+    def make_key(self, *scopes: str, label: str = "", days: float | None = None) -> MadeKey:
+        """Make an API key; `days` after which it expires."""
+        body = {"scopes": list(scopes), "label": label} | ({} if days is None else {"expires_in_days": days})
+        return read(MadeKey, self.send("POST", "/keys", json=body))
 
     def keys(self, limit: int = 50) -> Iterator[KeyAnswer]:
         """Yield all keys."""

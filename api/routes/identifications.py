@@ -100,7 +100,7 @@ def cancel(id: JobId, components: ThisService, caller: WhoAsks, response: Respon
     responses={200: STREAM, **problems(404, 422)},
 )
 async def events(id: JobId, components: ThisService, caller: WhoAsks, seen: Seen = None) -> StreamingResponse:
-    return await jobs.events(components, caller.group, id, KIND, seen)
+    return await jobs.events(components, caller, id, KIND, seen)
 
 
 @router.get("/{id}/modes", summary="Modes with their uncertainties", openapi_extra=guard("read"), responses=problems(404, 409, 422))

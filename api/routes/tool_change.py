@@ -91,7 +91,7 @@ async def lobe_job(id: jobs.JobId, parts: ThisService, caller: WhoAsks, response
     responses={200: jobs.STREAM, **problems(404, 422)},
 )
 async def lobe_events(id: jobs.JobId, parts: ThisService, caller: WhoAsks, seen: jobs.Seen = None) -> StreamingResponse:
-    return await jobs.events(parts, caller.group, id, LOBES, seen)
+    return await jobs.events(parts, caller, id, LOBES, seen)
 
 
 @router.delete(
