@@ -19,6 +19,9 @@ CampaignId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a campai
 KeyId = Annotated[str, Path(pattern=ID_PATTERN)]
 After = Annotated[str, Query(pattern=r"^[A-Za-z0-9 ._+()-]{0,64}$", description="`next` of the previous page.")]
 Limit = Annotated[int, Query(ge=1, le=200, description="Largest number of items.")]
+Why = Annotated[
+    str, Query(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$", description="Reason of the change, for those who read its trail.")
+]
 Repeat = Annotated[
     str | None,
     Header(

@@ -10,7 +10,7 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
-from api import problems
+from api import data_folder, problems
 from api.access import AccessMonitor
 from api.components import Components, Rates
 from api.files import Files
@@ -37,6 +37,7 @@ from api.routes import (
     streams,
     tool_change,
     toolings,
+    versions,
 )
 from api.schemas.campaigns import NewCampaign
 from api.schemas.common import ProblemDocument
@@ -75,7 +76,7 @@ def create_app(
         Of the job workers; without one, jobs wait for workers that run elsewhere.
     """
     if store is None and not settings.database:
-        settings.data.mkdir(parents=True, exist_ok=True)
+        data_folder.make(settings.data)
     kept = open_store(settings.database_url) if store is None else store
     most = QueryLimits(settings.query_seconds, settings.query_memory)
     workers = Pool(settings.workers, settings.queue, settings.kept_machines, most) if work is None else work
@@ -118,7 +119,7 @@ def create_app(
     problems.install(app)
     app.include_router(health.router)
     app.include_router(static_files.router)
-    about = (keys, machines, toolings, libraries, holders, materials, examples)
+    about = (keys, machines, toolings, versions, libraries, holders, materials, examples)
     for each in (*about, campaigns, recordings, resumable_upload, multi_upload, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(AccessMonitor, components=components)

@@ -8,9 +8,11 @@ import math
 import re
 import secrets
 from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from typing import Annotated, Any
+from urllib.parse import urlsplit
 
 from fastapi import Depends, Request, Response
 from fastapi.concurrency import run_in_threadpool
@@ -19,14 +21,20 @@ from starlette.requests import HTTPConnection
 
 from api.components import Components, components_of
 from api.problems import Problem
-from api.stores.entities import Key
+from api.stores.changes import Note
+from api.stores.entities import Key, Unavailable
 
 SCOPES = ("read", "upload", "run", "admin")
 HEADER = "X-API-Key"
+_ASK = {"WWW-Authenticate": "ApiKey"}
 #: Group and key of all requests where no key is required.
 LOCAL_GROUP = LOCAL_KEY = "local"
 #: A key is PREFIX_ID_SECRET.
 PREFIX = "ri"
+#: Longest life of a key that expires [days], and how exactly its last use is known [s].
+LONGEST, USED = 3650, 60.0
+#: What a proxy adds to a request that it passes on, beside X-Forwarded-…
+_PASSED_ON = ("forwarded", "x-real-ip", "via")
 _LOCAL_NAME = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:\d{1,5})?", re.IGNORECASE)
 
 
@@ -40,20 +48,31 @@ class Caller:
         Of the key.
     group : str
     scopes : tuple of str
+    name : str
+        Of the key, as people call it.
     """
 
     id: str
     group: str
     scopes: tuple[str, ...]
+    name: str
 
     def may(self, scope: str) -> bool:
         """Whether the caller has a scope; admin includes all others."""
         return scope in self.scopes or "admin" in self.scopes
 
+    def note(self, why: str = "", restores: int = 0) -> Note:
+        """Return what the caller leaves with a change."""
+        return Note(self.id, self.name, why, restores)
+
 
 def now() -> str:
     """Return the time in UTC as ISO 8601."""
-    return datetime.now(UTC).isoformat(timespec="milliseconds")
+    return _time(datetime.now(UTC))
+
+
+def _time(when: datetime) -> str:
+    return when.isoformat(timespec="milliseconds")
 
 
 def new_id() -> str:
@@ -61,11 +80,12 @@ def new_id() -> str:
     return f"{int(datetime.now(UTC).timestamp() * 1e3):012x}{secrets.token_hex(6)}"
 
 
-def make_key(group: str, scopes: tuple[str, ...], label: str) -> tuple[Key, str]:
-    """Return a new key and its text, which is stored nowhere."""
+def make_key(group: str, scopes: tuple[str, ...], label: str, days: float | None = None) -> tuple[Key, str]:
+    """Return a new key, which expires after so many days, and its text, which is stored nowhere."""
     # 256 random bits cannot be guessed: a plain hash is enough
     id, secret = new_id(), secrets.token_urlsafe(32)
-    return Key(id, group, label, scopes, hash_of(secret), now()), f"{PREFIX}_{id}_{secret}"
+    expires = None if days is None else _time(datetime.now(UTC) + timedelta(days=days))
+    return Key(id, group, label, scopes, hash_of(secret), now(), expires), f"{PREFIX}_{id}_{secret}"
 
 
 def hash_of(secret: str) -> str:
@@ -83,18 +103,53 @@ def caller_of(request: HTTPConnection, components: Components, given: str | None
     """
     text = request.headers.get(HEADER, "") or given or ""
     if not text and not components.settings.asks_for_keys:
-        # DNS rebinding: a foreign page may reach loopback through a host name of its own
-        if not _LOCAL_NAME.fullmatch(request.headers.get("host", "")):
-            raise Problem(403, "without an API key the service answers on localhost only")
-        return Caller(LOCAL_KEY, LOCAL_GROUP, SCOPES)
+        _check_local(request)
+        return Caller(LOCAL_KEY, LOCAL_GROUP, SCOPES, LOCAL_KEY)
     _, _, rest = text.partition("_")
     id, _, secret = rest.partition("_")
     key = components.store.keys.get(id) if text.startswith(f"{PREFIX}_") and id.isalnum() and id.isascii() and len(id) <= 64 else None
     # an unknown id takes as long as a wrong secret: no timing attack on ids
     kept = key.secret_hash if key is not None else hash_of("")
     if not hmac.compare_digest(hash_of(secret), kept) or key is None:
-        raise Problem(401, f"a valid API key is required in the header {HEADER}", headers={"WWW-Authenticate": "ApiKey"})
-    return Caller(key.id, key.group, key.scopes)
+        raise Problem(401, f"a valid API key is required in the header {HEADER}", headers=_ASK)
+    if _expired(key):
+        raise Problem(401, f"the API key has expired on {key.expires}", headers=_ASK)
+    if key.used is None or datetime.now(UTC) - datetime.fromisoformat(key.used) > timedelta(seconds=USED):
+        # who may read is answered although nobody can write at the moment
+        with suppress(Unavailable):
+            components.store.keys.use(key.id, now())
+    return Caller(key.id, key.group, key.scopes, key.label or key.id)
+
+
+def still_valid(components: Components, caller: Caller) -> bool:
+    """Whether the caller's key has been neither withdrawn nor expired since."""
+    if caller.id == LOCAL_KEY:
+        return True
+    key = components.store.keys.get(caller.id)
+    return key is not None and not _expired(key)
+
+
+def is_foreign(request: HTTPConnection) -> bool:
+    """Whether a page of another origin sends the request."""
+    origin, host = request.headers.get("origin"), request.headers.get("host", "")
+    return origin is not None and (urlsplit(origin).scheme not in ("http", "https") or urlsplit(origin).netloc.lower() != host.lower())
+
+
+def _expired(key: Key) -> bool:
+    return key.expires is not None and key.expires <= now()
+
+
+def _check_local(request: HTTPConnection) -> None:
+    """Refuse what does not come from this machine itself, where no key is required."""
+    # DNS rebinding: a foreign page may reach loopback through a host name of its own
+    if not _LOCAL_NAME.fullmatch(request.headers.get("host", "")):
+        raise Problem(403, "without an API key the service answers on localhost only")
+    # a browser sends a form anywhere without asking
+    if is_foreign(request):
+        raise Problem(403, "without an API key the service answers no pages of another origin")
+    passed_on = next((name for name in request.headers if name in _PASSED_ON or name.startswith("x-forwarded-")), None)
+    if passed_on is not None:
+        raise Problem(403, f"without an API key the service answers nothing that a proxy has passed on (found the header {passed_on})")
 
 
 class Guarded(APIRoute):

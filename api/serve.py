@@ -6,6 +6,7 @@ import logging
 import os
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from threading import Event
 from typing import Annotated, Any
@@ -45,13 +46,15 @@ def create_key(
     context: typer.Context,
     group: Annotated[str, typer.Option(help="Whose machines and toolings it opens.")] = "default",
     scopes: Annotated[str, typer.Option(help="Some of read, upload, run, admin, separated by commas.")] = "admin",
-    label: Annotated[str, typer.Option(help="What it is for.")] = "",
+    label: Annotated[str, typer.Option(help="What it is for: its name in the trail of changes.")] = "",
+    days: Annotated[float | None, typer.Option(help="After which it expires.", show_default="never")] = None,
 ) -> None:
     """Make an API key and print it once: the way to the first key of a group."""
     import re
 
+    from api.data_folder import make
     from api.schemas.common import NAME_PATTERN
-    from api.security import SCOPES, make_key
+    from api.security import LONGEST, SCOPES, make_key
     from api.stores.sql import open_store
 
     try:
@@ -62,11 +65,13 @@ def create_key(
             raise InputError("--group", group, "letters, digits, blanks and . _ + - ( ), at most 64")
         if not label.isprintable() or len(label) > 200:
             raise InputError("--label", label, "a line of at most 200 characters")
+        if days is not None and not 0.0 < days <= LONGEST:
+            raise InputError("--days", days, f"more than 0, at most {LONGEST}")
         settings = context.obj
         if not settings.database:
-            settings.data.mkdir(parents=True, exist_ok=True)
+            make(settings.data)
         store = open_store(settings.database_url)
-        key, text = make_key(group, wanted, label)
+        key, text = make_key(group, wanted, label, days)
         store.keys.add(key)
         store.close()
     except InputError as error:
@@ -164,22 +169,30 @@ def _log() -> None:
 
 
 def _run(settings: object) -> None:
-    import uvicorn
-
-    from api.access import TimedHeadProtocol
-    from api.connections import Connections, SmallHelloProtocol
+    from api.data_folder import alone
     from api.jobs.supervisor import Supervisor
     from api.main import create_app
     from api.settings import Settings
 
     assert isinstance(settings, Settings)
     _log()
-    try:
-        service = create_app(settings, supervisor=Supervisor(settings.job_workers, job_worker, settings, settings.job_nice))
-    except InputError as error:
-        _fail(error)
-    except OSError as error:
-        _fail(InputError("RCSA_IDENT_DATA", error.strerror or "an error", "a folder that can be made and written to"))
+    with ExitStack() as held:
+        try:
+            held.enter_context(alone(settings.data))
+            service = create_app(settings, supervisor=Supervisor(settings.job_workers, job_worker, settings, settings.job_nice))
+        except InputError as error:
+            _fail(error)
+        except OSError as error:
+            _fail(InputError("RCSA_IDENT_DATA", error.strerror or "an error", "a folder that can be made and written to"))
+        _listen(service, settings)
+
+
+def _listen(service: Any, settings: Any) -> None:
+    import uvicorn
+
+    from api.access import TimedHeadProtocol
+    from api.connections import Connections, SmallHelloProtocol
+
     fields = {"store": (settings.database and "database by URL") or str(settings.data), "workers": settings.workers}
     log = logging.getLogger("rcsa_ident.service")
     log.info("starting", extra={"fields": fields | {"address": f"http://{settings.host}:{settings.port}"}})

@@ -23,6 +23,7 @@ from api.schemas.machines import Frf, Identification, IdentificationSummary, Mac
 from api.schemas.materials import MaterialAnswer, Materials
 from api.schemas.queries import AdviceAnswer, TipAnswer
 from api.schemas.toolings import ToolingAnswer, ToolingSummary
+from api.schemas.versions import ChangeAnswer, Differences, ToolingVersion
 
 
 class Client(Uploads, Jobs):
@@ -71,12 +72,41 @@ class Client(Uploads, Jobs):
         """Return the spindle's receptance at its flange; options from_hz, to_hz, step_hz."""
         return read(Frf, self.send("GET", f"/machines/{id}/identification/frf", params=query))
 
-    def write_tooling(self, name: str, tooling: str | Json, seen: str | None = None) -> ToolingAnswer:
-        """Write a tooling, from the text of a tooling file or from its keys."""
+    def write_tooling(self, name: str, tooling: str | Json, seen: str | None = None, why: str = "") -> ToolingAnswer:
+        """Write a tooling, from the text of a tooling file or from its keys; what it replaces stays as a version."""
+        return read(ToolingAnswer, self._send_tooling("PUT", f"/toolings/{name}", tooling, match(seen), {"why": why} if why else {}))
+
+    def differences(self, name: str, tooling: str | Json) -> Differences:
+        """Return where a tooling differs from that of the library."""
+        return read(Differences, self._send_tooling("POST", f"/toolings/{name}/differences", tooling, {}, {}))
+
+    def _send_tooling(self, method: str, path: str, tooling: str | Json, headers: Json, params: Json) -> httpx2.Response:
         if isinstance(tooling, str):
-            headers = {"Content-Type": "application/toml", **match(seen)}
-            return read(ToolingAnswer, self.send("PUT", f"/toolings/{name}", content=tooling.encode(), headers=headers))
-        return read(ToolingAnswer, self.send("PUT", f"/toolings/{name}", json=tooling, headers=match(seen)))
+            kind = {"Content-Type": "application/toml", **headers}
+            return self.send(method, path, content=tooling.encode(), headers=kind, params=dict(params))
+        return self.send(method, path, json=tooling, headers=dict(headers), params=dict(params))
+
+    def changes(self, limit: int = 50, **wanted: str) -> Iterator[ChangeAnswer]:
+        """Yield the audit trail, newest first; options kind and name (of a tooling, or id of a machine)."""
+        return self.all("/changes", Page[ChangeAnswer], limit, wanted)
+
+    def tooling_version(self, name: str, version: int) -> ToolingVersion:
+        """Return a version of a tooling."""
+        return read(ToolingVersion, self.send("GET", f"/toolings/{name}/versions/{version}"))
+
+    def restore_tooling(self, name: str, version: int, seen: str | None = None, why: str = "") -> ToolingAnswer:
+        """Write a version of a tooling again, also one that was deleted."""
+        path = f"/toolings/{name}/versions/{version}/restore"
+        return read(ToolingAnswer, self.send("POST", path, headers=match(seen), params={"why": why}))
+
+    def identification_version(self, id: str, version: int) -> str:
+        """Return the text of RESULT.json or FLANGE.csv of a version."""
+        return self.send("GET", f"/machines/{id}/identification/versions/{version}").text
+
+    def restore_identification(self, id: str, version: int, seen: str | None = None, why: str = "") -> IdentificationSummary:
+        """Write a version of a machine's identification again."""
+        path = f"/machines/{id}/identification/versions/{version}/restore"
+        return read(IdentificationSummary, self.send("POST", path, headers=match(seen), params={"why": why}))
 
     def tooling(self, name: str) -> ToolingAnswer:
         """Return a tooling."""
@@ -162,9 +192,10 @@ class Client(Uploads, Jobs):
             files = {field: (path.name, opened.enter_context(path.open("rb"))) for field, path in named.items()}
             return self.send("POST", "/forces", data={"query": json.dumps(query)}, files=files, headers=dict(headers or {}))
 
-    def make_key(self, *scopes: str, label: str = "") -> MadeKey:
-        """Make an API key."""
-        return read(MadeKey, self.send("POST", "/keys", json={"scopes": list(scopes), "label": label}))
+    def make_key(self, *scopes: str, label: str = "", days: float | None = None) -> MadeKey:
+        """Make an API key; `days` after which it expires."""
+        body = {"scopes": list(scopes), "label": label} | ({} if days is None else {"expires_in_days": days})
+        return read(MadeKey, self.send("POST", "/keys", json=body))
 
     def keys(self, limit: int = 50) -> Iterator[KeyAnswer]:
         """Yield all keys."""

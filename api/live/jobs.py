@@ -18,13 +18,15 @@ from api.jobs.event_feed import Crowded
 from api.problems import Problem
 from api.schemas.common import ID_PATTERN
 from api.schemas.jobs import JobAnswer
-from api.security import now
+from api.security import Caller, now, still_valid
 from api.stores.entities import Taken
 from api.stores.jobs import OPEN, Full, Job
 
 EVENTS = "text/event-stream"
 #: Retry-After [s], and interval of the heartbeat of an event stream without events [s].
 AGAIN, HEARTBEAT = "2", 15.0
+#: Interval between two checks of the API key [s].
+LOOK = 3.0
 #: Longest wait of a request for the end of a job [s].
 LONGEST_WAIT = 30.0
 JobId = Annotated[str, Path(pattern=ID_PATTERN, description="Id of a job.")]
@@ -123,9 +125,9 @@ def finished(components: Components, group: str, id: str, kind: str, name: str) 
     return found_or_404(components.store.jobs.text(id, name), "result")
 
 
-async def events(components: Components, group: str, id: str, kind: str, seen: str | None) -> StreamingResponse:
-    """Return the stream of a job's events after a number."""
-    job = await run_in_threadpool(job_of, components, group, id, kind)
+async def events(components: Components, caller: Caller, id: str, kind: str, seen: str | None) -> StreamingResponse:
+    """Return the stream of a job's events after a number; it ends when the caller's key does."""
+    job = await run_in_threadpool(job_of, components, caller.group, id, kind)
     try:
         watching = components.feeds.stream()
         watching.__enter__()
@@ -134,7 +136,7 @@ async def events(components: Components, group: str, id: str, kind: str, seen: s
 
     async def stream() -> AsyncIterator[str]:
         try:
-            async for part in _events(components, job, int(seen or 0)):
+            async for part in _events(components, caller, job, int(seen or 0)):
                 yield part
         finally:
             watching.__exit__(None, None, None)
@@ -142,11 +144,11 @@ async def events(components: Components, group: str, id: str, kind: str, seen: s
     return StreamingResponse(stream(), media_type=EVENTS, headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"})
 
 
-async def _events(components: Components, job: Job, after: int) -> AsyncIterator[str]:
-    end = time.monotonic() + components.settings.watch_seconds
+async def _events(components: Components, caller: Caller, job: Job, after: int) -> AsyncIterator[str]:
+    end, beat = time.monotonic() + components.settings.watch_seconds, time.monotonic() + HEARTBEAT
     # the current state first, without a number: it is not an event that could be missed
     yield f"retry: 2000\n{_event(None, 'progress', answer(job).model_dump_json())}"
-    while time.monotonic() < end:
+    while time.monotonic() < end and await run_in_threadpool(still_valid, components, caller):
         found = await components.feeds.events(job.id, after)
         for event in found:
             after = event.number
@@ -168,7 +170,8 @@ async def _events(components: Components, job: Job, after: int) -> AsyncIterator
             # the client reconnected after the end
             yield _event(None, "end", answer(current).model_dump_json())
             return
-        if not await components.feeds.wait(job.id, after, min(HEARTBEAT, max(end - time.monotonic(), 0.0))):
+        if not await components.feeds.wait(job.id, after, min(LOOK, max(end - time.monotonic(), 0.0))) and time.monotonic() > beat:
+            beat = time.monotonic() + HEARTBEAT
             yield ": still there\n\n"
 
 

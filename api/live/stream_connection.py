@@ -18,7 +18,7 @@ from api.components import Components
 from api.live.stream_opening import Opening
 from api.problems import Problem
 from api.schemas.forces import Hello
-from api.security import LOCAL_KEY, Caller
+from api.security import Caller, still_valid
 from api.stores.entities import Unavailable
 from api.streams.frames import TooLarge, WrongKind, object_of, samples_of, samples_of_text
 from api.streams.hub import Full, Hub
@@ -33,7 +33,7 @@ LINGER, SETTLING = 5.0, 120.0
 #: Pause between two attempts to design an observer [s].
 PAUSE = 0.5
 #: Interval between two checks of the API key [s].
-LOOK = 20.0
+LOOK = 3.0
 #: A larger jump of the sample index is an error of the sender, not a gap [s].
 MOST_AHEAD = 3600.0
 UNEXPECTED = End(1011, 500, "an internal error occurred; it is logged under this session's id")
@@ -78,11 +78,11 @@ async def _until_disconnect(websocket: WebSocket) -> None:
 
 
 async def _watch_key(components: Components, caller: Caller) -> None:
-    """Check periodically that the API key has not been revoked."""
+    """Check periodically that the API key is still valid."""
     while True:
         await asyncio.sleep(LOOK)
-        if caller.id != LOCAL_KEY and await run_in_threadpool(components.store.keys.get, caller.id) is None:
-            raise Problem(401, "the API key has been revoked")
+        if not await run_in_threadpool(still_valid, components, caller):
+            raise Problem(401, "the API key has been revoked, or has expired")
 
 
 def _session_task(hub: Hub, session: Session, doing: Awaitable[None]) -> asyncio.Task[None]:

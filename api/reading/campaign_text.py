@@ -79,7 +79,7 @@ def declare(data: Mapping[str, Any], library: Library) -> tuple[str, str, int]:
     Parameters
     ----------
     data : mapping
-        The keys of campaign.toml; a tooling may also be a name of the library or a table of its own.
+        The keys of campaign.toml; a tooling may also be a name of the library, the text of a tooling file, or a table of its own.
     library : callable
 
     Raises
@@ -159,7 +159,12 @@ def _toolings(top: Table, cuts: list[dict[str, Any]], library: Library) -> dict[
             texts[key] = toml_of(what)
             continue
         if not isinstance(what, str):
-            raise InputError(field, what, "a name of the library, the path of a tooling file, or a table of the tooling's keys")
+            allowed = "a name of the library, the path of a tooling file, its text, or a table of the tooling's keys"
+            raise InputError(field, what, allowed)
+        if "\n" in what:
+            tooling_of_keys(parsed(what), "", key)
+            texts[key] = what
+            continue
         # a path stands for the library's tooling that is named by the key
         name = key if what.endswith(".toml") else what
         text = library(name) if TOOLING_NAME.fullmatch(name) else None

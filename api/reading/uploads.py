@@ -18,6 +18,7 @@ from api.files import NORMALISED, UPLOADS, Files, Full, Partial
 from api.reading import reader_tasks
 from api.reading.campaign_text import Upload, files_of
 from api.stores.campaigns import Campaign, FileKey, Recording
+from api.stores.changes import Note
 from api.stores.entities import Store, Taken, Unavailable
 from api.work.pool import Busy, Work
 from rcsa_ident.errors import InputError
@@ -256,11 +257,11 @@ class Uploads:
             self._release(campaign.group, [key for row in rows for key in files_named(row)])
         return there
 
-    def forget_machine(self, group: str, machine: str) -> bool:
+    def forget_machine(self, group: str, machine: str, note: Note) -> bool:
         """Remove a machine with its campaigns and everything that was uploaded for them."""
         with self.files.lock:
             keys = self.store.recordings.of_machine(group, machine)
-            there = self.store.machines.delete(group, machine)
+            there = self.store.machines.delete(group, machine, note)
             if keys:
                 self._release(group, keys)
         return there

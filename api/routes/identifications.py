@@ -53,7 +53,7 @@ def identify(body: NewIdentification, components: ThisService, caller: WhoAsks, 
         starts(known.text)
         texts["start"] = known.text
     request = body.model_dump_json()
-    job = Job(new_id(), caller.group, KIND, campaign.machine, campaign.id, request, "queued", now())
+    job = Job(new_id(), caller.group, KIND, campaign.machine, campaign.id, request, "queued", now(), key=caller.id, who=caller.name)
     digest = hashlib.sha256(request.encode()).hexdigest()
     return jobs.accepted(jobs.submit(components, job, texts, None if repeat is None else (repeat, digest)))
 
@@ -100,7 +100,7 @@ def cancel(id: JobId, components: ThisService, caller: WhoAsks, response: Respon
     responses={200: STREAM, **problems(404, 422)},
 )
 async def events(id: JobId, components: ThisService, caller: WhoAsks, seen: Seen = None) -> StreamingResponse:
-    return await jobs.events(components, caller.group, id, KIND, seen)
+    return await jobs.events(components, caller, id, KIND, seen)
 
 
 @router.get("/{id}/modes", summary="Modes with their uncertainties", openapi_extra=guard("read"), responses=problems(404, 409, 422))

@@ -17,7 +17,7 @@ router = APIRouter(prefix="/keys", tags=["keys"], route_class=Guarded)
 
 @router.post("", status_code=201, summary="Make an API key", openapi_extra=guard("admin"), responses=problems(*BODY))
 def make(body: NewKey, components: ThisService, caller: WhoAsks) -> MadeKey:
-    key, text = make_key(caller.group, tuple(dict.fromkeys(body.scopes)), body.label)
+    key, text = make_key(caller.group, tuple(dict.fromkeys(body.scopes)), body.label, body.expires_in_days)
     components.store.keys.add(key)
     return MadeKey(**_answer(key).model_dump(), key=text)
 
@@ -36,6 +36,5 @@ def withdraw(id: KeyId, components: ThisService, caller: WhoAsks) -> Response:
 
 
 def _answer(key: Key) -> KeyAnswer:
-    return KeyAnswer.model_validate(
-        {"id": key.id, "group": key.group, "label": key.label, "scopes": list(key.scopes), "created": key.created}
-    )
+    same = ("id", "group", "label", "created", "expires", "used")
+    return KeyAnswer.model_validate({name: getattr(key, name) for name in same} | {"scopes": list(key.scopes)})

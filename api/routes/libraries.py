@@ -14,7 +14,7 @@ from api.problems import Problem
 from api.routes.toolings import summary
 from api.schemas.common import NAME_PATTERN
 from api.schemas.libraries import ImportAnswer, ImportedTool
-from api.security import Guarded, WhoAsks, now
+from api.security import Caller, Guarded, WhoAsks, now
 from api.stores.entities import ABSENT, Document, Stale, digest_of
 from api.work.libraries import LARGEST_LIBRARY, imported
 from rcsa_ident.errors import InputError
@@ -77,17 +77,17 @@ async def import_library(
     entries = await while_there(request, components.work.run(imported, raw, given, joint))
 
     def keep() -> list[ImportedTool]:
-        return [_kept(components, caller.group, *entry, replace) for entry in entries]
+        return [_kept(components, caller, *entry, replace) for entry in entries]
 
     return ImportAnswer(items=await run_in_threadpool(keep))
 
 
-def _kept(components: Any, group: str, name: str, text: str, assumed: tuple[str, ...], reason: str, replace: bool) -> ImportedTool:
+def _kept(components: Any, caller: Caller, name: str, text: str, assumed: tuple[str, ...], reason: str, replace: bool) -> ImportedTool:
     """Outcome of one entry, independent of the others."""
     if not reason:
         try:
-            document = Document(group, name, text, json.dumps(summary(text)), digest_of(text), now())
-            components.store.toolings.put(document, None if replace else ABSENT)
+            document = Document(caller.group, name, text, json.dumps(summary(text)), digest_of(text), now())
+            components.store.toolings.put(document, None if replace else ABSENT, caller.note("imported from a tool library"))
         except InputError as error:
             reason = str(error)
         except Stale:

@@ -16,6 +16,7 @@ from api.conventions import (
     Limit,
     MachineId,
     Repeat,
+    Why,
     expected,
     guard,
     in_use,
@@ -44,11 +45,13 @@ _RESULT = {
 
 
 @router.post("", status_code=201, summary="Make a machine", openapi_extra=guard("upload"), responses=problems(409, *BODY))
-def make(body: NewMachine, components: ThisService, caller: WhoAsks, response: Response, repeat: Repeat = None) -> MachineAnswer:
+def make(
+    body: NewMachine, components: ThisService, caller: WhoAsks, response: Response, repeat: Repeat = None, why: Why = ""
+) -> MachineAnswer:
     machine = Machine(new_id(), caller.group, body.name, body.description, now())
     digest = hashlib.sha256(body.model_dump_json().encode()).hexdigest()
     try:
-        kept = components.store.machines.add(machine, None if repeat is None else (repeat, digest))
+        kept = components.store.machines.add(machine, None if repeat is None else (repeat, digest), caller.note(why))
     except Taken as taken:
         raise in_use(taken, body.name, repeat) from None
     response.headers["Location"] = f"/v1/machines/{kept.id}"
@@ -73,8 +76,8 @@ def get(id: MachineId, components: ThisService, caller: WhoAsks) -> MachineAnswe
     openapi_extra=guard("upload"),
     responses=problems(404, 422),
 )
-def forget(id: MachineId, components: ThisService, caller: WhoAsks) -> Response:
-    if not components.uploads.forget_machine(caller.group, id):
+def forget(id: MachineId, components: ThisService, caller: WhoAsks, why: Why = "") -> Response:
+    if not components.uploads.forget_machine(caller.group, id, caller.note(why)):
         raise Problem(404, "there is no such machine")
     return Response(status_code=204)
 
@@ -86,7 +89,9 @@ def forget(id: MachineId, components: ThisService, caller: WhoAsks) -> Response:
     openapi_extra=guard("upload", requestBody=_RESULT, **{"x-content-types": (JSON, CSV)}),
     responses={201: {"model": IdentificationSummary, "description": "The machine had none before."}, **problems(404, 412, *BODY)},
 )
-async def identify(id: MachineId, request: Request, response: Response, components: ThisService, caller: WhoAsks) -> IdentificationSummary:
+async def identify(
+    id: MachineId, request: Request, response: Response, components: ThisService, caller: WhoAsks, why: Why = ""
+) -> IdentificationSummary:
     await run_in_threadpool(machine_of, components, caller.group, id)
     text = utf8(await request.body())
     summary = await while_there(request, components.work.run(tasks.check, text))
@@ -94,14 +99,14 @@ async def identify(id: MachineId, request: Request, response: Response, componen
     kept = components.store.identifications
 
     def write() -> bool:
-        return kept.put(document, expected(request, lambda: _digest(kept.brief(caller.group, id))))
+        return kept.put(document, expected(request, lambda: _digest(kept.brief(caller.group, id))), caller.note(why))
 
     try:
         response.status_code = 201 if await run_in_threadpool(write) else 200
     except Stale:
         raise Problem(412, "the stored identification does not match If-Match or If-None-Match") from None
     response.headers.update(tagged(document.digest))
-    return _summary(document)
+    return summary_of(document)
 
 
 @router.get(
@@ -154,11 +159,12 @@ def _digest(document: Document | None) -> str | None:
     return None if document is None else document.digest
 
 
-def _summary(document: Document) -> IdentificationSummary:
+def summary_of(document: Document) -> IdentificationSummary:
+    """Return what lists tell of an identification."""
     return IdentificationSummary(**json.loads(document.summary), changed=document.changed, etag=document.digest)
 
 
 def _answer(components: Components, machine: Machine) -> MachineAnswer:
     document = components.store.identifications.brief(machine.group, machine.id)
-    summary = None if document is None else _summary(document)
+    summary = None if document is None else summary_of(document)
     return MachineAnswer(id=machine.id, name=machine.name, description=machine.description, created=machine.created, identification=summary)

@@ -7,7 +7,6 @@ import contextlib
 import json
 import logging
 import math
-from urllib.parse import urlsplit
 
 from fastapi import APIRouter, WebSocket
 from fastapi.concurrency import run_in_threadpool
@@ -24,7 +23,7 @@ from api.live.stream_opening import open_logger, open_replay
 from api.problems import Problem
 from api.schemas.common import body_of
 from api.schemas.forces import Hello, ReplayHello, StreamHello, StreamsAnswer, StreamSummary, WatchHello
-from api.security import HEADER, Caller, Guarded, WhoAsks, caller_of, new_id
+from api.security import HEADER, Caller, Guarded, WhoAsks, caller_of, is_foreign, new_id
 from api.streams.frames import TooLarge, WrongKind, object_of
 from api.streams.session import End, Session
 
@@ -91,8 +90,7 @@ async def stream(websocket: WebSocket) -> None:
 
 async def _admit(websocket: HTTPConnection, components: Components) -> Caller | None:
     """Return the caller, None where the first message has the key; pages of other origins are refused, whatever the browser would send."""
-    origin, host = websocket.headers.get("origin"), websocket.headers.get("host", "")
-    if origin is not None and (urlsplit(origin).scheme not in ("http", "https") or urlsplit(origin).netloc.lower() != host.lower()):
+    if is_foreign(websocket):
         raise Problem(403, "a page of another origin cannot open a stream")
     where = websocket.client.host if websocket.client is not None else "nobody"
     _check_rate(components, f"open {where}")

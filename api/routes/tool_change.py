@@ -64,7 +64,7 @@ async def lobes(body: LobeQuery, request: Request, parts: ThisService, caller: W
                 raise
     text = asked(machine, toolings, body.request(most))
     words = body.model_dump_json()
-    job = Job(new_id(), caller.group, LOBES, body.machine, None, words, "queued", now())
+    job = Job(new_id(), caller.group, LOBES, body.machine, None, words, "queued", now(), key=caller.id, who=caller.name)
     digest = hashlib.sha256(words.encode()).hexdigest()
     again = None if repeat is None else (repeat, digest)
     return jobs.accepted(await run_in_threadpool(jobs.submit, parts, job, {"question": text}, again))
@@ -92,7 +92,7 @@ async def lobe_job(id: jobs.JobId, parts: ThisService, caller: WhoAsks, response
     responses={200: jobs.STREAM, **problems(404, 422)},
 )
 async def lobe_events(id: jobs.JobId, parts: ThisService, caller: WhoAsks, seen: jobs.Seen = None) -> StreamingResponse:
-    return await jobs.events(parts, caller.group, id, LOBES, seen)
+    return await jobs.events(parts, caller, id, LOBES, seen)
 
 
 @router.delete(

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from api.components import ThisService
-from api.conventions import BODY, After, Limit, ToolingName, expected, found_or_404, guard, page, problems, tagged, unchanged, utf8
+from api.conventions import BODY, After, Limit, ToolingName, Why, expected, found_or_404, guard, page, problems, tagged, unchanged, utf8
 from api.problems import Problem
 from api.schemas.common import Page, body_of
 from api.schemas.toolings import EXAMPLE, ToolingAnswer, ToolingKeys, ToolingSummary
@@ -22,7 +22,7 @@ router = APIRouter(prefix="/toolings", tags=["toolings"], route_class=Guarded)
 TOML, JSON, SVG = "application/toml", "application/json", "image/svg+xml"
 #: Opened as a page of its own a drawing runs nothing and loads nothing.
 _ALONE = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'"}
-_BODY = {
+TOOLING_BODY = {
     "required": True,
     "content": {
         JSON: {"schema": {"$ref": "#/components/schemas/ToolingKeys"}, "example": EXAMPLE},
@@ -34,22 +34,21 @@ _BODY = {
 @router.put(
     "/{name}",
     summary="Write a tooling",
-    description="If-Match or If-None-Match: * keep what somebody else has written meanwhile.",
-    openapi_extra=guard("upload", requestBody=_BODY, **{"x-content-types": (JSON, TOML)}),
+    description="If-Match or If-None-Match: * keep what somebody else has written meanwhile. What is replaced stays as a version.",
+    openapi_extra=guard("upload", requestBody=TOOLING_BODY, **{"x-content-types": (JSON, TOML)}),
     responses={201: {"model": ToolingAnswer, "description": "There was none before."}, **problems(412, *BODY)},
 )
-async def write(name: ToolingName, request: Request, response: Response, parts: ThisService, caller: WhoAsks) -> ToolingAnswer:
+async def write(
+    name: ToolingName, request: Request, response: Response, parts: ThisService, caller: WhoAsks, why: Why = ""
+) -> ToolingAnswer:
     raw = await request.body()
-    if len(raw) > LARGEST:
-        raise Problem(413, f"a tooling has at most {LARGEST // 1000} kB")
-    is_toml = request.headers["content-type"].split(";")[0].strip().lower() == TOML
 
     def keep() -> tuple[bool, Document]:
-        text = utf8(raw) if is_toml else toml_text(body_of(ToolingKeys, raw))
+        text = text_of_body(request, raw)
         document = Document(caller.group, name, text, json.dumps(summary(text)), digest_of(text), now())
         kept = parts.store.toolings
         before = expected(request, lambda: getattr(kept.brief(caller.group, name), "digest", None))
-        return kept.put(document, before), document
+        return kept.put(document, before, caller.note(why)), document
 
     try:
         new, document = await run_in_threadpool(keep)
@@ -57,7 +56,7 @@ async def write(name: ToolingName, request: Request, response: Response, parts: 
         raise Problem(412, "the tooling is not the one that the query expects") from None
     response.status_code = 201 if new else 200
     response.headers.update(tagged(document.digest))
-    return _answer(document)
+    return answer_of(document)
 
 
 @router.get("", summary="List toolings", openapi_extra=guard("read"), responses=problems(422))
@@ -87,7 +86,7 @@ def get(name: ToolingName, request: Request, parts: ThisService, caller: WhoAsks
         return Response(status_code=304, headers=headers)
     if TOML in request.headers.get("accept", ""):
         return Response(document.text.encode(), media_type=TOML, headers=headers)
-    return Response(_answer(document).model_dump_json(), media_type=JSON, headers=headers)
+    return Response(answer_of(document).model_dump_json(), media_type=JSON, headers=headers)
 
 
 @router.get(
@@ -112,27 +111,25 @@ def drawing(name: ToolingName, request: Request, parts: ThisService, caller: Who
 @router.post(
     "/drawing",
     summary="A tooling that is in no library, to scale: SVG in millimetres",
-    openapi_extra=guard("read", requestBody=_BODY, **{"x-content-types": (JSON, TOML)}),
+    openapi_extra=guard("read", requestBody=TOOLING_BODY, **{"x-content-types": (JSON, TOML)}),
     response_class=Response,
     responses={200: {"description": "A drawing.", "content": {SVG: {"schema": {"type": "string"}}}}, **problems(*BODY)},
 )
 async def draw(request: Request) -> Response:
     raw = await request.body()
-    if len(raw) > LARGEST:
-        raise Problem(413, f"a tooling has at most {LARGEST // 1000} kB")
-    is_toml = request.headers["content-type"].split(";")[0].strip().lower() == TOML
 
     def drawn() -> str:
-        return tooling_svg(tooling_of(utf8(raw) if is_toml else toml_text(body_of(ToolingKeys, raw))))
+        return tooling_svg(tooling_of(text_of_body(request, raw)))
 
     return Response(await run_in_threadpool(drawn), media_type=SVG, headers=_ALONE)
 
 
 @router.delete("/{name}", status_code=204, summary="Forget a tooling", openapi_extra=guard("upload"), responses=problems(404, 412, 422))
-def forget(name: ToolingName, request: Request, parts: ThisService, caller: WhoAsks) -> Response:
+def forget(name: ToolingName, request: Request, parts: ThisService, caller: WhoAsks, why: Why = "") -> Response:
     kept = parts.store.toolings
     try:
-        there = kept.delete(caller.group, name, expected(request, lambda: getattr(kept.brief(caller.group, name), "digest", None)))
+        seen = expected(request, lambda: getattr(kept.brief(caller.group, name), "digest", None))
+        there = kept.delete(caller.group, name, seen, caller.note(why))
     except Stale:
         raise Problem(412, "the tooling is not the one that the query expects") from None
     if not there:
@@ -140,9 +137,13 @@ def forget(name: ToolingName, request: Request, parts: ThisService, caller: WhoA
     return Response(status_code=204)
 
 
-def toml_text(keys: ToolingKeys) -> str:
-    """Return keys as the text of a tooling file."""
-    return toml_of(keys.model_dump(exclude_unset=True, exclude_none=True))
+def text_of_body(request: Request, raw: bytes) -> str:
+    """Return the text of a tooling file from a body in TOML or JSON."""
+    if len(raw) > LARGEST:
+        raise Problem(413, f"a tooling has at most {LARGEST // 1000} kB")
+    if request.headers["content-type"].split(";")[0].strip().lower() == TOML:
+        return utf8(raw)
+    return toml_of(body_of(ToolingKeys, raw).model_dump(exclude_unset=True, exclude_none=True))
 
 
 def summary(text: str) -> dict[str, Any]:
@@ -153,6 +154,7 @@ def summary(text: str) -> dict[str, Any]:
     return {"teeth": cutter.teeth, "diameter_mm": cutter.diameter * 1e3, "stickout_mm": tooling.assembly.stickout * 1e3, "label": own[:200]}
 
 
-def _answer(document: Document) -> ToolingAnswer:
+def answer_of(document: Document) -> ToolingAnswer:
+    """Return a tooling as clients see it."""
     keys = ToolingKeys.model_validate(parsed(document.text))
     return ToolingAnswer(name=document.name, tooling=keys, changed=document.changed, etag=document.digest)

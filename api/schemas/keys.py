@@ -18,6 +18,7 @@ class NewKey(Body):
 
     label: Line = Field("", description="Purpose of the key.")
     scopes: list[Scope] = Field(min_length=1, max_length=4, description="Scopes of the key; admin includes all others.")
+    expires_in_days: float | None = Field(None, gt=0.0, le=3650.0, description="After which it opens nothing; without, it lasts.")
 
 
 class KeyAnswer(Answer):
@@ -28,6 +29,8 @@ class KeyAnswer(Answer):
     label: str
     scopes: list[Scope]
     created: str = Field(description="UTC, ISO 8601.")
+    expires: str | None = Field(description="null where it lasts until it is revoked.")
+    used: str | None = Field(description="When it was last used, to the minute; null where it never was.")
 
 
 class MadeKey(KeyAnswer):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from api.stores.campaigns import Campaigns, Recordings
+from api.stores.changes import UNSIGNED, Changes, Note
 from api.stores.jobs import Jobs
 
 #: Expected digest of a document that must not exist yet.
@@ -36,6 +37,10 @@ class Key:
     secret_hash : str
     created : str
         UTC, ISO 8601.
+    expires : str or None
+        From when on it opens nothing.
+    used : str or None
+        When it was last used, to the minute.
     """
 
     id: str
@@ -44,6 +49,8 @@ class Key:
     scopes: tuple[str, ...]
     secret_hash: str
     created: str
+    expires: str | None = None
+    used: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +102,9 @@ class Keys(Protocol):
     def get(self, id: str) -> Key | None:
         """Return a key of any group."""
 
+    def use(self, id: str, when: str) -> None:
+        """Write down when a key was last used."""
+
     def list(self, group: str, after: str, limit: int) -> list[Key]:
         """Return keys of a group after an id, in the order of ids."""
 
@@ -105,7 +115,7 @@ class Keys(Protocol):
 class Machines(Protocol):
     """Machines of all groups."""
 
-    def add(self, machine: Machine, repeat: tuple[str, str] | None = None) -> Machine:
+    def add(self, machine: Machine, repeat: tuple[str, str] | None = None, note: Note = UNSIGNED) -> Machine:
         """Store a machine and return it; for a repeated idempotency key with the same digest, return the first one.
 
         Raises
@@ -120,14 +130,14 @@ class Machines(Protocol):
     def list(self, group: str, after: str, limit: int) -> list[Machine]:
         """Return machines of a group after an id, in the order of ids."""
 
-    def delete(self, group: str, id: str) -> bool:
+    def delete(self, group: str, id: str, note: Note = UNSIGNED) -> bool:
         """Delete a machine with its identification, campaigns and jobs, and return whether there was one."""
 
 
 class Documents(Protocol):
-    """Named texts of all groups."""
+    """Named texts of all groups; every other content is a version of its own in `Changes`."""
 
-    def put(self, document: Document, expected: str | None = None) -> bool:
+    def put(self, document: Document, expected: str | None = None, note: Note = UNSIGNED) -> bool:
         """Store a text, replacing an existing one, and return whether it is new.
 
         Raises
@@ -145,7 +155,7 @@ class Documents(Protocol):
     def list(self, group: str, after: str, limit: int) -> list[Document]:
         """Return the documents after a name without their texts, in the order of names."""
 
-    def delete(self, group: str, name: str, expected: str | None = None) -> bool:
+    def delete(self, group: str, name: str, expected: str | None = None, note: Note = UNSIGNED) -> bool:
         """Delete a text and return whether there was one; raises `Stale` as `put` does."""
 
 
@@ -156,6 +166,7 @@ class Store(Protocol):
     machines: Machines
     identifications: Documents
     toolings: Documents
+    changes: Changes
     campaigns: Campaigns
     recordings: Recordings
     jobs: Jobs

@@ -43,6 +43,8 @@ class Job:
         Token of the process that carries it out.
     events : int
         Number of its last event.
+    key, who : str
+        Of the API key that asked for it: id and name.
     """
 
     id: str
@@ -62,6 +64,8 @@ class Job:
     attempts: int = 0
     worker: str | None = None
     events: int = 0
+    key: str = ""
+    who: str = ""
 
 
 @dataclass(frozen=True, slots=True)

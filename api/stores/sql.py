@@ -10,11 +10,13 @@ from sqlalchemy.exc import IntegrityError
 
 from api.stores import tables
 from api.stores.campaigns import Campaigns, Recordings
+from api.stores.changes import IDENTIFICATION, MACHINE, TOOLING, UNSIGNED, Changes, Note
 from api.stores.database import Database, open_engine
 from api.stores.entities import ABSENT, Document, Documents, Key, Keys, Machine, Machines, Stale, Taken
 from api.stores.idempotency import earlier, forget_old
 from api.stores.jobs import Jobs
 from api.stores.sql_campaigns import SqlCampaigns, SqlRecordings, delete_campaigns
+from api.stores.sql_changes import SqlChanges, log_deleted, log_document, log_machine
 from api.stores.sql_jobs import SqlJobs, forget_jobs
 
 
@@ -30,8 +32,9 @@ class SqlStore(Database):
         super().__init__(engine)
         self.keys: Keys = SqlKeys(self)
         self.machines: Machines = SqlMachines(self)
-        self.identifications: Documents = SqlDocuments(self, tables.identifications)
-        self.toolings: Documents = SqlDocuments(self, tables.toolings)
+        self.identifications: Documents = SqlDocuments(self, tables.identifications, IDENTIFICATION)
+        self.toolings: Documents = SqlDocuments(self, tables.toolings, TOOLING)
+        self.changes: Changes = SqlChanges(self)
         self.campaigns: Campaigns = SqlCampaigns(self)
         self.recordings: Recordings = SqlRecordings(self)
         self.jobs: Jobs = SqlJobs(self)
@@ -51,6 +54,10 @@ class SqlKeys:
         with self.store.reading() as connection:
             row = connection.execute(select(tables.keys).where(tables.keys.c.id == id)).first()
         return None if row is None else _key(row)
+
+    def use(self, id: str, when: str) -> None:
+        with self.store.writing() as connection:
+            connection.execute(update(tables.keys).where(tables.keys.c.id == id).values(used=when))
 
     def list(self, group: str, after: str, limit: int) -> list[Key]:
         t = tables.keys
@@ -79,7 +86,7 @@ class SqlMachines:
     def __init__(self, store: SqlStore) -> None:
         self.store = store
 
-    def add(self, machine: Machine, repeat: tuple[str, str] | None = None) -> Machine:
+    def add(self, machine: Machine, repeat: tuple[str, str] | None = None, note: Note = UNSIGNED) -> Machine:
         r = tables.repeats
         try:
             with self.store.writing() as connection:
@@ -90,6 +97,7 @@ class SqlMachines:
                         return _first(first)
                     connection.execute(insert(r).values(asdict(machine) | {"key": repeat[0], "digest": repeat[1]}))
                 connection.execute(insert(tables.machines).values(asdict(machine)))
+                log_machine(connection, machine.group, machine.id, machine.created, note)
                 return machine
         except IntegrityError:
             # another writer was first, or has the name
@@ -111,11 +119,14 @@ class SqlMachines:
             rows = connection.execute(select(t).where(t.c.group == group, t.c.id > after).order_by(t.c.id).limit(limit)).all()
         return [Machine(**row._asdict()) for row in rows]
 
-    def delete(self, group: str, id: str) -> bool:
+    def delete(self, group: str, id: str, note: Note = UNSIGNED) -> bool:
         t, i, c = tables.machines, tables.identifications, tables.campaigns
+        here = (t.c.group == group, t.c.id == id)
         with self.store.writing() as connection:
+            if connection.execute(select(t.c.id).where(*here).with_for_update()).first() is not None:
+                log_deleted(connection, MACHINE, group, id, note)
             # the machine first: nothing can be added to it from now on
-            there = connection.execute(delete(t).where(t.c.group == group, t.c.id == id)).rowcount > 0
+            there = connection.execute(delete(t).where(*here)).rowcount > 0
             connection.execute(delete(i).where(i.c.group == group, i.c.name == id))
             delete_campaigns(connection, select(c.c.id).where(c.c.group == group, c.c.machine == id))
             forget_jobs(connection, group, id)
@@ -125,10 +136,10 @@ class SqlMachines:
 class SqlDocuments:
     """Texts in a table."""
 
-    def __init__(self, store: SqlStore, table: Table) -> None:
-        self.store, self.table = store, table
+    def __init__(self, store: SqlStore, table: Table, kind: str) -> None:
+        self.store, self.table, self.kind = store, table, kind
 
-    def put(self, document: Document, expected: str | None = None) -> bool:
+    def put(self, document: Document, expected: str | None = None, note: Note = UNSIGNED) -> bool:
         t, data = self.table, asdict(document)
         here = (t.c.group == document.group, t.c.name == document.name)
         try:
@@ -140,10 +151,12 @@ class SqlDocuments:
                     connection.execute(insert(t).values(data))
                 else:
                     connection.execute(update(t).where(*here).values(data))
+                if there != document.digest:
+                    log_document(connection, self.kind, data, note, there is None)
                 return there is None
         except IntegrityError:
             # another writer stored the first text of that name at the same moment
-            return self.put(document, expected)
+            return self.put(document, expected, note)
 
     def get(self, group: str, name: str) -> Document | None:
         t = self.table
@@ -166,11 +179,13 @@ class SqlDocuments:
             rows = connection.execute(self._brief().where(t.c.group == group, t.c.name > after).order_by(t.c.name).limit(limit)).all()
         return [Document(**row._asdict(), text="") for row in rows]
 
-    def delete(self, group: str, name: str, expected: str | None = None) -> bool:
+    def delete(self, group: str, name: str, expected: str | None = None, note: Note = UNSIGNED) -> bool:
         t = self.table
         here = (t.c.group == group, t.c.name == name)
         with self.store.writing() as connection:
             there = connection.execute(select(t.c.digest).where(*here).with_for_update()).scalar()
             if expected is not None and (there or ABSENT) != expected:
                 raise Stale
+            if there is not None:
+                log_deleted(connection, self.kind, group, name, note)
             return connection.execute(delete(t).where(*here)).rowcount > 0

@@ -10,9 +10,11 @@ from sqlalchemy import Connection, delete, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from api.stores import tables
+from api.stores.changes import IDENTIFICATION, Note
 from api.stores.database import Database
 from api.stores.idempotency import earlier, forget_old
 from api.stores.jobs import OPEN, Event, Full, Job, Outcome, Worker
+from api.stores.sql_changes import log_document
 
 
 class SqlJobs:
@@ -139,7 +141,7 @@ class SqlJobs:
             _append(connection, id, found.events, [Event(0, "end", "")])
             # a machine that was deleted meanwhile stays deleted
             if outcome.applied is not None and connection.execute(select(m.c.id).where(m.c.id == found.machine).with_for_update()).first():
-                _apply(connection, found.group, found.machine, outcome)
+                _apply(connection, found, outcome)
             return True
 
     def events(self, id: str, after: int, limit: int) -> Sequence[Event]:
@@ -212,12 +214,18 @@ def _append(connection: Connection, job: str, last: int, events: Sequence[Event]
     connection.execute(update(t).where(t.c.id == job).values(events=last + len(rows)))
 
 
-def _apply(connection: Connection, group: str, machine: str, outcome: Outcome) -> None:
-    i = tables.identifications
+def _apply(connection: Connection, job: Any, outcome: Outcome) -> None:
+    i, c = tables.identifications, tables.campaigns
     assert outcome.applied is not None
-    connection.execute(delete(i).where(i.c.group == group, i.c.name == machine))
-    row = asdict(outcome.applied) | {"group": group, "name": machine, "changed": outcome.finished}
+    here = (i.c.group == job.group, i.c.name == job.machine)
+    before = connection.execute(select(i.c.digest).where(*here)).scalar()
+    connection.execute(delete(i).where(*here))
+    row = asdict(outcome.applied) | {"group": job.group, "name": job.machine, "changed": outcome.finished}
     connection.execute(insert(i).values(row))
+    if before != outcome.applied.digest:
+        named = connection.execute(select(c.c.name).where(c.c.id == job.campaign)).scalar()
+        note = Note(job.key, job.who, f"identified from the campaign {named}" if named else "identified")
+        log_document(connection, IDENTIFICATION, row, note, before is None)
 
 
 def forget_jobs(connection: Connection, group: str, machine: str) -> None:

@@ -16,11 +16,15 @@ from sqlalchemy import (
     Table,
     Text,
     UniqueConstraint,
+    func,
     insert,
     inspect,
+    literal,
     select,
+    text,
     update,
 )
+from sqlalchemy.schema import CreateColumn
 
 from rcsa_ident.errors import InputError
 
@@ -38,6 +42,8 @@ keys = Table(
     Column("scopes", String(200), nullable=False),
     Column("secret_hash", String(64), nullable=False),
     Column("created", String(40), nullable=False),
+    Column("expires", String(40)),
+    Column("used", String(40)),
 )
 machines = Table(
     "machines",
@@ -83,6 +89,27 @@ def _documents(name: str) -> Table:
 
 identifications = _documents("identifications")
 toolings = _documents("toolings")
+changes = Table(
+    "changes",
+    metadata,
+    Column("id", Integer, primary_key=True, autoincrement=True),
+    Column("group", _Name, nullable=False),
+    Column("kind", String(16), nullable=False),
+    Column("name", _Name, nullable=False),
+    Column("title", _Name, nullable=False),
+    Column("version", Integer, nullable=False),
+    Column("action", String(16), nullable=False),
+    Column("restores", Integer, nullable=False),
+    Column("created", String(40), nullable=False),
+    Column("key", _Name, nullable=False),
+    Column("who", String(200), nullable=False),
+    Column("why", String(400), nullable=False),
+    Column("text", Text, nullable=False),
+    Column("summary", Text, nullable=False),
+    Column("digest", String(64), nullable=False),
+    UniqueConstraint("group", "kind", "name", "version"),
+    Index("ix_changes_group", "group", "id"),
+)
 _FileName = String(200).with_variant(String(200, collation="C"), "postgresql")
 campaigns = Table(
     "campaigns",
@@ -135,6 +162,8 @@ jobs = Table(
     Column("attempts", Integer, nullable=False),
     Column("worker", String(64)),
     Column("events", Integer, nullable=False),
+    Column("key", _Name, nullable=False, server_default=""),
+    Column("who", String(200), nullable=False, server_default=""),
     Index("ix_jobs_group", "group", "kind", "id"),
 )
 job_repeats = _repeats("job_idempotency_keys")
@@ -169,8 +198,34 @@ def _missing_tables(connection: Connection) -> None:
     metadata.create_all(connection)
 
 
+def _kept_versions(connection: Connection) -> None:
+    """Versions with who, when and why; keys that expire; jobs that know who asked for them."""
+    metadata.create_all(connection)
+    for table in (keys, jobs):
+        there = {column["name"] for column in inspect(connection).get_columns(table.name)}
+        for column in (each for each in table.c if each.name not in there):
+            words = CreateColumn(column).compile(dialect=connection.dialect)
+            connection.execute(text(f"ALTER TABLE {table.name} ADD COLUMN {words}"))
+    _first_versions(connection)
+
+
+def _first_versions(connection: Connection) -> None:
+    """What is there is version 1, whoever wrote it."""
+    m, i, d = machines, identifications, toolings
+    nothing, unknown = (literal(""),) * 3, (literal(1), literal("made"), literal(0))
+    name_of = select(m.c.name).where(m.c.group == i.c.group, m.c.id == i.c.name).scalar_subquery()
+    for kind, table, name, title, when, content in (
+        ("machine", m, m.c.id, m.c.name, m.c.created, nothing),
+        ("identification", i, i.c.name, func.coalesce(name_of, i.c.name), i.c.changed, (i.c.text, i.c.summary, i.c.digest)),
+        ("tooling", d, d.c.name, d.c.name, d.c.changed, (d.c.text, d.c.summary, d.c.digest)),
+    ):
+        who = (literal(""), literal(""), literal("it was there before versions were kept"))
+        query = select(table.c.group, literal(kind), name, title, *unknown, when, *who, *content).order_by(name)
+        connection.execute(insert(changes).from_select([column.name for column in changes.c if column.name != "id"], query))
+
+
 #: Migrations from version k + 1 to k + 2, in order; a released one is never edited.
-MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_missing_tables,)
+MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_missing_tables, _kept_versions)
 SCHEMA_VERSION = 1 + len(MIGRATIONS)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -67,6 +67,28 @@ def toml_of(data: Mapping[str, Any]) -> str:
     for key, table in tables.items():
         lines += [f"[{_key(key)}]", *(f"{_key(k)} = {_inline(v)}" for k, v in table.items())]
     return "\n".join(lines) + "\n"
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[tuple[str, Any, Any]]:
+    """Return field, old and new value of every key in which two toolings differ; None where one does not have it.
+
+    Examples
+    --------
+    >>> differences({"cutter": {"teeth": 4}}, {"cutter": {"teeth": 3, "helix_deg": 30}})
+    [('cutter.teeth', 4, 3), ('cutter.helix_deg', None, 30)]
+    """
+    before, after = dict(_leaves(old)), dict(_leaves(new))
+    fields = dict.fromkeys([*before, *after])
+    return [(field, before.get(field), after.get(field)) for field in fields if before.get(field) != after.get(field)]
+
+
+def _leaves(value: Any, field: str = "") -> Iterator[tuple[str, Any]]:
+    tables = isinstance(value, list) and any(isinstance(each, Mapping) for each in value)
+    if isinstance(value, Mapping) or tables:
+        for key, inner in value.items() if isinstance(value, Mapping) else enumerate(value):
+            yield from _leaves(inner, f"{field}.{key}" if field else str(key))
+    else:
+        yield field, value
 
 
 def _key(key: str) -> str:

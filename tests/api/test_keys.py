@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 
 import pytest
 
 from api.client import Client
 from api.components import Rates
-from api.security import SCOPES
+from api.live.jobs import events
+from api.security import SCOPES, Caller
+from tests.api.identifying import job
 from tests.api.in_process import refused, service
 from tests.fixtures.service import example
+from tests.fixtures.waiting import PATIENCE
 
 #: Method, path, body, scope.
 CALLS = [
@@ -27,6 +31,12 @@ CALLS = [
     ("GET", "/toolings/t", None, "read"),
     ("GET", "/toolings/t/drawing", None, "read"),
     ("DELETE", "/toolings/t", None, "upload"),
+    ("GET", "/changes", None, "read"),
+    ("POST", "/toolings/t/differences", example(), "read"),
+    ("GET", "/toolings/t/versions/v", None, "read"),
+    ("POST", "/toolings/t/versions/v/restore", None, "upload"),
+    ("GET", "/machines/m/identification/versions/v", None, "read"),
+    ("POST", "/machines/m/identification/versions/v/restore", None, "upload"),
     ("POST", "/toolings/drawing", example(), "read"),
     ("POST", "/toolings/import", {"data": []}, "upload"),
     ("GET", "/materials", None, "read"),
@@ -76,7 +86,8 @@ def test_every_call_is_in_the_list(http):
         for method in item
         if path.startswith("/v1")
     ]
-    patterns = {"m": "{id}", "k": "{id}", "c": "{id}", "j": "{id}", "t": "{name}", "n": "{name}", "taper": "{taper}", "chuck": "{chuck}"}
+    patterns = {"m": "{id}", "k": "{id}", "c": "{id}", "j": "{id}", "t": "{name}", "n": "{name}", "v": "{version}"}
+    patterns |= {"taper": "{taper}", "chuck": "{chuck}"}
     listed = [(m, "/".join(patterns.get(part, part) for part in p.split("/"))) for m, p, _, _ in CALLS]
     assert sorted(operations) == sorted(listed)
 
@@ -143,6 +154,78 @@ def test_without_keys_only_localhost_is_answered(http):
         assert http.get("/v1/machines", headers={"Host": host}).status_code == 200, host
     for host in ("evil.example", "localhost.evil.example", "10.0.0.1:8000", "evil]"):
         assert http.get("/v1/machines", headers={"Host": host}).status_code == 403, host
+
+
+def test_without_keys_no_foreign_page_and_no_proxy_is_answered(http):
+    """A browser sends a form to any host without asking; a proxy brings everybody in."""
+    form = {"files": ("c.h5", b"x", "application/octet-stream")}
+
+    def sent(**headers):
+        return http.post("/v1/campaigns/c/recordings", files=form, headers=headers)
+
+    for origin in ("http://evil.example", "null", "http://localhost:9999", "file://localhost"):
+        answer = sent(Origin=origin)
+        assert answer.status_code == 403, origin
+        assert "another origin" in answer.json()["detail"]
+    assert sent(Origin="http://localhost").status_code == 404
+    for name in ("Forwarded", "X-Forwarded-For", "X-Forwarded-Host", "x-forwarded-proto", "X-Real-IP", "Via"):
+        answer = http.get("/v1/machines", headers={name: "for=10.0.0.1"})
+        assert answer.status_code == 403, name
+        assert name.lower() in answer.json()["detail"]
+
+
+def test_with_keys_a_proxy_may_stand_in_front(guarded_http):
+    http, keys = guarded_http
+    assert http.get("/v1/machines", headers={"X-API-Key": keys["read"], "X-Forwarded-For": "10.0.0.1"}).status_code == 200
+
+
+def test_a_key_expires_and_tells_when_it_was_last_used(guarded_http, store, monkeypatch):
+    http, keys = guarded_http
+    admin = Client(key=keys["admin"], http=http)
+    lasting, made = admin.make_key("read"), admin.make_key("read", label="a week", days=7.0)
+    assert lasting.expires is None
+    assert made.used is None
+    assert made.created < made.expires
+    week = Client(key=made.key, http=http)
+    assert list(week.machines()) == []
+    told = {key.id: key for key in admin.keys(limit=9)}
+    assert told[lasting.id].used is None
+    assert told[made.id].used >= made.created
+    # known to the minute: not every request writes
+    assert list(week.machines()) == []
+    assert {key.id: key.used for key in admin.keys(limit=9)}[made.id] == told[made.id].used
+    monkeypatch.setattr("api.security.USED", 0.0)
+    assert list(week.machines()) == []
+    assert store.keys.get(made.id).used > told[made.id].used
+    monkeypatch.setattr("api.security.now", lambda: made.expires)
+    assert "expired" in refused(401, week.machines().__next__).detail
+    for days in (0.0, -1.0, 3651.0):
+        assert refused(422, admin.make_key, "read", days=days).errors[0].field == "expires_in_days"
+
+
+def test_an_event_stream_ends_with_its_key(guarded_http, store, machine, monkeypatch):
+    """Of a job that waits, so that nothing else ends it or wakes it."""
+    monkeypatch.setattr("api.live.jobs.LOOK", 0.05)
+    http, keys = guarded_http
+    id = store.jobs.add(job(machine), {}, 9).id
+    caller = Caller(keys["read"].split("_")[1], "A", ("read",), "read")
+
+    async def followed():
+        stream = (await events(http.app.state.components, caller, id, "identification", None)).body_iterator
+        first = await anext(stream)
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(anext(stream), 0.5)
+        return first
+
+    async def withdrawn():
+        stream = (await events(http.app.state.components, caller, id, "identification", None)).body_iterator
+        await anext(stream)
+        store.keys.delete("A", caller.id)
+        return [part async for part in stream]
+
+    assert "progress" in asyncio.run(followed())
+    assert asyncio.run(asyncio.wait_for(withdrawn(), PATIENCE)) == []
+    assert http.app.state.components.feeds.streams == 0
 
 
 def test_a_bucket_of_tokens():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import socket
+import stat
 import subprocess
 import sys
 import threading
@@ -14,11 +15,13 @@ import httpx2
 import pytest
 
 from api.client import Client
+from api.data_folder import alone
+from api.main import create_app
 from api.settings import Settings, from_environment
 from rcsa_ident.errors import InputError
-from tests.api.in_process import refused
+from tests.api.in_process import Here, Near, refused
 from tests.fixtures import by_hand
-from tests.fixtures.service import command, serving
+from tests.fixtures.service import command, free_port, serving
 from tests.fixtures.waiting import PATIENCE, until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -98,6 +101,42 @@ def test_a_service_with_keys_killed_and_started_again(tmp_path, result):
     assert key.split("_", 2)[2].encode() not in (tmp_path / "data" / "service.db").read_bytes()
 
 
+def test_a_data_folder_is_its_owners_alone(tmp_path):
+    there = tmp_path / "there"
+    there.mkdir(mode=0o755)
+    for folder in (there, tmp_path / "new"):
+        create_app(Settings(data=folder), None, Here(), Here(), Near())
+        assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+
+
+def test_a_data_folder_has_one_service(tmp_path):
+    with alone(tmp_path / "data"):
+        with pytest.raises(InputError, match=r"RCSA_IDENT_DATA: found .*which another service is using"), alone(tmp_path / "data"):
+            pass
+        # another folder is another service's
+        with alone(tmp_path / "other"):
+            pass
+    # the one that has ended holds nothing
+    with alone(tmp_path / "data"):
+        pass
+
+
+@pytest.mark.slow
+def test_a_second_service_on_a_folder_says_so_and_ends(tmp_path):
+    with serving(tmp_path / "data") as first:
+        words, environment = command(tmp_path / "data", "--port", str(free_port()))
+        second = subprocess.run(words, env=environment, capture_output=True, text=True, check=False, timeout=PATIENCE)
+        assert second.returncode == 2
+        assert "which another service is using" in second.stderr
+        assert "Traceback" not in second.stderr
+        assert first.ready()
+        # even without a farewell the folder is free
+        first.process.kill()
+        first.process.wait(PATIENCE)
+    with serving(tmp_path / "data") as third:
+        assert third.ready()
+
+
 @pytest.mark.slow
 def test_a_service_without_keys_says_so_and_cuts_off_a_body_without_an_end(tmp_path):
     """In chunks, whose sum nobody tells before; the connection ends when the limit is passed."""
@@ -158,6 +197,7 @@ def test_a_long_question_ends_with_its_client_and_with_the_service(tmp_path, res
     [
         (["create-key", "--scopes", "root"], "--scopes"),
         (["create-key", "--group", "../x"], "--group"),
+        (["create-key", "--days", "0"], "--days"),
         (["--port", "99999"], "RCSA_IDENT_PORT"),
         (["--host", "0.0.0.0"], "RCSA_IDENT_KEYS"),
     ],

@@ -138,8 +138,8 @@ export function busy(button, work) {
   };
 }
 
-/** Ask before something is lost. */
-export function confirmed(question, words, yes) {
+/** Ask before something is lost; `words` is a text or an element. */
+export function confirmed(question, words, yes, no = "Keep it") {
   return new Promise((resolve) => {
     const box = h(
       "dialog",
@@ -148,12 +148,12 @@ export function confirmed(question, words, yes) {
         "form",
         { method: "dialog" },
         h("h2", null, question),
-        h("p", null, words),
+        typeof words === "string" ? h("p", null, words) : words,
         h(
           "div",
           { class: "row-of-buttons" },
           h("button", { value: "yes", class: "danger" }, yes),
-          h("button", { value: "no", autofocus: true }, "Keep it"),
+          h("button", { value: "no", autofocus: true }, no),
         ),
       ),
     );

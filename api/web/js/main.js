@@ -1,7 +1,7 @@
 // The frame: header, sections, and which view belongs to which address.
 import { Problem } from "./api.js";
 import { choices, fill, h, icon, note } from "./dom.js";
-import { route, show, to, where } from "./router.js";
+import { mayLeave, route, show, to, where } from "./router.js";
 import { allMachines, choose, forgetAll, knownMachines, machine } from "./state.js";
 import { isInch, setInch } from "./units.js";
 import { askForKey, keyButton } from "./views/keys.js";
@@ -24,6 +24,7 @@ route("identifications/:id", "identification", view("identification"));
 route("toolings", "toolings", view("toolings"));
 route("toolings/new", "toolings", view("tooling"));
 route("toolings/edit/:name", "toolings", view("tooling"));
+route("changes", "toolings", view("changes"));
 route("change", "change", view("change"));
 route("forces", "forces", view("forces"));
 route("forces/live", "forces", view("live"));
@@ -153,6 +154,7 @@ function onerror(place, error) {
 }
 
 async function refresh(moved = false) {
+  if (!(await mayLeave())) return;
   await show(main, onshow, onerror);
   // who reads with the ears hears that something else is there now
   if (moved) main.focus({ preventScroll: true });

@@ -1,9 +1,13 @@
 // Addresses after the #: #/path/with/parts?query. A view is a function (args, query, place) that fills the place and may return what ends it.
 import { Problem } from "./api.js";
+import { confirmed } from "./forms.js";
 
 const routes = [];
 let ends = null;
 let turn = 0;
+let address = "";
+let unsaved = () => false;
+let asked = null;
 
 /** Say which view belongs to a pattern as `campaigns/:id`. */
 export function route(pattern, section, view) {
@@ -32,9 +36,29 @@ export function go(path, query) {
   location.hash = to(path, query);
 }
 
+/** Say how to find out whether the view holds edits that are nowhere else; asked before it goes. */
+export function holdsEdits(found) {
+  unsaved = found;
+}
+
+/** Whether the view may go: where it holds edits, the person says so, else its address stands again. */
+export async function mayLeave() {
+  if (!unsaved()) return true;
+  asked ??= confirmed("Leave without saving?", "What you have entered here is not saved. It goes when you leave.", "Leave", "Stay here");
+  const leaves = await asked;
+  asked = null;
+  if (!leaves) history.replaceState(null, "", address);
+  return leaves;
+}
+
+window.addEventListener("beforeunload", (event) => {
+  if (unsaved()) event.preventDefault();
+});
+
 /** Write what a view shows into its address, without a step back for every keystroke. */
 export function remember(path, query) {
-  history.replaceState(null, "", to(path, query));
+  address = to(path, query);
+  history.replaceState(null, "", address);
 }
 
 /** Show the view of the address now. */
@@ -43,6 +67,8 @@ export async function show(place, onshow, onerror) {
   const { path, query } = where();
   ends?.();
   ends = null;
+  address = location.hash || "#/";
+  holdsEdits(() => false);
   for (const { shape, names, section, view } of routes) {
     const found = shape.exec(path);
     if (!found) continue;

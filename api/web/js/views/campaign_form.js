@@ -3,7 +3,7 @@ import { all, once, post, Problem } from "../api.js";
 import { add, card, empty, fill, h, head, link } from "../dom.js";
 import { dropZone } from "../drop.js";
 import { busy, field, quantity, select, showProblem } from "../forms.js";
-import { go, to } from "../router.js";
+import { go, holdsEdits, to } from "../router.js";
 import { allMachines, choose, machine } from "../state.js";
 import { quantityInput, u } from "../units.js";
 import { queueFor } from "../uploads.js";
@@ -207,6 +207,9 @@ export async function view(_args, _query, place) {
   first.input.addEventListener("input", spread);
   step.input.addEventListener("input", spread);
   take(files);
+  let edited = false;
+  form.addEventListener("input", () => (edited = true));
+  holdsEdits(() => edited || taken.size > 0);
 
   form.addEventListener(
     "submit",
@@ -243,6 +246,7 @@ export async function view(_args, _query, place) {
         choose(here.id);
         queueFor(campaign.id).add(campaign, [...taken.values()]);
         kept = [];
+        holdsEdits(() => false);
         go(`campaigns/${campaign.id}`);
       } catch (error) {
         if (!(error instanceof Problem)) throw error;

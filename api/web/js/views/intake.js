@@ -1,5 +1,5 @@
 // What was dropped: a campaign and its toolings and recordings are recognised by what is in them, and taken in after one look.
-import { all, getText, once, part, post, Problem, send } from "../api.js";
+import { all, once, part, post, Problem, send } from "../api.js";
 import { card, fill, h, note, waiting } from "../dom.js";
 import { busy, field, select, showProblem } from "../forms.js";
 import { go, to } from "../router.js";
@@ -7,8 +7,10 @@ import { allMachines, choose, knownMachines, machine } from "../state.js";
 import { queueFor } from "../uploads.js";
 import { unzipped } from "../zip.js";
 import { keepFiles } from "./campaign_form.js";
+import { differing } from "./changes.js";
 
 const RECORDING = /\.(h5|hdf5|tdms|uff|unv|wav|mat|parquet|csv)$/i;
+const TOML = { "Content-Type": "application/toml" };
 const last = (path) => path.split(/[\\/]/).at(-1);
 
 /** Sort files into campaign, toolings, recordings and others, by their content where the name does not say enough. */
@@ -26,15 +28,26 @@ export async function sorted(files) {
   return found;
 }
 
-/** Which key of [toolings] names which file, by a look that leaves the reading to the service. */
-export function keysOfToolings(text) {
-  const keys = new Map();
-  const block = /^\s*\[toolings\][^\n]*\n([\s\S]*?)(?=^\s*\[|$(?![\s\S]))/m.exec(text)?.[1] ?? "";
-  for (const line of block.split("\n")) {
-    const [, bare, one, two, path] = /^\s*(?:([A-Za-z0-9_-]+)|"([^"]+)"|'([^']+)')\s*=\s*["']([^"']+\.toml)["']/.exec(line) ?? [];
-    if (path) keys.set(last(path), bare ?? one ?? two);
-  }
-  return keys;
+const TOOLINGS = /^\s*\[toolings\][^\n]*\n([\s\S]*?)(?=^\s*\[|$(?![\s\S]))/m;
+
+/** The key and the file that a line of [toolings] names, by a look that leaves the reading to the service. */
+function namedIn(line) {
+  const [, bare, one, two, path] = /^\s*(?:([A-Za-z0-9_-]+)|"([^"]+)"|'([^']+)')\s*=\s*["']([^"']+\.toml)["']/.exec(line) ?? [];
+  return path ? [last(path), bare ?? one ?? two] : null;
+}
+
+/** Which key of [toolings] names which file. */
+export const keysOfToolings = (text) => new Map((TOOLINGS.exec(text)?.[1] ?? "").split("\n").map(namedIn).filter(Boolean));
+
+/** The campaign with the texts of toolings in the place of their files: it takes them from itself, not from the library. */
+export function withToolings(text, texts) {
+  // JSON's escapes are TOML's, but for DEL
+  const quoted = (words) => JSON.stringify(words).replaceAll("\x7f", "\\u007f");
+  const inlined = (line) => {
+    const key = namedIn(line)?.[1];
+    return texts.has(key) ? `${quoted(key)} = ${quoted(`${texts.get(key)}\n`)}` : line;
+  };
+  return text.replace(TOOLINGS, (block) => block.split("\n").map(inlined).join("\n"));
 }
 
 const nameIn = (text) => /^\s*\[campaign\][^[]*?^\s*name\s*=\s*["']([^"']*)["']/ms.exec(text)?.[1] ?? "";
@@ -86,10 +99,35 @@ export async function intake(place, files) {
   const toolings = await Promise.all(
     found.toolings.map(async ({ file, text }) => {
       const key = keys.get(file.name) ?? file.name.replace(/\.toml$/i, "");
-      return { key, text, there: library.has(key) ? await getText(`toolings/${part(key)}`, "application/toml") : null };
+      return { key, text, listed: keys.has(file.name), there: library.has(key) ? await compared(key, text) : null };
     }),
-  );
+  ).catch((error) => {
+    fill(place, note("bad", error.message, ...(error.errors ?? []).map((e) => `${e.field}: found ${e.found}, allowed ${e.allowed}`)));
+    if (!(error instanceof Problem)) throw error;
+  });
+  if (!toolings) return;
   offer(place, found, toolings, [...keys.values()]);
+}
+
+/** Where a dropped tooling differs from the library's. */
+async function compared(key, text) {
+  const answer = await send("POST", `toolings/${part(key)}/differences`, { body: text, headers: TOML }).catch((error) => {
+    throw named(error, `tooling ${key}`);
+  });
+  return answer.json();
+}
+
+/** What to do with a dropped tooling that differs from the library's: never over it, unless somebody says so. */
+function choiceOf(tooling) {
+  const choice = select(
+    [
+      ...(tooling.listed ? [["campaign", "use the dropped one for this campaign; the library keeps its own"]] : []),
+      ["library", "use the library's"],
+      ["replace", "replace the library's, for all machines; it stays as a version"],
+    ],
+    tooling.listed ? "campaign" : "library",
+  );
+  return { ...tooling, choice };
 }
 
 function offer(place, found, toolings, wanted) {
@@ -101,15 +139,8 @@ function offer(place, found, toolings, wanted) {
   const naming = field("Its name", called, { name: "name" });
   naming.hidden = which.value !== "";
   which.addEventListener("change", () => (naming.hidden = which.value !== ""));
-  const differing = toolings.filter((t) => t.there !== null && t.there !== t.text);
+  const apart = toolings.filter((t) => t.there?.differences.length).map(choiceOf);
   const missing = wanted.filter((key) => !toolings.some((t) => t.key === key));
-  const choice = select(
-    [
-      ["file", "take the dropped files, in the library, too"],
-      ["library", "use what is in the library"],
-    ],
-    "file",
-  );
   const button = h("button", { class: "primary" }, "Take it in");
   const said = h("div", { role: "status" });
   const form = h(
@@ -128,7 +159,15 @@ function offer(place, found, toolings, wanted) {
       { class: "fields" },
       field("Machine", which),
       naming,
-      differing.length ? field(`${differing.map((t) => t.key).join(", ")}: in the library, but different`, choice) : null,
+    ),
+    apart.map((t) =>
+      h(
+        "section",
+        { class: "view", "data-tooling": t.key },
+        note("doubt", `${t.key} is in the library already, and differs:`),
+        differing(t.there.differences, "In the library", "Dropped"),
+        field(`What to do with ${t.key}`, t.choice),
+      ),
     ),
     missing.length ? note("", `Not among the files, so taken from the library: ${missing.join(", ")}.`) : null,
     h("div", { class: "row-of-buttons" }, button, h("button", { type: "button", onclick: () => fill(place) }, "Leave it")),
@@ -141,17 +180,19 @@ function offer(place, found, toolings, wanted) {
       try {
         fill(said, waiting("writing toolings and campaign …"));
         const machineId = which.value || (await made(called.value.trim()));
-        for (const tooling of toolings) {
-          if (tooling.there === tooling.text || (tooling.there !== null && choice.value === "library")) continue;
-          await send("PUT", `toolings/${part(tooling.key)}`, { body: tooling.text, headers: { "Content-Type": "application/toml" } }).catch(
-            (error) => {
-              throw named(error, `tooling ${tooling.key}`);
-            },
-          );
+        const chosen = (what) => apart.filter((t) => t.choice.value === what);
+        const why = new URLSearchParams({ why: `with the campaign ${title || found.campaign.file.name}`.slice(0, 200) });
+        for (const tooling of [...toolings.filter((t) => t.there === null), ...chosen("replace")]) {
+          // over what was shown, and over nothing else
+          const seen = tooling.there ? { "If-Match": `"${tooling.there.etag}"` } : { "If-None-Match": "*" };
+          await send("PUT", `toolings/${part(tooling.key)}?${why}`, { body: tooling.text, headers: { ...TOML, ...seen } }).catch((error) => {
+            throw named(error, `tooling ${tooling.key}`);
+          });
         }
+        const own = new Map(chosen("campaign").map((t) => [t.key, t.text]));
         const answer = await send("POST", `machines/${machineId}/campaigns`, {
-          body: found.campaign.text,
-          headers: { "Content-Type": "application/toml", ...key },
+          body: withToolings(found.campaign.text, own),
+          headers: { ...TOML, ...key },
         }).catch((error) => {
           throw named(error, "campaign.toml");
         });

@@ -7,6 +7,7 @@ import { confirmed, failed } from "../forms.js";
 import { go, to } from "../router.js";
 import { allMachines } from "../state.js";
 import { plain } from "../units.js";
+import { trail } from "./changes.js";
 import { coupling, modesCards, notes } from "./modes.js";
 
 const JSON_TYPE = "application/json";
@@ -133,6 +134,7 @@ export async function view({ id }, _query, place) {
       ),
     ),
     upload(machine, fault),
+    card("Versions of the identification", null, await trail({ kind: "identification", name: id })),
   );
 }
 

@@ -3,9 +3,10 @@ import { getText, part, Problem, send, get } from "../api.js";
 import { add, card, fill, h, head, link, save, tell } from "../dom.js";
 import { drawn, picture } from "../drawing.js";
 import { busy, clearFaults, confirmed, failed, field, quantity, select, showProblem } from "../forms.js";
-import { go, to } from "../router.js";
+import { go, holdsEdits, to } from "../router.js";
 import { machine } from "../state.js";
 import { q, text } from "../units.js";
+import { trail } from "./changes.js";
 import { segmentsTable } from "./segments.js";
 
 const START = {
@@ -178,6 +179,10 @@ export async function view({ name = "" }, query, place) {
     ),
   );
   store.setAttribute("form", (form.id = "tooling-form"));
+  // what is shown, not what is stored: an empty field and no key are the same here
+  const state = () => JSON.stringify([...form.querySelectorAll("input, select")].map((each) => each.value));
+  let saved = state();
+  holdsEdits(() => state() !== saved);
 
   function written() {
     const found = {
@@ -252,8 +257,11 @@ export async function view({ name = "" }, query, place) {
       try {
         const kept = await (await send("PUT", `toolings/${part(wanted)}`, { json: written(), headers: before })).json();
         tell(`${wanted} is in the library.`);
-        if (wanted === name) there.etag = kept.etag;
-        else go(`toolings/edit/${part(wanted)}`);
+        saved = state();
+        if (wanted === name) {
+          there.etag = kept.etag;
+          await versions();
+        } else go(`toolings/edit/${part(wanted)}`);
       } catch (error) {
         if (error.status === 412) {
           const words =
@@ -266,6 +274,9 @@ export async function view({ name = "" }, query, place) {
     }),
   );
 
+  async function versions() {
+    fill(history, await trail({ kind: "tooling", name }));
+  }
   async function download() {
     try {
       save(`${name}.toml`, await getText(`toolings/${part(name)}`, "application/toml"), "application/toml");
@@ -274,13 +285,19 @@ export async function view({ name = "" }, query, place) {
     }
   }
   async function remove() {
-    if (!(await confirmed(`Delete ${name}?`, "Campaigns that used it keep what they need.", "Delete it"))) return;
+    if (!(await confirmed(`Delete ${name}?`, "Campaigns that used it keep what they need; its versions stay, too.", "Delete it"))) return;
     try {
       await send("DELETE", `toolings/${part(name)}`);
+      saved = state();
       go("toolings");
     } catch (error) {
       failed(fault, error);
     }
+  }
+  const history = h("div");
+  if (name) {
+    add(place, card("Versions", null, history));
+    await versions();
   }
   await draw();
   return () => {

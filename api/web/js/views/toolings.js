@@ -7,6 +7,7 @@ import { field, quantity, select } from "../forms.js";
 import { to } from "../router.js";
 import { machine } from "../state.js";
 import { q } from "../units.js";
+import { differingInWords } from "./changes.js";
 
 let told = [];
 
@@ -17,7 +18,7 @@ export async function view(_args, _query, place) {
   const assumed = assumptions(toolings);
   add(
     place,
-    head("Toolings", "Tool and holder, from the free end to the flange.", link(to("toolings/new"), "Draw a new one", "button primary")),
+    head("Toolings", "Tool and holder, from the free end to the flange.", link(to("toolings/new"), "Draw a new one", "button primary"), link(to("changes"), "Changes", "button quiet")),
     said,
     toolings.length
       ? h("div", { class: "shelf" }, toolings.map(cardOf))
@@ -84,10 +85,7 @@ async function take(files, said, assumed) {
       else lines.push(["doubt", `${file.name}: neither a tooling file (.toml) nor a tool library (.json)`]);
     } catch (error) {
       if (!(error instanceof Problem)) throw error;
-      lines.push([
-        "bad",
-        `${file.name}: ${error.status === 412 ? "a tooling of this name is in the library already; it stays as it is" : error.message}`,
-      ]);
+      lines.push(["bad", `${file.name}: ${error.status === 412 ? await already(file) : error.message}`]);
     }
   }
   if (lines.some(([kind]) => kind === "good")) {
@@ -95,6 +93,14 @@ async function take(files, said, assumed) {
     told = lines;
     window.dispatchEvent(new Event("refresh"));
   } else fill(said, spoken(lines));
+}
+
+/** Why a file is not taken: its name is in the library. */
+async function already(file) {
+  const options = { body: await file.text(), headers: { "Content-Type": "application/toml" } };
+  const { differences } = await (await send("POST", `toolings/${part(stem(file))}/differences`, options)).json();
+  if (!differences.length) return `${stem(file)} is in the library already, and the same`;
+  return `${stem(file)} is in the library already, and differs (${differingInWords(differences)}); it stays as it is`;
 }
 
 function spoken(lines) {

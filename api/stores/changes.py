@@ -1,0 +1,88 @@
+"""The audit trail: who wrote which tooling, machine or identification, when and why, with the text of every version."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+#: Kinds of what changes.
+TOOLING, MACHINE, IDENTIFICATION = "tooling", "machine", "identification"
+KINDS = (TOOLING, MACHINE, IDENTIFICATION)
+#: What happens to it.
+MADE, CHANGED, RESTORED, DELETED = "made", "changed", "restored", "deleted"
+ACTIONS = (MADE, CHANGED, RESTORED, DELETED)
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """What a writer leaves with a change.
+
+    Parameters
+    ----------
+    key : str
+        Id of the API key.
+    who : str
+        Its name.
+    why : str
+    restores : int
+        The version that is written again; 0 where the content is new.
+    """
+
+    key: str = ""
+    who: str = ""
+    why: str = ""
+    restores: int = 0
+
+
+#: Of a change that nobody asked for by a request.
+UNSIGNED = Note()
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """An entry of the trail.
+
+    Parameters
+    ----------
+    id : int
+        Increases over all entries.
+    kind, name : str
+        One of `KINDS`; name of the tooling, or id of the machine.
+    title : str
+        As people call it, then: a machine's name stays readable when it is gone.
+    version : int
+        Counts the changes of one thing from 1.
+    action : str
+        One of `ACTIONS`.
+    restores : int
+    created : str
+        UTC, ISO 8601.
+    text, summary, digest : str
+        Of the version, as in `Document`; empty where there is none.
+    """
+
+    id: int
+    group: str
+    kind: str
+    name: str
+    title: str
+    version: int
+    action: str
+    restores: int
+    created: str
+    key: str
+    who: str
+    why: str
+    text: str
+    summary: str
+    digest: str
+
+
+class Changes(Protocol):
+    """The trail of all groups; it is written by the changes themselves."""
+
+    def list(self, group: str, before: int | None, limit: int, kind: str | None = None, name: str | None = None) -> list[Change]:
+        """Return entries before an id without their texts, newest first."""
+
+    def get(self, group: str, kind: str, name: str, version: int) -> Change | None:
+        """Return an entry."""

@@ -1,0 +1,132 @@
+"""Nothing is taken silently: a dropped tooling that differs is shown and not written, versions come back, edits are asked for."""
+
+from __future__ import annotations
+
+import json
+import re
+from contextlib import closing
+from pathlib import Path
+
+from playwright.sync_api import Page, expect
+
+from api.client import Client
+from api.stores.sql import open_store
+from tests.fixtures import by_hand
+from tests.fixtures.service import Served
+from tests.web.conftest import drop
+
+_CAMPAIGN = """[campaign]
+name = "Dropped"
+sampling_rate_hz = 51200.0
+[sensors.flange_x]
+quantity = "displacement"
+axis = "X"
+sensitivity = 1.0
+[workpiece]
+name = "EN AW-6082"
+tangential_coefficient_mpa = 902.0
+radial_ratio = 0.26
+[toolings]
+NAME = "toolings/NAME.toml"
+[[cuts]]
+id = "1"
+tooling = "NAME"
+spindle_speed_rpm = 8000.0
+axial_depth_mm = 0.4
+feed_per_tooth_mm = 0.1
+entry_angle_deg = 90.0
+exit_angle_deg = 180.0
+feed_direction = "+X"
+cut = "recordings/1.h5"
+"""
+THREE = by_hand.TOOLING.replace("teeth = 4", "teeth = 3")
+
+
+def dropped(page: Page, folder: Path, name: str) -> None:
+    """Let a campaign go over the page whose tooling has 3 teeth."""
+    (folder / "campaign.toml").write_text(_CAMPAIGN.replace("NAME", name))
+    (folder / f"{name}.toml").write_text(THREE)
+    drop(page, "section.drop", [folder / "campaign.toml", folder / f"{name}.toml"])
+    expect(page.locator(f'[data-tooling="{name}"]')).to_be_visible()
+
+
+def _kept(served: Served, campaign: str) -> str:
+    """What the store has of a campaign."""
+    with closing(open_store(f"sqlite:///{served.data / 'service.db'}")) as store:
+        found = store.campaigns.get("local", campaign)
+    assert found is not None
+    return found.text
+
+
+def test_a_dropped_campaign_leaves_the_library_as_it_is(opened, client: Client, served: Served, shop: str, tmp_path):
+    """Unless somebody says so, over what was shown; then it comes back by two clicks."""
+    name = "S9-drop"
+    before = client.write_tooling(name, by_hand.TOOLING)
+    page = opened()
+    dropped(page, tmp_path, name)
+    row = page.locator(f'[data-tooling="{name}"] tbody tr')
+    expect(row).to_have_count(1)
+    assert row.locator("th, td").all_inner_texts() == ["cutter teeth", "4", "3"]
+    page.get_by_role("button", name="Take it in", exact=True).click()
+    expect(page.locator("h1")).to_have_text("Dropped")
+    assert client.tooling(name).etag == before.etag
+    # the campaign has what was dropped with it
+    campaign = page.url.rsplit("/", 1)[1]
+    assert json.loads(_kept(served, campaign))["toolings"] == {name: f"{THREE}\n"}
+    assert [c.action for c in client.changes(kind="tooling", name=name)] == ["made"]
+
+    page.goto(f"{served.url}/#/")
+    dropped(page, tmp_path, name)
+    page.get_by_label(f"What to do with {name}").select_option("replace")
+    page.get_by_role("button", name="Take it in", exact=True).click()
+    expect(page.locator("h1")).to_have_text("Dropped")
+    assert client.tooling(name).tooling.cutter.teeth == 3
+    newest = next(client.changes(kind="tooling", name=name))
+    assert (newest.action, newest.who, newest.why) == ("changed", "local", "with the campaign Dropped")
+
+    page.goto(f"{served.url}/#/changes")
+    expect(page.locator("tbody tr", has_text=f"changed the tooling {name}: “with the campaign Dropped”")).to_be_visible()
+    page.get_by_role("button", name=f"Restore version 1 of {name}").click()
+    dialog = page.locator("dialog")
+    expect(dialog.locator("tbody tr")).to_have_count(1)
+    assert dialog.locator("tbody tr").locator("th, td").all_inner_texts() == ["cutter teeth", "3", "4"]
+    dialog.get_by_role("button", name="Restore it").click()
+    expect(page.locator("tbody tr", has_text=f"restored the tooling {name} from its version 1")).to_be_visible()
+    assert client.tooling(name).etag == before.etag
+
+
+def test_edits_that_are_not_saved_are_asked_for(opened, client: Client, served: Served):
+    client.write_tooling("S9-edits", by_hand.TOOLING)
+    page = opened("#/toolings/edit/S9-edits")
+    teeth = page.get_by_label("Teeth", exact=True)
+    toolings = page.get_by_role("link", name="Toolings", exact=True)
+    # nothing entered, nothing asked
+    toolings.click()
+    expect(page.locator("h1")).to_have_text("Toolings")
+    page.go_back()
+    teeth.fill("3")
+    toolings.click()
+    page.get_by_role("button", name="Stay here").click()
+    expect(page.locator("h1")).to_have_text("S9-edits")
+    assert page.url.endswith("#/toolings/edit/S9-edits")
+    expect(teeth).to_have_value("3")
+    page.get_by_role("button", name="Save", exact=True).click()
+    expect(page.locator("tbody tr", has_text="changed the tooling S9-edits")).to_be_visible()
+    # saved: no question any more
+    toolings.click()
+    expect(page.locator("h1")).to_have_text("Toolings")
+    page.go_back()
+    teeth.fill("5")
+    toolings.click()
+    page.get_by_role("button", name="Leave", exact=True).click()
+    expect(page.locator("h1")).to_have_text("Toolings")
+    assert client.tooling("S9-edits").tooling.cutter.teeth == 3
+
+
+def test_a_tooling_file_of_a_name_that_is_taken_tells_how_it_differs(opened, client: Client, tmp_path):
+    before = client.write_tooling("S9-taken", by_hand.TOOLING)
+    page = opened("#/toolings")
+    (tmp_path / "S9-taken.toml").write_text(THREE)
+    drop(page, "section.drop", [tmp_path / "S9-taken.toml"])
+    expect(page.locator(".note.bad")).to_have_text(re.compile("differs .cutter teeth 4 in the library, 3 in the file.; it stays as it is"))
+    assert client.tooling("S9-taken").etag == before.etag
