@@ -188,12 +188,15 @@ class LobeQuery(Milled):
         }
     )
 
+    recommend: bool = Field(
+        True, description="false: zero-order limits alone, as a preview, at once; true: recommended cuts, computed by a method that fits."
+    )
     tested: list[TestedCut] = Field(default=[], max_length=MOST_TESTED, description="Cuts that were tried: how many are told right?")
 
     def request(self, work_seconds: float) -> LobeRequest:
         """Return the query in SI, for one of its toolings."""
         tested = tuple((from_rpm(each.spindle_speed_rpm), each.axial_depth_mm * 1e-3, each.verdict) for each in self.tested)
-        return replace(super().request(work_seconds), tested=tested)
+        return replace(super().request(work_seconds), tested=tested, recommend=self.recommend)
 
 
 class BestSpeed(Answer):
@@ -201,7 +204,7 @@ class BestSpeed(Answer):
 
     spindle_speed_rpm: float
     limit_depth_mm: float | None = Field(description="Stability limit; null: stable up to the depth that was asked for.")
-    recommended_depth_mm: float = Field(description="The limit less what a recommendation holds back.")
+    recommended_depth_mm: float | None = Field(description="The limit less what a recommendation holds back; null in a preview.")
 
 
 class RecommendedCut(Answer):
@@ -241,6 +244,7 @@ class ToolingLobes(Answer):
     absolute_frequency_hz: float | None
     best_speeds: list[BestSpeed]
     recommended: list[RecommendedCut]
+    recommended_by: str | None = Field(description="The method that computed best speeds and recommended cuts; null in a preview.")
     flip_speeds: int = Field(description="Speeds at which stability is lost by period doubling.")
     tested: TestedTally | None = Field(None, description="null: no tested cuts were given.")
     warnings: list[str]
@@ -345,6 +349,7 @@ class ToolingAdvice(Answer):
     stickout_mm: float
     lowest_limit_mm: float
     common_stable_depth_mm: float | None = Field(description="Stable at every speed on all machines that the records allow.")
+    recommended_by: str | None = Field(description="The method that computed the recommended cuts.")
     highest_removal: list[OperatingPoint]
     windows: list[Window]
     planned: list[PlannedAnswer]

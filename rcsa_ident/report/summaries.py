@@ -215,10 +215,11 @@ def lobes_summary(advice: Advice) -> dict[str, Any]:
             {
                 "spindle_speed_rpm": to_rpm(pocket.spindle_speed, 6),
                 "limit_depth_mm": finite(pocket.limit_depth, 1e3),
-                "recommended_depth_mm": 1e3 * pocket.recommended_depth,
+                "recommended_depth_mm": finite(pocket.recommended_depth, 1e3),
             }
-            for pocket in lobes.best_speeds(recommended=advice.usable.stable)
+            for pocket in advice.pockets
         ],
+        "recommended_by": advice.recommended_by,
         "recommended": [_recommended(point, lobes) for point in advice.recommended],
         "flip_speeds": int(lobes.flip.sum()),
         "tested": None if advice.tested is None else tally_summary(advice.tested),
@@ -253,6 +254,7 @@ def advice_summary(advice: Advice) -> dict[str, Any]:
         "stickout_mm": None if advice.stickout is None else advice.stickout * 1e3,
         "lowest_limit_mm": float(advice.lobes.nominal.min()) * 1e3,
         "common_stable_depth_mm": None if common is None else float(common.min()) * 1e3,
+        "recommended_by": advice.recommended_by,
         "highest_removal": [_point(point, advice.lobes) for point in advice.recommended],
         "windows": [
             {

@@ -29,13 +29,13 @@ class Pocket(Shown):
     spindle_speed : float [rad/s]
     limit_depth : float [m]
         The stability limit there; infinite where the cut is stable up to the depth that was asked for.
-    recommended_depth : float [m]
-        The limit there less what a recommendation holds back.
+    recommended_depth : float or None [m]
+        The limit there less what a recommendation holds back; None where nothing is recommended.
     """
 
     spindle_speed: float
     limit_depth: float
-    recommended_depth: float
+    recommended_depth: float | None
 
     def __str__(self) -> str:
         limit = (
@@ -43,7 +43,8 @@ class Pocket(Shown):
             if self.limit_depth == np.inf
             else f"stability limit {1e3 * self.limit_depth:.2f} mm"
         )
-        return f"{to_rpm(self.spindle_speed):.0f} rev/min: {limit}, recommended {1e3 * self.recommended_depth:.2f} mm"
+        recommended = "" if self.recommended_depth is None else f", recommended {1e3 * self.recommended_depth:.2f} mm"
+        return f"{to_rpm(self.spindle_speed):.0f} rev/min: {limit}{recommended}"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -260,7 +260,7 @@ function comparison(found, summaries, question) {
     limit("stability limit", (r) => r.best),
     column("Removes", "removal", (r) => r.best?.removal_rate_cm3_per_min),
   ];
-  const box = card("Side by side", null, table("Toolings side by side", columns, rows), reserve(found.lobes, question));
+  const box = card("Side by side", null, table("Toolings side by side", columns, rows), reserve(found, question));
   box.classList.add("wide");
   return box;
 }
