@@ -1,7 +1,7 @@
 """``python -m benchmarks [--json] [claim ...]``: run the claims and print {claim, ours, peer, ratio, unit, accuracy}.
 
-``study --help``, ``search_trace --help``, ``lobes_truth --help`` and ``tested_cuts --help`` tell of the studies, which have options of
-their own.
+``study --help``, ``search_trace --help``, ``lobes_truth --help``, ``recommendation --help`` and ``tested_cuts --help`` tell of the
+studies, which have options of their own.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 #: Each is a module with ``run() -> list of rows``.
 CLAIMS = ("candidate", "lobes", "stability", "observer", "real_files", "service", "uploads", "published_modes", "bad_input")
 #: Each is a module with ``main(arguments)``.
-STUDIES = ("study", "search_trace", "lobes_truth", "tested_cuts", "first_page", "streaming", "live_chart", "durability")
+STUDIES = ("study", "search_trace", "lobes_truth", "tested_cuts", "first_page", "streaming", "live_chart", "durability", "recommendation")
 
 
 def main() -> None:

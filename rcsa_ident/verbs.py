@@ -200,6 +200,7 @@ def advise(
     max_depth : float [m]
         Limits beyond it are not of interest.
     method : StabilityMethod, default ZeroOrder()
+        Of the lobes; where they are zero-order ones, recommended cuts are computed anew by full discretisation.
     drive : SpindleDrive, optional
         Power, torque and highest speed of the spindle.
     depth : float [m], optional

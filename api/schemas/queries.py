@@ -188,12 +188,15 @@ class LobeQuery(Milled):
         }
     )
 
+    recommend: bool = Field(
+        True, description="false: zero-order limits alone, as a preview, at once; true: recommended cuts, computed by a method that fits."
+    )
     tested: list[TestedCut] = Field(default=[], max_length=MOST_TESTED, description="Cuts that were tried: how many are told right?")
 
     def request(self, work_seconds: float) -> LobeRequest:
         """Return the query in SI, for one of its toolings."""
         tested = tuple((from_rpm(each.spindle_speed_rpm), each.axial_depth_mm * 1e-3, each.verdict) for each in self.tested)
-        return replace(super().request(work_seconds), tested=tested)
+        return replace(super().request(work_seconds), tested=tested, recommend=self.recommend)
 
 
 class BestSpeed(Answer):
@@ -244,6 +247,7 @@ class ToolingLobes(Answer):
     best_speeds: list[BestSpeed]
     recommended: list[RecommendedCut]
     withheld: str | None = Field(None, description="Why these limits are no source of a recommended depth; null where they are.")
+    recommended_by: str | None = Field(description="The method that computed best speeds and recommended cuts; null in a preview.")
     flip_speeds: int = Field(description="Speeds at which stability is lost by period doubling.")
     tested: TestedTally | None = Field(None, description="null: no tested cuts were given.")
     warnings: list[str]
@@ -349,6 +353,7 @@ class ToolingAdvice(Answer):
     lowest_limit_mm: float | None
     common_stable_depth_mm: float | None = Field(description="Stable at every speed on all machines that the records allow.")
     withheld: str | None = Field(None, description="Why these limits are no source of a recommended depth; null where they are.")
+    recommended_by: str | None = Field(description="The method that computed the recommended cuts.")
     highest_removal: list[OperatingPoint]
     windows: list[Window]
     planned: list[PlannedAnswer]

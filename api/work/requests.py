@@ -96,6 +96,8 @@ class LobeRequest:
         Longer work is refused.
     tested : tuple of (speed [rad/s], depth [m], "stable", "chatter" or "marginal")
         Cuts that were tried.
+    recommend : bool
+        Whether cuts are recommended, too: zero-order limits alone are there at once.
     """
 
     cut: CutSpec
@@ -105,13 +107,15 @@ class LobeRequest:
     bands: bool
     stiffness_spread: float
     work_seconds: float
+    recommend: bool = True
     tested: tuple[tuple[float, float, str], ...] = ()
 
     def change(self, machine: TipSource, tooling: Tooling) -> ToolChange:
         """Return the question for a machine and a tooling."""
         draws = DRAWS if self.bands else 0
         method = method_named(self.method)
-        return ToolChange(machine, tooling, self.cut, np.array(self.speeds), self.max_depth, method, draws, self.stiffness_spread)
+        speeds, spread = np.array(self.speeds), self.stiffness_spread
+        return ToolChange(machine, tooling, self.cut, speeds, self.max_depth, method, draws, spread, self.recommend)
 
     @property
     def tested_cuts(self) -> TestedCuts | None:

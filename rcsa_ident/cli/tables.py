@@ -121,14 +121,13 @@ def show_lobes(advice: Advice) -> None:
         frequency = to_hz(lobes.absolute_frequency)
         out.print(f"stable at any speed up to {1e3 * lobes.absolute_limit:.3f} mm (chatter would start at {frequency:.0f} Hz)")
     heads = ("spindle speed\nrev/min", "recommended\ndepth mm", "stability\nlimit mm")
-    table = _table(*heads, title="recommended cuts of the range")
+    by = "" if advice.recommended_by in (None, lobes.method) else f", by {advice.recommended_by}"
+    table = _table(*heads, title=f"recommended cuts of the range{by}")
     for point in advice.recommended:
         table.add_row(f"{to_rpm(point.spindle_speed):.0f}", recommended_text(point), limit_text(point.limit, lobes.max_depth))
     show(table)
     _tell_unlimited(advice)
-    peaks = ", ".join(
-        f"{limit_text(p.limit_depth, lobes.max_depth)} mm at {to_rpm(p.spindle_speed):.0f} rev/min" for p in lobes.best_speeds()
-    )
+    peaks = ", ".join(f"{limit_text(p.limit_depth, lobes.max_depth)} mm at {to_rpm(p.spindle_speed):.0f} rev/min" for p in advice.pockets)
     out.print(f"highest stability limits: {peaks}")
 
 

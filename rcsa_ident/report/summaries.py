@@ -217,8 +217,9 @@ def lobes_summary(advice: Advice) -> dict[str, Any]:
                 "limit_depth_mm": finite(pocket.limit_depth, 1e3),
                 "recommended_depth_mm": finite(pocket.recommended_depth, 1e3),
             }
-            for pocket in lobes.best_speeds(recommended=advice.usable.stable)
+            for pocket in advice.pockets
         ],
+        "recommended_by": advice.recommended_by,
         "recommended": [_recommended(point, lobes) for point in advice.recommended],
         "withheld": lobes.withheld or None,
         "flip_speeds": int(lobes.flip.sum()),
@@ -255,6 +256,7 @@ def advice_summary(advice: Advice) -> dict[str, Any]:
         "lowest_limit_mm": finite(float(advice.lobes.limit_depth.min()), 1e3),
         "common_stable_depth_mm": None if common is None else finite(float(common.min()), 1e3),
         "withheld": advice.lobes.withheld or None,
+        "recommended_by": advice.recommended_by,
         "highest_removal": [_point(point, advice.lobes) for point in advice.recommended],
         "windows": [
             {

@@ -13,7 +13,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.shown import Drawn, Shown
 from rcsa_ident.stability.pockets import peaks
-from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, StabilityLobes
+from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Pocket, StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally
 from rcsa_ident.units import to_cm3_per_min, to_rpm
 
@@ -378,7 +378,7 @@ class Advice(Drawn):
     usable : UsableDepths
         What is recommended at each of them, within power and torque.
     recommended : tuple of OperatingPoint
-        The cuts that remove most, one for each pocket, the best first.
+        The cuts that remove most, one for each pocket, the best first; none where they were not asked for.
     windows : tuple of SpeedWindow
         Speeds at which a depth is recommended, where one was asked for.
     planned : tuple of PlannedCut
@@ -386,6 +386,10 @@ class Advice(Drawn):
         How many of the cuts that were tried the limits tell right.
     remarks : tuple of str
         What the user should know.
+    pockets : tuple of Pocket
+        The speeds with the highest limits, the highest first.
+    recommended_by : str or None
+        The method that computed recommended cuts and pockets; None where nothing was to be recommended.
     """
 
     tooling: str
@@ -397,6 +401,8 @@ class Advice(Drawn):
     planned: tuple[PlannedCut, ...]
     tested: Tally | None
     remarks: tuple[str, ...]
+    pockets: tuple[Pocket, ...] = ()
+    recommended_by: str | None = None
 
     @property
     def common(self) -> FloatArray | None:

@@ -20,7 +20,7 @@ _ZERO_ORDER = ZeroOrder()
 #: Machines drawn from what the records leave open.
 DRAWS = 60
 #: How much deeper than asked for the zero-order method looks, for proportions.
-_DEEPER = 5.0
+DEEPER = 5.0
 
 
 def stability_lobes(
@@ -95,10 +95,10 @@ def _limits(
         return found
     if isinstance(method, ZeroOrder):
         return replace(found, drawn=drawn_limits(tip, process, speeds, max_depth, draws, seed))
-    drawn = drawn_limits(tip, process, speeds, _DEEPER * max_depth, draws, seed)
-    nominal = _ZERO_ORDER.lobes(both, process, speeds, _DEEPER * max_depth).limit_depth
+    drawn = drawn_limits(tip, process, speeds, DEEPER * max_depth, draws, seed)
+    nominal = _ZERO_ORDER.lobes(both, process, speeds, DEEPER * max_depth).limit_depth
     told = "the uncertainty band is scaled from the zero-order method's"
-    return replace(found, drawn=_in_proportion(drawn, nominal, found.limit_depth), warnings=(*found.warnings, told))
+    return replace(found, drawn=in_proportion(drawn, nominal, found.limit_depth), warnings=(*found.warnings, told))
 
 
 def drawn_limits(
@@ -136,8 +136,8 @@ def _embedded(values: np.ndarray, tip: Receptance) -> np.ndarray:
     return embedded
 
 
-def _in_proportion(drawn: FloatArray, nominal: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Limits that are to `wanted` as the drawn ones are to `nominal`; where one of these is infinite no proportion is known."""
+def in_proportion(drawn: FloatArray, nominal: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return limits that are to `wanted` as the drawn ones are to `nominal`; where one of these is infinite no proportion is known."""
     ratio = np.divide(wanted, nominal, out=np.ones(nominal.shape), where=np.isfinite(wanted) & np.isfinite(nominal))
     return np.where(np.isinf(nominal) & np.isfinite(wanted), wanted, drawn * ratio)
 

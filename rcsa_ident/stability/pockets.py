@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from rcsa_ident.errors import InputError
 POCKET = 0.85
 #: A speed beyond those that were asked for may lie this much below what a tolerance needs, as a share.
 COARSE = 0.9
+#: How far beside a pocket's top a better speed is looked for, and in steps of which share of the speed.
+AROUND, FINE = 0.02, 0.005
 
 
 def peaks(speed: FloatArray, level: FloatArray, count: int = 3) -> list[tuple[float, float]]:
@@ -45,6 +48,47 @@ def peaks(speed: FloatArray, level: FloatArray, count: int = 3) -> list[tuple[fl
         if all(np.min(level[min(k, c) : max(k, c) + 1]) < POCKET * level[k] for c in chosen):
             chosen.append(k)
     return [(float(0.5 * (speed[edges[k]] + speed[ends[k]])), float(level[k])) for k in chosen[:count]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Neighbourhood:
+    """Close speeds around a pocket's top.
+
+    Parameters
+    ----------
+    tops : (float, float)
+        Between which the top may move.
+    speeds : array, shape (n,)
+        Rising, as far beyond as a tolerance needs.
+    """
+
+    tops: tuple[float, float]
+    speeds: FloatArray
+
+
+def speeds_around(tops: Sequence[float], tolerance: float, between: tuple[float, float]) -> list[Neighbourhood]:
+    """Return the neighbourhood of each of some pockets' tops: `AROUND` on both sides of it.
+
+    Parameters
+    ----------
+    tops : sequence of float
+        One nearer to an earlier one than `AROUND` belongs to that.
+    tolerance : float
+        As in `least_within_tolerance`.
+    between : (float, float)
+        Tops do not move beyond.
+    """
+    step = max(FINE, tolerance / 8.0)
+    found: list[Neighbourhood] = []
+    kept: list[float] = []
+    for top in tops:
+        if any(abs(top / other - 1.0) <= AROUND for other in kept):
+            continue
+        kept.append(top)
+        low, high = max(between[0], top * (1.0 - AROUND)), min(between[1], top * (1.0 + AROUND))
+        inner = np.linspace(low, high, 1 + int(np.ceil((high - low) / (step * top))))
+        found.append(Neighbourhood((low, high), pad_speeds(np.append(inner, top), tolerance)))
+    return found
 
 
 def least_within_tolerance(speed: FloatArray, limit: FloatArray, tolerance: float) -> FloatArray:

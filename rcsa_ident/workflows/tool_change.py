@@ -5,8 +5,9 @@ Command line, service, page, report and a script ask here, so that all of them s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,19 +18,20 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
+from rcsa_ident.errors import InputError
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine, TipSource
 from rcsa_ident.machine.speed_dependence import tips_over_speed
 from rcsa_ident.machining_setup import CutSpec, Tooling
-from rcsa_ident.stability.advice import Advice, highest_removal, planned_cut, speed_windows, usable_depths
+from rcsa_ident.stability.advice import Advice, OperatingPoint, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
-from rcsa_ident.stability.lobes import DRAWS, both_directions, stability_lobes
+from rcsa_ident.stability.lobes import DEEPER, DRAWS, both_directions, in_proportion, stability_lobes
 from rcsa_ident.stability.methods import MethodName, StabilityMethod
-from rcsa_ident.stability.pockets import pad_speeds
-from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, StabilityLobes
+from rcsa_ident.stability.pockets import AROUND, pad_speeds, speeds_around
+from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Pocket, StabilityLobes
 from rcsa_ident.stability.stability_map import MonodromyMethod, StabilityMap, stability_map
 from rcsa_ident.stability.surface_error import SurfaceError, surface_location_error
 from rcsa_ident.stability.tested_cuts import Tally, TestedCuts, tally
-from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes
+from rcsa_ident.stability.tip_modes import TIP, TipModes, fitted_modes, known_modes
 from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.proportions import edge_length
@@ -47,7 +49,10 @@ _PITCH_FACTOR, _CHANGING_SECONDS = 30.0, 4.0
 #: Where teeth differ, methods that follow a period follow a revolution: so many teeth cost once more. A simulation asks every tooth
 #: in every step, which counts from so many on.
 _TEETH_OF_PERIOD, _TEETH_OF_STEP = 2.0, 40.0
+#: What recommendations are computed by where the lobes are a preview, and at about how many speeds.
+_FITTING, _FITTED_SPEEDS = FullDiscretisation(), 50
 _UNLIMITED = SpindleDrive.flat(None, None, None)
+Place = TypeVar("Place", OperatingPoint, Pocket)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,6 +127,8 @@ class ToolChange:
         Machines drawn from what the records leave open; 0 leaves it aside.
     stiffness_spread : float
         Standard deviation of the tool-holder's stiffness, as a share.
+    recommend : bool
+        Whether cuts are recommended, too: zero-order limits alone are a preview, there at once.
     """
 
     machine: TipSource
@@ -132,6 +139,7 @@ class ToolChange:
     method: StabilityMethod = ZeroOrder()  # noqa: RUF009 - frozen
     draws: int = DRAWS
     stiffness_spread: float = STIFFNESS_SPREAD
+    recommend: bool = True
 
     @property
     def process(self) -> MillingProcess:
@@ -153,6 +161,8 @@ class ToolChange:
         if not (zero_order and self.machine.prepared):
             found += _CHANGING_SECONDS if self.machine.speed_range is not None else 0.0
             found += spread_seconds(self.machine, self.omega) if self.draws else 0.0
+        if zero_order and self.recommend:
+            found += _FITTED_SPEEDS * _FITTING.seconds_per_speed * float(np.mean(4000.0 / to_rpm(self.speeds)))
         return found
 
     @property
@@ -174,6 +184,18 @@ class ToolChange:
             order.append(places)
             parts.append(stability_lobes(tip, process, speeds[places], depth, self.method, draws))
         return StabilityLobes.joined(parts, order)
+
+    def fitting_limits(self, speeds: FloatArray) -> StabilityLobes:
+        """Return the limits at rising speeds by the method that fits any cut; drawn machines are in their zero-order proportion."""
+        parts, order = [], []
+        for places, tip in tips_over_speed(self.machine, self.tooling, self.machine.lines(BEYOND), speeds, spread=False):
+            order.append(places)
+            parts.append(_FITTING.lobes(_modes_of(tip), self.process, speeds[places], self.max_depth))
+        found = StabilityLobes.joined(parts, order)
+        preview = self.limits(speeds, DEEPER * self.max_depth)
+        if preview.drawn is None:
+            return found
+        return replace(found, drawn=in_proportion(preview.drawn, preview.limit_depth, found.limit_depth))
 
     def remarks(self, lobes: StabilityLobes) -> tuple[str, ...]:
         """Return what speaks against limits."""
@@ -229,19 +251,89 @@ def advise(
         change = replace(change, max_depth=max(change.max_depth, 2.0 * depth / (1.0 - reserve)))
     wide = _limits_beside(change, pad_speeds(change.speeds, tolerance, [speed for speed, _ in planned]))
     low, high = float(np.min(change.speeds)), float(np.max(change.speeds))
-    usable = usable_depths(wide, process, drive, tolerance, probability, reserve).between(low, high)
+
+    def usable_of(limits: StabilityLobes) -> UsableDepths:
+        return usable_depths(limits, process, drive, tolerance, probability, reserve)
+
+    usable = usable_of(wide).between(low, high)
     lobes = wide.between(low, high)
+    found = _recommended(change, lobes, usable, usable_of, tolerance)
     return Advice(
         change.tooling.name,
         change.tooling.assembly.stickout,
         lobes,
         usable,
-        tuple(highest_removal(usable, process)),
+        found.points,
         () if depth is None else tuple(speed_windows(usable, depth)),
         tuple(planned_cut(wide, process, drive, speed, at, tolerance, probability) for speed, at in planned),
         None if tested is None else classify_tested_cuts(change, tested),
-        change.remarks(lobes),
+        tuple(dict.fromkeys([*change.remarks(lobes), *found.remarks])),
+        found.pockets,
+        found.by,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Recommended:
+    """Recommended cuts, pockets, the method behind them, and what speaks against them."""
+
+    points: tuple[OperatingPoint, ...]
+    pockets: tuple[Pocket, ...]
+    by: str | None
+    remarks: tuple[str, ...] = ()
+
+
+def _recommended(
+    change: ToolChange, lobes: StabilityLobes, usable: UsableDepths, usable_of: Callable[[StabilityLobes], UsableDepths], tolerance: float
+) -> _Recommended:
+    """Return the cuts that are recommended.
+
+    Zero-order limits only say where to look: half a percent beside a pocket's top another vibration may be the limit, of which they know
+    nothing. Around the best of their pockets the limits are computed anew, so close that the tolerance of the speed is seen.
+    """
+    process, preview = change.process, isinstance(change.method, ZeroOrder)
+    points, pockets = highest_removal(usable, process), lobes.best_speeds(recommended=usable.stable)
+    if not preview:
+        return _Recommended(tuple(points), tuple(pockets), change.method.name)
+    if not change.recommend:
+        return _Recommended((), tuple(replace(pocket, recommended_depth=np.nan) for pocket in pockets), None)
+    between = float(usable.spindle_speed[0]), float(usable.spindle_speed[-1])
+    tops = [point.spindle_speed for point in points] + [pocket.spindle_speed for pocket in pockets]
+    blocks = speeds_around(tops, tolerance, between)
+    if not blocks:
+        return _Recommended((), (), _FITTING.name)
+    try:
+        limits = change.fitting_limits(np.unique(np.concatenate([block.speeds for block in blocks])))
+    except InputError as error:
+        return _Recommended((), (), None, (f"no cut is recommended: {error}",))
+    points.clear()
+    pockets.clear()
+    for block in blocks:
+        own = limits.between(float(block.speeds[0]), float(block.speeds[-1]))
+        depths = usable_of(own).between(*block.tops)
+        points += highest_removal(depths, process, 1)
+        pockets += own.between(*block.tops).best_speeds(1, depths.stable)
+    points.sort(key=lambda point: -(point.depth * point.spindle_speed))
+    pockets.sort(key=lambda pocket: -pocket.limit_depth)
+    return _Recommended(tuple(_apart(points)), tuple(_apart(pockets)), _FITTING.name, limits.warnings)
+
+
+def _apart(found: Sequence[Place], count: int = 3) -> list[Place]:
+    """The first of those that stand close to each other."""
+    kept: list[Place] = []
+    for each in found:
+        if all(abs(each.spindle_speed / other.spindle_speed - 1.0) > AROUND for other in kept):
+            kept.append(each)
+    return kept[:count]
+
+
+def _modes_of(tip: Receptance | TipModes) -> TipModes:
+    """A tip's modes, fitted where they are not known."""
+    if isinstance(tip, TipModes):
+        return tip
+    both = both_directions(tip)
+    known = known_modes(both)
+    return (fitted_modes(both) if known is None else known)[0]
 
 
 def _limits_beside(change: ToolChange, speeds: FloatArray) -> StabilityLobes:
@@ -278,8 +370,7 @@ def map_of(change: ToolChange, depths: int = 100, full: bool = False) -> Stabili
     speeds, depth = np.unique(change.speeds), change.max_depth * np.arange(1, depths + 1) / depths
     parts = []
     for places, tip in tips_over_speed(change.machine, change.tooling, change.machine.lines(BEYOND), speeds, spread=False):
-        modes = tip if isinstance(tip, TipModes) else fitted_modes(both_directions(tip))[0]
-        parts.append(stability_map(modes, change.process, speeds[places], depth, method, full))
+        parts.append(stability_map(_modes_of(tip), change.process, speeds[places], depth, method, full))
     return StabilityMap.joined(parts)
 
 

@@ -73,6 +73,17 @@ def test_stable_speeds_are_null(shop):
     assert found.best_speeds[0].limit_depth_mm is None
 
 
+def test_a_preview_is_there_without_recommended_cuts(shop):
+    client, id = shop
+    (preview,) = client.lobes(id, "T1", speeds=SPEEDS, recommend=False).toolings
+    (found,) = client.lobes(id, "T1", speeds=SPEEDS).toolings
+    assert (preview.recommended, preview.recommended_by) == ([], None)
+    assert preview.best_speeds[0].recommended_depth_mm is None
+    assert preview.limit_depth_mm == found.limit_depth_mm
+    assert found.recommended_by == "full-discretisation"
+    assert 0.0 < found.recommended[0].recommended_depth_mm < found.recommended[0].limit_depth_mm
+
+
 def test_the_cut_counts(shop):
     """Twice the coefficient, half the depth; a material of the library in the workpiece's place; a feed of two axes alike."""
     client, id = shop

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcsa_ident.errors import InputError
-from rcsa_ident.stability.pockets import least_within_tolerance, pad_speeds, peaks
+from rcsa_ident.stability.pockets import AROUND, least_within_tolerance, pad_speeds, peaks, speeds_around
 
 SPEED = 100.0 * np.arange(1, 10)
 
@@ -84,3 +84,21 @@ def test_a_coarse_step_does_not_lead_far_beyond_the_speeds(first):
 def test_a_speed_that_differs_in_its_last_digit_is_the_same():
     found = pad_speeds(np.array([500.0, 600.0]), 0.0, also=[600.0 * (1.0 - 1e-15), 550.0])
     np.testing.assert_allclose(found, [500.0, 550.0, 600.0])
+
+
+def test_speeds_around_pockets_see_the_tolerance_at_every_top():
+    found = speeds_around([1000.0, 1010.0, 1990.0], 0.01, (500.0, 2000.0))
+    # the second belongs to the first
+    assert [each.tops for each in found] == [(980.0, 1020.0), (pytest.approx(1990.0 * (1.0 - AROUND)), 2000.0)]
+    for each, top in zip(found, (1000.0, 1990.0), strict=True):
+        assert top in each.speeds
+        assert np.all(np.diff(each.speeds) > 0.0)
+        assert np.max(np.diff(each.speeds)) < 0.0051 * top
+        assert each.speeds[0] <= 0.99 * each.tops[0] * (1.0 + 1e-12)
+        assert each.speeds[-1] >= 1.01 * each.tops[1] * (1.0 - 1e-12)
+
+
+def test_a_single_speed_is_its_own_neighbourhood():
+    (found,) = speeds_around([1000.0], 0.0, (1000.0, 1000.0))
+    assert found.tops == (1000.0, 1000.0)
+    np.testing.assert_array_equal(found.speeds, [1000.0])

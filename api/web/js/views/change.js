@@ -193,11 +193,12 @@ export async function view(_args, query, place) {
         material: material.value,
         tested: tested.cuts,
       });
-      const found = await answers(body, signal, answer, late);
-      clearTimeout(late);
-      if (signal.aborted) return;
+      for await (const found of answers(body, signal, answer, late)) {
+        clearTimeout(late);
+        if (signal.aborted) return;
+        results(answer, found, { toolings, body, tested, ontested });
+      }
       answer.removeAttribute("aria-busy");
-      results(answer, found, { toolings, body, tested, ontested });
     } catch (error) {
       clearTimeout(late);
       if (error.name === "AbortError" || signal.aborted) return;
@@ -230,23 +231,24 @@ export async function view(_args, query, place) {
   };
 }
 
-/** Lobes, advice and tooltip FRFs of a query; the slower methods come from a job that tells how far it is. */
-async function answers(body, signal, place, late) {
+/** Lobes, advice and tooltip FRFs of a query: a preview at once, then the recommended cuts; slower methods come from a job that tells how far it is. */
+async function* answers(body, signal, place, late) {
   const { lobes: question, tips, advice } = body;
   const quick = question.method === QUICK;
-  const lobes = quick
-    ? post("lobes", question, { signal })
-    : followLobes(question, signal, (words, share) => {
-        clearTimeout(late);
-        fill(place, waiting(words), share === null ? null : h("progress", { max: 1, value: share, "aria-label": "progress" }));
-      });
-  // an answer that fails is told once, by the first of them
-  const [found, advised, ...responses] = await Promise.all([
-    lobes,
-    advice ? post("advice", advice, { signal }) : null,
-    ...tips.map((tip) => post("tooltip", tip, { signal })),
-  ]);
-  return { lobes: found.toolings, advice: advised?.toolings ?? null, tips: responses };
+  const responses = Promise.all(tips.map((tip) => post("tooltip", tip, { signal })));
+  if (!quick) {
+    const told = (words, share) => {
+      clearTimeout(late);
+      fill(place, waiting(words), share === null ? null : h("progress", { max: 1, value: share, "aria-label": "progress" }));
+    };
+    // an answer that fails is told once, by the first of them
+    const [found, shown] = await Promise.all([followLobes(question, signal, told), responses]);
+    return void (yield { lobes: found.toolings, advice: null, tips: shown });
+  }
+  const [preview, shown] = await Promise.all([post("lobes", { ...question, recommend: false }, { signal }), responses]);
+  yield { lobes: preview.toolings, advice: null, tips: shown };
+  if (advice) yield { lobes: preview.toolings, advice: (await post("advice", advice, { signal })).toolings, tips: shown };
+  else yield { lobes: (await post("lobes", question, { signal })).toolings, advice: null, tips: shown };
 }
 
 function toolingPicks(toolings, chosen, onchange) {

@@ -81,7 +81,7 @@ function lobesCard(found, removal, question, tested, ontested) {
               low !== undefined && low !== null && high
                 ? [" (95 %: ", q("depth", low, { bare: true }), " to ", q("depth", high), ")"]
                 : null,
-              deep === null ? ", no depth recommended" : [", recommended depth ", q("depth", deep)],
+              deep === null ? ", no depth recommended" : [`, recommended depth ${lobes.recommended_by === lobes.method ? "" : "by this preview "}`, q("depth", deep)],
               removal[i] && deep !== null ? [" · ", q("removal", removal[i] * lobes.spindle_speed_rpm[k] * deep)] : null,
               chatter === null ? null : ` · beyond the limit chatter at ${plain(chatter)} Hz`,
               lobes.flip[k] ? " · period doubling" : null,
@@ -260,7 +260,7 @@ function comparison(found, summaries, question) {
     limit("stability limit", (r) => r.best),
     column("Removes", "removal", (r) => r.best?.removal_rate_cm3_per_min),
   ];
-  const box = card("Side by side", null, table("Toolings side by side", columns, rows), reserve(found.lobes, question));
+  const box = card("Side by side", null, table("Toolings side by side", columns, rows), reserve(found, question));
   box.classList.add("wide");
   return box;
 }

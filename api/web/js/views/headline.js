@@ -7,6 +7,15 @@ import { plain, q, text } from "../units.js";
 /** The recommended cuts of a tooling: within power and torque where these were asked for. */
 export const recommended = (found, i) => found.advice?.[i]?.highest_removal ?? found.lobes[i].recommended;
 
+/** Whether a tooling's recommended cuts are not computed yet. */
+const isPreview = (found, i) => !found.advice && found.lobes[i].recommended_by === null;
+
+/** The method that computed the recommended cuts, where it is another one than that of the lobes. */
+const computedBy = (found) => {
+  const by = found.advice?.[0]?.recommended_by ?? found.lobes[0].recommended_by;
+  return by === null || by === found.lobes[0].method ? "" : ` It was computed by ${by}; the lobes are those of ${found.lobes[0].method}.`;
+};
+
 /** What to set, said first: a speed, a depth, and why. */
 export function headline(found, question) {
   const cards = found.lobes.length;
@@ -14,6 +23,15 @@ export function headline(found, question) {
     const [best, ...further] = recommended(found, i);
     const drawing = h("div", { class: "mini" }, libraryDrawing(lobes.tooling));
     const key = h("span", { class: `key line ${SERIES[i % SERIES.length]}`, "aria-hidden": "true" });
+    if (!best && isPreview(found, i)) {
+      return h(
+        "article",
+        { class: "best", "aria-busy": "true" },
+        h("h2", null, key, lobes.tooling),
+        h("p", null, "The lobes are a preview. The recommended cut is being computed …"),
+        drawing,
+      );
+    }
     if (!best) {
       const limit = lobes.absolute_limit_mm;
       const below = limit === null ? "" : ` Stable below ${text("depth", limit)} everywhere.`;
@@ -71,7 +89,7 @@ export function headline(found, question) {
             ]),
           )
         : null,
-      cards === 1 ? reserve([lobes], question, lobes.best_speeds[0]) : null,
+      cards === 1 ? reserve(found, question, lobes.recommended_by === null ? null : lobes.best_speeds[0]) : null,
       drawing,
     );
   });
@@ -93,12 +111,12 @@ const unlimited = (question) =>
   );
 
 /** How sure the recommendation is, and what it stays away from. */
-export function reserve(lobes, question, pocket = null) {
-  const banded = lobes.some((each) => each.limit_depth_low_mm);
+export function reserve(found, question, pocket = null) {
+  const banded = found.lobes.some((each) => each.limit_depth_low_mm);
   return h(
     "p",
     { class: "soft small reserve" },
-    `The recommended depth is 10 % below the stability limit${banded ? " that 95 % of the machines allowed by the records reach" : ""}, with the speed right within 1 %.`,
+    `The recommended depth is 10 % below the stability limit${banded ? " that 95 % of the machines allowed by the records reach" : ""}, with the speed right within 1 %.${computedBy(found)}`,
     pocket ? [` Highest stability limit: ${plain(pocket.spindle_speed_rpm)} rev/min, `, limitOf(pocket, question), "."] : null,
   );
 }
