@@ -200,16 +200,17 @@ def test_a_recommendation_stands_beside_its_limit_and_an_infinite_one_is_none(fo
     assert len(summary["recommended"]) == len(advice.recommended) > 1
     best = summary["recommended"][0]
     # stable up to the depth that was asked for: no limit is known there
-    assert advice.recommended[0].spindle_speed > 1800.0
     assert best["limit_depth_mm"] is None
-    assert best["recommended_depth_mm"] == pytest.approx(0.9 * 4.0)
+    assert best["recommended_depth_mm"] is None
     assert summary["best_speeds"][0]["limit_depth_mm"] is None
     assert curves["limit_depth_mm"][-1] is None
-    assert curves["recommended_depth_mm"] == pytest.approx(1e3 * advice.usable.stable)
+    known = [1e3 * depth if np.isfinite(depth) else None for depth in advice.usable.stable]
+    assert curves["recommended_depth_mm"] == pytest.approx(known)
+    assert curves["recommended_depth_mm"][-1] is None
     text = " ".join(parsed(report_html(found, campaign, readings, [page_of()])).text)
     for point in advice.recommended:
         assert f"{point.spindle_speed * 30.0 / np.pi:.0f}" in text
-        assert f"{1e3 * point.depth:.2f}" in text
+        assert (f"{1e3 * point.depth:.2f}" if np.isfinite(point.depth) else "no depth recommended") in text
 
 
 def test_rows_say_what_a_recording_is_worth(readings):
