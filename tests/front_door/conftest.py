@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,6 +42,7 @@ def nouns(tmp_path_factory) -> SimpleNamespace:
     time = np.arange(2000) / 25600.0
     force = np.stack([np.sin(6000.0 * time), np.cos(6000.0 * time)], axis=1)
     estimate = ForceEstimate((Dof.X, Dof.Y), 1.0 / 25600.0, 50.0 * force, np.full(force.shape, 2.0), np.ones(2))
+    settled: Any = SimpleNamespace(settling=0)
     flange = ri.normal_modes(ri.hz(1.0) * np.array([800.0, 1900.0]), [0.05, 0.04], [[0.2, 0.5], [0.15, -0.6]], plane("flange"))
     return SimpleNamespace(
         folder=folder,
@@ -67,7 +69,7 @@ def nouns(tmp_path_factory) -> SimpleNamespace:
         recording=pair(duration=0.2).cut,
         reading=readings[0],
         estimate=estimate,
-        forces=MonitoredCut(estimate, None, ri.rpm(9000), 4, (ri.hz(300.0), ri.hz(4000.0)), {}, {}, {}, ("a remark",)),  # type: ignore[arg-type]
+        forces=MonitoredCut(estimate, settled, ri.rpm(9000), 4, (ri.hz(300.0), ri.hz(4000.0)), {}, {}, {}, ("a remark",)),
     )
 
 
