@@ -204,11 +204,10 @@ def test_forms_that_are_none(client, machine):
 
 
 def test_a_tooling_that_would_cost_too_much_is_refused(client, machine):
-    thin = copy.deepcopy(TOOLING)
-    thin["tool"]["segments"] = [{"length_mm": 4999.0, "outer_diameter_mm": 0.01, "material": "steel"}]
-    thin["tool"]["stickout_mm"] = 4900.0
-    thin["holder"]["segments"][0]["inner_diameter_mm"] = 0.0
-    assert refused(422, client.make_campaign, machine, declared(toolings={"T1": thin})).errors[0].field == "segments"
+    fine = copy.deepcopy(TOOLING)
+    taper = {"length_mm": 1.0, "outer_diameter_mm": 12.0, "end_diameter_mm": 12.1, "material": "steel"}
+    fine["tool"] |= {"segments": [taper] * 190, "stickout_mm": 120.0}
+    assert refused(422, client.make_campaign, machine, declared(toolings={"T1": fine})).errors[0].field == "segments"
 
 
 def test_a_machine_takes_its_campaigns_along(client, machine, tmp_path):

@@ -122,13 +122,11 @@ def test_what_is_written_reads_back(data):
 
 @pytest.mark.slow
 def test_a_tooling_that_would_cost_too_much_is_refused_before_it_does():
-    """5 m of needle, and many tapers; what passes has not more elements than allowed."""
-    needle = {"length_mm": 5000.0, "outer_diameter_mm": 0.5, "material": "carbide"}
+    """Many tapers; what passes has not more elements than allowed."""
     taper = {"length_mm": 1.0, "outer_diameter_mm": 12.0, "end_diameter_mm": 12.1, "material": "carbide"}
-    for tool in ({"stickout_mm": 4900.0, "segments": [needle]}, {"stickout_mm": 70.0, "segments": [taper] * 150}):
-        assembly = tooling_of(toml_of(example(tool=tool))).assembly
-        with pytest.raises(InputError, match="finite elements"):
-            weigh(assembly, 4300.0)
+    assembly = tooling_of(toml_of(example(tool={"stickout_mm": 70.0, "segments": [taper] * 150}))).assembly
+    with pytest.raises(InputError, match="finite elements"):
+        weigh(assembly, 4300.0)
     stack = [dict(taper, length_mm=5.0)] * 22
     assembly = tooling_of(toml_of(example(tool={"stickout_mm": 70.0, "segments": stack}))).assembly
     weigh(assembly, 4300.0)

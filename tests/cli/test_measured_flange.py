@@ -167,7 +167,7 @@ def test_a_broken_flange_is_told_in_a_sentence(tmp_path, tooling_file, flange, c
         ((), "--ktc-mpa: found nothing"),
         (("--krc", 0.26), "--ktc-mpa: found nothing"),
         (("--ktc-mpa", 902), "--krc: found nothing"),
-        (("--ktc-mpa", -1, "--krc", 0.26), "--ktc-mpa: found -1.0"),
+        (("--ktc-mpa", -1, "--krc", 0.26), "--ktc-mpa: found -1 MPa"),
         (("--ktc-mpa", "nan", "--krc", 0.26), "--ktc-mpa: found nan"),
         ((*CUT, "--runout-um", "1,2,3"), "--runout-um: found 3 numbers, allowed is 4, one for each tooth (in um)"),
         ((*CUT, "--runout-um", "1,a,3,4"), "--runout-um: found"),
