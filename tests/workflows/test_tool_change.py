@@ -12,7 +12,6 @@ import pytest
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.power import SpindleDrive
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
-from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.identification.status import Status
@@ -23,10 +22,8 @@ from rcsa_ident.machine.known_tip import KnownTip
 from rcsa_ident.machine.measured import MeasuredFlange
 from rcsa_ident.machine.speed_dependence import BLOCK, tips_over_speed
 from rcsa_ident.machining_setup import CutSpec
-from rcsa_ident.stability.advice import highest_removal
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import DRAWS, both_directions, drawn_limits, stability_lobes
-from rcsa_ident.stability.result import RESERVE
 from rcsa_ident.stability.semi_discretisation import SemiDiscretisation
 from rcsa_ident.stability.stability_map import stability_map
 from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict, tally
@@ -369,106 +366,6 @@ def test_modes_are_fitted_to_receptances_that_reach_beyond_the_band():
 
 
 # what is recommended
-
-
-def test_advice_is_about_the_limits_that_are_shown():
-    asked = ToolChange(by_hand.machine(), by_hand.tooling(), FED, np.linspace(600.0, 1500.0, 60), 5e-3, draws=20)
-    drive = SpindleDrive.flat(power=5e3)
-    found = advise(asked, drive, depth=0.4e-3, planned=[(1234.5, 0.3e-3)])
-    assert (found.tooling, found.stickout) == ("T1", pytest.approx(0.06))
-    assert {*asked.speeds.tolist(), 1234.5} <= set(found.lobes.spindle_speed.tolist())
-    np.testing.assert_array_equal(found.usable.spindle_speed, found.lobes.spindle_speed)
-    at = np.searchsorted(found.lobes.spindle_speed, asked.speeds)
-    np.testing.assert_array_equal(found.lobes.limit_depth[at], asked.limits().limit_depth)
-    np.testing.assert_array_equal(found.lobes.drawn[:, at], asked.limits().drawn)
-    # within the range the speeds beside one are the same; at its ends some lie beyond it
-    inner = slice(3, -3)
-    np.testing.assert_allclose(found.usable.stable[inner], found.lobes.recommended_depth()[inner], rtol=1e-12)
-    assert np.all(found.usable.stable <= found.lobes.recommended_depth() * (1.0 + 1e-12))
-    np.testing.assert_array_equal(found.usable.limit, found.lobes.nominal)
-    best = found.recommended[0]
-    assert found.recommended_by == "full-discretisation"
-    assert best.removal_rate == max(point.removal_rate for point in found.recommended)
-    (limit,) = replace(asked, method=FullDiscretisation()).limits(np.array([best.spindle_speed]), draws=0).limit_depth
-    assert best.limit == pytest.approx(limit, rel=5e-3)
-    assert 0.0 < best.depth < (1.0 - RESERVE) * best.limit
-    for window in found.windows:
-        assert window.allowed >= 0.4e-3
-    (cut,) = found.planned
-    assert cut.spindle_speed == 1234.5
-    assert cut.robust_limit <= cut.limit
-    np.testing.assert_array_equal(found.common, found.lobes.limit_quantile(1.0))
-
-
-def test_how_deep_limits_are_looked_for_recommends_nothing_and_hides_no_speed():
-    asked = ToolChange(by_hand.machine(), by_hand.tooling(), FED, np.linspace(600.0, 1500.0, 60), 50e-3, draws=0)
-    whole = advise(asked)
-    depth = 0.5 * float(np.max(whole.usable.depth))
-    wanted = advise(asked, depth=depth).windows
-    assert wanted
-    # this depth's reserve lies beyond what is asked for otherwise
-    shallow = advise(replace(asked, max_depth=depth), depth=depth, planned=[(1000.0, 0.1 * depth)])
-    assert len(shallow.windows) == len(wanted)
-    step = float(asked.speeds[1] - asked.speeds[0])
-    for found, known in zip(*(sorted(each, key=lambda w: w.low) for each in (shallow.windows, wanted)), strict=True):
-        # without a straight line to a limit that nobody has looked for a window ends at a speed that was asked
-        assert known.low * (1.0 - 1e-9) <= found.low <= known.low + step
-        assert known.high - step <= found.high <= known.high * (1.0 + 1e-9)
-    # nothing ends the cut where the search was shallower than the limit
-    tiny = 0.1 * float(whole.usable.depth.min())
-    free = advise(replace(asked, max_depth=tiny), planned=[(1000.0, 0.5 * tiny)])
-    assert np.all(np.isinf(free.usable.depth))
-    assert [point.depth for point in free.recommended] == [np.inf]
-    assert free.planned[0].robust_limit == np.inf
-
-
-#: One plane with two modes, 5 % immersion: period doubling, of which zero-order limits know nothing, takes the tops of their pockets.
-DOUBLING = TipModes.of({Dof.X: normal_modes(2.0 * np.pi * np.array([900.0, 2300.0]), [0.02, 0.02], [[6.0], [4.0]], (TIP[0],))})
-THIN = CutSpec(Engagement.from_immersion(0.05, "up"), feed_per_tooth=1e-4, coefficients={"tangential": 9e8, "radial_ratio": 0.26})
-
-
-def doubling(**further):
-    return ToolChange(KnownTip(DOUBLING), by_hand.tooling(), THIN, np.linspace(1000.0, 2400.0, 141), 8e-3, **further)
-
-
-def holds(asked, point):
-    """Whether a cut is stable over +-1 % of its speed, by a method that had no part in it."""
-    speeds = point.spindle_speed * np.array([0.99, 0.995, 1.0, 1.005, 1.01])
-    return bool(np.all(replace(asked, method=SemiDiscretisation()).limits(speeds, draws=0).nominal >= point.depth))
-
-
-def test_what_is_recommended_holds_where_zero_order_limits_do_not():
-    asked = doubling()
-    found = advise(asked)
-    preview = highest_removal(found.usable, asked.process)
-    assert not all(holds(asked, point) for point in preview)
-    assert found.recommended
-    assert all(holds(asked, point) for point in found.recommended)
-    # and is not timid: the reserve and what the tolerance of the speed takes
-    assert all(point.depth > 0.6 * point.limit for point in found.recommended)
-
-
-def test_a_preview_recommends_nothing():
-    found = advise(doubling(recommend=False))
-    assert (found.recommended, found.recommended_by) == ((), None)
-    assert found.pockets
-    assert all(np.isnan(pocket.recommended_depth) for pocket in found.pockets)
-    asked = doubling()
-    assert asked.seconds > replace(asked, recommend=False).seconds
-
-
-def test_a_method_that_fits_recommends_from_its_own_limits():
-    asked = replace(doubling(method=FullDiscretisation()), speeds=np.linspace(1500.0, 1560.0, 5))
-    found = advise(asked)
-    assert found.recommended_by == "full-discretisation"
-    assert found.recommended[0].depth == found.usable.depth.max()
-
-
-def test_a_cut_that_no_fitting_method_takes_is_not_recommended():
-    uneven = tuple(2e-6 * np.array([1.0, 0.0, -1.0, 0.0])[: by_hand.tooling().cutter.teeth])
-    found = advise(replace(doubling(), cut=replace(THIN, runout=uneven, feed_per_tooth=None)))
-    assert found.recommended == ()
-    assert any(remark.startswith("no cut is recommended: ") for remark in found.remarks)
 
 
 def test_tested_cuts_are_asked_each_at_its_own_speed():
