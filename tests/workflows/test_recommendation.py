@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.cutting.power import SpindleDrive

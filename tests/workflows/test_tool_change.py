@@ -365,7 +365,7 @@ def test_modes_are_fitted_to_receptances_that_reach_beyond_the_band():
     assert replace(asked, method=FullDiscretisation()).omega[-1] == pytest.approx(BEYOND * 2.0 * np.pi * 3000.0)
 
 
-# what is recommended
+# cuts that were tried
 
 
 def test_tested_cuts_are_asked_each_at_its_own_speed():
