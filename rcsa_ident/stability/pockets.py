@@ -15,7 +15,7 @@ POCKET = 0.85
 #: A speed beyond those that were asked for may lie this much below what a tolerance needs, as a share.
 COARSE = 0.9
 #: How far beside a pocket's top a better speed is looked for, and in steps of which share of the speed.
-AROUND, FINE = 0.02, 0.005
+AROUND, FINE = 0.015, 0.005
 
 
 def peaks(speed: FloatArray, level: FloatArray, count: int = 3) -> list[tuple[float, float]]:
@@ -86,8 +86,9 @@ def speeds_around(tops: Sequence[float], tolerance: float, between: tuple[float,
             continue
         kept.append(top)
         low, high = max(between[0], top * (1.0 - AROUND)), min(between[1], top * (1.0 + AROUND))
-        inner = np.linspace(low, high, 1 + int(np.ceil((high - low) / (step * top))))
-        found.append(Neighbourhood((low, high), pad_speeds(np.append(inner, top), tolerance)))
+        first, last = low * (1.0 - tolerance), high * (1.0 + tolerance)
+        speeds = np.linspace(first, last, 1 + int(np.ceil((last - first) / (step * top) - 1e-9)))
+        found.append(Neighbourhood((low, high), _apart(np.unique(np.concatenate([speeds, [low, top, high]])))))
     return found
 
 
@@ -128,6 +129,9 @@ def pad_speeds(speeds: FloatArray, tolerance: float, also: Sequence[float] = ())
     above = np.arange(speeds[-1] + step, high + step, step) if high > speeds[-1] else np.zeros(0)
     # a coarse step leads far out, down to a standstill: where it does, the tolerance's own end will do
     below, above = np.where(below > COARSE * low, below, low), np.where(COARSE * above < high, above, high)
-    found = np.unique(np.concatenate([inner, below, above]))
-    # the same speed twice, but for its last digit
-    return found[np.concatenate([[True], np.diff(found) > 1e-9 * found[1:]])]
+    return _apart(np.unique(np.concatenate([inner, below, above])))
+
+
+def _apart(speeds: FloatArray) -> FloatArray:
+    """Rising speeds, none of them twice but for its last digit."""
+    return speeds[np.concatenate([[True], np.diff(speeds) > 1e-9 * speeds[1:]])]

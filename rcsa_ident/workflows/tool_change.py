@@ -50,7 +50,7 @@ _PITCH_FACTOR, _CHANGING_SECONDS = 30.0, 4.0
 #: in every step, which counts from so many on.
 _TEETH_OF_PERIOD, _TEETH_OF_STEP = 2.0, 40.0
 #: What recommendations are computed by where the lobes are a preview, and at about how many speeds.
-_FITTING, _FITTED_SPEEDS = FullDiscretisation(), 50
+_FITTING, _FITTED_SPEEDS = FullDiscretisation(), 35
 _UNLIMITED = SpindleDrive.flat(None, None, None)
 Place = TypeVar("Place", OperatingPoint, Pocket)
 
@@ -298,7 +298,8 @@ def _recommended(
     if not change.recommend:
         return _Recommended((), tuple(replace(pocket, recommended_depth=np.nan) for pocket in pockets), None)
     between = float(usable.spindle_speed[0]), float(usable.spindle_speed[-1])
-    tops = [point.spindle_speed for point in points] + [pocket.spindle_speed for pocket in pockets]
+    # zero-order limits that are no source of a recommendation still know where pockets may be
+    tops = [found.spindle_speed for found in points] or [found.spindle_speed for found in pockets]
     blocks = speeds_around(tops, tolerance, between)
     if not blocks:
         return _Recommended((), (), _FITTING.name)

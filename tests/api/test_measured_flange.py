@@ -111,7 +111,8 @@ def test_advice_is_that_of_the_machine_that_was_measured(measured):
     for one, two in zip(own.highest_removal, other.highest_removal, strict=True):
         numbers, others = one.model_dump(), two.model_dump()
         assert numbers.pop("bound") == others.pop("bound")
-        assert numbers == pytest.approx(others, rel=1e-6)
+        # through modes that were fitted to either
+        assert numbers == pytest.approx(others, rel=2e-3)
     assert own.common_stable_depth_mm is None
 
 

@@ -216,8 +216,10 @@ def test_unequal_pitch_and_a_shape_are_told_with_every_answer(shop):
         assert answer.withheld in answer.warnings
         assert answer.withheld.endswith("full-discretisation takes unlike teeth")
         assert any("the cutter's shape is high-feed; its stability limits were 0.61 to 1.45 times" in w for w in answer.warnings)
-    assert (lobes.recommended, advice.highest_removal, lobes.recommended_depth_mm) == ([], [], [None] * 3)
-    assert lobes.best_speeds[0].recommended_depth_mm is None
+    # the limits recommend nothing, and the cuts come from the method that they name
+    assert lobes.recommended_depth_mm == [None] * 3
+    assert [lobes.recommended_by, advice.recommended_by] == ["full-discretisation"] * 2
+    assert lobes.recommended[0].recommended_depth_mm == advice.highest_removal[0].recommended_depth_mm > 0.0
     right = client.lobes(id, odd, method="full-discretisation", **ask).toolings[0]
     assert right.withheld is None
     assert all(depth > 0.0 for depth in right.recommended_depth_mm)

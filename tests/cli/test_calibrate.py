@@ -29,7 +29,7 @@ def force_campaign(tmp_path_factory):
     lines = ['[campaign]\nname = "dynamometer"\nsampling_rate_hz = 25600']
     for axis in "xy":
         lines.append(f'[sensors.force_{axis}]\nquantity = "force"\naxis = "{axis.upper()}"\nsensitivity = -0.004')
-    lines.append('[workpiece]\nname = "AlZn"\ntangential_coefficient_mpa = 1\nradial_ratio = 0.1\n[toolings]\nT1 = "T1.toml"')
+    lines.append('[workpiece]\nname = "AlZn"\ntangential_coefficient_mpa = 1000\nradial_ratio = 0.1\n[toolings]\nT1 = "T1.toml"')
     for i, c in enumerate(plan()):
         turning = replace(c, spindle_speed=c.spindle_speed * (1.0 + 5e-4 * rng.normal()))
         force = true_force(turning, 0.5, RATE, 6.0 * rng.random(), 2e-6)

@@ -78,7 +78,8 @@ def test_lobes_and_advice_are_those_of_the_machine_that_was_measured(tmp_path, r
     for one, other in zip(advice[0]["highest_removal"], advice[1]["highest_removal"], strict=True):
         assert one["bound"] == other["bound"]
         for key in ("spindle_speed_rpm", "recommended_depth_mm", "limit_depth_mm", "removal_rate_cm3_per_min", "power_kw", "torque_nm"):
-            assert one[key] == pytest.approx(other[key], rel=1e-6)
+            # through modes that were fitted to either
+            assert one[key] == pytest.approx(other[key], rel=2e-3)
     assert advice[0]["planned"][0]["margin"] == pytest.approx(advice[1]["planned"][0]["margin"], rel=1e-6)
     assert advice[0]["planned"][0]["probability"] is None
 

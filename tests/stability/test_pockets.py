@@ -89,13 +89,19 @@ def test_a_speed_that_differs_in_its_last_digit_is_the_same():
 def test_speeds_around_pockets_see_the_tolerance_at_every_top():
     found = speeds_around([1000.0, 1010.0, 1990.0], 0.01, (500.0, 2000.0))
     # the second belongs to the first
-    assert [each.tops for each in found] == [(980.0, 1020.0), (pytest.approx(1990.0 * (1.0 - AROUND)), 2000.0)]
+    assert [each.tops for each in found] == [pytest.approx((985.0, 1015.0)), pytest.approx((1990.0 * (1.0 - AROUND), 2000.0))]
     for each, top in zip(found, (1000.0, 1990.0), strict=True):
         assert top in each.speeds
         assert np.all(np.diff(each.speeds) > 0.0)
         assert np.max(np.diff(each.speeds)) < 0.0051 * top
         assert each.speeds[0] <= 0.99 * each.tops[0] * (1.0 + 1e-12)
         assert each.speeds[-1] >= 1.01 * each.tops[1] * (1.0 - 1e-12)
+
+
+def test_a_top_beside_the_end_of_the_range_has_no_closer_speeds():
+    (found,) = speeds_around([1000.0], 0.01, (500.0, 1000.0 * (1.0 + 1e-12)))
+    assert found.speeds.size < 12
+    assert np.min(np.diff(found.speeds)) > 1e-6
 
 
 def test_a_single_speed_is_its_own_neighbourhood():

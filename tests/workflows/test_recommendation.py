@@ -29,7 +29,7 @@ THIN = CutSpec(Engagement.from_immersion(0.05, "up"), feed_per_tooth=1e-4, coeff
 
 
 def doubling(**further):
-    return ToolChange(KnownTip(DOUBLING), by_hand.tooling(), THIN, np.linspace(1000.0, 2400.0, 141), 8e-3, **further)
+    return ToolChange(KnownTip(DOUBLING), by_hand.tooling(), THIN, np.linspace(1000.0, 2400.0, 141), 30e-3, **further)
 
 
 def holds(asked, point):

@@ -324,12 +324,12 @@ def test_seconds_are_those_of_the_speeds_the_spread_and_the_change():
     speeds = np.array([1000.0, 2000.0]) * np.pi / 30.0
     # slower spindles have closer lobes: 4 + 2 times the cost at 4000 rev/min, and that of 1 % less and more
     times = 6.0 + 4.0 / 0.99 + 2.0 / 1.01
-    bare = change(by_hand.machine(known=False), speeds, draws=0)
+    bare = change(by_hand.machine(known=False), speeds, draws=0, recommend=False)
     assert bare.seconds == pytest.approx(times * ZeroOrder.seconds_per_speed)
     # of close speeds there are many within 1 %
     close = replace(bare, speeds=np.array([1000.0, 1001.0]) * np.pi / 30.0)
     assert close.seconds == pytest.approx(22.0 * 4.0 * ZeroOrder.seconds_per_speed, rel=0.05)
-    known = change(by_hand.machine(), speeds)
+    known = change(by_hand.machine(), speeds, recommend=False)
     kept = replace(known, machine=known.machine.kept())
     drawn, spread = kept.seconds, spread_seconds(known.machine, known.omega)
     assert drawn > 2.0 * bare.seconds
@@ -339,7 +339,7 @@ def test_seconds_are_those_of_the_speeds_the_spread_and_the_change():
     assert spread_seconds(known.machine, known.omega[::2]) == pytest.approx(spread * known.omega[::2].size / known.omega.size)
     assert spread_seconds(one_axis(), known.omega) == pytest.approx(0.5 * spread)
     assert spread_seconds(bare.machine, known.omega) == 0.0
-    changing = change(by_hand.machine(softening=True), speeds)
+    changing = change(by_hand.machine(softening=True), speeds, recommend=False)
     own = spread_seconds(changing.machine, changing.omega)
     assert changing.seconds - drawn - own == pytest.approx(replace(changing, draws=0).seconds - bare.seconds)
     assert replace(changing, draws=0).seconds > 1.0
@@ -408,7 +408,7 @@ def test_a_measured_flange_has_the_lobes_and_the_advice_of_its_modes(planes):
     for found, expected in zip(advice.recommended, wanted.recommended, strict=True):
         assert found.spindle_speed == expected.spindle_speed
         # through modes that were fitted to either
-        assert (found.depth, found.limit) == (pytest.approx(expected.depth, rel=1e-3), pytest.approx(expected.limit, rel=1e-3))
+        assert (found.depth, found.limit) == (pytest.approx(expected.depth, rel=2e-3), pytest.approx(expected.limit, rel=2e-3))
     assert [w.low for w in advice.windows] == pytest.approx([w.low for w in wanted.windows], rel=1e-4)
     # methods that fit modes stay within what was measured, and say what it does not tell
     marched = replace(measured, method=FullDiscretisation(), speeds=speeds[::50]).limits()

@@ -17,6 +17,8 @@ export function results(place, found, { toolings, body, tested, ontested }) {
   const feed = question.cut.feed_per_tooth_mm ?? null;
   const removal = summaries.map((t) => (feed === null || !t ? null : removalPer(t, question.cut.immersion, feed)));
   const several = found.lobes.length > 1;
+  // a speed that somebody writes while the recommended cut comes stays
+  const written = place.querySelector(".reader input:focus")?.value;
   fill(place, headline(found, question), warnings(found));
   add(
     place,
@@ -24,6 +26,12 @@ export function results(place, found, { toolings, body, tested, ontested }) {
     several ? comparison(found, summaries, question) : null,
     frfCard(found, body),
   );
+  if (written !== undefined) {
+    const speed = place.querySelector(".reader input");
+    speed.value = written;
+    speed.focus();
+    speed.dispatchEvent(new Event("input", { bubbles: false }));
+  }
   whisper(
     [...place.querySelectorAll(".best")]
       .map((each) => each.querySelector("h2").textContent + ": " + (each.querySelector(".set")?.textContent ?? ""))

@@ -8,42 +8,8 @@ import { machine } from "../state.js";
 import { q, text } from "../units.js";
 import { trail } from "./changes.js";
 import { segmentsTable } from "./segments.js";
+import { SHAPES, START } from "./tooling_start.js";
 
-const START = {
-  cutter: { teeth: 4, diameter_mm: 12, helix_deg: 30 },
-  tool: {
-    stickout_mm: 60,
-    segments: [
-      { length_mm: 26, outer_diameter_mm: 9.6, material: "carbide" },
-      { length_mm: 74, outer_diameter_mm: 12, material: "carbide" },
-    ],
-  },
-  holder: {
-    insertion_mm: 40,
-    segments: [
-      { length_mm: 40, outer_diameter_mm: 32, inner_diameter_mm: 12, material: "steel" },
-      { length_mm: 26, outer_diameter_mm: 63, material: "steel" },
-    ],
-  },
-  contact: { translational_stiffness: 2e10, rotational_stiffness: 6e5, translational_damping: 6e4, rotational_damping: 9 },
-};
-const SHAPES = [
-  ["flat", "flat end"],
-  ["bull-nose", "bull nose"],
-  ["ball", "ball end"],
-  ["tapered", "tapered"],
-  ["face", "face mill"],
-  ["high-feed", "high feed"],
-  ["radius", "hollow radius"],
-  ["barrel", "barrel"],
-  ["lens", "lens"],
-  ["oval", "oval"],
-  ["taper-barrel", "tapered barrel"],
-  ["lollipop", "lollipop"],
-  ["chamfer", "chamfer mill"],
-  ["dovetail", "dovetail"],
-  ["profile", "outline of its own"],
-];
 // of the tool inside the bore, in diameters of its shank: below it no clamping holds; as where the library asks for stickouts
 const LEAST_INSERTION = 1;
 const CONTACT = [
