@@ -50,8 +50,9 @@ def run(result: Path | None = None) -> list[dict[str, Any]]:
             ("161 speeds with bands", {"speeds": {"step_rpm": 100}}),
             ("321 speeds without bands", {"bands": False}),
             ("321 speeds with bands, five toolings in one query", {"several": 5}),
+            ("321 speeds with bands, and recommended cuts", {"recommend": True}),
         ):
-            asked = {"several": 1} | further
+            asked = {"several": 1, "recommend": False} | further
             count = asked.pop("several")
 
             def lobes(seed: int, count: int = count, asked: dict[str, Any] = asked) -> tuple[str, str, Any]:
