@@ -97,10 +97,12 @@ def case(machine: MachineFile, tooling: Tooling, rng: np.random.Generator) -> di
     dynamics = poles(reduced(rotor(machine.spindle, tooling.assembly)), middle)
     truth = Truth(dynamics, tooling, CuttingConditions(1.0, 1.0, FEED, engagement, feed_angle), known)
     row: dict[str, Any] = {"seconds": seconds, "modes": dynamics.pole.size, "agrees": None}
-    for name, points in (("recommended", advice.recommended), ("zero-order", highest_removal(advice.usable, change.process, 1))):
-        row[name] = truth.of(points[0]) if points else None
-    if advice.recommended:
-        best = advice.recommended[0]
+    for name, points in (("recommended", advice.recommended), ("zero-order", highest_removal(advice.usable, change.process))):
+        # where nothing limits the cut no depth is recommended
+        deep = [point for point in points if np.isfinite(point.depth)]
+        row[name] = truth.of(deep[0]) if deep else None
+    if row["recommended"] is not None:
+        best = next(point for point in advice.recommended if np.isfinite(point.depth))
         near = stability_lobes(tip, change.process, best.spindle_speed * np.array(AROUND), DEEPEST, FullDiscretisation())
         row["agrees"] = bool(near.nominal.min() >= best.depth)
     return row
@@ -112,7 +114,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
     lines = [
         f"{len(rows)} cases, {min(row['modes'] for row in rows)} to {max(row['modes'] for row in rows)} modes; an answer takes "
         f"{np.median(seconds):.2f} s of one core in the median, {seconds.max():.2f} s at most; by full discretisation "
-        f"{np.mean([bool(row['agrees']) for row in rows]):.1%} of the recommended cuts are stable over +-1 % of speed.",
+        f"{np.mean([row['agrees'] for row in rows if row['agrees'] is not None]):.1%} of the recommended cuts are stable over +-1 % of speed.",
         "",
         "| depth from | cuts | stable over +-1 % of speed in the time march | depth over the true limit there, median (10 %, 90 %) "
         "| over the least true limit within +-1 % |",
