@@ -111,10 +111,11 @@ def case(machine: MachineFile, tooling: Tooling, rng: np.random.Generator) -> di
 def table(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the summary over all cases."""
     seconds = np.array([row["seconds"] for row in rows])
+    agrees = [row["agrees"] for row in rows if row["agrees"] is not None]
     lines = [
         f"{len(rows)} cases, {min(row['modes'] for row in rows)} to {max(row['modes'] for row in rows)} modes; an answer takes "
         f"{np.median(seconds):.2f} s of one core in the median, {seconds.max():.2f} s at most; by full discretisation "
-        f"{np.mean([row['agrees'] for row in rows if row['agrees'] is not None]):.1%} of the recommended cuts are stable over +-1 % of speed.",
+        f"{np.mean(agrees):.1%} of the recommended cuts are stable over +-1 % of speed.",
         "",
         "| depth from | cuts | stable over +-1 % of speed in the time march | depth over the true limit there, median (10 %, 90 %) "
         "| over the least true limit within +-1 % |",
