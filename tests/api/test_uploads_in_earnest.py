@@ -194,7 +194,7 @@ def test_too_many_at_once_are_told_to_wait(place, tmp_path):
 
 
 def _answered(ask):
-    """The answer to a body that is refused unread: the rest of it may meet a closed line before the answer is read, so it is asked again."""
+    """The answer to a body that is refused unread: what is left of it may meet a closed line first, so it is asked again."""
     for _ in range(5):
         try:
             return ask()
