@@ -36,8 +36,8 @@ SMOOTH_ERROR = 2e-3
 #: Searches from new starts, until one axis has come to the same answer twice.
 ATTEMPTS = 3
 #: Score beyond which planes plainly feel each other once a stiffness that changes with speed is in the fit: 0 to 36 where they do not,
-#: 62 and more where they do; and by how much the fit of both together has to be better to need no other: exchanging and adding modes
-#: gains a few hundred, planes that feel each other thousands.
+#: 55 and more where they do (no benchmark prints scores); and by how much the fit of both together has to be better to need no other:
+#: exchanging and adding modes gains a few hundred, planes that feel each other thousands.
 PLAIN, PLAIN_GAIN = 50.0, 1000.0
 
 

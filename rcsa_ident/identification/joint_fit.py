@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -96,9 +97,7 @@ def fit_roughly(
     report : callable of (stage, cost, solution)
     """
 
-    def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> Misfit:
-        return Misfit(data, priors, shares, weight)
-
+    misfit_of = partial(Misfit, data, priors)
     start = _start(data, first, data.speed_changes)
     return refine_and_learn_noise(misfit_of, start, *learned_noise(searched), report, ROUGHLY)
 
@@ -120,9 +119,7 @@ def fit_jointly(
     report : callable of (stage, cost, solution)
     """
 
-    def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> Misfit:
-        return Misfit(data, priors, shares, weight)
-
+    misfit_of = partial(Misfit, data, priors)
     start = _from_several_starts(data, priors, searched, first).point
     found, misfit = refine_and_learn_noise(misfit_of, start, *learned_noise(searched), report)
     if data.speed_changes:
@@ -150,9 +147,7 @@ def grow_jointly(
     report : callable of (stage, cost, solution)
     """
 
-    def misfit_of(shares: tuple[float, ...], weight: FloatArray) -> Misfit:
-        return Misfit(data, priors, shares, weight)
-
+    misfit_of = partial(Misfit, data, priors)
     found = chosen
     for _ in range(GROWN):
         found = grow_modes(found, misfit, data.band_hz)
