@@ -10,11 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from api.work.toolings import parsed, toml_of, weigh
+from api.work.toolings import parsed, weigh
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import READERS
 from rcsa_ident.io.setups import campaign_of
 from rcsa_ident.io.setups import tooling_of as tooling_of_keys
+from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machining_setup import Campaign, Tooling
 
@@ -218,6 +219,4 @@ def toml_text(text: str, there: Callable[[str], bool] = lambda _: True) -> str:
             del cut["air"]
         for key in {"cut", "air"} & cut.keys():
             cut[key] = f"recordings/{cut[key]}"
-    head = {key: value for key, value in data.items() if key != "cuts"}
-    head["toolings"] = {name: f"toolings/{name}.toml" for name in data["toolings"]}
-    return toml_of(head) + "".join(f"[[cuts]]\n{toml_of(cut)}" for cut in cuts)
+    return toml_of(data | {"toolings": {name: f"toolings/{name}.toml" for name in data["toolings"]}, "cuts": cuts})

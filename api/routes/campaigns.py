@@ -24,13 +24,12 @@ from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.campaigns import Campaign, Counts, Recording
 from api.stores.entities import Taken
 from api.transfer.archives import zipped
-from api.work.toolings import parsed, toml_of
+from api.work.toolings import parsed
+from rcsa_ident.io.toml_text import toml_of
 
 router = APIRouter(tags=["campaigns"], route_class=Guarded)
 TOML, JSON, ZIP = "application/toml", "application/json", "application/zip"
-_EXAMPLE_TOML = toml_of({key: value for key, value in EXAMPLE.items() if key != "cuts"}) + "".join(
-    f"[[cuts]]\n{toml_of(cut)}" for cut in EXAMPLE["cuts"]
-)
+_EXAMPLE_TOML = toml_of(EXAMPLE)
 _BODY = {
     "required": True,
     "content": {

@@ -15,7 +15,8 @@ from api.schemas.common import Page, body_of
 from api.schemas.toolings import EXAMPLE, ToolingAnswer, ToolingKeys, ToolingSummary
 from api.security import Guarded, WhoAsks, now
 from api.stores.entities import Document, Stale, digest_of
-from api.work.toolings import LARGEST, parsed, toml_of, tooling_of
+from api.work.toolings import LARGEST, parsed, tooling_of
+from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.report.drawing import tooling_svg
 
 router = APIRouter(prefix="/toolings", tags=["toolings"], route_class=Guarded)

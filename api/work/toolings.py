@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -51,24 +49,6 @@ def weigh(assembly: ToolAssembly, highest_hz: float) -> None:
         raise InputError("segments", found, f"at most {MOST_ELEMENTS}: fewer tapers, or nothing so thin for its length")
 
 
-def toml_of(data: Mapping[str, Any]) -> str:
-    """Return keys as TOML: a table for each table at the top, inline ones below.
-
-    Examples
-    --------
-    >>> print(toml_of({"name": "S1", "cutter": {"teeth": 4, "pitch_deg": [80.0, 100.0]}}), end="")
-    name = "S1"
-    [cutter]
-    teeth = 4
-    pitch_deg = [80.0, 100.0]
-    """
-    tables = {key: value for key, value in data.items() if isinstance(value, Mapping)}
-    lines = [f"{_key(key)} = {_inline(value)}" for key, value in data.items() if key not in tables]
-    for key, table in tables.items():
-        lines += [f"[{_key(key)}]", *(f"{_key(k)} = {_inline(v)}" for k, v in table.items())]
-    return "\n".join(lines) + "\n"
-
-
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[tuple[str, Any, Any]]:
     """Return field, old and new value of every key in which two toolings differ; None where one does not have it.
 
@@ -89,20 +69,3 @@ def _leaves(value: Any, field: str = "") -> Iterator[tuple[str, Any]]:
             yield from _leaves(inner, f"{field}.{key}" if field else str(key))
     else:
         yield field, value
-
-
-def _key(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _quoted(key)
-
-
-def _quoted(text: str) -> str:
-    # JSON's escapes are TOML's, but for DEL
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _inline(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_key(k)} = {_inline(v)}" for k, v in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_inline(v) for v in value) + "]"
-    return _quoted(value) if isinstance(value, str) else json.dumps(value)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable
 from enum import StrEnum
@@ -133,40 +132,16 @@ def plan(
 
 def plan_text(planned: PlannedCuts) -> str:
     """Return the cuts as a campaign file has them; the recordings are named, not yet made."""
-    lines = []
-    for name, cut in zip(_names(planned), planned.cuts, strict=True):
-        c = cut.conditions
-        lines += [
-            "[[cuts]]",
-            f"id = {_quoted(name)}",
-            f"tooling = {_quoted(cut.tooling)}",
-            f"spindle_speed_rpm = {float(f'{to_rpm(c.spindle_speed):.9g}')}",
-            f"axial_depth_mm = {float(f'{c.axial_depth * 1e3:.9g}')}",
-            f"feed_per_tooth_mm = {float(f'{c.feed_per_tooth * 1e3:.9g}')}",
-            f"entry_angle_deg = {float(f'{math.degrees(c.engagement.entry):.9g}')}",
-            f"exit_angle_deg = {float(f'{math.degrees(c.engagement.exit):.9g}')}",
-            f"feed_direction = {_direction(c.feed_angle)}",
-            f"cut = {_quoted(f'recordings/{name}_cut.h5')}",
-            f"air = {_quoted(f'recordings/{name}_air.h5')}",
-            "",
-        ]
-    return "\n".join(lines)
+    from rcsa_ident.io.setups import cut_keys
+    from rcsa_ident.io.toml_text import toml_of
+
+    named = zip(_names(planned), planned.cuts, strict=True)
+    return toml_of({"cuts": [cut_keys(name, cut.tooling, cut.conditions) for name, cut in named]}, digits=9)
 
 
 def _names(planned: PlannedCuts) -> list[str]:
     """An id for each cut: tooling and place in the plan."""
     return [f"{cut.tooling}-plan-{i:02d}" for i, cut in enumerate(planned.cuts, start=1)]
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
-
-
-def _direction(angle: float) -> str:
-    from rcsa_ident.io.setups import FEED_DIRECTIONS
-
-    named = next((name for name, known in FEED_DIRECTIONS.items() if abs(angle - known) < 1e-12), None)
-    return f"{math.degrees(angle):.9g}" if named is None else _quoted(named)
 
 
 def _depths(text: str) -> tuple[float, ...]:
@@ -236,6 +211,13 @@ def _noise_of(folder: Path) -> float:
     return line_noise([m for m in found if m is not None])
 
 
+def _direction(angle: float) -> str | float:
+    from rcsa_ident.io.setups import feed_direction_of
+
+    found = feed_direction_of(angle)
+    return found if isinstance(found, str) else float(f"{found:.9g}")
+
+
 def _row(name: str, cut: PlannedCut) -> dict[str, Any]:
     c = cut.conditions
     return {
@@ -243,7 +225,7 @@ def _row(name: str, cut: PlannedCut) -> dict[str, Any]:
         "tooling": cut.tooling,
         "spindle_speed_rpm": float(f"{to_rpm(c.spindle_speed):.9g}"),
         "axial_depth_mm": float(f"{c.axial_depth * 1e3:.9g}"),
-        "feed_direction": json.loads(_direction(c.feed_angle)),
+        "feed_direction": _direction(c.feed_angle),
         "limit_depth_mm": cut.limit_depth * 1e3,
     }
 
@@ -285,7 +267,7 @@ def _show(planned: PlannedCuts) -> None:
         numbers = (
             f"{to_rpm(c.spindle_speed):.0f}",
             f"{c.axial_depth * 1e3:g}",
-            _direction(c.feed_angle).strip('"'),
+            str(_direction(c.feed_angle)),
             limit,
             *(f"{100.0 * v:.3f}" for v in after),
         )

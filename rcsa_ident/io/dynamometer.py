@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.setups import read_toml
+from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_keys, workpiece_of
 from rcsa_ident.machining_setup import Workpiece
@@ -22,18 +23,10 @@ def write_workpiece(path: str | Path, workpiece: Workpiece, remarks: Sequence[st
     remarks : sequence of str
         Comments above it, a line each.
     """
-    lines = [f"# {' '.join(remark.split())}" for remark in remarks] + ["[workpiece]"]
-    for key, value in workpiece_keys(workpiece, all_spreads=True).items():
-        lines.append(f"{key} = {_quoted(value) if isinstance(value, str) else format(value, '.7g')}")
-    write_text(path, "\n".join(lines) + "\n")
+    write_text(path, toml_of({"workpiece": workpiece_keys(workpiece, all_spreads=True)}, remarks, digits=7))
 
 
 def read_workpiece(path: str | Path) -> Workpiece:
     """Return the workpiece of a file with a ``[workpiece]`` table; other tables are left alone."""
     top = Table(read_toml(path, "workpiece"), str(path))
     return workpiece_of(top.table("workpiece", WORKPIECE_KEYS))
-
-
-def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Sequence
+from itertools import takewhile
 from pathlib import Path
 from typing import NamedTuple
+
+import tomlkit
+from tomlkit.items import Table
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import read_bytes, write_text
 from rcsa_ident.io.frf_files import read_frfs
 from rcsa_ident.io.setups import LARGEST_SETUP, read_tooling
+from rcsa_ident.io.toml_text import one_line
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.tool_holder.geometry import Contact
 
@@ -93,43 +97,28 @@ def write_calibrated_tooling(source: str | Path, target: str | Path, contact: Co
         The new one.
     remarks : sequence of str
         Written above it as comments.
-
-    Raises
-    ------
-    InputError
-        The contact stands in the file in a way that cannot be replaced line by line.
     """
-    text = read_bytes(source, "tooling", LARGEST_SETUP).decode("utf-8-sig")
     values = {
         "translational_stiffness": ("N/m per m", contact.translational_stiffness),
         "rotational_stiffness": ("N m/rad per m", contact.rotational_stiffness),
         "translational_damping": ("N s/m per m", contact.translational_damping),
         "rotational_damping": ("N m s/rad per m", contact.rotational_damping),
     }
-    block = ["[contact]", *(f"# {' '.join(remark.split())}" for remark in remarks)]
-    block += [f"{key} = {value:.8g}  # {unit}" for key, (unit, value) in values.items()]
-    lines = text.splitlines()
-    start = next((i for i, line in enumerate(lines) if re.match(r"\s*\[\s*contact\s*\]", line)), None)
-    if start is None:
-        lines += ["", *block]
+    table = tomlkit.table()
+    for remark in remarks:
+        table.add(tomlkit.comment(one_line(remark)))
+    for key, (unit, value) in values.items():
+        table.add(key, tomlkit.item(float(f"{value:.8g}")).comment(unit))
+    read_tooling(source)  # what is no tooling is refused before it is touched
+    document = tomlkit.parse(read_bytes(source, "tooling", LARGEST_SETUP).decode("utf-8-sig"))
+    before = document.get("contact")
+    if isinstance(before, Table) and before.display_name is not None:
+        # what stands between its last key and the next table belongs to that one
+        left = list(takewhile(lambda entry: entry[0] is None, reversed(before.value.body)))
+        for _, item in reversed(left):
+            table.value.append(None, item)
+        document["contact"] = table
     else:
-        end = next((i for i in range(start + 1, len(lines)) if re.match(r"\s*\[", lines[i])), len(lines))
-        # what stands in front of the next table belongs to it
-        while end > start + 1 and (not lines[end - 1].strip() or lines[end - 1].lstrip().startswith("#")) and end < len(lines):
-            end -= 1
-        lines[start:end] = block
-    before = Path(target).read_bytes() if Path(target).is_file() else None
-    write_text(target, "\n".join(lines) + "\n")
-    try:
-        read = read_tooling(target).assembly
-        complete = read.contact is not None and all(
-            abs(getattr(read.contact, key) - value) <= 1e-5 * value for key, (_, value) in values.items()
-        )
-    except InputError:
-        complete = False
-    if not complete:
-        if before is None:
-            Path(target).unlink(missing_ok=True)
-        else:
-            Path(target).write_bytes(before)
-        raise InputError("contact", "a table in another form", "a table [contact] with one key per line, or no such table", str(source))
+        document.pop("contact", None)
+        document.append("contact", table)
+    write_text(target, tomlkit.dumps(document))

@@ -34,7 +34,7 @@ from rcsa_ident.plausibility import (
 )
 from rcsa_ident.signals.recording import Quantity, Sensor
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, clamped
-from rcsa_ident.units import from_rpm
+from rcsa_ident.units import from_rpm, to_rpm
 
 CAMPAIGN_FILE = "campaign.toml"
 LARGEST_SETUP = 4 * MEGABYTE
@@ -320,6 +320,33 @@ def feed_angle_of(table: Table) -> float:
     if degrees is None or abs(degrees) > 360.0:
         table.refuse("feed_direction", describe(value), allowed)
     return float(np.radians(degrees))
+
+
+def feed_direction_of(angle: float) -> str | float:
+    """Return what ``feed_direction`` says of an angle [rad]: an axis, or degrees from +X."""
+    return next((axis for axis, known in FEED_DIRECTIONS.items() if abs(angle - known) < 1e-12), float(np.degrees(angle)))
+
+
+def cut_keys(name: str, tooling: str, conditions: CuttingConditions) -> dict[str, Any]:
+    """Return an entry of ``[[cuts]]``; its recordings are named after it.
+
+    Parameters
+    ----------
+    name, tooling : str
+    conditions : CuttingConditions
+    """
+    return {
+        "id": name,
+        "tooling": tooling,
+        "spindle_speed_rpm": to_rpm(conditions.spindle_speed),
+        "axial_depth_mm": conditions.axial_depth * 1e3,
+        "feed_per_tooth_mm": conditions.feed_per_tooth * 1e3,
+        "entry_angle_deg": float(np.degrees(conditions.engagement.entry)),
+        "exit_angle_deg": float(np.degrees(conditions.engagement.exit)),
+        "feed_direction": feed_direction_of(conditions.feed_angle),
+        "cut": f"recordings/{name}_cut.h5",
+        "air": f"recordings/{name}_air.h5",
+    }
 
 
 def _inside(folder: Path, table: Table, key: str) -> Path:

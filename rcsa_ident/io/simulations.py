@@ -6,14 +6,18 @@ import shutil
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import filling, write_text
 from rcsa_ident.io.hdf5 import write_hdf5
 from rcsa_ident.io.machines import MachineFile
+from rcsa_ident.io.setups import cut_keys
+from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.workpieces import workpiece_keys
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.units import to_rpm
@@ -132,59 +136,30 @@ def _write_columns(path: Path, first: tuple[str], abscissa: FloatArray, values: 
 def _campaign_text(setup: MachineFile, toolings: Sequence[Tooling]) -> str:
     """The campaign file, as a machinist would write it."""
     suite, plan = setup.sensors, setup.plan
-    lines = ["[campaign]", f"name = {_quoted(setup.name)}", f"sampling_rate_hz = {suite.rate!r}"]
-    for axis in "XY":
-        lines += _sensor("flange", "displacement", axis, suite.gap_sensitivity, suite.gap_delay, suite.gap_bandwidth)
-    for axis in "XY":
-        lines += _sensor(
-            "fixture", "acceleration", axis, suite.acceleration_sensitivity, suite.acceleration_delay, suite.acceleration_bandwidth
-        )
+    gap = ("displacement", suite.gap_sensitivity, suite.gap_delay, suite.gap_bandwidth)
+    acceleration = ("acceleration", suite.acceleration_sensitivity, suite.acceleration_delay, suite.acceleration_bandwidth)
+    sensors = {
+        f"{place}_{axis.lower()}": _sensor(axis, *what) for place, what in (("flange", gap), ("fixture", acceleration)) for axis in "XY"
+    }
     if suite.trigger:
-        lines += [
-            "[sensors.trigger]",
-            'quantity = "trigger"',
-            "pulses_per_revolution = 1",
-            f"tooth_angle_deg = {np.degrees(suite.tooth_angle):.9g}",
-        ]
-    lines.append("[workpiece]")
-    for key, value in workpiece_keys(setup.workpiece).items():
-        lines.append(f"{key} = {_quoted(value) if isinstance(value, str) else format(value, '.9g')}")
-    lines += ["[toolings]", *(f"{_quoted(t.name)} = {_quoted(f'toolings/{t.name}.toml')}" for t in toolings)]
-    for tooling in toolings:
-        for i, speed in enumerate(plan.spindle_speeds):
-            cut = f"{tooling.name}-{i:02d}"
-            lines += [
-                "[[cuts]]",
-                f"id = {_quoted(cut)}",
-                f"tooling = {_quoted(tooling.name)}",
-                f"spindle_speed_rpm = {to_rpm(speed):.9g}",
-                f"axial_depth_mm = {plan.axial_depth * 1e3:.9g}",
-                f"feed_per_tooth_mm = {plan.feed_per_tooth * 1e3:.9g}",
-                f"entry_angle_deg = {np.degrees(plan.engagement.entry):.9g}",
-                f"exit_angle_deg = {np.degrees(plan.engagement.exit):.9g}",
-                f"feed_direction = {_feed(plan.feed_angle)}",
-                f"cut = {_quoted(f'recordings/{cut}_cut.h5')}",
-                f"air = {_quoted(f'recordings/{cut}_air.h5')}",
-            ]
-    return "\n".join(lines) + "\n"
+        angle = float(f"{np.degrees(suite.tooth_angle):.9g}")
+        sensors["trigger"] = {"quantity": "trigger", "pulses_per_revolution": 1, "tooth_angle_deg": angle}
+    cuts = [
+        cut_keys(
+            f"{tooling.name}-{i:02d}",
+            tooling.name,
+            CuttingConditions(speed, plan.axial_depth, plan.feed_per_tooth, plan.engagement, plan.feed_angle),
+        )
+        for tooling in toolings
+        for i, speed in enumerate(plan.spindle_speeds)
+    ]
+    exact = {"campaign": {"name": setup.name, "sampling_rate_hz": suite.rate}, "sensors": sensors}
+    rest = {"workpiece": workpiece_keys(setup.workpiece), "toolings": {t.name: f"toolings/{t.name}.toml" for t in toolings}, "cuts": cuts}
+    return toml_of(exact) + "\n" + toml_of(rest, digits=9)
 
 
-def _sensor(place: str, quantity: str, axis: str, sensitivity: float, delay: float, bandwidth: float | None) -> list[str]:
-    lines = [f"[sensors.{place}_{axis.lower()}]", f'quantity = "{quantity}"', f'axis = "{axis}"', f"sensitivity = {sensitivity!r}"]
+def _sensor(axis: str, quantity: str, sensitivity: float, delay: float, bandwidth: float | None) -> dict[str, Any]:
+    found: dict[str, Any] = {"quantity": quantity, "axis": axis, "sensitivity": sensitivity}
     if delay != 0.0:
-        lines.append(f"delay_s = {delay!r}")
-    if bandwidth is not None:
-        lines.append(f"bandwidth_hz = {bandwidth!r}")
-    return lines
-
-
-def _feed(angle: float) -> str:
-    for name, known in (("+X", 0.0), ("+Y", 0.5 * np.pi), ("-X", np.pi), ("-Y", -0.5 * np.pi)):
-        if abs(angle - known) < 1e-12:
-            return f'"{name}"'
-    return f"{np.degrees(angle):.9g}"
-
-
-def _quoted(text: str) -> str:
-    """A TOML string."""
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+        found["delay_s"] = delay
+    return found if bandwidth is None else found | {"bandwidth_hz": bandwidth}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.io.files import write_text
+from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.catalogue import CatalogueHolder
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Material
@@ -52,9 +52,7 @@ def tooling_keys(tooling: Tooling) -> dict[str, Any]:
 def holder_keys(holder: CatalogueHolder) -> dict[str, Any]:
     """Return a holder of the catalogue as `holder` of a tooling file, in millimetres."""
     names = {material: name for name, material in MATERIALS.items()}
-    # metres and back leave a last digit that nobody wrote
-    rows = [{k: round(v, 6) if isinstance(v, float) else v for k, v in _segment(s, names).items()} for s in holder.segments]
-    return {"insertion_mm": round(1e3 * holder.insertion, 6), "segments": rows}
+    return {"insertion_mm": 1e3 * holder.insertion, "segments": [_segment(s, names) for s in holder.segments]}
 
 
 def tooling_text(data: Mapping[str, Any], notes: Sequence[str] = ()) -> str:
@@ -66,18 +64,8 @@ def tooling_text(data: Mapping[str, Any], notes: Sequence[str] = ()) -> str:
     notes : sequence of str
         Remarks in front of it.
     """
-    lines = [f"# {note}" for note in notes]
-    lines += [f"name = {json.dumps(data['name'], ensure_ascii=False)}"] if "name" in data else []
-    for key in ("cutter", "tool", "holder", "contact"):
-        if key not in data:
-            continue
-        lines.append(f"[{key}]")
-        lines += [f"{name} = {_value(value)}" for name, value in data[key].items() if name != "segments"]
-        if "segments" in data[key]:
-            lines += ["segments = [", *(f"  {_inline(segment)}," for segment in data[key]["segments"]), "]"]
-    for name, material in data.get("materials", {}).items():
-        lines += [f"[materials.{json.dumps(name)}]", *(f"{key} = {_value(value)}" for key, value in material.items())]
-    return "\n".join(lines) + "\n"
+    # metres and back leave a last digit that nobody wrote
+    return toml_of(data, notes, digits=12)
 
 
 def _segment(segment: BeamSegment, names: Mapping[Material, str]) -> dict[str, Any]:
@@ -99,16 +87,3 @@ def _material(material: Material) -> dict[str, float]:
         "poisson": material.poisson,
         "loss_factor": material.loss_factor,
     }
-
-
-def _inline(segment: Mapping[str, Any]) -> str:
-    return "{ " + ", ".join(f"{k} = {_value(v)}" for k, v in segment.items()) + " }"
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, list):
-        return f"[{', '.join(map(_value, value))}]"
-    # metres and back leave a last digit that nobody wrote
-    return str(value) if isinstance(value, int) else repr(round(value, 9)) if abs(value) < 1e6 else repr(float(value))

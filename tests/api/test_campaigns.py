@@ -15,10 +15,10 @@ import pytest
 from api.reading.campaign_text import FORMATS, campaign_of_text, declare, files_of, recording_name, toml_text
 from api.reading.campaigns import load_campaign
 from api.transfer.archives import zipped
-from api.work.toolings import toml_of
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.recordings import READERS, read_cut
 from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.io.toolings import tooling_keys
 from rcsa_ident.workflows.identify import judge_cut
 from tests.api.in_process import refused
@@ -26,11 +26,6 @@ from tests.api.recordings import TOOLING, content, declared
 from tests.fixtures.paths import SAMPLES
 
 TOML = {"Content-Type": "application/toml"}
-
-
-def as_toml(data):
-    head = {key: value for key, value in data.items() if key != "cuts"}
-    return toml_of(head) + "".join(f"[[cuts]]\n{toml_of(cut)}" for cut in data["cuts"])
 
 
 @pytest.fixture
@@ -62,7 +57,7 @@ def test_a_campaign_from_making_to_forgetting(client, machine):
 
 def test_toml_and_json_say_the_same(client, machine):
     data = declared(2, toolings={"T1": {**TOOLING, "materials": {"carbide": {"loss_factor": 0.004}}}})
-    one, other = client.make_campaign(machine, data), client.make_campaign(machine, as_toml(data))
+    one, other = client.make_campaign(machine, data), client.make_campaign(machine, toml_of(data))
     assert one.model_copy(update={"id": "", "created": ""}) == other.model_copy(update={"id": "", "created": ""})
     assert client.campaign_file(one.id) == client.campaign_file(other.id)
     # which is a campaign again
@@ -183,7 +178,7 @@ def test_what_is_wrong_is_named(client, machine, changed, field):
     data = broken(**changed)
     assert refused(422, client.make_campaign, machine, data).errors[0].field == field
     try:
-        text = as_toml(data)
+        text = toml_of(data)
         tomllib.loads(text)
     except tomllib.TOMLDecodeError:
         return
@@ -195,12 +190,12 @@ def test_what_is_wrong_is_named(client, machine, changed, field):
 def test_forms_that_are_none(client, machine):
     for data in ({}, {"cuts": []}, declared() | {"cuts": "x"}, declared(further=1), declared(toolings={"T1": 7})):
         refused(422, client.make_campaign, machine, data)
-    for text in ("", "= 1", "[cuts]", "cuts = 1", "[[cuts]]", "cuts = []", as_toml(declared()).replace("0.26", "nan"), "a = 1979-05-27"):
+    for text in ("", "= 1", "[cuts]", "cuts = 1", "[[cuts]]", "cuts = []", toml_of(declared()).replace("0.26", "nan"), "a = 1979-05-27"):
         refused(422, client.make_campaign, machine, text)
     many = declared()
     many["cuts"] = [{**many["cuts"][0], "id": f"c{k}", "cut": f"{k}.h5"} for k in range(2001)]
     assert refused(422, client.make_campaign, machine, many).errors[0].field == "cuts"
-    refused(413, client.make_campaign, machine, as_toml(declared()) + "# " + "x" * 1_000_000)
+    refused(413, client.make_campaign, machine, toml_of(declared()) + "# " + "x" * 1_000_000)
 
 
 def test_a_tooling_that_would_cost_too_much_is_refused(client, machine):

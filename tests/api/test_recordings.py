@@ -399,14 +399,13 @@ def test_a_folder_as_a_whole(client, tmp_path):
     (folder / "recordings").mkdir(parents=True)
     (folder / "toolings").mkdir()
     data = declared(2)
-    from api.work.toolings import toml_of
+    from rcsa_ident.io.toml_text import toml_of
     from tests.api.recordings import TOOLING
 
     (folder / "toolings" / "x.toml").write_text(toml_of(TOOLING))
     for cut in data["cuts"]:
         cut |= {key: f"recordings/{cut[key]}" for key in ("cut", "air")}
-    head = {key: value for key, value in data.items() if key != "cuts"} | {"toolings": {"T1": "toolings/x.toml"}}
-    (folder / "campaign.toml").write_text(toml_of(head) + "".join(f"[[cuts]]\n{toml_of(cut)}" for cut in data["cuts"]))
+    (folder / "campaign.toml").write_text(toml_of(data | {"toolings": {"T1": "toolings/x.toml"}}))
     for k in range(2):
         made(folder / "recordings", f"c{k}_cut.h5", k)
         made(folder / "recordings", f"c{k}_air.h5", k, True)

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from api.work.toolings import MOST_ELEMENTS, toml_of, tooling_of, weigh
+from api.work.toolings import MOST_ELEMENTS, tooling_of, weigh
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.tool_holder.model import tool_holder_structure
 from tests.api.in_process import refused
 from tests.fixtures import by_hand
