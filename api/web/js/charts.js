@@ -23,6 +23,13 @@ export function uplot() {
   return streaming;
 }
 
+let unpacking = null;
+/** zip.js itself. */
+export function zipjs() {
+  unpacking ??= script("zip/zip-core.min.js").then(() => window.zip);
+  return unpacking;
+}
+
 /** The value of a colour of the page, as it is now. */
 export function colour(name, alpha = 1) {
   const probe = h("span", { hidden: true });
