@@ -138,3 +138,18 @@ def test_turning_lines_by_an_angle():
     np.testing.assert_array_equal(turned[6:], 0.0)
     np.testing.assert_array_equal(variance, noise[[0, 1, 2, 3, 4, 5, 5, 5]])
     assert frf.turned(lines, noise, 0.3, 3)[0].shape[0] == 4
+
+
+@pytest.mark.parametrize("name", ["h1", "h2", "coherence"])
+def test_the_same_as_an_analyser_of_modal_tests(name):
+    """Noisy hits and their answers, averaged by another implementation."""
+    from pyFRF import FRF
+
+    rng = np.random.default_rng(7)
+    hit = rng.standard_normal((12, 1024))
+    answer = np.array([np.convolve(each, [0.3, 0.2, -0.1])[:1024] for each in hit]) + 0.2 * rng.standard_normal(hit.shape)
+    measured = hit + 0.1 * rng.standard_normal(hit.shape)
+    other = FRF(1000, exc=measured[:, None], resp=answer[:, None], exc_type="f", resp_type="d", window="none")
+    found = getattr(other, f"get_{name if name == 'coherence' else name.upper()}")().reshape(-1)
+    own = getattr(frf, name)(np.fft.rfft(answer), np.fft.rfft(measured))
+    np.testing.assert_allclose(own[1:-1], found[1:-1], rtol=1e-12, atol=1e-14)
