@@ -1,0 +1,133 @@
+"""A process that reads strangers' files cuts itself off first: from files, network, other processes and programs, where the kernel can.
+
+Linux's Landlock closes the file system and TCP, a seccomp filter the rest. Neither needs rights, neither can be taken back. The
+numbers and structures are those of the kernel's headers linux/landlock.h, linux/seccomp.h and linux/filter.h.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import errno
+import os
+import platform
+import struct
+import sys
+import sysconfig
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+_NO_NEW_PRIVILEGES = 38
+_CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446
+_VERSION_FLAG, _PATH_BENEATH = 1, 1
+#: Rights over files by the version of Landlock that knows them: all of the first, then moves, truncation, device control.
+_FILE_RIGHTS = {1: (1 << 13) - 1, 2: 1 << 13, 3: 1 << 14, 5: 1 << 15}
+_READ_FILE, _READ_FOLDER, _WRITE_FILE, _REMOVE_FILE, _MAKE_FILE, _TRUNCATE = 1 << 2, 1 << 3, 1 << 1, 1 << 5, 1 << 8, 1 << 14
+_FOR_A_FILE = _READ_FILE | _WRITE_FILE | _TRUNCATE
+_TCP, _OUTSIDE = (1 << 2) - 1, (1 << 2) - 1
+
+_ALLOW, _DENY = 0x7FFF0000, 0x00050000 | errno.EACCES
+#: Architecture as the filter sees it, the call that installs one, and what is denied: socket, connect, ptrace, process_vm_readv and
+#: _writev, execve and execveat, kill, and (the same everywhere) io_uring_setup, pidfd_send_signal, pidfd_getfd.
+_CALLS = {
+    "x86_64": (0xC000003E, 317, (41, 42, 101, 310, 311, 59, 322, 62)),
+    "aarch64": (0xC00000B7, 277, (198, 203, 117, 270, 271, 221, 281, 129)),
+}
+_EVERYWHERE = (424, 425, 438)
+_FIRST_OF_X32 = 0x40000000
+
+
+@dataclass(frozen=True, slots=True)
+class Confinement:
+    """What holds in a process that has cut itself off.
+
+    Parameters
+    ----------
+    files : bool
+        It opens nothing but what it was told.
+    network : bool
+        It makes no socket of any kind, starts no program and touches no other process.
+    """
+
+    files: bool = False
+    network: bool = False
+
+    def __str__(self) -> str:
+        if self.files and self.network:
+            return "cut off from other files, the network and other processes"
+        if self.files or self.network:
+            return f"cut off from {'other files' if self.files else 'the network and other processes'} only: this system cannot do more"
+        return "held by limits of memory and time only: this system cannot cut it off from files and network"
+
+
+def confine(readable: Iterable[Path], writable: Iterable[Path] = ()) -> Confinement:
+    """Cut this process off; to be called by its only thread, for those that run already are not reached.
+
+    Parameters
+    ----------
+    readable : iterable of Path
+        Files, and folders with all below them, that may still be read. Python's own are, too.
+    writable : iterable of Path
+        Folders in which files may be read, made, written and removed.
+    """
+    if sys.platform != "linux":
+        return Confinement()
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0) != 0:
+        return Confinement()
+    return Confinement(_close_files(libc, [*readable, *_python()], writable), _close_calls(libc))
+
+
+def _python() -> list[Path]:
+    """Where modules and their libraries are; what is imported late is still found."""
+    places = [*sys.path, sys.prefix, sys.base_prefix, *sysconfig.get_paths().values(), "/usr/lib", "/lib", "/lib64", "/usr/share/zoneinfo"]
+    return [Path(place) for place in dict.fromkeys(places) if place and Path(place) != Path.cwd() and Path(place).exists()]
+
+
+def _close_files(libc: ctypes.CDLL, readable: Iterable[Path], writable: Iterable[Path]) -> bool:
+    version = libc.syscall(_CREATE_RULESET, None, 0, _VERSION_FLAG)
+    if version < 1:
+        return False
+    rights = sum(right for since, right in _FILE_RIGHTS.items() if since <= version)
+    numbers = [rights, *([_TCP] if version >= 4 else []), *([_OUTSIDE] if version >= 6 else [])]
+    attributes = struct.pack(f"={len(numbers)}Q", *numbers)
+    rules = libc.syscall(_CREATE_RULESET, attributes, len(attributes), 0)
+    if rules < 0:
+        return False
+    try:
+        # nothing outside is executed: the libraries that are loaded need no right for it
+        _allow(libc, rules, readable, (_READ_FILE | _READ_FOLDER) & rights)
+        _allow(libc, rules, writable, (_FOR_A_FILE | _READ_FOLDER | _REMOVE_FILE | _MAKE_FILE) & rights)
+        return libc.syscall(_RESTRICT_SELF, rules, 0) == 0
+    finally:
+        os.close(rules)
+
+
+def _allow(libc: ctypes.CDLL, rules: int, paths: Iterable[Path], rights: int) -> None:
+    for path in paths:
+        with contextlib.suppress(FileNotFoundError, PermissionError):
+            place = os.open(path, os.O_PATH | os.O_CLOEXEC)
+            try:
+                beneath = struct.pack("=Qi", rights if path.is_dir() else rights & _FOR_A_FILE, place)
+                if libc.syscall(_ADD_RULE, rules, _PATH_BENEATH, beneath, 0) != 0:
+                    raise OSError(ctypes.get_errno(), "Landlock refuses a rule", str(path))
+            finally:
+                os.close(place)
+
+
+def _close_calls(libc: ctypes.CDLL) -> bool:
+    """Deny calls by number in all threads of this process."""
+    if platform.machine() not in _CALLS:
+        return False
+    machine, install, numbers = _CALLS[platform.machine()]
+    denied = (*numbers, *_EVERYWHERE)
+    load, equal, at_least, end = 0x20, 0x15, 0x35, 0x06
+    # a list of (code, jump if true, jump if false, number): another architecture's calls are denied, and those of the 32-bit ABI
+    rows = [(load, 0, 0, 4), (equal, 1, 0, machine), (end, 0, 0, _DENY), (load, 0, 0, 0), (at_least, len(denied) + 1, 0, _FIRST_OF_X32)]
+    rows += [(equal, len(denied) - i, 0, number) for i, number in enumerate(denied)]
+    rows += [(end, 0, 0, _ALLOW), (end, 0, 0, _DENY)]
+    code = ctypes.create_string_buffer(b"".join(struct.pack("=HBBI", *row) for row in rows))
+    program = struct.pack("@HP", len(rows), ctypes.addressof(code))
+    everyone = 1
+    return libc.syscall(install, 1, everyone, program) == 0
