@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import time
-import tomllib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from functools import partial
@@ -17,6 +16,7 @@ import httpx2
 from api.client.asking import Asking, Json, ServiceError, read
 from api.schemas.campaigns import CampaignAnswer, CampaignSummary, RecordingAnswer, SignalAnswer, SpectrumAnswer, UploadAnswer
 from api.schemas.common import Page
+from rcsa_ident.io.toml_text import read_toml
 
 _BLOCK = 1 << 20
 
@@ -172,8 +172,8 @@ class Uploads(Asking):
         report : callable, optional
             Called with each stored recording.
         """
-        data = tomllib.loads((folder / "campaign.toml").read_text(encoding="utf-8-sig"))
-        toolings = {name: tomllib.loads((folder / path).read_text(encoding="utf-8-sig")) for name, path in data["toolings"].items()}
+        data = read_toml(folder / "campaign.toml", "campaign")
+        toolings = {name: read_toml(folder / path, "tooling") for name, path in data["toolings"].items()}
         campaign = self.make_campaign(machine, {**data, "toolings": toolings})
         # air cuts first: each cut is then judged once
         paths = dict.fromkeys(cut[key] for key in ("air", "cut") for cut in data["cuts"] if key in cut)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path as Folder
 from typing import Annotated
 
@@ -17,6 +16,7 @@ from api.security import Guarded
 from api.transfer.archives import zipped, zipped_bytes
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_campaign
+from rcsa_ident.io.toml_text import read_toml
 
 router = APIRouter(prefix="/examples", tags=["examples"], route_class=Guarded)
 _FOLDER = Folder(__file__).resolve().parents[1] / "examples"
@@ -67,8 +67,7 @@ def _sample(components: Components) -> list[tuple[str, Folder]]:
     folder = components.settings.examples
     try:
         campaign = read_campaign(folder)
-        with (folder / "campaign.toml").open("rb") as file:
-            toolings = [folder / str(each) for each in tomllib.load(file)["toolings"].values()]
+        toolings = [folder / str(each) for each in read_toml(folder / "campaign.toml", "campaign")["toolings"].values()]
     except (InputError, OSError, KeyError, AttributeError):
         return []
     root = folder.resolve()

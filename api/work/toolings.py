@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from api.work.requests import ToolingSource
 from rcsa_ident.errors import InputError
 from rcsa_ident.io import setups
+from rcsa_ident.io.toml_text import keys_of_toml
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import expected_elements
@@ -33,12 +33,7 @@ def tooling_from(source: ToolingSource) -> Tooling:
 
 def parsed(text: str) -> dict[str, Any]:
     """Return the keys of a TOML text."""
-    try:
-        return tomllib.loads(text)
-    except RecursionError:
-        raise InputError("tooling", "lists in lists without end", "TOML") from None
-    except ValueError as error:
-        raise InputError("tooling", f"a TOML error ({error})", "TOML") from None
+    return keys_of_toml(text, "tooling")
 
 
 def weigh(assembly: ToolAssembly, highest_hz: float) -> None:

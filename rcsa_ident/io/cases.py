@@ -9,8 +9,9 @@ import numpy as np
 
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.setups import feed_angle_of, read_toml, read_tooling
+from rcsa_ident.io.setups import feed_angle_of, read_tooling
 from rcsa_ident.io.tested_cuts import read_tested_cuts
+from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.plausibility import FEED_PER_TOOTH

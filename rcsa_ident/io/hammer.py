@@ -14,8 +14,8 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import read_bytes, write_text
 from rcsa_ident.io.frf_files import read_frfs
-from rcsa_ident.io.setups import LARGEST_SETUP, read_tooling
-from rcsa_ident.io.toml_text import one_line
+from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.io.toml_text import LARGEST_SETUP, one_line
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.tool_holder.geometry import Contact
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from rcsa_ident.cutting.conditions import Engagement
-from rcsa_ident.io.setups import beam_segments, feed_angle_of, material_library, read_toml
+from rcsa_ident.io.setups import beam_segments, feed_angle_of, material_library
+from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Workpiece

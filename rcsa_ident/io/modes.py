@@ -8,7 +8,7 @@ import numpy as np
 
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel, normal_modes
-from rcsa_ident.io.setups import read_toml
+from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.units import from_hz
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
@@ -16,7 +14,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.files import MEGABYTE, read_bytes
+from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Campaign, Cut, Tooling
@@ -37,7 +35,6 @@ from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Mat
 from rcsa_ident.units import from_rpm, to_rpm
 
 CAMPAIGN_FILE = "campaign.toml"
-LARGEST_SETUP = 4 * MEGABYTE
 FEED_DIRECTIONS = {"+X": 0.0, "-X": np.pi, "+Y": 0.5 * np.pi, "-Y": -0.5 * np.pi}
 
 _TOOLING = ("name", "cutter", "tool", "holder", "contact", "materials")
@@ -68,24 +65,6 @@ _CUT = (
     "cut",
     "air",
 )
-
-
-def read_toml(path: str | Path, field: str) -> dict[str, Any]:
-    """Return the content of a TOML file; a syntax error names its line."""
-    raw = read_bytes(path, field, LARGEST_SETUP)
-    try:
-        return tomllib.loads(raw.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
-        raise InputError(field, "a character that is not UTF-8", "text in UTF-8", f"{path} line {line}") from None
-    except RecursionError:
-        raise InputError(field, "lists nested too deeply", "TOML", str(path)) from None
-    except ValueError as error:
-        text = str(error)
-        line_found = re.search(r"\(at line (\d+), column \d+\)", text)
-        where = f"{path} line {line_found[1]}" if line_found else str(path)
-        found = text[: line_found.start()].strip() if line_found else text
-        raise InputError(field, f"a TOML error ({found})", "TOML", where) from None
 
 
 def read_tooling(path: str | Path) -> Tooling:

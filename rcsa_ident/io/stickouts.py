@@ -7,7 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.setups import beam_segments, material_library, read_toml, read_tooling
+from rcsa_ident.io.setups import beam_segments, material_library, read_tooling
+from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.geometry import clamped

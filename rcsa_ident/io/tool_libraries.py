@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import json
 import re
-import tomllib
 import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
@@ -21,6 +20,7 @@ from rcsa_ident.cutting.shape import CutterShape, cylinder_remark
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes
 from rcsa_ident.io.setups import tooling_of
+from rcsa_ident.io.toml_text import keys_of_toml
 from rcsa_ident.io.toolings import tooling_text
 from rcsa_ident.io.validated_table import Table, listed
 from rcsa_ident.machining_setup import Tooling
@@ -178,7 +178,7 @@ def import_tools(raw: bytes, where: str, assumptions: Assumptions | None = None,
         try:
             data, notes = _tooling(Table(entry, where, place), name, given, spare)
             text = tooling_text(data, notes)
-            tooling = tooling_of(tomllib.loads(text), where, name)
+            tooling = tooling_of(keys_of_toml(text, "tooling", where), where, name)
             found.append(Imported(number, name, kind, tooling, text, tuple(notes), ""))
         except _Skipped as skipped:
             found.append(Imported(number, name, kind, None, "", (), str(skipped)))

@@ -38,7 +38,7 @@ def test_receptance_of_the_modes(tmp_path):
     ("old", "new", "words"),
     [
         ("[[x]]", "[[z]]", r"z: found an unknown key"),
-        ("[[x]]", "[x]", r"line 5: modes: found a TOML error"),
+        ("[[x]]", "[x]", r"line 5, column 3: modes: found a TOML error"),
         ("damping_ratio = 0.02", "damping_ratio = 2", r"x\[0\]\.damping_ratio: found 2"),
         ("modal_mass_kg = 0.04", "", r"x\[0\]\.modal_mass_kg: found nothing, allowed is one of"),
         ("modal_mass_kg = 0.04", "modal_mass_kg = 1\nstiffness_n_per_m = 1", r"x\[0\]\.modal_mass_kg: found both"),

@@ -118,16 +118,16 @@ def test_rounded_pitch_is_a_full_turn(tmp_path_factory, angles, decimals):
 
 CARBIDE = '12.0, material = "carbide"'
 BROKEN_TOOLINGS = [
-    ("teeth = 4", "teeth = = 4", ["line 3", "tooling", "a TOML error (Invalid value)"]),
-    ("teeth = 4", "teeth = 4\nteeth = 4", ["line 4", "Cannot overwrite a value"]),
+    ("teeth = 4", "teeth = = 4", ["line 3", "tooling", "a TOML error (extra `=`, expected nothing)"]),
+    ("teeth = 4", "teeth = 4\nteeth = 4", ["line 4", "duplicate key"]),
     ("teeth = 4", "", ["cutter.teeth", "found nothing", "a whole number at least 1 and at most 100"]),
     ("teeth = 4", "teeth = 4.5", ["cutter.teeth", "found 4.5", "a whole number"]),
     ("teeth = 4", "teeth = true", ["cutter.teeth", "found true"]),
     ("teeth = 4", "theeth = 4", ["cutter.theeth", "an unknown key", "did you mean teeth?"]),
     ("diameter_mm = 12.0", "diameter_mm = 0", ["cutter.diameter_mm", "found 0", "at least 0.05", "[mm]"]),
     ("diameter_mm = 12.0", "diameter_mm = nan", ["cutter.diameter_mm", "found nan", "a finite number"]),
-    ("diameter_mm = 12.0", "diameter_mm = 1e400", ["cutter.diameter_mm", "found inf"]),
-    ("diameter_mm = 12.0", f"diameter_mm = 1{'0' * 400}", ["cutter.diameter_mm", "a number too large"]),
+    ("diameter_mm = 12.0", "diameter_mm = inf", ["cutter.diameter_mm", "found inf"]),
+    ("diameter_mm = 12.0", f"diameter_mm = 1{'0' * 400}", ["line 4, column 15", "integer number overflowed"]),
     ("diameter_mm = 12.0", 'diameter_mm = "12"', ["cutter.diameter_mm", 'the text "12"', "a finite number"]),
     ("diameter_mm = 12.0", "diameter_mm = 2026-11-01", ["cutter.diameter_mm", "date 2026-11-01"]),
     ("helix_deg = 30.0", "helix_deg = 89", ["cutter.helix_deg", "at most 80 [deg]"]),
