@@ -14,6 +14,7 @@ from api import data_folder, problems
 from api.access import AccessMonitor
 from api.components import Components, Rates
 from api.files import Files
+from api.head_requests import HeadRequests
 from api.jobs.event_feed import EventFeeds
 from api.jobs.supervisor import Supervisor
 from api.metrics import JobCounts, Metrics
@@ -122,6 +123,7 @@ def create_app(
     about = (keys, machines, toolings, versions, libraries, holders, materials, examples)
     for each in (*about, campaigns, recordings, resumable_upload, multi_upload, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
+    app.add_middleware(HeadRequests, router=app.router)
     app.add_middleware(AccessMonitor, components=components)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
     return app

@@ -103,7 +103,7 @@ def _short(text: str) -> str:
 def _allowed(app: FastAPI, path: str) -> str:
     """Return all methods of a path; a route knows its own only."""
     matching = (item for known, item in app.openapi()["paths"].items() if re.fullmatch(re.sub(r"\{\w+\}", "[^/]+", known), path))
-    return ", ".join(sorted({method.upper() for item in matching for method in item}))
+    return ", ".join({method.upper() for item in matching for method in item})
 
 
 def install(app: FastAPI) -> None:
@@ -132,8 +132,9 @@ def install(app: FastAPI) -> None:
         }
         detail = words.get(error.status_code, title(error.status_code))
         headers = dict(error.headers or {})
-        if error.status_code == 405 and (methods := _allowed(app, request.url.path)):
-            headers["Allow"] = methods
+        if error.status_code == 405:
+            methods = set((_allowed(app, request.url.path) or headers.get("Allow", "")).split(", "))
+            headers["Allow"] = ", ".join(sorted(methods | ({"HEAD"} if "GET" in methods else set())))
         return document(request, Problem(error.status_code, detail, headers=headers))
 
     app.add_exception_handler(Problem, known)

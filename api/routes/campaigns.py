@@ -17,7 +17,7 @@ from api.conventions import BODY, After, CampaignId, Limit, MachineId, Repeat, g
 from api.files import UPLOADS
 from api.lookups import known_campaign, machine_of
 from api.problems import Problem
-from api.reading.campaign_text import LARGEST, declare, files_of, toml_text
+from api.reading.campaign_text import LARGEST, campaign_of_text, declare, files_of, toml_text
 from api.schemas.campaigns import EXAMPLE, CampaignAnswer, CampaignSummary, CutAnswer, FileState, NewCampaign, VerdictAnswer
 from api.schemas.common import Page, body_of
 from api.security import Guarded, WhoAsks, new_id, now
@@ -25,6 +25,7 @@ from api.stores.campaigns import Campaign, Counts, Recording
 from api.stores.entities import Taken
 from api.transfer.archives import zipped
 from api.work.toolings import parsed
+from rcsa_ident.errors import InputError
 from rcsa_ident.io.toml_text import toml_of
 
 router = APIRouter(tags=["campaigns"], route_class=Guarded)
@@ -159,8 +160,17 @@ def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
         workpiece=data["workpiece"],
         toolings=list(data["toolings"]),
         usable=sum(cut.verdict is not None and cut.verdict.usable for cut in cuts),
+        remarks=_remarks(campaign),
         cuts=cuts,
     )
+
+
+def _remarks(campaign: Campaign) -> list[str]:
+    try:
+        return list(campaign_of_text(campaign.text).remarks)
+    except InputError as error:
+        # accepted by an earlier release, which knew fewer limits
+        return [str(error)]
 
 
 def _cut(cut: dict[str, Any], rows: dict[str, Recording]) -> CutAnswer:

@@ -92,17 +92,17 @@ def _sent(request: Request, name: str, headers: dict[str, str]) -> Response:
     )
 
 
-@router.api_route("/", methods=["GET", "HEAD"])
+@router.get("/")
 def index(request: Request) -> Response:
     return _sent(request, "index.html", {"Cache-Control": "no-cache", **_GUARDS})
 
 
-@router.api_route("/docs", methods=["GET", "HEAD"])
+@router.get("/docs")
 def docs(request: Request) -> Response:
     return _sent(request, "docs.html", {"Cache-Control": "no-cache", **_GUARDS})
 
 
-@router.api_route("/static/{tag}/{name:path}", methods=["GET", "HEAD"])
+@router.get("/static/{tag}/{name:path}")
 def static(tag: str, name: str, request: Request) -> Response:
     if name not in _names() or name.endswith(".html"):
         raise Problem(404, "there is no such file")

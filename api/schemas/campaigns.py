@@ -172,6 +172,7 @@ class CampaignAnswer(Answer):
     workpiece: dict[str, Any]
     toolings: list[str]
     usable: int = Field(description="Number of cuts that an identification would use.")
+    remarks: list[str] = Field(description="What is unusual about its toolings, its workpiece and its cuts.")
     cuts: list[CutAnswer]
 
 

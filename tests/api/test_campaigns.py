@@ -65,6 +65,18 @@ def test_toml_and_json_say_the_same(client, machine):
     assert again.cuts == one.cuts
 
 
+def test_a_campaign_says_what_is_unusual_about_it(client, machine):
+    assert client.make_campaign(machine, declared()).remarks == []
+    data = declared(2)
+    for cut in data["cuts"]:
+        cut["feed_per_tooth_mm"] = 2.5
+    made = client.make_campaign(machine, data)
+    (remark,) = made.remarks
+    assert remark.startswith("c0 and 1 more: ")
+    assert "feed_per_tooth_mm is 2.5 mm" in remark
+    assert client.campaign(made.id).remarks == made.remarks
+
+
 def test_a_repeated_query_makes_one_campaign(client, machine):
     one = client.make_campaign(machine, declared(), repeat="k")
     assert client.make_campaign(machine, declared(), repeat="k") == one

@@ -72,9 +72,6 @@ def test_a_file_is_named_with_line_and_column(tmp_path):
 def test_numbers_beyond_64_bit_are_whole():
     keys = keys_of_toml("a = 99999999999999999999999\nb = -9223372036854775809", "x")
     assert keys == {"a": 99999999999999999999999, "b": -9223372036854775809}
-        "a": 99999999999999999999999,
-        "b": -9223372036854775809,
-    }
 
 
 #: What JSON's and a hand's quoting took for ordinary: DEL, a line's end, a tag of plane 14, quotes, keys that need them.

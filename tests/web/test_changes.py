@@ -95,6 +95,25 @@ def test_a_dropped_campaign_leaves_the_library_as_it_is(opened, client: Client, 
     assert client.tooling(name).etag == before.etag
 
 
+def test_a_version_is_restored_over_what_was_seen_and_over_nothing_else(opened, client: Client):
+    """Of two people the second one is told; what was deleted comes back where nobody has written another."""
+    name = "S9-two"
+    first = client.write_tooling(name, by_hand.TOOLING)
+    client.write_tooling(name, THREE)
+    page = opened("#/changes")
+    page.get_by_role("button", name=f"Restore version 1 of {name}").click()
+    expect(page.locator("dialog")).to_be_visible()
+    mine = client.write_tooling(name, by_hand.TOOLING.replace("teeth = 4", "teeth = 2"))
+    page.locator("dialog").get_by_role("button", name="Restore it").click()
+    expect(page.locator(".note.bad")).to_contain_text(f"Somebody has changed {name} meanwhile, so nothing was restored.")
+    assert client.tooling(name).etag == mine.etag
+    client.forget_tooling(name)
+    page.get_by_role("button", name=f"Restore version 1 of {name}").click()
+    page.locator("dialog").get_by_role("button", name="Restore it").click()
+    expect(page.locator("tbody tr", has_text=f"restored the tooling {name} from its version 1")).to_be_visible()
+    assert client.tooling(name).etag == first.etag
+
+
 def test_edits_that_are_not_saved_are_asked_for(opened, client: Client, served: Served):
     client.write_tooling("S9-edits", by_hand.TOOLING)
     page = opened("#/toolings/edit/S9-edits")

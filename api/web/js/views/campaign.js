@@ -35,6 +35,7 @@ export async function view({ id }, query, place) {
       h("button", { type: "button", class: "quiet danger", onclick: remove }, "Delete"),
     ),
     fault,
+    campaign.remarks.length ? note("doubt", ...campaign.remarks) : null,
     counts,
     next,
     strangers,

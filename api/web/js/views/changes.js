@@ -1,5 +1,5 @@
 // Who changed which tooling or machine, when and why: the trail of all changes, the versions of one thing, and the way back.
-import { get, part, post } from "../api.js";
+import { get, part, post, Problem, send } from "../api.js";
 import { add, fill, h, head, note, table, tell } from "../dom.js";
 import { busy, confirmed, failed } from "../forms.js";
 import { allMachines } from "../state.js";
@@ -50,24 +50,38 @@ function restoreButton(change, fault) {
   const label = `Restore version ${change.version} of ${change.title}`;
   const button = h("button", { type: "button", class: "quiet small", "aria-label": label }, "Restore");
   const tooling = change.kind === "tooling";
-  const path = `${tooling ? `toolings/${part(change.name)}` : `machines/${part(change.name)}/identification`}/versions/${change.version}`;
+  const thing = tooling ? `toolings/${part(change.name)}` : `machines/${part(change.name)}/identification`;
+  const path = `${thing}/versions/${change.version}`;
   button.addEventListener(
     "click",
     busy(button, async () => {
       try {
+        // over what the person has seen, and over nothing else
+        const headers = await asSeen(thing);
         const words = tooling ? differing((await get(path)).differences, "Now", "Then") : [];
         const promise = h("p", null, "What is there now stays as a version, too.");
         if (!(await confirmed(`${label}?`, h("div", { class: "view" }, words, promise), "Restore it", "Leave it"))) return;
-        await post(`${path}/restore`, undefined);
+        await post(`${path}/restore`, undefined, { headers });
         if (!tooling) await allMachines(true);
         tell(`Version ${change.version} of ${change.title} is there again.`);
         window.dispatchEvent(new Event("refresh"));
       } catch (error) {
-        failed(fault, error);
+        const meanwhile = `Somebody has changed ${change.title} meanwhile, so nothing was restored. Look at its versions again.`;
+        failed(fault, error.status === 412 ? new Problem(412, { detail: meanwhile }) : error);
       }
     }),
   );
   return button;
+}
+
+/** The condition that a thing is still what it is now, or still gone. */
+async function asSeen(path) {
+  try {
+    return { "If-Match": (await send("HEAD", path)).headers.get("ETag") };
+  } catch (error) {
+    if (error.status !== 404) throw error;
+    return { "If-None-Match": "*" };
+  }
 }
 
 const shown = (value) => (value === null ? "–" : Array.isArray(value) ? value.join(", ") : String(value));
