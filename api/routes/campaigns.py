@@ -25,6 +25,7 @@ from api.stores.campaigns import Campaign, Counts, Recording
 from api.stores.entities import Taken
 from api.transfer.archives import zipped
 from api.work.toolings import parsed, toml_of
+from rcsa_ident.identification.status import too_few
 
 router = APIRouter(tags=["campaigns"], route_class=Guarded)
 TOML, JSON, ZIP = "application/toml", "application/json", "application/zip"
@@ -150,6 +151,7 @@ def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
     data = json.loads(campaign.text)
     rows = {row.name: row for row in components.store.recordings.list(campaign.group, campaign.id, "", 1_000_000)}
     cuts = [_cut(cut, rows) for cut in data["cuts"]]
+    usable = [cut.tooling for cut in cuts if cut.verdict is not None and cut.verdict.usable]
     return CampaignAnswer(
         id=campaign.id,
         machine=campaign.machine,
@@ -159,7 +161,8 @@ def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
         sensors=data["sensors"],
         workpiece=data["workpiece"],
         toolings=list(data["toolings"]),
-        usable=sum(cut.verdict is not None and cut.verdict.usable for cut in cuts),
+        usable=len(usable),
+        too_few=too_few(usable),
         cuts=cuts,
     )
 

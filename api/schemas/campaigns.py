@@ -172,6 +172,7 @@ class CampaignAnswer(Answer):
     workpiece: dict[str, Any]
     toolings: list[str]
     usable: int = Field(description="Number of cuts that an identification would use.")
+    too_few: str | None = Field(description="What is missing, where these are too few for an identification that can be relied on.")
     cuts: list[CutAnswer]
 
 

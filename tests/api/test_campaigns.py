@@ -17,6 +17,7 @@ from api.reading.campaigns import load_campaign
 from api.transfer.archives import zipped
 from api.work.toolings import toml_of
 from rcsa_ident.errors import InputError
+from rcsa_ident.identification.status import too_few
 from rcsa_ident.io.recordings import READERS, read_cut
 from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.io.toolings import tooling_keys
@@ -45,6 +46,7 @@ def test_formats_are_those_of_the_readers():
 def test_a_campaign_from_making_to_forgetting(client, machine):
     made = client.make_campaign(machine, declared(2))
     assert (made.name, made.machine, made.usable, made.toolings) == ("by hand", machine, 0, ["T1"])
+    assert made.too_few == too_few([])
     assert made.sampling_rate_hz == 25600.0
     assert made.sensors["flange_x"] == {"quantity": "displacement", "axis": "X", "sensitivity": 1.0e4}
     assert made.workpiece["radial_ratio"] == 0.26
