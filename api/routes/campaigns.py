@@ -26,6 +26,7 @@ from api.stores.entities import Taken
 from api.transfer.archives import zipped
 from api.work.toolings import parsed
 from rcsa_ident.errors import InputError
+from rcsa_ident.identification.status import too_few
 from rcsa_ident.io.toml_text import toml_of
 
 router = APIRouter(tags=["campaigns"], route_class=Guarded)
@@ -150,6 +151,7 @@ def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
     data = json.loads(campaign.text)
     rows = {row.name: row for row in components.store.recordings.list(campaign.group, campaign.id, "", 1_000_000)}
     cuts = [_cut(cut, rows) for cut in data["cuts"]]
+    usable = [cut.tooling for cut in cuts if cut.verdict is not None and cut.verdict.usable]
     return CampaignAnswer(
         id=campaign.id,
         machine=campaign.machine,
@@ -159,8 +161,9 @@ def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
         sensors=data["sensors"],
         workpiece=data["workpiece"],
         toolings=list(data["toolings"]),
-        usable=sum(cut.verdict is not None and cut.verdict.usable for cut in cuts),
+        usable=len(usable),
         remarks=_remarks(campaign),
+        too_few=too_few(usable),
         cuts=cuts,
     )
 

@@ -173,6 +173,7 @@ class CampaignAnswer(Answer):
     toolings: list[str]
     usable: int = Field(description="Number of cuts that an identification would use.")
     remarks: list[str] = Field(description="What is unusual about its toolings, its workpiece and its cuts.")
+    too_few: str | None = Field(description="What is missing, where these are too few for an identification that can be relied on.")
     cuts: list[CutAnswer]
 
 

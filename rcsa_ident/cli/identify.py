@@ -52,6 +52,7 @@ class Method(StrEnum):
 @answers
 def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask = None, json_: Json = False) -> None:
     """Read everything and give a verdict on every recording; nothing is identified."""
+    from rcsa_ident.identification.status import too_few
     from rcsa_ident.report.summaries import recording_rows
     from rcsa_ident.workflows.coverage import left_open
 
@@ -60,8 +61,10 @@ def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask 
         campaign, readings = read_and_judge(campaign_dir, pool, stages)
     rows, open_, remarks = recording_rows(readings), left_open(campaign, readings), campaign.remarks
     usable = sum(row.usable for row in rows)
+    few = too_few(each.tooling for each in readings if each.verdict.usable)
     if json_:
-        told = {"campaign": campaign.name, "cuts": len(rows), "usable": usable, "left_open": list(open_), "warnings": list(remarks)}
+        told = {"campaign": campaign.name, "cuts": len(rows), "usable": usable, "too_few": few}
+        told |= {"left_open": list(open_), "warnings": list(remarks)}
         emit(told | {"recordings": [asdict(row) for row in rows]})
     else:
         from rcsa_ident.cli.tables import show_recordings
@@ -72,6 +75,8 @@ def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask 
         for remark in remarks:
             warn(remark)
         say(f"{usable} of {len(rows)} recordings usable, {stages.seconds['recordings']:.1f} s")
+        if few is not None:
+            warn(few)
     if not usable:
         raise typer.Exit(BAD_INPUT)
 

@@ -17,7 +17,7 @@ from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import JOINT, planes
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import Identification, IdentificationCode
-from rcsa_ident.identification.status import Status
+from rcsa_ident.identification.status import FEWEST_CUTS, FEWEST_TOOLINGS, Status
 from rcsa_ident.machine.flange_part import JointedFlange
 from rcsa_ident.remarks import Remark
 
@@ -27,7 +27,6 @@ WORST_MODEL_ERROR = 0.02
 EVIDENCE_TIE = 6.0
 #: Relative difference of two such solutions, and deviation of the answer, from which on they matter.
 LARGEST_DIFFERENCE, LARGEST_BAND = 0.02, 0.01
-FEWEST_CUTS = 8
 #: Share of the cuts that may contradict the others before the whole is in doubt.
 MOST_BAD_CUTS = 0.1
 #: Half of the lines must carry at least this many times their noise (its amplitude's root mean square).
@@ -112,7 +111,7 @@ def diagnose(
                 f"{str(axis.axis).upper()}: the machine's contribution to the tooltip FRF has a standard deviation of {100 * band:.1f} % "
                 f"(limit {100 * LARGEST_BAND:g} %), several times that with tools that were never cut: more or quieter cuts are needed",
             )
-    if len(data.toolings) < 2:
+    if len(data.toolings) < FEWEST_TOOLINGS:
         words = "only one tooling: translation and slope of the flange cannot be separated; cut with a second, different holder"
         doubt(IdentificationCode.ONE_TOOLING, words)
     for t, name in enumerate(data.toolings):

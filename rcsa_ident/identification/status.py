@@ -1,8 +1,13 @@
-"""May an answer be used?"""
+"""May an answer be used, and are there enough cuts for one?"""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable
 from enum import StrEnum
+
+#: Toolings, and usable cuts of each, with fewer of which every identification is suspect.
+FEWEST_TOOLINGS, FEWEST_CUTS = 2, 8
 
 
 class Status(StrEnum):
@@ -11,3 +16,11 @@ class Status(StrEnum):
     CONVERGED = "converged"
     SUSPECT = "suspect"
     FAILED = "failed"
+
+
+def too_few(toolings: Iterable[str]) -> str | None:
+    """Return a sentence where the usable cuts, each told by its tooling, are too few for an answer without doubts, else None."""
+    enough = sum(count >= FEWEST_CUTS for count in Counter(toolings).values())
+    if enough >= FEWEST_TOOLINGS:
+        return None
+    return f"Too few for an identification that can be relied on: it needs two toolings with {FEWEST_CUTS} usable cuts each, better 20."

@@ -16,6 +16,7 @@ from api.reading.campaign_text import FORMATS, campaign_of_text, declare, files_
 from api.reading.campaigns import load_campaign
 from api.transfer.archives import zipped
 from rcsa_ident.errors import InputError
+from rcsa_ident.identification.status import too_few
 from rcsa_ident.io.recordings import READERS, read_cut
 from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.io.toml_text import toml_of
@@ -40,6 +41,7 @@ def test_formats_are_those_of_the_readers():
 def test_a_campaign_from_making_to_forgetting(client, machine):
     made = client.make_campaign(machine, declared(2))
     assert (made.name, made.machine, made.usable, made.toolings) == ("by hand", machine, 0, ["T1"])
+    assert made.too_few == too_few([])
     assert made.sampling_rate_hz == 25600.0
     assert made.sensors["flange_x"] == {"quantity": "displacement", "axis": "X", "sensitivity": 1.0e4}
     assert made.workpiece["radial_ratio"] == 0.26

@@ -189,6 +189,13 @@ def test_the_exit_code_follows_the_code_and_not_the_words(tmp_path, small_campai
 
 
 @pytest.mark.slow
+def test_check_tells_that_cuts_are_too_few_to_identify(tmp_path):
+    campaign = part_of_the_sample_runs(tmp_path, 40)
+    words = "Too few for an identification that can be relied on: it needs two toolings with 8 usable cuts each, better 20."
+    assert f"warning: {words}" in run("check", campaign, "--processes", 1).stderr
+    assert json.loads(run("check", campaign, "--processes", 1, "--json").stdout)["too_few"] == words
+
+
 def test_check_warns_of_what_is_unusual_about_a_campaign(tmp_path):
     campaign = part_of_the_sample_runs(tmp_path, 40)
     for path in campaign.rglob("toolings/S1-ER32.toml"):

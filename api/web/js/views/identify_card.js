@@ -4,9 +4,6 @@ import { card, h } from "../dom.js";
 import { busy, failed, field, quantity, select } from "../forms.js";
 import { go } from "../router.js";
 
-/** Toolings, and usable cuts of each, with fewer of which every identification is suspect. */
-const NEEDED = { toolings: 2, cuts: 8 };
-
 /** The next step, and what may be set for it. */
 export function identifyCard(campaign) {
   const seed = quantity("Seed", "none", 1, { name: "seed", hint: "The same seed gives the same result." });
@@ -19,10 +16,8 @@ export function identifyCard(campaign) {
   );
   const apply = h("input", { type: "checkbox", checked: true, id: "apply" });
   const start = h("input", { type: "checkbox", id: "start" });
-  const used = campaign.cuts.filter((cut) => cut.verdict?.usable);
-  const few = campaign.toolings.filter((name) => used.filter((cut) => cut.tooling === name).length >= NEEDED.cuts).length < NEEDED.toolings;
   // until there are enough, more recordings are the next step
-  const button = h("button", { class: few ? null : "primary" }, "Identify the machine");
+  const button = h("button", { class: campaign.too_few ? null : "primary" }, "Identify the machine");
   const form = h(
     "form",
     { novalidate: true, class: "view" },
@@ -32,7 +27,7 @@ export function identifyCard(campaign) {
       button,
       h("span", { class: "soft" }, `from ${campaign.usable} usable cuts; it takes about a minute for 80`),
     ),
-    few ? h("p", { class: "soft" }, `Too few for an identification that can be relied on: it needs two toolings with ${NEEDED.cuts} usable cuts each, better 20.`) : null,
+    campaign.too_few ? h("p", { class: "soft" }, campaign.too_few) : null,
     h(
       "details",
       null,
