@@ -14,6 +14,7 @@ from api.files import Files
 from api.jobs.event_feed import EventFeeds
 from api.jobs.supervisor import Supervisor
 from api.metrics import Metrics
+from api.reading.example_campaign import Examples
 from api.reading.uploads import Uploads
 from api.settings import Settings
 from api.stores.entities import Store
@@ -52,7 +53,7 @@ class Rates:
 
 @dataclass(frozen=True, slots=True)
 class Components:
-    """Settings, store, workers, files and uploads, rate limits, metrics, force streams, event feeds of jobs and their supervisor."""
+    """Settings, store, workers, files and uploads, rate limits, metrics, force streams, event feeds of jobs, examples, supervisor."""
 
     settings: Settings
     store: Store
@@ -64,6 +65,7 @@ class Components:
     metrics: Metrics = field(repr=False)
     streams: Hub = field(repr=False)
     feeds: EventFeeds = field(repr=False)
+    examples: Examples = field(repr=False)
     supervisor: Supervisor | None = field(repr=False)
 
 

@@ -18,10 +18,12 @@ from api.head_requests import HeadRequests
 from api.jobs.event_feed import EventFeeds
 from api.jobs.supervisor import Supervisor
 from api.metrics import JobCounts, Metrics
+from api.reading.example_campaign import Examples
 from api.reading.reader import Limits, Reader
 from api.reading.uploads import Uploads
 from api.routes import (
     campaigns,
+    example_campaign,
     examples,
     forces,
     health,
@@ -88,9 +90,8 @@ def create_app(
     rates, metrics = Rates(settings.requests_per_minute, settings.burst), Metrics(lambda: float(workers.waiting))
     hub = Hub(StreamProcess() if host is None else host, _stream_limits(settings), metrics)
     metrics.streams.set_function(lambda: float(len(hub.sessions)))
-    components = Components(
-        settings, kept, workers, files, readers, uploads, rates, metrics, hub, EventFeeds(kept.jobs, settings.watchers), supervisor
-    )
+    feeds, made = EventFeeds(kept.jobs, settings.watchers), Examples(uploads, workers)
+    components = Components(settings, kept, workers, files, readers, uploads, rates, metrics, hub, feeds, made, supervisor)
     metrics.registry.register(JobCounts(kept.jobs))
 
     @asynccontextmanager
@@ -103,6 +104,7 @@ def create_app(
         maintenance = asyncio.create_task(uploads.maintain())
         yield
         maintenance.cancel()
+        await made.stop()
         # beside each other: every one of them gives its processes time
         ends = [asyncio.to_thread(each.stop) for each in (readers, workers, *([] if supervisor is None else [supervisor]))]
         await asyncio.gather(hub.stop(), *ends, maintenance, return_exceptions=True)
@@ -120,7 +122,7 @@ def create_app(
     problems.install(app)
     app.include_router(health.router)
     app.include_router(static_files.router)
-    about = (keys, machines, toolings, versions, libraries, holders, materials, examples)
+    about = (keys, machines, toolings, versions, libraries, holders, materials, examples, example_campaign)
     for each in (*about, campaigns, recordings, resumable_upload, multi_upload, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(HeadRequests, router=app.router)

@@ -92,12 +92,17 @@ def make_sample_campaign(
     folder = Path(folder)
     if (folder / CAMPAIGN_FILE).is_file():
         return folder
+    machine = sample_machine(cuts)
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError("folder", str(folder), "a campaign, an empty folder, or one that does not exist")
+    return simulate_campaign(machine, folder, seed, progress, mapper).folder
+
+
+def sample_machine(cuts: int = SAMPLE_CUTS) -> MachineFile:
+    """Return the sample machine with a plan of so many cuts, half of them with each of its two toolings."""
     machine = read_machine(sample_data() / "hpm.toml")
     each = cuts // len(machine.toolings)
     if each < 1 or each * len(machine.toolings) != cuts:
         raise InputError("cuts", cuts, f"a multiple of {len(machine.toolings)}: so many toolings cut")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError("folder", str(folder), "a campaign, an empty folder, or one that does not exist")
     speeds = np.linspace(machine.plan.spindle_speeds[0], machine.plan.spindle_speeds[-1], each)
-    machine = replace(machine, plan=replace(machine.plan, spindle_speeds=tuple(speeds.tolist())))
-    return simulate_campaign(machine, folder, seed, progress, mapper).folder
+    return replace(machine, plan=replace(machine.plan, spindle_speeds=tuple(speeds.tolist())))

@@ -18,7 +18,7 @@ from api.schemas.common import Page
 from api.schemas.forces import ForceAnswer, StreamsAnswer, StreamSummary
 from api.schemas.holders import CatalogueAnswer, Holders
 from api.schemas.keys import KeyAnswer, MadeKey
-from api.schemas.libraries import Example, Examples, ImportAnswer
+from api.schemas.libraries import Example, ExampleCampaign, Examples, ImportAnswer
 from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes
 from api.schemas.materials import MaterialAnswer, Materials
 from api.schemas.queries import AdviceAnswer, TipAnswer
@@ -150,6 +150,14 @@ class Client(Uploads, Jobs):
     def example(self, name: str, file: Path) -> None:
         """Download the file of an example."""
         self.download(f"/examples/{quote(name)}", file)
+
+    def make_example(self) -> ExampleCampaign:
+        """Make the example machine with its campaign, whose recordings follow; or what is missing of them."""
+        return read(ExampleCampaign, self.send("POST", "/examples/campaign"))
+
+    def forget_example(self) -> None:
+        """Delete the example machine with its campaign and its toolings."""
+        self.send("DELETE", "/examples/campaign")
 
     def forget_tooling(self, name: str, seen: str | None = None) -> None:
         """Delete a tooling."""

@@ -107,10 +107,10 @@ class Uploads:
         try:
             campaign = await asyncio.to_thread(self.store.campaigns.get, state.group, state.campaign)
             if campaign is not None and state.name in files_of(campaign.text):
-                received = await asyncio.to_thread(_received, path)
+                whole = await asyncio.to_thread(received, path)
                 with suppress(KeyError):
                     # else the campaign has gone meanwhile
-                    await self.take(campaign, state.name, received, state.replacing)
+                    await self.take(campaign, state.name, whole, state.replacing)
             await asyncio.to_thread(self.files.forget, path)
         except InputError:
             await asyncio.to_thread(self.files.forget, path)
@@ -289,7 +289,8 @@ class Uploads:
             await asyncio.sleep(_ROUND)
 
 
-def _received(path: Path) -> Received:
+def received(path: Path) -> Received:
+    """Return a file that is complete and synced, with its hash."""
     with path.open("rb") as file:
         return Received(path, path.stat().st_size, hashlib.file_digest(file, "sha256").hexdigest())
 

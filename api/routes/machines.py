@@ -29,6 +29,7 @@ from api.conventions import (
 )
 from api.lookups import identification_of, known_machine, machine_of
 from api.problems import Problem
+from api.reading.example_campaign import example_id
 from api.schemas.common import Page
 from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes, NewMachine
 from api.security import Guarded, WhoAsks, new_id, now
@@ -167,4 +168,5 @@ def summary_of(document: Document) -> IdentificationSummary:
 def _answer(components: Components, machine: Machine) -> MachineAnswer:
     document = components.store.identifications.brief(machine.group, machine.id)
     summary = None if document is None else summary_of(document)
-    return MachineAnswer(id=machine.id, name=machine.name, description=machine.description, created=machine.created, identification=summary)
+    told = {name: getattr(machine, name) for name in ("id", "name", "description", "created")}
+    return MachineAnswer(**told, example=machine.id == example_id(machine.group), identification=summary)

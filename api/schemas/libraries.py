@@ -32,6 +32,13 @@ class Example(Answer):
     about: str
 
 
+class ExampleCampaign(Answer):
+    """The example of a group."""
+
+    machine: str = Field(description="Its id.")
+    campaign: str = Field(description="Its id.")
+
+
 class Examples(Answer):
     """All examples."""
 

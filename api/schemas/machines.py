@@ -25,6 +25,7 @@ class MachineAnswer(Answer):
     name: str
     description: str
     created: str = Field(description="UTC, ISO 8601.")
+    example: bool = Field(description="Whether the virtual machine made its recordings.")
     identification: IdentificationSummary | None = Field(description="null where the machine has not been identified.")
 
 

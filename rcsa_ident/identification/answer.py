@@ -174,12 +174,11 @@ class PlaneFit(Fit):
 
     def doubts(self) -> tuple[list[Remark], list[Remark]]:
         """Return the reasons for `suspect` and the notes."""
-        data, layout = self.data, planes(self.solution.layout)
+        data = self.data
         bands = [deviation_of_tip(posterior, axis) for posterior, axis in zip(self.posteriors, data.axes, strict=True)]
         reasons = diagnose(data, self.solution, self.misfit, bands, two_solutions(data, self.searched))
-        natural = {
-            str(axis.axis).upper(): np.exp(self.solution.theta[layout.axis(i)][: layout.axes[i].modes]) for i, axis in enumerate(data.axes)
-        }
+        known = zip(data.axes, self.posteriors, strict=True)
+        natural = {str(axis.axis).upper(): posterior.machine(axis.axis)[0].omega_n for axis, posterior in known}
         return reasons, remarks(data, self.solution, self.misfit, self.covariance, natural)
 
 
@@ -235,12 +234,11 @@ class CoupledFit(Fit):
 
     def doubts(self) -> tuple[list[Remark], list[Remark]]:
         """Return the reasons for `suspect` and the notes, first of them how much the planes feel each other."""
-        layout = _coupled(self.solution)
         value, changes = self.posterior.part(None).response(self._contribution)
         assert changes is not None
         bands = [float(np.linalg.norm(changes[:, :, i, i]) / max(float(np.linalg.norm(value[:, i, i])), 1e-300)) for i in range(2)]
         reasons = diagnose(self.data, self.solution, self.misfit, bands)
-        natural = {"X and Y": np.exp(self.solution.theta[: layout.modes])}
+        natural = {"X and Y": self.posterior.best.standing().omega_n}
         found = remarks(self.data, self.solution, self.misfit, self.covariance, natural)
         told = [Remark(IdentificationCode.PLANES_COUPLED, self._in_words(value))]
         if self._gain_of_another_feed() > WORTH:

@@ -156,7 +156,7 @@ def remarks(
     covariance : array, shape (p, p)
         Covariance of all unknowns.
     natural : mapping of str to array [rad/s]
-        Natural frequencies of each machine, under the name of its axes.
+        Natural frequencies of each machine's modes as the result has them, under the name of its axes.
     """
     notes: list[Remark] = []
 

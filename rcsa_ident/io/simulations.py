@@ -81,7 +81,7 @@ def write_simulation(
             folder.mkdir()
         for path, tooling in zip(setup.toolings, toolings, strict=True):
             shutil.copyfile(path, runs / "toolings" / f"{tooling.name}.toml")
-        write_text(runs / "campaign.toml", _campaign_text(setup, toolings))
+        write_text(runs / "campaign.toml", campaign_text(setup, toolings))
         rows = ["record,spindle_speed_rpm,tooth_angle_deg"]
         for done, cut in enumerate(cuts, start=1):
             _write_columns(known / "forces" / f"{cut.id}.csv", ("order",), np.arange(cut.force_lines.shape[0]), cut.force_lines)
@@ -133,8 +133,8 @@ def _write_columns(path: Path, first: tuple[str], abscissa: FloatArray, values: 
     write_text(path, "\n".join([",".join(header), *lines]) + "\n")
 
 
-def _campaign_text(setup: MachineFile, toolings: Sequence[Tooling]) -> str:
-    """The campaign file, as a machinist would write it."""
+def campaign_text(setup: MachineFile, toolings: Sequence[Tooling]) -> str:
+    """Return the campaign file, as a machinist would write it; recordings are ``recordings/<cut>_cut.h5`` and ``_air.h5``."""
     suite, plan = setup.sensors, setup.plan
     gap = ("displacement", suite.gap_sensitivity, suite.gap_delay, suite.gap_bandwidth)
     acceleration = ("acceleration", suite.acceleration_sensitivity, suite.acceleration_delay, suite.acceleration_bandwidth)

@@ -44,6 +44,8 @@ CALLS = [
     ("GET", "/holders/taper/chuck", None, "read"),
     ("GET", "/examples", None, "read"),
     ("GET", "/examples/n", None, "read"),
+    ("POST", "/examples/campaign", None, "upload"),
+    ("DELETE", "/examples/campaign", None, "upload"),
     ("POST", "/forces", {"machine": "m", "tooling": "t", "campaign": "c", "recording": "n"}, "run"),
     ("GET", "/forces/streams", None, "read"),
     ("POST", "/machines/m/campaigns", {}, "upload"),

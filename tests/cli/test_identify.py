@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -113,6 +114,17 @@ def test_a_warm_start_says_the_same_of_a_tip(small_campaign, first, warm):
 
 
 @pytest.mark.slow
+def test_modes_of_notes_are_those_of_the_result(warm):
+    """To the hertz: their frequencies are those of the damped machine, not the undamped one that is searched for."""
+    data = read_result(warm[0])
+    outside = [note for note in data["notes"] if " lie outside the excited band" in note]
+    told = {note.split(":")[0]: re.findall(r"\d+", note.split(" lie ")[0]) for note in outside}
+    assert told
+    for axis, frequencies in told.items():
+        kept = [f"{mode['natural_frequency_hz']:.0f}" for mode in data["axes"][axis]["modes"]]
+        assert set(frequencies) <= set(kept)
+
+
 def test_notes_and_coefficients_are_printed_and_written(warm):
     data, printed = read_result(warm[0]), warm[1]
     assert "tangential coefficient: " in printed
