@@ -45,6 +45,7 @@ from api.routes import (
 from api.schemas.campaigns import NewCampaign
 from api.schemas.common import ProblemDocument
 from api.schemas.forces import ForceQuery, ForceUpload
+from api.schemas.jobs import PartialLobes
 from api.security import HEADER
 from api.settings import Settings
 from api.stores.entities import Store
@@ -140,10 +141,10 @@ def _openapi(app: FastAPI) -> dict[str, Any]:
     if app.openapi_schema is None:
         schema = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
         components = schema.setdefault("components", {})
-        # bodies that routes parse themselves, and the error answer of all routes
-        for model in (ProblemDocument, NewCampaign, ForceQuery, ForceUpload):
+        # bodies that routes parse themselves, what streams of events tell, and the error answer of all routes
+        for model in (ProblemDocument, NewCampaign, ForceQuery, ForceUpload, PartialLobes):
             described = model.model_json_schema(ref_template="#/components/schemas/{model}")
-            components.setdefault("schemas", {}).update(described.pop("$defs"))
+            components.setdefault("schemas", {}).update(described.pop("$defs", {}))
             components["schemas"][model.__name__] = described
         components["securitySchemes"] = {"key": {"type": "apiKey", "in": "header", "name": HEADER}}
         for path in schema["paths"].values():

@@ -75,6 +75,11 @@ def _time(when: datetime) -> str:
     return when.isoformat(timespec="milliseconds")
 
 
+def seconds_between(first: str, last: str) -> float:
+    """Return the time between two moments as `now` tells them [s]."""
+    return (datetime.fromisoformat(last) - datetime.fromisoformat(first)).total_seconds()
+
+
 def new_id() -> str:
     """Return a new id; later ids sort behind earlier ones."""
     return f"{int(datetime.now(UTC).timestamp() * 1e3):012x}{secrets.token_hex(6)}"

@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from threading import Event
 from typing import Annotated, Any
@@ -82,7 +83,10 @@ def create_key(
 @app.command("worker")
 def worker(
     context: typer.Context,
-    count: Annotated[int | None, typer.Option(min=1, max=256, help="Processes (RCSA_IDENT_JOB_WORKERS).", show_default=False)] = None,
+    count: Annotated[
+        int | None, typer.Option(min=0, max=256, help="Processes for identifications (RCSA_IDENT_JOB_WORKERS).", show_default=False)
+    ] = None,
+    lobes: Annotated[int | None, typer.Option(min=0, max=256, help="For lobes (RCSA_IDENT_LOBE_WORKERS).", show_default=False)] = None,
 ) -> None:
     """Run job workers for a service that runs elsewhere, with the same database and the same folder for recordings."""
     import signal
@@ -92,7 +96,9 @@ def worker(
 
     settings = context.obj
     _log()
-    supervisor = Supervisor(count or max(settings.job_workers, 1), job_worker, settings, settings.job_nice)
+    # a service whose jobs run elsewhere names none for itself
+    crew = _crew(max(settings.job_workers, 1) if count is None else count, max(settings.lobe_workers, 1) if lobes is None else lobes)
+    supervisor = Supervisor(crew, settings, settings.job_nice)
     ended = threading.Event()
     for each in (signal.SIGTERM, signal.SIGINT):
         signal.signal(each, lambda *_: ended.set())
@@ -140,10 +146,13 @@ def restore_store(
     typer.echo(f"{data}: {account.files} files, {account.bytes / 1e6:.1f} MB")
 
 
-def job_worker(settings: Any, ready: Callable[[], None], stop: Event) -> None:
-    """Carry out jobs until `stop` is set: what each job worker does."""
-    from functools import partial
+def _crew(identifications: int, lobes: int) -> list[Callable[[Any, Callable[[], None], Event], None]]:
+    """What each job worker does: each kind of jobs has its own, so that a short one never waits behind a long one of the other."""
+    return [*[partial(job_worker, "identification")] * identifications, *[partial(job_worker, "lobes")] * lobes]
 
+
+def job_worker(kind: str, settings: Any, ready: Callable[[], None], stop: Event) -> None:
+    """Carry out jobs of a kind until `stop` is set."""
     from api.files import Files
     from api.jobs import identification, lobes
     from api.jobs.cluster import over_cluster
@@ -157,7 +166,7 @@ def job_worker(settings: Any, ready: Callable[[], None], stop: Event) -> None:
     load = partial(load_campaign, store, Files(settings.data / "files", settings.group_bytes, settings.free_bytes))
     spread = over_cluster(settings.dask) if settings.dask else map
     carriers: dict[str, Carrier] = {"identification": partial(identification.carry, load, spread=spread), "lobes": lobes.carry}
-    JobWorker(store.jobs, Durable(settings.engine_url), carriers, settings.job_attempts).run(ready, stop)
+    JobWorker(store.jobs, Durable(settings.engine_url), {kind: carriers[kind]}, settings.job_attempts).run(ready, stop)
 
 
 def _log() -> None:
@@ -179,7 +188,8 @@ def _run(settings: object) -> None:
     with ExitStack() as held:
         try:
             held.enter_context(alone(settings.data))
-            service = create_app(settings, supervisor=Supervisor(settings.job_workers, job_worker, settings, settings.job_nice))
+            crew = _crew(settings.job_workers, settings.lobe_workers)
+            service = create_app(settings, supervisor=Supervisor(crew, settings, settings.job_nice))
         except InputError as error:
             _fail(error)
         except OSError as error:

@@ -71,8 +71,9 @@ class Settings:
         Of a core and by the clock, for reading one upload.
     reader_calls : int
         After which the process that reads uploads is replaced.
-    job_workers : int
-        Processes that carry out jobs beside the service; 0 where they run elsewhere.
+    job_workers, lobe_workers : int
+        Processes beside the service that carry out identifications, and lobes as jobs, which never wait for each other; 0 where they
+        run elsewhere.
     job_nice : int
         How far those processes step back behind streams and queries (0 to 19, as `nice`); 0 on a machine that does nothing else.
     job_queue : int
@@ -124,6 +125,7 @@ class Settings:
     reader_wall_seconds: float = 900.0
     reader_calls: int = 200
     job_workers: int = 1
+    lobe_workers: int = 1
     job_nice: int = 10
     job_queue: int = 50
     job_attempts: int = 10
@@ -144,7 +146,7 @@ class Settings:
             ("max_upload_bytes", 1000, 10**12), ("uploads", 1, 1000), ("group_bytes", 1000, 10**15), ("free_bytes", 0, 10**15),
             ("upload_seconds", 1.0, 10**6), ("upload_idle_seconds", 0.1, 3600.0), ("upload_bytes_per_second", 0, 10**9),
             ("reader_memory", 512, 10**6), ("reader_seconds", 0.1, 10**4), ("reader_wall_seconds", 0.1, 10**5), ("reader_calls", 1, 10**6),
-            ("job_workers", 0, 256), ("job_nice", 0, 19),
+            ("job_workers", 0, 256), ("lobe_workers", 0, 256), ("job_nice", 0, 19),
             ("job_queue", 1, 10**6), ("job_attempts", 1, 1000), ("job_work_seconds", 1.0, 10**7),
             ("watchers", 1, 10**5), ("watch_seconds", 0.1, 10**6),
         ):  # fmt: skip

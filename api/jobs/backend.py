@@ -8,7 +8,7 @@ from typing import Protocol
 
 #: What an unfinished job remembers belongs to this version: raise it when steps change their order, names or texts.
 #: A job that began with another version starts over.
-VERSION = "2"
+VERSION = "3"
 #: Returns the stored text of a step by its name, or computes and stores it.
 Remember = Callable[[str, Callable[[], str]], str]
 #: Carries out the job of an id; a repetition gives the same result.
@@ -37,19 +37,22 @@ class Carried:
 
 
 class JobBackend(Protocol):
-    """A durable engine: a job that was submitted is carried out until its call returns."""
+    """A durable engine: a job that was submitted is carried out until its call returns.
 
-    def start(self, executor: str, carry: Carry) -> None:
-        """Carry out jobs as this executor, one at a time, its own unfinished ones first."""
+    Each kind of jobs has a queue of its own: none waits behind jobs of another kind.
+    """
 
-    def submit(self, job: str, priority: int) -> None:
-        """Submit a job, which is carried out once however often it is submitted; lower numbers first."""
+    def start(self, executor: str, carry: Carry, kinds: Sequence[str]) -> None:
+        """Carry out jobs of these kinds as this executor, one at a time of each, its own unfinished ones first."""
+
+    def submit(self, job: str, kind: str) -> None:
+        """Submit a job, which is carried out once however often it is submitted; the oldest of a kind first."""
 
     def carried(self) -> Sequence[Carried]:
         """Return all jobs of the engine."""
 
-    def resume(self, job: str) -> None:
-        """Return the job of a dead executor to the queue."""
+    def resume(self, job: str, kind: str) -> None:
+        """Return the job of a dead executor to the queue of its kind."""
 
     def forget(self, jobs: Sequence[str]) -> None:
         """Delete jobs that are over, with their steps."""

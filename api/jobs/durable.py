@@ -13,7 +13,6 @@ from dbos import Serializer as _Serializer
 
 from api.jobs.backend import VERSION, Carried, Carry
 
-QUEUE = "jobs"
 #: Interval between two polls for a job [s].
 POLL = 0.5
 _NAME = "rcsa-ident"
@@ -46,7 +45,7 @@ class Durable:
         self.url = url
         self.client: DBOSClient | None = None
 
-    def start(self, executor: str, carry: Carry) -> None:
+    def start(self, executor: str, carry: Carry, kinds: Sequence[str]) -> None:
         if self.url.startswith("sqlite:///"):
             # stays with the file: readers and writers do not block each other
             with sqlite3.connect(self.url.removeprefix("sqlite:///")) as connection:
@@ -72,14 +71,16 @@ class Durable:
         def workflow(job: str) -> None:
             carry(job, _remember)
 
-        DBOS.listen_queues([QUEUE])
+        queues = [_queue(kind) for kind in kinds]
+        DBOS.listen_queues(queues)
         DBOS.launch()
-        DBOS.register_queue(QUEUE, worker_concurrency=1, polling_interval_sec=POLL)
+        for queue in queues:
+            DBOS.register_queue(queue, worker_concurrency=1, polling_interval_sec=POLL)
         self.client = DBOSClient(system_database_url=self.url, serializer=Json(), application_name=_NAME, system_database_pool_size=2)
 
-    def submit(self, job: str, priority: int) -> None:
+    def submit(self, job: str, kind: str) -> None:
         assert self.client is not None
-        options: Any = {"workflow_name": "carry", "queue_name": QUEUE, "workflow_id": job, "app_version": VERSION, "priority": priority}
+        options: Any = {"workflow_name": "carry", "queue_name": _queue(kind), "workflow_id": job, "app_version": VERSION}
         self.client.enqueue(options, job)
 
     def carried(self) -> Sequence[Carried]:
@@ -87,13 +88,17 @@ class Durable:
         rows = self.client.list_workflows(name="carry", load_input=False, load_output=False)
         return [Carried(row.workflow_id, _STATES.get(row.status, "over"), row.executor_id, row.app_version == VERSION) for row in rows]
 
-    def resume(self, job: str) -> None:
+    def resume(self, job: str, kind: str) -> None:
         assert self.client is not None
-        self.client.resume_workflow(job, queue_name=QUEUE)
+        self.client.resume_workflow(job, queue_name=_queue(kind))
 
     def forget(self, jobs: Sequence[str]) -> None:
         assert self.client is not None
         self.client.delete_workflows(list(jobs))
+
+
+def _queue(kind: str) -> str:
+    return f"jobs of kind {kind}"
 
 
 def _remember(name: str, compute: Callable[[], str]) -> str:

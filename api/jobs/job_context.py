@@ -191,14 +191,14 @@ class JobContext:
             self._add(Event(0, kind, json.dumps(data, allow_nan=False)))
         self.check()
 
-    def curve(self, topic: str, data: Callable[[], dict[str, Any] | None]) -> None:
+    def curve(self, topic: str, data: Callable[[], dict[str, Any] | None], kind: str = "fit") -> None:
         """Report a curve that replaces the previous one of its topic; computed at most once a second, None is not reported."""
         now = time.monotonic()
         if now - self.last.get(topic, 0.0) >= CURVE:
             self.last[topic] = now
             found = data()
             if found is not None:
-                self._add(Event(0, "fit", json.dumps(found, allow_nan=False), topic))
+                self._add(Event(0, kind, json.dumps(found, allow_nan=False), topic))
         self.check()
 
     def _add(self, event: Event) -> None:

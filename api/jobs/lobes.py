@@ -1,24 +1,68 @@
-"""Stability lobes that take long, as a job: one step for each tooling."""
+"""Stability lobes that take long, as a job: one step for each tooling, whose limits are told as they come."""
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 from api.jobs.codec import Unknown, decode, encode
 from api.jobs.job_context import JobContext
-from api.stores.jobs import Job, Outcome
+from api.stores.jobs import PARTIAL, Job, Outcome
 from api.work import tasks
 from api.work.pool import guarded
 from api.work.requests import LobeRequest, MachineText, ToolingSource
 from rcsa_ident.errors import InputError
+from rcsa_ident.units import to_hz, to_rpm
+
+#: Of the progress, which counts speeds over all toolings.
+STAGE = "speeds"
 
 
 def asked(machine: MachineText, toolings: Sequence[ToolingSource], question: LobeRequest) -> str:
     """Return the text of a job: machine and toolings as they are now, whatever becomes of them while it waits."""
     return encode((machine, tuple(toolings), question))
+
+
+class _Known:
+    """The limits of one of several toolings that are known, told whenever there is another.
+
+    Parameters
+    ----------
+    context : JobContext
+    speeds : sequence of float [rad/s]
+        That were asked for; a recommendation needs some beside them, too.
+    tooling : str
+    index, toolings : int
+    """
+
+    def __init__(self, context: JobContext, speeds: Sequence[float], tooling: str, index: int, toolings: int) -> None:
+        self.context, self.speeds, self.tooling, self.index, self.toolings = context, frozenset(speeds), tooling, index, toolings
+        self.found: dict[float, tuple[float, float]] = {}
+
+    def __call__(self, speed: float, limit: float, chatter: float) -> None:
+        self.found[speed] = limit, chatter
+        self.progress()
+        self.context.curve(f"partial {self.index}", self.rows, PARTIAL)
+
+    def progress(self) -> None:
+        """Tell how far the job is: toolings come one after the other."""
+        count = len(self.speeds)
+        self.context.progress(STAGE, self.index * count + len(self.speeds & self.found.keys()), self.toolings * count)
+
+    def rows(self) -> dict[str, Any]:
+        """Return what is known, as `PartialLobes`."""
+        rising = sorted(self.found)
+        limits, chatter = ([self.found[speed][k] for speed in rising] for k in (0, 1))
+        return {
+            "tooling": self.tooling,
+            "index": self.index,
+            "spindle_speed_rpm": [to_rpm(speed, 6) for speed in rising],
+            "limit_depth_mm": [1e3 * limit if math.isfinite(limit) else None for limit in limits],
+            "chatter_frequency_hz": [to_hz(each) if math.isfinite(each) else None for each in chatter],
+        }
 
 
 def carry(job: Job, context: JobContext) -> Outcome:
@@ -34,8 +78,9 @@ def carry(job: Job, context: JobContext) -> Outcome:
     except Unknown:
         raise InputError("question", "one of another version of the service", "the same question, asked again") from None
     found: list[dict[str, Any]] = []
+    known = [_Known(context, question.speeds, tooling.name, i, len(toolings)) for i, tooling in enumerate(toolings)]
     for i, tooling in enumerate(toolings):
-        context.progress("lobes", i, len(toolings))
-        found.append(context.remember(f"lobes.{i}", partial(guarded, tasks.lobes, machine, tooling, question)))
-    context.progress("lobes", len(toolings), len(toolings))
+        known[i].progress()
+        found.append(context.remember(f"lobes.{i}", partial(guarded, tasks.lobes, machine, tooling, question, known[i])))
+    context.progress(STAGE, len(toolings) * len(question.speeds), len(toolings) * len(question.speeds))
     return Outcome("done", "", texts={"answer": json.dumps({"machine": job.machine, "toolings": found}, allow_nan=False)})

@@ -7,7 +7,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from api.processes import BackOff, Child, spawn_context
@@ -24,8 +24,7 @@ class Supervisor:
 
     Parameters
     ----------
-    count : int
-    work : callable of (settings, ready, stop)
+    works : sequence of callable of (settings, ready, stop)
         What each worker does; importable by name.
     settings : object
         Picklable.
@@ -33,8 +32,8 @@ class Supervisor:
         Increment of their niceness.
     """
 
-    def __init__(self, count: int, work: Work, settings: Any, nice: int = 0) -> None:
-        self.count, self.work, self.settings, self.nice = count, work, settings, nice
+    def __init__(self, works: Sequence[Work], settings: Any, nice: int = 0) -> None:
+        self.works, self.settings, self.nice = works, settings, nice
         self.members: list[_Member] = []
         self.ending = threading.Event()
         self.watch: threading.Thread | None = None
@@ -42,11 +41,11 @@ class Supervisor:
     @property
     def ready(self) -> bool:
         """Whether a worker takes jobs or is at its first start; true where there should be none."""
-        return self.count == 0 or any(member.hopeful for member in self.members)
+        return not self.works or any(member.hopeful for member in self.members)
 
     def start(self) -> None:
         """Start all workers."""
-        self.members = [_Member(self.work, self.settings, self.nice) for _ in range(self.count)]
+        self.members = [_Member(work, self.settings, self.nice) for work in self.works]
         self.watch = threading.Thread(target=self._watch, daemon=True)
         self.watch.start()
 

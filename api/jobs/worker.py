@@ -25,8 +25,6 @@ log = logging.getLogger("rcsa_ident.jobs")
 #: Intervals between two polls for new jobs, two heartbeats and two rounds of housekeeping, and time without a heartbeat after which a
 #: worker counts as dead [s].
 LOOK, BEAT, ROUND, LEASE = 0.5, 4.0, 3.0, 20.0
-#: Jobs that a user waits for come first.
-PRIORITY = {"lobes": 1}
 #: Carries out a job of one kind and returns its outcome, without the seconds.
 Carrier = Callable[[Job, JobContext], Outcome]
 
@@ -101,6 +99,7 @@ class JobWorker:
     jobs : Jobs
     backend : JobBackend
     carriers : mapping of kind to Carrier
+        Of the kinds that it carries out.
     attempts : int
     """
 
@@ -116,8 +115,9 @@ class JobWorker:
         while not self._claim():
             if stop.wait(LOOK):
                 return
-        self.backend.start(self.id, lambda id, remember: carry(self.jobs, self.carriers, self.token, self.attempts, id, remember))
-        log.info("job worker", extra={"fields": {"worker": self.id}})
+        kinds = tuple(self.carriers)
+        self.backend.start(self.id, lambda id, remember: carry(self.jobs, self.carriers, self.token, self.attempts, id, remember), kinds)
+        log.info("job worker", extra={"fields": {"worker": self.id, "kinds": ", ".join(kinds)}})
         ready()
         last_beat = last_round = 0.0
         while not stop.wait(LOOK):
@@ -142,7 +142,7 @@ class JobWorker:
         open = {job.id: job for job in self.jobs.open()}
         for id, job in open.items():
             if id not in self.submitted:
-                self.backend.submit(id, PRIORITY.get(job.kind, 10))
+                self.backend.submit(id, job.kind)
         self.submitted = set(open)
 
     def reconcile(self) -> None:
@@ -157,7 +157,7 @@ class JobWorker:
             # one of several workers that see it takes it over
             if orphan and self.jobs.take(id, open[id].worker, self.token):
                 log.warning("job taken over from a dead worker", extra={"fields": {"job": id, "from": each.executor, "worker": self.id}})
-                self.backend.resume(id)
+                self.backend.resume(id, open[id].kind)
         done = {
             id
             for id, each in carried.items()

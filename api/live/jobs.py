@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import time
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Mapping, Sequence
 from typing import Annotated, Any
 
 from fastapi import Header, Path, Response
@@ -18,7 +18,7 @@ from api.jobs.event_feed import Crowded
 from api.problems import Problem
 from api.schemas.common import ID_PATTERN
 from api.schemas.jobs import JobAnswer
-from api.security import Caller, now, still_valid
+from api.security import Caller, now, seconds_between, still_valid
 from api.stores.entities import Taken
 from api.stores.jobs import OPEN, Full, Job
 
@@ -46,7 +46,7 @@ _EVENT: dict[str, Any] = {
     "type": "object",
     "description": "One event of the stream; its data is JSON.",
     "properties": {
-        "event": {"enum": ["progress", "trace", "fit", "note", "end"]},
+        "event": {"enum": ["progress", "trace", "fit", "partial", "note", "end"]},
         "data": {"type": "string"},
         "id": {"type": "string"},
         "retry": {"type": "integer"},
@@ -55,17 +55,34 @@ _EVENT: dict[str, Any] = {
 }
 STREAM: dict[str, Any] = {
     "description": "Server-sent events: `progress` and `end` with the job, `trace` with axis, stage, cost and seconds, `fit` with axis, "
-    "frequency_hz, measured_abs and model_abs [m/N], `note` with a text: a sentence of the job's story. It ends with `end`.",
+    "frequency_hz, measured_abs and model_abs [m/N], `partial` with what of a tooling's lobes is known (`PartialLobes`), `note` with a "
+    "text: a sentence of the job's story. It ends with `end`.",
     "content": {EVENTS: {"schema": _EVENT}},
 }
 
 
-def answer(job: Job) -> JobAnswer:
+def answers(components: Components, jobs: Sequence[Job]) -> list[JobAnswer]:
+    """Return jobs as clients see them, those that wait with their places."""
+    waiting = [job.id for job in jobs if job.state == "queued"]
+    places = components.store.jobs.places(waiting) if waiting else {}
+    return [_answer(job, places.get(job.id)) for job in jobs]
+
+
+def answer(components: Components, job: Job) -> JobAnswer:
     """Return a job as clients see it."""
+    return answers(components, [job])[0]
+
+
+def _answer(job: Job, queue: tuple[int, int] | None) -> JobAnswer:
     names = ("id", "kind", "machine", "campaign", "state", "created", "started", "finished", "status")
     columns = {name: getattr(job, name) for name in names}
     texts = {name: None if text is None else json.loads(text) for name, text in (("progress", job.progress), ("problem", job.problem))}
-    return JobAnswer.model_validate(columns | texts)
+    end = job.finished or now()
+    begun = job.started or end
+    # clocks of the service and of a worker elsewhere may differ
+    times = {"waited_s": max(seconds_between(job.created, begun), 0.0), "running_s": max(seconds_between(begun, end), 0.0)}
+    place = None if queue is None else {"place": queue[0], "waiting": queue[1]}
+    return JobAnswer.model_validate(columns | texts | times | {"queue": place})
 
 
 def place(job: Job) -> str:
@@ -73,9 +90,9 @@ def place(job: Job) -> str:
     return f"/v1/{'lobes' if job.kind == 'lobes' else 'identifications'}/{job.id}"
 
 
-def accepted(job: Job) -> JSONResponse:
+def accepted(components: Components, job: Job) -> JSONResponse:
     """Return the answer 202 to a submitted job."""
-    return JSONResponse(answer(job).model_dump(mode="json"), 202, {"Location": place(job), "Retry-After": AGAIN})
+    return JSONResponse(answer(components, job).model_dump(mode="json"), 202, {"Location": place(job), "Retry-After": AGAIN})
 
 
 def submit(components: Components, job: Job, texts: Mapping[str, str], repeat: tuple[str, str] | None) -> Job:
@@ -114,7 +131,7 @@ def cancel(components: Components, group: str, id: str, kind: str, response: Res
     if not cancelled:
         raise Problem(409, f"the job has already ended: its state is {job.state}")
     response.headers["Location"] = place(job)
-    return answer(job)
+    return answer(components, job)
 
 
 def finished(components: Components, group: str, id: str, kind: str, name: str) -> str:
@@ -147,7 +164,8 @@ async def events(components: Components, caller: Caller, id: str, kind: str, see
 async def _events(components: Components, caller: Caller, job: Job, after: int) -> AsyncIterator[str]:
     end, beat = time.monotonic() + components.settings.watch_seconds, time.monotonic() + HEARTBEAT
     # the current state first, without a number: it is not an event that could be missed
-    yield f"retry: 2000\n{_event(None, 'progress', answer(job).model_dump_json())}"
+    told = await run_in_threadpool(answer, components, job)
+    yield f"retry: 2000\n{_event(None, 'progress', told.model_dump_json())}"
     while time.monotonic() < end and await run_in_threadpool(still_valid, components, caller):
         found = await components.feeds.events(job.id, after)
         for event in found:
@@ -156,7 +174,8 @@ async def _events(components: Components, caller: Caller, job: Job, after: int) 
                 current = await run_in_threadpool(components.store.jobs.find, job.id)
                 if current is None:
                     return
-                yield _event(after, event.kind, answer(current).model_dump_json())
+                told = await run_in_threadpool(answer, components, current)
+                yield _event(after, event.kind, told.model_dump_json())
             else:
                 yield _event(after, event.kind, event.data)
             if event.kind == "end":
@@ -168,8 +187,14 @@ async def _events(components: Components, caller: Caller, job: Job, after: int) 
             return
         if current.state not in OPEN:
             # the client reconnected after the end
-            yield _event(None, "end", answer(current).model_dump_json())
+            yield _event(None, "end", (await run_in_threadpool(answer, components, current)).model_dump_json())
             return
+        if current.state == "queued":
+            # jobs before it have ended: nothing of its own has happened
+            moved = await run_in_threadpool(answer, components, current)
+            if moved.queue != told.queue:
+                told = moved
+                yield _event(None, "progress", told.model_dump_json())
         if not await components.feeds.wait(job.id, after, min(LOOK, max(end - time.monotonic(), 0.0))) and time.monotonic() > beat:
             beat = time.monotonic() + HEARTBEAT
             yield ": still there\n\n"

@@ -6,6 +6,7 @@ import hashlib
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
+from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
 from api.components import ThisService
@@ -55,7 +56,7 @@ def identify(body: NewIdentification, components: ThisService, caller: WhoAsks, 
     request = body.model_dump_json()
     job = Job(new_id(), caller.group, KIND, campaign.machine, campaign.id, request, "queued", now(), key=caller.id, who=caller.name)
     digest = hashlib.sha256(request.encode()).hexdigest()
-    return jobs.accepted(jobs.submit(components, job, texts, None if repeat is None else (repeat, digest)))
+    return jobs.accepted(components, jobs.submit(components, job, texts, None if repeat is None else (repeat, digest)))
 
 
 @router.get("", summary="List identifications, newest first", openapi_extra=guard("read"), responses=problems(422))
@@ -71,7 +72,7 @@ def list_jobs(
     wanted = {"kind": KIND, "machine": machine, "campaign": campaign, "state": state}
     given = {name: str(value) for name, value in wanted.items() if value is not None}
     rows, following = page(components.store.jobs.list(caller.group, given, after, limit + 1), limit, lambda job: job.id)
-    return Page(items=[jobs.answer(job) for job in rows], next=following)
+    return Page(items=jobs.answers(components, rows), next=following)
 
 
 @router.get(
@@ -84,7 +85,7 @@ async def get(id: JobId, components: ThisService, caller: WhoAsks, response: Res
     job = await jobs.awaited(components, caller.group, id, KIND, prefer)
     if job.finished is None:
         response.headers["Retry-After"] = jobs.AGAIN
-    return jobs.answer(job)
+    return await run_in_threadpool(jobs.answer, components, job)
 
 
 @router.delete("/{id}", status_code=202, summary="Cancel an identification", openapi_extra=guard("run"), responses=problems(404, 409, 422))

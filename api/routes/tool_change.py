@@ -67,7 +67,8 @@ async def lobes(body: LobeQuery, request: Request, parts: ThisService, caller: W
     job = Job(new_id(), caller.group, LOBES, body.machine, None, words, "queued", now(), key=caller.id, who=caller.name)
     digest = hashlib.sha256(words.encode()).hexdigest()
     again = None if repeat is None else (repeat, digest)
-    return jobs.accepted(await run_in_threadpool(jobs.submit, parts, job, {"question": text}, again))
+    kept = await run_in_threadpool(jobs.submit, parts, job, {"question": text}, again)
+    return await run_in_threadpool(jobs.accepted, parts, kept)
 
 
 @router.get(
@@ -81,7 +82,8 @@ async def lobe_job(id: jobs.JobId, parts: ThisService, caller: WhoAsks, response
     text = await run_in_threadpool(parts.store.jobs.text, job.id, "answer") if job.state == "done" else None
     if job.finished is None:
         response.headers["Retry-After"] = jobs.AGAIN
-    return LobeJob(job=jobs.answer(job), answer=None if text is None else LobeAnswer.model_validate_json(text))
+    told = await run_in_threadpool(jobs.answer, parts, job)
+    return LobeJob(job=told, answer=None if text is None else LobeAnswer.model_validate_json(text))
 
 
 @router.get(

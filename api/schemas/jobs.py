@@ -34,6 +34,13 @@ class Progress(Answer):
     total: int
 
 
+class QueuePlace(Answer):
+    """Where a job stands among those of its kind that wait; 1 is the next one."""
+
+    place: int
+    waiting: int
+
+
 class JobProblem(Answer):
     """Why a job failed."""
 
@@ -50,6 +57,9 @@ class JobAnswer(Answer):
     campaign: str | None
     state: JobState
     progress: Progress | None
+    queue: QueuePlace | None = Field(description="While it waits for a worker.")
+    waited_s: float = Field(description="Until a worker took it up, or so far.")
+    running_s: float = Field(description="Since a worker took it up, until it ended or so far.")
     created: str = Field(description="UTC, ISO 8601.")
     started: str | None
     finished: str | None
@@ -62,6 +72,16 @@ class LobeJob(Answer):
 
     job: JobAnswer
     answer: LobeAnswer | None = Field(description="Once the job is done.")
+
+
+class PartialLobes(Answer):
+    """What is known of a tooling's lobes while a job computes them speed by speed; each replaces the one before."""
+
+    tooling: str
+    index: int = Field(description="Of the tooling in the question, from 0.")
+    spindle_speed_rpm: list[float] = Field(description="Whose limits are known, rising; some lie beside those that were asked for.")
+    limit_depth_mm: list[float | None] = Field(description="null: stable up to the depth that was asked for.")
+    chatter_frequency_hz: list[float | None]
 
 
 class Lines(Answer):

@@ -8,6 +8,8 @@ from typing import Protocol
 
 OPEN = ("queued", "running")
 STATES = (*OPEN, "done", "failed", "cancelled")
+#: Kind of the events with a part of the answer, which go when the job ends.
+PARTIAL = "partial"
 
 
 class Full(Exception):
@@ -77,7 +79,7 @@ class Event:
     number : int
         Increases within the job, with gaps.
     kind : str
-        progress, trace, fit, note or end.
+        progress, trace, fit, partial, note or end.
     data : str
         JSON; empty for progress and end, whose content is the job itself.
     topic : str
@@ -179,6 +181,9 @@ class Jobs(Protocol):
 
     def open(self) -> Sequence[Job]:
         """Return all jobs that are queued or running, oldest first."""
+
+    def places(self, ids: Sequence[str]) -> dict[str, tuple[int, int]]:
+        """Return (place, waiting) of each of these jobs that waits: its place among all jobs of its kind that do, and their number."""
 
     def begin(self, id: str, worker: str, when: str) -> Job | None:
         """Assign a job to a worker and return it; None where it is over."""

@@ -13,7 +13,7 @@ from api.stores import tables
 from api.stores.changes import IDENTIFICATION, Note
 from api.stores.database import Database
 from api.stores.idempotency import earlier, forget_old
-from api.stores.jobs import OPEN, Event, Full, Job, Outcome, Worker
+from api.stores.jobs import OPEN, PARTIAL, Event, Full, Job, Outcome, Worker
 from api.stores.sql_changes import log_document
 
 
@@ -87,6 +87,7 @@ class SqlJobs:
             cancelled = found.state in OPEN
             if cancelled:
                 connection.execute(update(t).where(*here).values(state="cancelled", finished=when))
+                _forget_partial(connection, id)
                 _append(connection, id, found.events, [Event(0, "end", "")])
             return Job(**connection.execute(select(t).where(*here)).one()._asdict()), cancelled
 
@@ -95,6 +96,15 @@ class SqlJobs:
         with self.store.reading() as connection:
             rows = connection.execute(select(t).where(t.c.state.in_(OPEN)).order_by(t.c.id)).all()
         return [Job(**row._asdict()) for row in rows]
+
+    def places(self, ids: Sequence[str]) -> dict[str, tuple[int, int]]:
+        t = tables.jobs
+        place = func.row_number().over(partition_by=t.c.kind, order_by=t.c.id).label("place")
+        waiting = func.count().over(partition_by=t.c.kind).label("waiting")
+        rank = select(t.c.id, place, waiting).where(t.c.state == "queued").subquery()
+        with self.store.reading() as connection:
+            rows = connection.execute(select(rank).where(rank.c.id.in_(ids))).all()
+        return {row.id: (row.place, row.waiting) for row in rows}
 
     def begin(self, id: str, worker: str, when: str) -> Job | None:
         t = tables.jobs
@@ -135,6 +145,7 @@ class SqlJobs:
                 return False
             names = ("state", "status", "problem", "finished", "seconds")
             connection.execute(update(t).where(t.c.id == id).values({name: getattr(outcome, name) for name in names}))
+            _forget_partial(connection, id)
             for name, text in outcome.texts.items():
                 connection.execute(delete(x).where(x.c.job == id, x.c.name == name))
                 connection.execute(insert(x).values(job=id, name=name, text=text))
@@ -212,6 +223,12 @@ def _append(connection: Connection, job: str, last: int, events: Sequence[Event]
     rows = [asdict(event) | {"job": job, "number": last + 1 + i} for i, event in enumerate(lasting)]
     connection.execute(insert(e), rows)
     connection.execute(update(t).where(t.c.id == job).values(events=last + len(rows)))
+
+
+def _forget_partial(connection: Connection, job: str) -> None:
+    """Delete what an answer was on its way: the answer itself is there, or nobody wants it."""
+    e = tables.job_events
+    connection.execute(delete(e).where(e.c.job == job, e.c.kind == PARTIAL))
 
 
 def _apply(connection: Connection, job: Any, outcome: Outcome) -> None:

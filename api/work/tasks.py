@@ -19,6 +19,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import write_tip_csv
 from rcsa_ident.machine.machine import Machine
 from rcsa_ident.report.summaries import advice_summary, frf_summary, lobes_curves, lobes_summary
+from rcsa_ident.stability.methods import Watch
 from rcsa_ident.units import from_hz, to_hz, to_rpm
 from rcsa_ident.workflows.tool_change import ToolChange, advise, spread_seconds
 from rcsa_ident.workflows.tool_change import tooltip as ask_tip
@@ -117,9 +118,11 @@ def _speed(speed: float | None) -> dict[str, float | None]:
     return {"spindle_speed_rpm": None if speed is None else to_rpm(speed, 6)}
 
 
-def lobes(machine: MachineText, tooling: ToolingSource, request: LobeRequest) -> dict[str, Any]:
-    """Return the stability lobes of a tooling, and what is recommended within them."""
+def lobes(machine: MachineText, tooling: ToolingSource, request: LobeRequest, watch: Watch | None = None) -> dict[str, Any]:
+    """Return the stability lobes of a tooling, and what is recommended within them; `watch` is told of speeds as they come."""
     change = _change(machine, tooling, request)
+    if watch is not None:
+        change = change.watched(watch)
     advice = advise(change, tested=request.tested_cuts)
     return {"tooling": advice.tooling, "warnings": list(advice.remarks)} | lobes_summary(advice) | lobes_curves(advice)
 

@@ -12,6 +12,7 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.uncertain import AtNodes, Mixed, UncertainReceptance, curves_of, nodes_of
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, TipSource
 from rcsa_ident.machining_setup import Tooling
+from rcsa_ident.stability.methods import coarse_to_fine
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 
@@ -30,7 +31,7 @@ def tips_over_speed(
     spread: bool = True,
     stiffness_spread: float = STIFFNESS_SPREAD,
 ) -> Iterator[tuple[NDArray[np.intp], UncertainReceptance | TipModes]]:
-    """Yield the tip for each block of speeds that share one, beside the places of these speeds.
+    """Yield the tip for each block of speeds that share one, beside the places of these speeds; blocks that lie far apart come first.
 
     Parameters
     ----------
@@ -55,8 +56,8 @@ def tips_over_speed(
         middles = [tips.middle(own[block]) for block in blocks]
         if tips.coupled:
             tips.share_nodes(middles)
-        for block, middle in zip(blocks, middles, strict=True):
-            yield places[block], tips.at(middle)
+        for k in coarse_to_fine(len(blocks)):
+            yield places[blocks[k]], tips.at(middles[k])
 
 
 def _blocks(speeds: FloatArray, known: tuple[float, float]) -> list[NDArray[np.intp]]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from enum import StrEnum
 from importlib import import_module
-from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol, runtime_checkable
 
 from rcsa_ident.errors import InputError
 
@@ -42,6 +42,31 @@ class StabilityMethod(Protocol):
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed; the arguments have been checked."""
         ...
+
+
+#: Told of each speed once its limit is known: speed [rad/s], limit [m] and chatter frequency [rad/s], as in `StabilityLobes`.
+Watch = Callable[[float, float, float], None]
+
+
+@runtime_checkable
+class Watched(Protocol):
+    """A method that asks one speed after the other, and tells each limit at once; the limits are the same where nobody watches."""
+
+    watch: Watch | None
+
+
+def coarse_to_fine(count: int) -> list[int]:
+    """Return all places of a list, both ends first, then every gap halved again and again: a curve is there early.
+
+    Examples
+    --------
+    >>> coarse_to_fine(7)
+    [0, 6, 4, 2, 1, 3, 5]
+    """
+    if count < 2:
+        return list(range(count))
+    steps = (1 << k for k in reversed(range((count - 1).bit_length())))
+    return list(dict.fromkeys([0, count - 1, *(place for step in steps for place in range(0, count, step))]))
 
 
 class _Methods(Mapping[str, type[StabilityMethod]]):

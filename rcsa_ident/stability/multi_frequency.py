@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -12,7 +12,7 @@ from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.hill import Hill, PeriodicTeeth, TipMotion
-from rcsa_ident.stability.methods import MethodName
+from rcsa_ident.stability.methods import MethodName, Watch, coarse_to_fine
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import TipModes, receptance_of
 
@@ -41,6 +41,8 @@ class MultiFrequency:
     harmonics : int or None, default None
         Harmonics of [alpha(t)] that are kept. None keeps all, with every harmonic of the force inside the receptance's
         band: exact, but for what lies beyond the band. 0 is the zero-order limit.
+    watch : callable or None
+        Told of each speed once its limit is known.
     """
 
     name: ClassVar[str] = MethodName.MULTI_FREQUENCY.value
@@ -49,6 +51,7 @@ class MultiFrequency:
     gives_maps: ClassVar[bool] = False
 
     harmonics: int | None = None
+    watch: Watch | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.harmonics is not None and not 0 <= self.harmonics <= 200:
@@ -70,15 +73,16 @@ class MultiFrequency:
         chatter = np.full(speeds.size, np.nan)
         lobe = np.full(speeds.size, -1, dtype=np.intp)
         lost = 0
-        for i, speed in enumerate(speeds):
-            passing = cutter.teeth * float(speed)
+        for i in coarse_to_fine(speeds.size):
+            passing = cutter.teeth * float(speeds[i])
             found = Hill(motion, teeth, passing).limit(max_depth)
-            if found is None:
-                continue
-            limit[i] = found.depth
-            chatter[i] = np.nan if found.chatter is None else found.chatter
-            lobe[i] = -1 if found.chatter is None else int(found.chatter / passing)
-            lost += found.chatter is None
+            if found is not None:
+                limit[i] = found.depth
+                chatter[i] = np.nan if found.chatter is None else found.chatter
+                lobe[i] = -1 if found.chatter is None else int(found.chatter / passing)
+                lost += found.chatter is None
+            if self.watch is not None:
+                self.watch(float(speeds[i]), float(limit[i]), float(chatter[i]))
         doubts = _doubts(motion, chatter)
         if np.ptp(cutter.runout) > 0.0:
             doubts.append("run-out is left out: the limit is that of equal teeth")

@@ -7,6 +7,7 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.first_instability import first_loss
+from rcsa_ident.stability.methods import Watch, coarse_to_fine
 from rcsa_ident.stability.monodromy import RESIDUAL, MonodromyOperator, Multiplier, stable_depth_bound
 from rcsa_ident.stability.result import StabilityLobes
 
@@ -70,23 +71,31 @@ def islands_from(cut: MonodromyOperator) -> float:
 
 
 def marched_lobes(
-    cut: MonodromyOperator, speeds: FloatArray, max_depth: float, intervals: int | None, tolerance: float, method: str
+    cut: MonodromyOperator,
+    speeds: FloatArray,
+    max_depth: float,
+    intervals: int | None,
+    tolerance: float,
+    method: str,
+    watch: Watch | None = None,
 ) -> StabilityLobes:
     """Return the lobes of a cut by its multipliers: the first loss of stability at each speed, and how the tool vibrates there."""
     limit = np.full(speeds.size, np.inf)
     chatter = np.full(speeds.size, np.nan)
     lobe, flip = np.full(speeds.size, -1, dtype=np.intp), np.zeros(speeds.size, dtype=bool)
     low, lost = stable_depth_bound(cut.modes, cut.process), 0
-    for i, speed in enumerate(speeds):
-        depth, step, good = _limit(cut, float(speed), low, max_depth, intervals, tolerance)
+    for i in coarse_to_fine(speeds.size):
+        speed = float(speeds[i])
+        depth, step, good = _limit(cut, speed, low, max_depth, intervals, tolerance)
         lost += not good
-        if depth is None:
-            continue
-        found = cut.multiplier(float(speed), depth, step, waves=True)
-        limit[i], chatter[i] = depth, dominant(found)
-        lobe[i] = int(chatter[i] / (speed * cut.process.cutter.teeth))
-        # a quasi-periodic vibration may pass -1, too, but as one of a pair
-        flip[i] = found.value.real < 0.0 and abs(found.value.imag) < 1e-6 * abs(found.value)
+        if depth is not None:
+            found = cut.multiplier(speed, depth, step, waves=True)
+            limit[i], chatter[i] = depth, dominant(found)
+            lobe[i] = int(chatter[i] / (speed * cut.process.cutter.teeth))
+            # a quasi-periodic vibration may pass -1, too, but as one of a pair
+            flip[i] = found.value.real < 0.0 and abs(found.value.imag) < 1e-6 * abs(found.value)
+        if watch is not None:
+            watch(speed, float(limit[i]), float(chatter[i]))
     doubts = [f"at {lost} of {speeds.size} speeds the limit is not converged to {100.0 * tolerance:g} %"] if lost else []
     return StabilityLobes(speeds, limit, chatter, lobe, max_depth, method, warnings=tuple(doubts), flip=flip)
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.process import MillingProcess
 from rcsa_ident.dynamics.receptance import Receptance
-from rcsa_ident.stability.methods import MethodName
+from rcsa_ident.stability.methods import MethodName, Watch
 from rcsa_ident.stability.monodromy import MonodromyOperator
 from rcsa_ident.stability.multiplier_limits import check_resolution, marched_lobes
 from rcsa_ident.stability.result import StabilityLobes
@@ -34,6 +34,8 @@ class SemiDiscretisation:
         Steps per tooth period, at least; None chooses them from an estimate of the error.
     tolerance : float, default 3e-3
         Of the limit depth, relative, where `intervals` is None.
+    watch : callable or None
+        Told of each speed once its limit is known.
     """
 
     name: ClassVar[str] = MethodName.SEMI_DISCRETISATION.value
@@ -43,6 +45,7 @@ class SemiDiscretisation:
 
     intervals: int | None = None
     tolerance: float = 3e-3
+    watch: Watch | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         check_resolution(self.intervals, self.tolerance)
@@ -53,4 +56,4 @@ class SemiDiscretisation:
 
     def lobes(self, tip: Receptance | TipModes, process: MillingProcess, speeds: FloatArray, max_depth: float) -> StabilityLobes:
         """Return the limit at each speed by itself."""
-        return marched_lobes(self.monodromy(tip, process), speeds, max_depth, self.intervals, self.tolerance, self.name)
+        return marched_lobes(self.monodromy(tip, process), speeds, max_depth, self.intervals, self.tolerance, self.name, self.watch)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -14,7 +14,7 @@ from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.stability import _time_kernels as kernels
 from rcsa_ident.stability.first_instability import first_loss
-from rcsa_ident.stability.methods import MethodName
+from rcsa_ident.stability.methods import MethodName, Watch, coarse_to_fine
 from rcsa_ident.stability.monodromy import common_period, stable_depth_bound
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tip_modes import ModeArrays, TipModes, require_modes
@@ -80,6 +80,8 @@ class TimeDomain:
         False lets a tooth cut where it would without vibration, and makes the rubbing viscous: the linear equations of the other
         methods. Where teeth differ or the speed swings, the forced vibration alone can lift teeth out, and the limit moves by tens
         of percents.
+    watch : callable or None
+        Told of each speed once its limit is known.
     """
 
     name: ClassVar[str] = MethodName.TIME_DOMAIN.value
@@ -90,6 +92,7 @@ class TimeDomain:
     periods: int = 150
     tolerance: float = 3e-3
     contact_loss: bool = True
+    watch: Watch | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not 20 <= self.periods <= 100_000:
@@ -104,14 +107,16 @@ class TimeDomain:
         chatter, lobe = np.full(speeds.size, np.nan), np.full(speeds.size, -1, dtype=np.intp)
         flip = np.zeros(speeds.size, dtype=bool)
         low = stable_depth_bound(modes, process)
-        for i, speed in enumerate(speeds):
-            cut = _Cut(modes, process, float(speed), self.contact_loss)
+        for i in coarse_to_fine(speeds.size):
+            speed = float(speeds[i])
+            cut = _Cut(modes, process, speed, self.contact_loss)
             depth = first_loss(lambda d, cut=cut: cut.growth(d, self.periods), low, max_depth, self.tolerance, _RATIO)  # type: ignore[misc]
-            if depth is None:
-                continue
-            limit[i] = depth
-            chatter[i], flip[i] = cut.vibration(depth, self.periods)
-            lobe[i] = int(chatter[i] / (speed * process.cutter.teeth))
+            if depth is not None:
+                limit[i] = depth
+                chatter[i], flip[i] = cut.vibration(depth, self.periods)
+                lobe[i] = int(chatter[i] / (speed * process.cutter.teeth))
+            if self.watch is not None:
+                self.watch(speed, float(limit[i]), float(chatter[i]))
         return StabilityLobes(speeds, limit, chatter, lobe, max_depth, self.name, flip=flip)
 
 

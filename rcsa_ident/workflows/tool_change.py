@@ -25,7 +25,7 @@ from rcsa_ident.machining_setup import CutSpec, Tooling
 from rcsa_ident.stability.advice import Advice, OperatingPoint, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import DEEPER, DRAWS, both_directions, in_proportion, stability_lobes
-from rcsa_ident.stability.methods import MethodName, StabilityMethod
+from rcsa_ident.stability.methods import MethodName, StabilityMethod, Watch, Watched
 from rcsa_ident.stability.pockets import AROUND, pad_speeds, speeds_around
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Pocket, StabilityLobes
 from rcsa_ident.stability.stability_map import MonodromyMethod, StabilityMap, stability_map
@@ -174,6 +174,10 @@ class ToolChange:
             return _PITCH_FACTOR if uneven else 1.0
         factor = 1.0 + cutter.teeth / _TEETH_OF_PERIOD if uneven or np.ptp(cutter.runout) > 0.0 else 1.0
         return factor * max(1.0, (cutter.teeth / _TEETH_OF_STEP) ** 2) if self.method.name == MethodName.TIME_DOMAIN else factor
+
+    def watched(self, watch: Watch) -> ToolChange:
+        """Return the same question, whose method tells each speed's limit once it is known, where it asks speed by speed."""
+        return replace(self, method=replace(self.method, watch=watch)) if isinstance(self.method, Watched) else self  # type: ignore[type-var]
 
     def limits(self, speeds: FloatArray | None = None, max_depth: float | None = None, draws: int | None = None) -> StabilityLobes:
         """Return the stability limits at rising speeds, each asked of the machine as it is at that speed; by default as asked for."""

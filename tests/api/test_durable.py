@@ -36,17 +36,17 @@ def carry(job, remember):
         return remember(name, compute)
     told.append([job, [step(name) for name in ("a", "b", "c")]])
 
-engine.start(executor, carry)
+engine.start(executor, carry, ["lobes"])
 for job in jobs:
-    engine.submit(job, 10)
-    engine.submit(job, 10)
+    engine.submit(job, "lobes")
+    engine.submit(job, "lobes")
 end = time.monotonic() + 60
 while time.monotonic() < end:
     found = {each.job: each for each in engine.carried()}
     if deadly == "adopt":
         for each in found.values():
             if each.state == "running" and each.executor != executor:
-                engine.resume(each.job)
+                engine.resume(each.job, "lobes")
     if found and all(each.state == "over" for each in found.values()):
         break
     time.sleep(0.1)

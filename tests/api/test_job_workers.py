@@ -152,7 +152,7 @@ def test_a_job_of_another_version_starts_over_and_says_so(store, machine):
     worker.submitted = {id}
     worker.reconcile()
     worker.submit_accepted()
-    assert worker.backend.calls == [("forget", id), ("submit", id, 10)]
+    assert worker.backend.calls == [("forget", id), ("submit", id, "identification")]
     steps.texts.clear()
     state, notes = carried()
     assert state == "done"
@@ -298,14 +298,14 @@ class Fake:
         self.known = list(carried)
         self.calls = []
 
-    def submit(self, job, priority):
-        self.calls.append(("submit", job, priority))
+    def submit(self, job, kind):
+        self.calls.append(("submit", job, kind))
 
     def carried(self):
         return self.known
 
-    def resume(self, job):
-        self.calls.append(("resume", job))
+    def resume(self, job, kind):
+        self.calls.append(("resume", job, kind))
 
     def forget(self, jobs):
         self.calls.append(("forget", *jobs))
@@ -323,7 +323,7 @@ def test_what_was_accepted_is_handed_over_once(store, machine):
     worker = worker_of(store)
     worker.submit_accepted()
     worker.submit_accepted()
-    assert worker.backend.calls == [("submit", ids[0], 10), ("submit", ids[1], 1)]
+    assert worker.backend.calls == [("submit", ids[0], "identification"), ("submit", ids[1], "lobes")]
 
 
 def test_what_the_engine_has_lost_is_handed_over_again(store, machine):
@@ -332,7 +332,7 @@ def test_what_the_engine_has_lost_is_handed_over_again(store, machine):
     worker.submit_accepted()
     worker.reconcile()
     worker.submit_accepted()
-    assert worker.backend.calls == [("submit", id, 10)] * 2
+    assert worker.backend.calls == [("submit", id, "identification")] * 2
 
 
 @pytest.mark.parametrize(
@@ -351,7 +351,7 @@ def test_a_round_of_an_open_job(store, machine, state, executor, current, expect
     id = running(store, machine)
     worker = worker_of(store, Carried(id, state, executor, current))
     worker.reconcile()
-    assert worker.backend.calls == ([] if expected is None else [(expected, id)])
+    assert [call[:2] for call in worker.backend.calls] == ([] if expected is None else [(expected, id)])
 
 
 def test_a_round_of_what_has_ended(store, machine):
@@ -380,7 +380,7 @@ def test_a_job_of_one_that_lives_elsewhere_is_left_to_it(store, machine, monkeyp
     moment[0] += 0.2 * LEASE
     worker.reconcile()
     # what another version has remembered helps nobody: the engine forgets it, and the job starts over
-    assert worker.backend.calls == [("resume", id)] + ([] if current else [("forget", id)])
+    assert worker.backend.calls == [("resume", id, "identification")] + ([] if current else [("forget", id)])
 
 
 def test_a_job_that_another_has_just_taken_over_is_left_to_it(store, machine):
@@ -431,7 +431,7 @@ def test_a_worker_that_is_told_to_stop_leaves_nothing_behind(store, machine):
     stop = threading.Event()
 
     class Once(Fake):
-        def start(self, executor, carry):
+        def start(self, executor, carry, kinds):
             stop.set()
 
     worker = JobWorker(store.jobs, Once(), {}, 3)

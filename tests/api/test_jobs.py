@@ -10,7 +10,7 @@ import pytest
 
 from api.security import new_id, now
 from api.stores.entities import Document, Machine, Taken, digest_of
-from api.stores.jobs import Applied, Event, Full, Outcome, Worker
+from api.stores.jobs import PARTIAL, Applied, Event, Full, Outcome, Worker
 from tests.api.identifying import job, running
 from tests.api.in_process import BOTH
 
@@ -85,6 +85,38 @@ def test_what_a_job_tells_comes_in_order_and_of_a_topic_the_last(store, machine)
     assert [e.data for e in store.jobs.events(id, numbers[2], 100)] == ["2", "d", ""]
     assert len(store.jobs.events(id, 0, 2)) == 2
     assert json.loads(store.jobs.find(id).progress) == {"done": 2}
+
+
+@BOTH
+def test_who_waits_has_a_place_among_its_kind(store, machine):
+    """Counted over all groups, since they share the workers; a job that runs or has ended stands in nobody's way."""
+    other = store.machines.add(Machine(new_id(), "B", "M", "", now())).id
+
+    def waiting(**changed):
+        return store.jobs.add(job(machine, **changed), {}, 10).id
+
+    first, second = waiting(id="1"), store.jobs.add(job(other, id="2", group="B"), {}, 10).id
+    lobes = waiting(id="3", kind="lobes")
+    third = waiting(id="4")
+    assert store.jobs.places([first, third, lobes, "nobody"]) == {first: (1, 3), third: (3, 3), lobes: (1, 1)}
+    store.jobs.begin(first, "w", now())
+    assert store.jobs.places([first, second, third]) == {second: (1, 2), third: (2, 2)}
+    store.jobs.cancel("B", second, now())
+    assert store.jobs.places([third]) == {third: (1, 1)}
+
+
+@BOTH
+@pytest.mark.parametrize("end", ["finish", "cancel"])
+def test_parts_of_an_answer_go_when_the_job_ends(store, machine, end):
+    id = running(store, machine)
+    assert store.jobs.tell(id, "w", [Event(0, PARTIAL, "a", "partial 0"), Event(0, PARTIAL, "b", "partial 1"), Event(0, "note", "c")])
+    assert store.jobs.tell(id, "w", [Event(0, PARTIAL, "d", "partial 0")])
+    assert [(e.kind, e.data) for e in store.jobs.events(id, 0, 100)[1:]] == [(PARTIAL, "b"), ("note", "c"), (PARTIAL, "d")]
+    if end == "finish":
+        store.jobs.finish(id, "w", Outcome("done", now()))
+    else:
+        store.jobs.cancel("A", id, now())
+    assert [e.kind for e in store.jobs.events(id, 0, 100)] == ["progress", "note", "end"]
 
 
 @BOTH

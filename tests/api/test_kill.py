@@ -73,10 +73,9 @@ def after(client: Client, id: str, count: int) -> None:
 
 
 @contextmanager
-def started(folder: Path, url: str, count: int = 1) -> Iterator[tuple[Client, subprocess.Popen]]:
-    settings = {"RCSA_IDENT_JOB_WORKERS": str(count), "RCSA_IDENT_JOB_NICE": "0"} | (
-        {} if url.startswith("sqlite") else {"RCSA_IDENT_DATABASE": url}
-    )
+def started(folder: Path, url: str, count: int = 1, lobes: int = 0) -> Iterator[tuple[Client, subprocess.Popen]]:
+    settings = {"RCSA_IDENT_JOB_WORKERS": str(count), "RCSA_IDENT_LOBE_WORKERS": str(lobes), "RCSA_IDENT_JOB_NICE": "0"}
+    settings |= {} if url.startswith("sqlite") else {"RCSA_IDENT_DATABASE": url}
     with serving(folder, **settings) as served, Client(served.url) as client:
         yield client, served.process
         kill([*descendants(served.process.pid), served.process.pid])
@@ -170,7 +169,7 @@ def lobe_job(store: Store, machine: str, result: str, speeds: int, method: str) 
 
 @contextmanager
 def working(folder: Path, url: str, name: str) -> Iterator[subprocess.Popen]:
-    words, environment = command(folder, "worker", "--count", "1", RCSA_IDENT_DATABASE=url, RCSA_IDENT_JOB_NICE="0")
+    words, environment = command(folder, "worker", "--count", "0", "--lobes", "1", RCSA_IDENT_DATABASE=url, RCSA_IDENT_JOB_NICE="0")
     with (folder.parent / name).open("w") as log, subprocess.Popen(words, env=environment, stderr=log) as running:
         try:
             yield running
@@ -211,7 +210,7 @@ def test_a_worker_that_is_not_free_or_not_there(tmp_path, result):
     """A job without a place to look up is cancelled within moments; where workers die at once, the service goes on and says so."""
     folder = tmp_path / "data"
     url = f"sqlite:///{folder / 'service.db'}"
-    with started(folder, url) as (client, _):
+    with started(folder, url, 0, 1) as (client, _):
         machine = client.make_machine("M").id
         client.identify(machine, result)
         slow = {"method": "time-domain", "speeds": {"from_rpm": 3000, "to_rpm": 20000, "step_rpm": 50}, "bands": False}

@@ -10,9 +10,11 @@ from functools import partial
 import pytest
 
 from api.client import Client, ServiceError
-from api.jobs import lobes
+from api.jobs import job_context, lobes
 from api.jobs.codec import decode
 from api.jobs.worker import carry
+from api.schemas.jobs import PartialLobes
+from api.stores.jobs import PARTIAL
 from tests.api.identifying import Steps, carried
 from tests.api.in_process import refused, service
 from tests.fixtures.service import example
@@ -133,3 +135,61 @@ def test_cancelled_lobes_have_no_answer(shop, store):
     assert (found.job.state, found.answer) == ("cancelled", None)
     refused(409, client.send, "DELETE", f"/lobes/{job}")
     refused(404, client.job, job)
+
+
+@pytest.mark.slow
+def test_limits_come_before_the_answer(shop, store, tmp_path, monkeypatch):
+    """Speed by speed of one tooling after the other, all of them the answer's own; a part of it is not there any more at its end."""
+    monkeypatch.setattr(job_context, "CURVE", 0.0)
+    monkeypatch.setattr(job_context, "DELIVERY", 0.01)
+    client, id = shop
+    job = later(client, id, "T1", example(), method="multi-frequency", bands=False)
+    told, tell = [], store.jobs.tell
+
+    def kept(id, worker, events, progress=None, further=False):
+        told.extend((event.kind, event.data) for event in events)
+        told.extend([] if progress is None else [("progress", progress)])
+        return tell(id, worker, events, progress, further)
+
+    monkeypatch.setattr(store.jobs, "tell", kept)
+    carried(store, tmp_path)
+    found = client.lobe_job(job)
+    assert found.answer == client.lobes(id, "T1", example(), method="multi-frequency", bands=False, speeds=SPEEDS)
+    parts = [PartialLobes.model_validate_json(data) for kind, data in told if kind == PARTIAL]
+    assert {part.index for part in parts} == {0, 1}
+    for part in parts:
+        whole = found.answer.toolings[part.index]
+        assert part.tooling == whole.tooling
+        limits = dict(zip(whole.spindle_speed_rpm, zip(whole.limit_depth_mm, whole.chatter_frequency_hz, strict=True), strict=True))
+        own = zip(part.spindle_speed_rpm, part.limit_depth_mm, part.chatter_frequency_hz, strict=True)
+        # beside those that were asked for there are speeds that a recommendation needs
+        assert all(limits.get(speed, (limit, chatter)) == (limit, chatter) for speed, limit, chatter in own)
+    assert set(parts[-1].spindle_speed_rpm) >= set(found.answer.toolings[1].spindle_speed_rpm)
+    # the first part spans the speeds
+    first, *_, last = next(part.spindle_speed_rpm for part in parts if len(part.spindle_speed_rpm) > 1)
+    assert first <= 6000.0
+    assert last >= 12000.0
+    progress = [json.loads(data) for kind, data in told if kind == "progress"]
+    assert progress[-1] == {"stage": "speeds", "done": 26, "total": 26}
+    assert PARTIAL not in [event.kind for event in store.jobs.events(job, 0, 1000)]
+
+
+def test_who_waits_is_told_its_place_and_for_how_long(shop, store):
+    """Also when it moves up, in which nothing of its own happens."""
+    client, id = shop
+    first, second = (later(client, id, "T1") for _ in range(2))
+    waiting = client.lobe_job(second).job
+    assert (waiting.queue.place, waiting.queue.waiting) == (2, 2)
+    assert waiting.waited_s >= 0.0
+    assert waiting.running_s == 0.0
+    told = []
+    for kind, data in client.events(second, "lobes"):
+        told.append((kind, data["queue"]))
+        if len(told) == 1:
+            client.send("DELETE", f"/lobes/{first}")
+        elif len(told) == 2:
+            client.send("DELETE", f"/lobes/{second}")
+    assert told == [("progress", {"place": 2, "waiting": 2}), ("progress", {"place": 1, "waiting": 1}), ("end", None)]
+    ended = client.lobe_job(second).job
+    assert ended.queue is None
+    assert ended.waited_s >= waiting.waited_s

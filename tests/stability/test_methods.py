@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import is_dataclass
+from dataclasses import is_dataclass, replace
 
 import numpy as np
 import pytest
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.stability.lobes import stability_lobes
-from rcsa_ident.stability.methods import METHODS, MethodName, method_named
+from rcsa_ident.stability.methods import METHODS, MethodName, Watched, coarse_to_fine, method_named
 from rcsa_ident.stability.time_domain import TimeDomain
 from tests.stability.mills import ONE, RPM, mill, tip
 
@@ -47,3 +47,40 @@ def test_an_unknown_name_is_refused_with_those_that_are_known():
 def test_the_names_cost_no_import():
     code = "import sys, rcsa_ident.stability.methods; print([m for m in ('numpy', 'numba', 'scipy') if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 7, 64, 161])
+def test_from_coarse_to_fine_every_place_comes_once(count):
+    order = coarse_to_fine(count)
+    assert sorted(order) == list(range(count))
+    # after so many the widest gap is that of equal steps, or twice as wide
+    for known in (n for n in (5, 9, 17, 33) if n < count):
+        assert np.max(np.diff(np.sort(order[:known]))) <= 2 * -(-count // (known - 2))
+
+
+SPEEDS = np.linspace(9000.0, 15_000.0, 6) * RPM
+
+
+@pytest.mark.parametrize("name", [name for name in METHODS if name != "zero-order"])
+def test_limits_are_told_as_they_come_and_are_the_same(name):
+    """Told once each, from coarse to fine; those of the whole answer, and those of each speed by itself, to the last bit."""
+    method = TimeDomain(periods=20) if name == "time-domain" else method_named(name)
+    told = []
+    watched = replace(method, watch=lambda *row: told.append(row))
+    assert isinstance(watched, Watched)
+    found, plain = (stability_lobes(tip(ONE), mill(), SPEEDS, 1e-3, each) for each in (watched, method))
+    assert [row[0] for row in told] == [SPEEDS[k] for k in coarse_to_fine(SPEEDS.size)]
+    order = np.argsort([row[0] for row in told])
+    np.testing.assert_array_equal(np.array(told)[order, 1:], np.stack([found.limit_depth, found.chatter_frequency], axis=1))
+    # some speeds are stable up to that depth
+    assert 0 < np.sum(found.stable) < SPEEDS.size
+    assert found.warnings == plain.warnings
+    for name in ("limit_depth", "chatter_frequency", "lobe", "flip"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(plain, name))
+    for k, speed in enumerate(SPEEDS):
+        alone = stability_lobes(tip(ONE), mill(), np.array([speed]), 1e-3, method)
+        np.testing.assert_array_equal(alone.limit_depth, found.limit_depth[k : k + 1])
+
+
+def test_zero_order_asks_all_speeds_at_once():
+    assert not isinstance(method_named("zero-order"), Watched)
