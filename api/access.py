@@ -19,7 +19,7 @@ from uvicorn.protocols.http.auto import AutoHTTPProtocol
 from api.components import Components
 from api.connections import Connections
 from api.problems import Problem, document
-from api.stores.entities import Unavailable
+from api.stores.entities import Destroyed, Unavailable
 from api.work.pool import Busy
 
 log = logging.getLogger("rcsa_ident.service")
@@ -150,6 +150,9 @@ class TimedHeadProtocol(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
 
 
 def _problem(error: Exception) -> Problem:
+    if isinstance(error, Destroyed):
+        words = "the database is damaged, and nothing more is written to it: whoever runs the service restores a backup"
+        return Problem(503, words, headers={"Retry-After": "600"})
     if isinstance(error, Unavailable):
         return Problem(503, "the database does not answer", headers=RETRY)
     if isinstance(error, Busy):

@@ -41,8 +41,10 @@ _WHY = {
     412: "The stored content does not match If-Match or If-None-Match.",
     413: "The body is too large.",
     415: "The body is of another type.",
+    416: "The file ends before the part that Range asks for.",
     422: "The input is not usable; the fields at fault are named.",
     429: "There are too many requests with this API key.",
+    500: "What is stored is damaged; the sentence says how it becomes whole again.",
     503: "Too many queries are waiting for an answer, or the database does not answer.",
 }
 _ALWAYS = (401, 403, 429, 503)

@@ -1,15 +1,18 @@
-"""The data folder: its owner's alone, and one service's at a time."""
+"""The data folder: its owner's alone, one service's at a time, and never begun anew over what is left of a store."""
 
 from __future__ import annotations
 
 import fcntl
+import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 from rcsa_ident.errors import InputError
 
 LOCK = "service.lock"
+#: The embedded databases: the store, and the steps of jobs.
+STORE, ENGINE = "service.db", "jobs.db"
 
 
 def make(folder: Path) -> None:
@@ -18,6 +21,33 @@ def make(folder: Path) -> None:
     # somebody else's folder has the rights that he has given it
     with suppress(PermissionError):
         folder.chmod(0o700)
+
+
+def check(folder: Path) -> None:
+    """Refuse a folder whose databases are damaged, and one that has lost its store: a new one would forget what is left.
+
+    Raises
+    ------
+    InputError
+    """
+    mend = f"a whole store in {folder}: restore a backup into a new folder (rcsa-ident-serve restore)"
+    lost = not (folder / STORE).is_file() or (folder / STORE).stat().st_size == 0
+    if lost and ((folder / ENGINE).exists() or any(folder.glob("files/*/uploads/*"))):
+        raise InputError("RCSA_IDENT_DATA", f"recordings or jobs, but {STORE} is missing or empty", mend)
+    for name, further in ((STORE, ""), (ENGINE, f", or remove {ENGINE}: jobs that are open start over")):
+        path = folder / name
+        if not path.is_file() or path.stat().st_size == 0:
+            continue
+        try:
+            with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=rw", uri=True)) as database:
+                ((state,),) = database.execute("PRAGMA quick_check(1)").fetchall()
+        except sqlite3.OperationalError:
+            # locked, or of somebody else: whoever opens it says so
+            continue
+        except sqlite3.DatabaseError as error:
+            state = str(error)
+        if state != "ok":
+            raise InputError("RCSA_IDENT_DATA", f"{name}, which is damaged ({state.splitlines()[-1][:200]})", mend + further)
 
 
 @contextmanager

@@ -22,6 +22,8 @@ from typing import Any
 
 #: Kinds of files: uploads as received, samples read from them, and parts of unfinished uploads.
 UPLOADS, NORMALISED, PARTS = "uploads", "normalised", "parts"
+#: Time [s] for which a file counts as whole after it was hashed, unless it changes: parts of one download follow each other.
+FRESH = 60.0
 #: Age [s] at which an abandoned part is removed, and a file that no row refers to.
 STALE_PART, STALE_FILE = 86400.0, 600.0
 _KEY = re.compile(r"[0-9a-f]{64}")
@@ -106,8 +108,7 @@ class Part:
         """Return the hash of the whole, hexadecimal."""
         if self.hash is None:
             self.file.flush()
-            with self.path.open("rb") as file:
-                self.hash = hashlib.file_digest(file, "sha256")
+            return sha256_of(self.path)
         return str(self.hash.hexdigest())
 
 
@@ -126,6 +127,7 @@ class Files:
 
     def __init__(self, folder: Path, group_bytes: int = 1 << 62, free_bytes: int = 0) -> None:
         self.folder, self.group_bytes, self.free_bytes = folder, group_bytes, free_bytes
+        self.hashed: dict[tuple[Any, ...], float] = {}
         #: Held from the rename of a file until its row is written, and while files without a row are removed.
         self.lock = threading.Lock()
 
@@ -144,6 +146,21 @@ class Files:
         if not _KEY.fullmatch(key) or kind not in (UPLOADS, NORMALISED):
             raise ValueError(f"no key of a file: {kind}/{key}")
         return self.of_group(group, kind) / f"{key}{'.h5' if kind == NORMALISED else ''}"
+
+    def is_whole(self, path: Path, sha256: str) -> bool:
+        """Whether a file has this hash; of one that was stored before hashes were kept ("") whether it is there."""
+        try:
+            stat = path.stat()
+            mark = (path, sha256, stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns)
+            now = time.monotonic()
+            if now - self.hashed.get(mark, -FRESH) < FRESH or not sha256:
+                return True
+            if sha256_of(path) != sha256:
+                return False
+        except OSError:
+            return False
+        self.hashed = {key: seen for key, seen in self.hashed.items() if now - seen < FRESH} | {mark: now}
+        return True
 
     def part(self, group: str) -> Part:
         """Return a new part."""
@@ -239,6 +256,12 @@ def _noted(path: Path) -> Partial | None:
         return state if path.stat().st_size >= state.offset else None
     except (OSError, ValueError, TypeError):
         return None
+
+
+def sha256_of(path: Path) -> str:
+    """Return the hash of a file, hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def no_room(error: BaseException) -> bool:

@@ -11,10 +11,10 @@ from pathlib import Path
 
 from api.components import Components
 from api.conventions import found_or_404
-from api.files import NORMALISED
 from api.problems import Problem
 from api.reading.campaign_text import campaign_of_text
 from api.reading.reader_tasks import recording_and_air
+from api.reading.stored import samples_of
 from api.schemas.toolings import ToolingKeys
 from api.stores.campaigns import Campaign, Recording
 from api.stores.entities import Document, Machine
@@ -84,15 +84,15 @@ def uploaded(components: Components, group: str, campaign: str, recording: str) 
     air = None if cut.air is None else components.store.recordings.get(group, campaign, cut.air.name)
     tooling = ToolingSource(cut.tooling, json.loads(row.text)["toolings"][cut.tooling])
     sensors = channels_of(found["channels"], declared.sensors)
-    still = None if air is None else components.files.path(group, NORMALISED, air.normalised)
-    path = components.files.path(group, NORMALISED, kept.normalised)
+    still = None if air is None else samples_of(components.files, air)
+    path = samples_of(components.files, kept)
     return Uploaded(row.machine, tooling, path, still, sensors, found["sampling_rate_hz"], cut.conditions.spindle_speed)
 
 
 def air_cut(components: Components, group: str, campaign: str, recording: str) -> ReadPair:
     """Return what reads an uploaded recording alone."""
     kept = _kept(components, group, campaign, unicodedata.normalize("NFC", recording))
-    return pair_reader(components.files.path(group, NORMALISED, kept.normalised), None)
+    return pair_reader(samples_of(components.files, kept), None)
 
 
 def _kept(components: Components, group: str, campaign: str, name: str) -> Recording:

@@ -81,6 +81,7 @@ def create_app(
     """
     if store is None and not settings.database:
         data_folder.make(settings.data)
+        data_folder.check(settings.data)
     kept = open_store(settings.database_url) if store is None else store
     most = QueryLimits(settings.query_seconds, settings.query_memory)
     workers = Pool(settings.workers, settings.queue, settings.kept_machines, most) if work is None else work

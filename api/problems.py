@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Mapping, Sequence
 from http import HTTPStatus
@@ -12,9 +13,11 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
+from api.stores.entities import Damaged
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.validated_table import describe
 
+log = logging.getLogger("rcsa_ident.service")
 MEDIA_TYPE = "application/problem+json"
 _LONGEST = 200
 #: The library's fields as the bodies call them.
@@ -117,6 +120,11 @@ def install(app: FastAPI) -> None:
         assert isinstance(error, InputError)
         return document(request, of_input(error))
 
+    def damaged(request: Request, error: Exception) -> Response:
+        assert isinstance(error, Damaged)
+        log.error("damaged", extra={"fields": {"request_id": getattr(request.state, "request_id", ""), "found": str(error)}})
+        return document(request, Problem(500, str(error)))
+
     def malformed(request: Request, error: Exception) -> Response:
         assert isinstance(error, RequestValidationError)
         return document(request, of_validation(error.errors()))
@@ -139,5 +147,6 @@ def install(app: FastAPI) -> None:
 
     app.add_exception_handler(Problem, known)
     app.add_exception_handler(InputError, unusable)
+    app.add_exception_handler(Damaged, damaged)
     app.add_exception_handler(RequestValidationError, malformed)
     app.add_exception_handler(HTTPException, plain)

@@ -53,7 +53,7 @@ def create_key(
     """Make an API key and print it once: the way to the first key of a group."""
     import re
 
-    from api.data_folder import make
+    from api.data_folder import check, make
     from api.schemas.common import NAME_PATTERN
     from api.security import LONGEST, SCOPES, make_key
     from api.stores.sql import open_store
@@ -71,6 +71,7 @@ def create_key(
         settings = context.obj
         if not settings.database:
             make(settings.data)
+            check(settings.data)
         store = open_store(settings.database_url)
         key, text = make_key(group, wanted, label, days)
         store.keys.add(key)
@@ -126,7 +127,7 @@ def backup_store(
     except InputError as error:
         _fail(error)
     typer.echo(f"{file}: {account.files} files, {account.bytes / 1e6:.1f} MB")
-    for words, names in (("missing, though referred to", account.missing), ("not what was uploaded any more", account.damaged)):
+    for words, names in (("missing, though referred to", account.missing), ("not what was stored any more", account.damaged)):
         for name in names:
             typer.echo(f"warning: {name} is {words}", err=True)
 

@@ -29,7 +29,7 @@ class Account:
     missing : tuple of str
         Files that rows refer to but that do not exist.
     damaged : tuple of str
-        Uploads whose content does not match its hash any more.
+        Files whose content does not match its hash any more.
     """
 
     files: int

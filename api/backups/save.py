@@ -41,11 +41,11 @@ def backup(data: Path, target: Path) -> Account:
         raise InputError("FILE.tar", "no such folder", "a file in an existing folder")
     part = target.with_name(f".{target.name}.{os.getpid()}.part")
     with disk("FILE.tar"), _alone(data) as staging:
-        missing = _gather(data, staging)
+        wanted = _gather(data, staging)
         try:
             # readable by the owner only
             with open(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "wb") as file:
-                account = _write(file, staging, missing)
+                account = _write(file, staging, wanted)
                 file.flush()
                 os.fsync(file.fileno())
             _name(part, target)
@@ -83,9 +83,9 @@ def _alone(data: Path) -> Iterator[Path]:
             shutil.rmtree(staging, ignore_errors=True)
 
 
-def _gather(data: Path, staging: Path) -> tuple[str, ...]:
-    """Make snapshots of the databases and links to all files that their rows refer to; return the missing ones."""
-    missing: tuple[str, ...] = ()
+def _gather(data: Path, staging: Path) -> dict[str, str]:
+    """Make snapshots of the databases and links to all files that their rows refer to; return these with their SHA-256."""
+    wanted: dict[str, str] = {}
     for _ in range(5):
         # links before the snapshot keep files that are deleted after it; links after it include those that arrived just before it
         _link(data / FILES, staging / FILES)
@@ -94,13 +94,12 @@ def _gather(data: Path, staging: Path) -> tuple[str, ...]:
         _snapshot(data / STORE, staging / STORE)
         _link(data / FILES, staging / FILES)
         wanted = _referred(staging)
-        missing = tuple(sorted(name for name in wanted if not (staging / name).is_file()))
-        if not missing:
+        if all((staging / name).is_file() for name in wanted):
             break
     for path in [path for path in (staging / FILES).rglob("*") if path.is_file()]:
         if path.relative_to(staging).as_posix() not in wanted:
             path.unlink()
-    return missing
+    return wanted
 
 
 def _link(source: Path, target: Path) -> None:
@@ -129,12 +128,13 @@ def _snapshot(source: Path, target: Path) -> None:
         raise InputError("RCSA_IDENT_DATA", f"{source.name} does not answer", "a database of this service") from None
 
 
-def _referred(folder: Path) -> set[str]:
+def _referred(folder: Path) -> dict[str, str]:
+    """Files that rows refer to, with their SHA-256, empty where it is not known."""
     store = open_store(f"sqlite:///{folder / STORE}")
     try:
         files = Files(folder / FILES)
-        found = {(group, *key) for group in store.recordings.groups() for key in store.recordings.kept(group) if key[1]}
-        return {files.path(*each).relative_to(folder).as_posix() for each in found}
+        found = {(group, *key): sha256 for group in store.recordings.groups() for key, sha256 in store.recordings.kept(group).items()}
+        return {files.path(*each).relative_to(folder).as_posix(): sha256 for each, sha256 in found.items() if each[2]}
     finally:
         store.close()
         # without a separate WAL file
@@ -142,14 +142,15 @@ def _referred(folder: Path) -> set[str]:
             database.execute("PRAGMA journal_mode=DELETE")
 
 
-def _write(file: BinaryIO, staging: Path, missing: tuple[str, ...]) -> Account:
+def _write(file: BinaryIO, staging: Path, wanted: dict[str, str]) -> Account:
     files = sorted(path.relative_to(staging).as_posix() for path in (staging / FILES).rglob("*") if path.is_file())
     names = [name for name in (STORE, ENGINE) if (staging / name).is_file()] + files
     members: dict[str, dict[str, Any]] = {}
     for name in names:
         with (staging / name).open("rb") as source:
             members[name] = _add(file, name, source, os.fstat(source.fileno()).st_size)
-    damaged = tuple(name for name, each in members.items() if f"/{UPLOADS}/" in name and not name.endswith(each["sha256"]))
+    missing = tuple(sorted(wanted.keys() - members.keys()))
+    damaged = tuple(name for name, each in members.items() if wanted.get(name) and wanted[name] != each["sha256"])
     manifest = {
         "format": FORMAT,
         "release": __version__,

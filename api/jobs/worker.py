@@ -17,7 +17,7 @@ from typing import Any
 
 from api.jobs.backend import JobBackend, Remember
 from api.jobs.job_context import Faulty, JobContext, Outdated, Stopped
-from api.stores.entities import Unavailable
+from api.stores.entities import Damaged, Unavailable
 from api.stores.jobs import Job, Jobs, Outcome, Worker
 from rcsa_ident.errors import InputError
 
@@ -74,6 +74,9 @@ def _outcome(jobs: Jobs, carrier: Carrier, job: Job, token: str, remember: Remem
         return failed(f"{where}{error.field}: found {found}, allowed is {error.allowed}", (error.field, found, error.allowed))
     except Unavailable:
         raise
+    except Damaged as error:
+        log.error("damaged", extra={"fields": {"job": job.id, "found": str(error)}})
+        return failed(str(error))
     except Faulty:
         return failed("an internal error occurred; it is logged under this job's id")
     except Exception as error:

@@ -19,7 +19,7 @@ from api.live.stream_opening import Opening
 from api.problems import Problem
 from api.schemas.forces import Hello
 from api.security import Caller, still_valid
-from api.stores.entities import Unavailable
+from api.stores.entities import Damaged, Unavailable
 from api.streams.frames import TooLarge, WrongKind, object_of, samples_of, samples_of_text
 from api.streams.hub import Full, Hub
 from api.streams.listener import Listener
@@ -237,6 +237,8 @@ def end_of(error: Exception) -> End:
         return End(1008, 422, found.detail, tuple(found.errors))
     if isinstance(error, Problem):
         return End(1008, error.status, error.detail, tuple(error.errors))
+    if isinstance(error, Damaged):
+        return End(1011, 500, str(error))
     if isinstance(error, Full):
         return End(1013, 503, str(error))
     if isinstance(error, Busy | Unavailable):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from api.files import NORMALISED, Files
 from api.reading.campaign_text import campaign_of_text
+from api.reading.stored import Samples
 from api.stores.entities import Store
 from rcsa_ident.errors import InputError
 from rcsa_ident.machining_setup import Campaign, Cut
@@ -24,19 +26,28 @@ def load_campaign(store: Store, files: Files, group: str, campaign_id: str) -> t
     InputError
         The campaign has been deleted, or none of its cuts has a recording.
     """
-    from api.reading.samples import read_cut_normalised
-
     row = store.campaigns.get(group, campaign_id)
     if row is None:
         raise InputError("campaign", f'"{campaign_id}"', "an existing campaign")
-    keys = {each.name: each.normalised for each in store.recordings.list(group, campaign_id, "", 1_000_000)}
+    listed = store.recordings.list(group, campaign_id, "", 1_000_000)
+    paths = {each.name: files.path(group, NORMALISED, each.normalised) for each in listed}
+    samples = Samples({paths[each.name]: each.samples for each in listed})
 
     def locate(name: str) -> Path:
-        return files.path(group, NORMALISED, keys[name]) if name in keys else Path()
+        return paths.get(name, Path())
 
     found = campaign_of_text(row.text, locate)
     there = [cut for cut in found.cuts if cut.recording != Path()]
     if not there:
         raise InputError("campaign", "no recording of a cut", "a campaign with recordings")
     cuts = tuple(replace(cut, air=None) if cut.air == Path() else cut for cut in there)
-    return replace(found, cuts=cuts), read_cut_normalised
+    return replace(found, cuts=cuts), partial(_read_whole, samples)
+
+
+def _read_whole(samples: Samples, cut: Cut) -> tuple[Recording, Recording | None]:
+    from api.reading.samples import read_cut_normalised
+
+    for path in (cut.recording, cut.air):
+        if path is not None:
+            samples.check(path)
+    return read_cut_normalised(cut)

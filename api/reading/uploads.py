@@ -7,19 +7,20 @@ import hashlib
 import json
 import logging
 import weakref
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from api.files import NORMALISED, UPLOADS, Files, Full, Partial
+from api.files import NORMALISED, UPLOADS, Files, Full, Partial, sha256_of
 from api.reading import reader_tasks
 from api.reading.campaign_text import Upload, files_of
+from api.reading.stored import is_whole, samples_of
 from api.stores.campaigns import Campaign, FileKey, Recording
 from api.stores.changes import Note
-from api.stores.entities import Store, Taken, Unavailable
+from api.stores.entities import Damaged, Store, Taken, Unavailable
 from api.work.pool import Busy, Work
 from rcsa_ident.errors import InputError
 
@@ -84,10 +85,14 @@ class Uploads:
         there = await asyncio.to_thread(self.store.recordings.get, campaign.group, campaign.id, name)
         if there is not None and there.sha256 != received.sha256 and not replacing:
             raise Taken("name")
-        if there is not None and there.sha256 == received.sha256:
+        same = there is not None and there.sha256 == received.sha256
+        if there is not None and same and await asyncio.to_thread(is_whole, self.files, there):
             status, kept = 200, there
         else:
             status, kept = await self._read(campaign, name, file.role, file.cuts[0], received, replacing)
+            if same:
+                log.warning("a damaged recording is whole again", extra={"fields": {"recording": name, "campaign": campaign.id}})
+                await self._judge_again(campaign, file.cuts)
         await self.settle(campaign)
         again = await asyncio.to_thread(self.store.recordings.get, campaign.group, campaign.id, name)
         return status, again or kept
@@ -134,7 +139,8 @@ class Uploads:
         target = self.files.spare(campaign.group)
         try:
             upload = Upload(received.path, name, target)
-            found = await self.reader.run(reader_tasks.look, upload, campaign.text, cut, role, self._path(air))
+            there = await asyncio.to_thread(self._samples, air)
+            found = await self.reader.run(reader_tasks.look, upload, campaign.text, cut, role, there)
             recording = Recording(
                 campaign.group,
                 campaign.id,
@@ -146,6 +152,7 @@ class Uploads:
                 json.dumps(found, allow_nan=False),
                 "" if air is None else air.normalised,
                 datetime.now(UTC).isoformat(timespec="milliseconds"),
+                await asyncio.to_thread(sha256_of, target),
             )
             before = await asyncio.to_thread(self._keep, recording, received.path, target, replacing)
         finally:
@@ -170,14 +177,14 @@ class Uploads:
 
     def _release(self, group: str, keys: Iterable[FileKey]) -> None:
         """Remove files that no row refers to any more; the caller holds the lock."""
-        self.files.remove(group, set(keys) - self.store.recordings.kept(group))
+        self.files.remove(group, set(keys).difference(self.store.recordings.kept(group)))
 
     def _air(self, campaign: Campaign, cut: str) -> Recording | None:
         name = next((name for name, file in files_of(campaign.text).items() if file.role == "air" and cut in file.cuts), None)
         return None if name is None else self.store.recordings.get(campaign.group, campaign.id, name)
 
-    def _path(self, recording: Recording | None) -> Path | None:
-        return None if recording is None else self.files.path(recording.group, NORMALISED, recording.normalised)
+    def _samples(self, recording: Recording | None) -> Path | None:
+        return None if recording is None else samples_of(self.files, recording)
 
     async def settle(self, campaign: Campaign) -> None:
         """Judge every cut again whose air cut has been added or removed since its verdict."""
@@ -220,12 +227,18 @@ class Uploads:
                 text = json.dumps(data | {"verdict": verdict, "alone": own}, allow_nan=False)
                 await asyncio.to_thread(self.store.recordings.judge, row, replace(row, found=text))
 
+    async def _judge_again(self, campaign: Campaign, cuts: Sequence[str]) -> None:
+        """Judge cuts whose verdicts may say that a file was damaged."""
+        rows = {row.name: row for row in await asyncio.to_thread(self.store.recordings.list, campaign.group, campaign.id, "", 1_000_000)}
+        for cut in json.loads(campaign.text)["cuts"]:
+            if cut["id"] in cuts and cut["cut"] in rows:
+                await self._judge(campaign, cut["id"], rows[cut["cut"]], rows.get(cut.get("air", "")))
+
     async def _judge(self, campaign: Campaign, cut: str, recording: Recording, air: Recording | None) -> None:
-        path = self._path(recording)
-        assert path is not None
         try:
-            verdict = await self.reader.run(reader_tasks.judge, campaign.text, cut, path, self._path(air))
-        except InputError as error:
+            own, still = await asyncio.to_thread(lambda: (samples_of(self.files, recording), self._samples(air)))
+            verdict = await self.reader.run(reader_tasks.judge, campaign.text, cut, own, still)
+        except (InputError, Damaged) as error:
             verdict = refused_verdict(str(error))
         text = json.dumps(json.loads(recording.found) | {"verdict": verdict, "alone": verdict}, allow_nan=False)
         after = replace(recording, found=text, judged_with="" if air is None else air.normalised)
@@ -247,14 +260,17 @@ class Uploads:
         await self.settle(campaign)
         return there
 
-    def forget_campaign(self, campaign: Campaign) -> bool:
-        """Remove a campaign with everything that was uploaded for it."""
+    def forget_campaign(self, group: str, id: str) -> bool:
+        """Remove a campaign with everything that was uploaded for it, and return whether there was one."""
         with self.files.lock:
-            rows = self.store.recordings.list(campaign.group, campaign.id, "", 1_000_000)
-            there = self.store.campaigns.delete(campaign.group, campaign.id)
-            for name in files_of(campaign.text):
-                self.files.forget(self.files.partial(campaign.group, partial_name(campaign.id, name))[0])
-            self._release(campaign.group, [key for row in rows for key in files_named(row)])
+            campaign = self.store.campaigns.get(group, id, anyhow=True)
+            rows = self.store.recordings.list(group, id, "", 1_000_000)
+            there = self.store.campaigns.delete(group, id)
+            # of a damaged declaration nobody knows the names: its parts go when they are a day old
+            with suppress(ValueError, LookupError, TypeError):
+                for name in files_of("" if campaign is None else campaign.text):
+                    self.files.forget(self.files.partial(group, partial_name(id, name))[0])
+            self._release(group, [key for row in rows for key in files_named(row)])
         return there
 
     def forget_machine(self, group: str, machine: str, note: Note) -> bool:
@@ -291,8 +307,7 @@ class Uploads:
 
 def received(path: Path) -> Received:
     """Return a file that is complete and synced, with its hash."""
-    with path.open("rb") as file:
-        return Received(path, path.stat().st_size, hashlib.file_digest(file, "sha256").hexdigest())
+    return Received(path, path.stat().st_size, sha256_of(path))
 
 
 def files_named(recording: Recording) -> list[FileKey]:

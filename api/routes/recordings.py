@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import json
 import unicodedata
-from collections.abc import Iterator
-from pathlib import Path as FilePath
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import StreamingResponse
+from fastapi.responses import FileResponse
 
 from api.components import Components, ThisService
 from api.conventions import BODY, CampaignId, Limit, found_or_404, guard, page, problems, tagged, unchanged, while_there
-from api.files import NORMALISED, UPLOADS
 from api.lookups import known_campaign
 from api.problems import Problem
 from api.reading import reader_tasks
 from api.reading.campaign_text import File, files_of
+from api.reading.stored import samples_of, upload_of
 from api.reading.uploads import Received
 from api.schemas.campaigns import RecordingAnswer, SignalAnswer, SpectrumAnswer
 from api.schemas.common import Page
@@ -36,6 +34,7 @@ from api.transfer.body_stream import (
     refuse_encoded,
     storage_problems,
 )
+from api.transfer.parts_of_file import PartsOfFile
 
 router = APIRouter(prefix="/campaigns/{id}/recordings", tags=["recordings"], route_class=Guarded)
 BINARY = "application/octet-stream"
@@ -49,7 +48,7 @@ _DIGESTS = [
     {"name": name, "in": "header", "schema": {"type": "string"}, "description": "sha-256=:BASE64: of the file, checked (RFC 9530)."}
     for name in ("Repr-Digest", "Content-Digest")
 ]
-_STREAM = 1 << 20
+_CONTENT: dict[str, Any] = {BINARY: {"schema": {"type": "string", "format": "binary"}}}
 
 
 @router.put(
@@ -115,12 +114,14 @@ def get(id: CampaignId, name: RecordingName, response: Response, components: Thi
 @router.get(
     "/{name}/file",
     summary="The original file",
+    description="Hashed before its first byte is sent: it is what was uploaded, or it is not sent. Parts by Range, and If-Range.",
     openapi_extra=guard("read"),
-    response_class=StreamingResponse,
+    response_class=FileResponse,
     responses={
-        200: {"description": "Its entity tag is its SHA-256.", "content": {BINARY: {"schema": {"type": "string", "format": "binary"}}}},
+        200: {"description": "Its entity tag is its SHA-256.", "content": _CONTENT},
+        206: {"description": "The part that Range asks for.", "content": _CONTENT},
         304: {"description": "The content matches If-None-Match."},
-        **problems(404, 422),
+        **problems(400, 404, 416, 422, 500),
     },
 )
 def file(id: CampaignId, name: RecordingName, request: Request, components: ThisService, caller: WhoAsks) -> Response:
@@ -128,37 +129,26 @@ def file(id: CampaignId, name: RecordingName, request: Request, components: This
     if unchanged(request, row.sha256):
         return Response(status_code=304, headers=tagged(row.sha256))
     # a browser must never show an uploaded file as a page
-    headers = {
-        "Content-Disposition": "attachment",
-        "Content-Length": str(row.size),
-        "Content-Security-Policy": "default-src 'none'; sandbox",
-    }
-    path = components.files.path(caller.group, UPLOADS, row.sha256)
-    return StreamingResponse(_read(path), media_type=BINARY, headers=tagged(row.sha256) | headers)
+    headers = {"Content-Disposition": "attachment", "Content-Security-Policy": "default-src 'none'; sandbox"}
+    return PartsOfFile(upload_of(components.files, row), media_type=BINARY, headers=tagged(row.sha256) | headers)
 
 
-def _read(path: FilePath) -> Iterator[bytes]:
-    with path.open("rb") as opened:
-        while block := opened.read(_STREAM):
-            yield block
-
-
-@router.get("/{name}/spectrum", summary="Amplitude spectrum", openapi_extra=guard("read"), responses=problems(404, 422))
+@router.get("/{name}/spectrum", summary="Amplitude spectrum", openapi_extra=guard("read"), responses=problems(404, 422, 500))
 async def spectrum(
     id: CampaignId, name: RecordingName, request: Request, components: ThisService, caller: WhoAsks, points: Points = 2000
 ) -> SpectrumAnswer:
     _, row = await run_in_threadpool(_kept, components, caller.group, id, name)
-    path = components.files.path(caller.group, NORMALISED, row.normalised)
+    path = await run_in_threadpool(samples_of, components.files, row)
     speed = json.loads(row.found)["spindle_speed_rpm"]
     return SpectrumAnswer.model_validate(await while_there(request, components.work.run(reader_tasks.spectrum, path, speed, points)))
 
 
-@router.get("/{name}/signal", summary="Envelope over time", openapi_extra=guard("read"), responses=problems(404, 422))
+@router.get("/{name}/signal", summary="Envelope over time", openapi_extra=guard("read"), responses=problems(404, 422, 500))
 async def signal(
     id: CampaignId, name: RecordingName, request: Request, components: ThisService, caller: WhoAsks, points: Points = 1000
 ) -> SignalAnswer:
     _, row = await run_in_threadpool(_kept, components, caller.group, id, name)
-    path = components.files.path(caller.group, NORMALISED, row.normalised)
+    path = await run_in_threadpool(samples_of, components.files, row)
     return SignalAnswer.model_validate(await while_there(request, components.work.run(reader_tasks.envelope, path, points)))
 
 

@@ -16,6 +16,7 @@ from api.components import Components, ThisService
 from api.conventions import BODY, CampaignId, guard, problems, tagged
 from api.files import Part, Partial
 from api.problems import Problem
+from api.reading.stored import is_whole
 from api.reading.uploads import partial_name
 from api.routes.recordings import BINARY, RecordingName, Replace, answer, named, take
 from api.schemas.campaigns import RecordingAnswer
@@ -134,7 +135,8 @@ def _state(components: Components, campaign: Campaign, name: str) -> Partial | N
     """State of an upload; a stored recording is complete."""
     state = components.files.partial(campaign.group, partial_name(campaign.id, name))[1]
     row = None if state is not None else components.store.recordings.get(campaign.group, campaign.id, name)
-    return state if row is None else Partial(row.size, row.size)
+    # one that is damaged is sent again
+    return state if row is None or not is_whole(components.files, row) else Partial(row.size, row.size)
 
 
 async def _go_on(components: Components, campaign: Campaign, name: str, offset: int, length: int | None) -> Partial:

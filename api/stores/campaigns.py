@@ -51,6 +51,8 @@ class Recording:
     judged_with : str
         `normalised` of the air cut that the verdict on a cut rests on, empty without one.
     created : str
+    samples : str
+        SHA-256 of the samples' file, hexadecimal; empty where a release has stored them that did not keep it.
     """
 
     group: str
@@ -63,6 +65,7 @@ class Recording:
     found: str
     judged_with: str
     created: str
+    samples: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +95,8 @@ class Campaigns(Protocol):
             The machine is not there.
         """
 
-    def get(self, group: str, id: str) -> Campaign | None:
-        """Return a campaign."""
+    def get(self, group: str, id: str, anyhow: bool = False) -> Campaign | None:
+        """Return a campaign; raises `Damaged` where its text is not what was written, unless it is wanted `anyhow`."""
 
     def unsettled(self) -> list[tuple[str, str]]:
         """Return group and id of campaigns whose verdicts may be older than their recordings."""
@@ -120,7 +123,7 @@ class Recordings(Protocol):
     def put(self, recording: Recording, replace: bool) -> Recording | None:
         """Store a recording unless one with other content has its name; return the previous one.
 
-        The same content again changes nothing; with `replace` other content is replaced.
+        The same content again changes nothing but where its samples are; with `replace` other content is replaced.
 
         Raises
         ------
@@ -145,8 +148,8 @@ class Recordings(Protocol):
     def delete(self, group: str, campaign: str, name: str) -> Recording | None:
         """Delete a recording and return it."""
 
-    def kept(self, group: str) -> set[FileKey]:
-        """Return the files that recordings of a group refer to."""
+    def kept(self, group: str) -> dict[FileKey, str]:
+        """Return the files that recordings of a group refer to, with their SHA-256, empty where it is not known."""
 
     def groups(self) -> Iterator[str]:
         """Yield groups that have recordings."""

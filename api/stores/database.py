@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -11,10 +12,12 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, IntegrityError, NoSuchModuleError, OperationalError, TimeoutError
 
 from api.stores import tables
-from api.stores.entities import Unavailable
+from api.stores.entities import Destroyed, Unavailable
 from rcsa_ident.errors import InputError
 
 _BUSY_MS = 5000
+#: Codes by which SQLite and PostgreSQL say that a file is no database, or that pages of it are damaged.
+_DESTROYED = {11, 26, "XX001", "XX002"}
 
 
 def open_engine(url: str) -> Engine:
@@ -35,9 +38,22 @@ def open_engine(url: str) -> Engine:
                 # service and workers may find a new database at the same moment
                 connection.execute(text("SELECT pg_advisory_xact_lock(7243451)"))
             tables.migrate(connection)
-    except OperationalError:
+    except (DBAPIError, sqlite3.DatabaseError) as error:
+        engine.dispose()
+        if _destroyed(error):
+            found = f"a database that is damaged ({getattr(error, 'orig', error)})"
+            raise InputError("RCSA_IDENT_DATABASE", found, f"a whole one in {parsed.render_as_string()}: restore a backup") from None
+        if not isinstance(error, OperationalError):
+            raise
         raise InputError("RCSA_IDENT_DATABASE", "no answer", f"a database that can be opened ({parsed.render_as_string()})") from None
     return engine
+
+
+def _destroyed(error: Exception) -> bool:
+    """Whether an error says that the database is damaged."""
+    cause = getattr(error, "orig", None) or error
+    codes = {getattr(cause, "sqlite_errorcode", None) or 0, getattr(cause, "sqlstate", None)}
+    return not _DESTROYED.isdisjoint({code & 0xFF if isinstance(code, int) else code for code in codes})
 
 
 def _sqlite(connection: Any, _record: Any) -> None:
@@ -57,11 +73,13 @@ class Database:
     """Transactions on one database."""
 
     def __init__(self, engine: Engine) -> None:
-        self.engine = engine
+        self.engine, self.destroyed = engine, False
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:
-        """Writing transaction; on SQLite one at a time."""
+        """Writing transaction; on SQLite one at a time. Nothing more is written to a database that is damaged."""
+        if self.destroyed:
+            raise Destroyed
         with self._answering(), self.engine.begin() as connection:
             yield connection
 
@@ -77,12 +95,17 @@ class Database:
             yield
         except IntegrityError:
             raise
-        except (DBAPIError, TimeoutError) as error:
-            if isinstance(error, OperationalError | TimeoutError) or error.connection_invalidated:
+        except (DBAPIError, TimeoutError, sqlite3.DatabaseError) as error:
+            if _destroyed(error):
+                self.destroyed = True
+                raise Destroyed from error
+            if isinstance(error, OperationalError | TimeoutError | sqlite3.DatabaseError) or error.connection_invalidated:
                 raise Unavailable from error
             raise
 
     def check(self) -> None:
+        if self.destroyed:
+            raise Destroyed
         with self.reading() as connection:
             connection.execute(text("SELECT 1"))
 

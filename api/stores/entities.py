@@ -26,6 +26,14 @@ class Unavailable(Exception):
     """The database does not answer."""
 
 
+class Destroyed(Unavailable):
+    """The database is there, but its file or its pages are damaged."""
+
+
+class Damaged(Exception):
+    """What is read is not what was written; its text is a sentence that says how to mend it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Key:
     """An API key; only the hash of its secret is stored.
@@ -93,6 +101,24 @@ def digest_of(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()[:32]
 
 
+def whole(text: str, digest: str, what: str, mend: str) -> str:
+    """Return a text that has its digest.
+
+    Parameters
+    ----------
+    what, mend : str
+        What the text is, and what makes it whole again, for people.
+
+    Raises
+    ------
+    Damaged
+        It has another one.
+    """
+    if digest_of(text) != digest:
+        raise Damaged(f"the stored {what} is damaged: its content is not what was stored; {mend}")
+    return text
+
+
 class Keys(Protocol):
     """Keys of all groups."""
 
@@ -147,7 +173,7 @@ class Documents(Protocol):
         """
 
     def get(self, group: str, name: str) -> Document | None:
-        """Return a text."""
+        """Return a text; raises `Damaged` where it is not what was written."""
 
     def brief(self, group: str, name: str) -> Document | None:
         """Return a document without its text."""

@@ -210,7 +210,7 @@ class Jobs(Protocol):
         """Return the number of the last event of each job."""
 
     def text(self, id: str, name: str) -> str | None:
-        """Return an input or result of a job."""
+        """Return an input or result of a job; raises `Damaged` where it is not what was written."""
 
     def counts(self) -> Sequence[tuple[str, str, int, float]]:
         """Return (kind, state, jobs, seconds that they took) over all groups."""

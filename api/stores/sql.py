@@ -12,7 +12,7 @@ from api.stores import tables
 from api.stores.campaigns import Campaigns, Recordings
 from api.stores.changes import IDENTIFICATION, MACHINE, TOOLING, UNSIGNED, Changes, Note
 from api.stores.database import Database, open_engine
-from api.stores.entities import ABSENT, Document, Documents, Key, Keys, Machine, Machines, Stale, Taken
+from api.stores.entities import ABSENT, Document, Documents, Key, Keys, Machine, Machines, Stale, Taken, whole
 from api.stores.idempotency import earlier, forget_old
 from api.stores.jobs import Jobs
 from api.stores.sql_campaigns import SqlCampaigns, SqlRecordings, delete_campaigns
@@ -162,7 +162,11 @@ class SqlDocuments:
         t = self.table
         with self.store.reading() as connection:
             row = connection.execute(select(t).where(t.c.group == group, t.c.name == name)).first()
-        return None if row is None else Document(**row._asdict())
+        if row is None:
+            return None
+        what = f"tooling {name}" if self.kind == TOOLING else "identification of the machine"
+        whole(row.text, row.digest, what, "write it again, or restore one of its versions")
+        return Document(**row._asdict())
 
     def brief(self, group: str, name: str) -> Document | None:
         t = self.table

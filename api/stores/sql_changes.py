@@ -10,6 +10,7 @@ from sqlalchemy import Connection, func, insert, select, update
 from api.stores import tables
 from api.stores.changes import CHANGED, DELETED, IDENTIFICATION, MACHINE, MADE, RESTORED, TOOLING, Change, Note
 from api.stores.database import Database
+from api.stores.entities import whole
 
 
 class SqlChanges:
@@ -33,6 +34,8 @@ class SqlChanges:
         here = (t.c.group == group, t.c.kind == kind, t.c.name == name, t.c.version == version)
         with self.store.reading() as connection:
             row = connection.execute(select(t).where(*here)).first()
+        if row is not None and row.text:
+            whole(row.text, row.digest, f"version {version} of {row.title}", "restore another one, or a backup")
         return None if row is None else Change(**row._asdict())
 
 

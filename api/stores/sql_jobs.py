@@ -12,6 +12,7 @@ from sqlalchemy.exc import IntegrityError
 from api.stores import tables
 from api.stores.changes import IDENTIFICATION, Note
 from api.stores.database import Database
+from api.stores.entities import digest_of, whole
 from api.stores.idempotency import earlier, forget_old
 from api.stores.jobs import OPEN, PARTIAL, Event, Full, Job, Outcome, Worker
 from api.stores.sql_changes import log_document
@@ -44,7 +45,7 @@ class SqlJobs:
                     connection.execute(insert(r).values(row))
                 connection.execute(insert(t).values(asdict(job)))
                 for name, text in texts.items():
-                    connection.execute(insert(x).values(job=job.id, name=name, text=text))
+                    connection.execute(insert(x).values(job=job.id, name=name, text=text, digest=digest_of(text)))
                 return job
         except IntegrityError:
             # the same key arrived twice at the same moment
@@ -148,7 +149,7 @@ class SqlJobs:
             _forget_partial(connection, id)
             for name, text in outcome.texts.items():
                 connection.execute(delete(x).where(x.c.job == id, x.c.name == name))
-                connection.execute(insert(x).values(job=id, name=name, text=text))
+                connection.execute(insert(x).values(job=id, name=name, text=text, digest=digest_of(text)))
             _append(connection, id, found.events, [Event(0, "end", "")])
             # a machine that was deleted meanwhile stays deleted
             if outcome.applied is not None and connection.execute(select(m.c.id).where(m.c.id == found.machine).with_for_update()).first():
@@ -171,8 +172,8 @@ class SqlJobs:
     def text(self, id: str, name: str) -> str | None:
         x = tables.job_texts
         with self.store.reading() as connection:
-            found: str | None = connection.execute(select(x.c.text).where(x.c.job == id, x.c.name == name)).scalar()
-        return found
+            found = connection.execute(select(x.c.text, x.c.digest).where(x.c.job == id, x.c.name == name)).first()
+        return None if found is None else whole(found.text, found.digest, f"{name} of the job {id}", "ask for the job once more")
 
     def counts(self) -> Sequence[tuple[str, str, int, float]]:
         t = tables.jobs

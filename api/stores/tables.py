@@ -26,6 +26,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.schema import CreateColumn
 
+from api.stores.entities import digest_of
 from rcsa_ident.errors import InputError
 
 metadata = MetaData()
@@ -119,6 +120,7 @@ campaigns = Table(
     Column("machine", _Name, nullable=False),
     Column("name", String(200), nullable=False),
     Column("text", Text, nullable=False),
+    Column("digest", String(64), nullable=False, server_default=""),
     Column("cuts", Integer, nullable=False),
     Column("created", String(40), nullable=False),
     Column("changes", Integer, nullable=False),
@@ -140,6 +142,7 @@ recordings = Table(
     Column("usable", Integer, nullable=False),
     Column("judged_with", String(64), nullable=False),
     Column("created", String(40), nullable=False),
+    Column("samples", String(64), nullable=False, server_default=""),
 )
 
 jobs = Table(
@@ -182,6 +185,7 @@ job_texts = Table(
     Column("job", _Name, primary_key=True),
     Column("name", String(32), primary_key=True),
     Column("text", Text, nullable=False),
+    Column("digest", String(64), nullable=False, server_default=""),
 )
 job_workers = Table(
     "job_workers",
@@ -201,12 +205,17 @@ def _missing_tables(connection: Connection) -> None:
 def _kept_versions(connection: Connection) -> None:
     """Versions with who, when and why; keys that expire; jobs that know who asked for them."""
     metadata.create_all(connection)
-    for table in (keys, jobs):
+    _add_columns(connection, keys, jobs)
+    _first_versions(connection)
+
+
+def _add_columns(connection: Connection, *changed: Table) -> None:
+    """Add the columns that tables do not have yet."""
+    for table in changed:
         there = {column["name"] for column in inspect(connection).get_columns(table.name)}
         for column in (each for each in table.c if each.name not in there):
             words = CreateColumn(column).compile(dialect=connection.dialect)
             connection.execute(text(f"ALTER TABLE {table.name} ADD COLUMN {words}"))
-    _first_versions(connection)
 
 
 def _first_versions(connection: Connection) -> None:
@@ -224,8 +233,20 @@ def _first_versions(connection: Connection) -> None:
         connection.execute(insert(changes).from_select([column.name for column in changes.c if column.name != "id"], query))
 
 
+def _digests(connection: Connection) -> None:
+    """A digest beside every text and every file; what is there counts as whole."""
+    _add_columns(connection, campaigns, recordings, job_texts)
+    for table in (campaigns, job_texts):
+        own = list(table.primary_key)
+        # one text after the other: together they may be larger than the memory
+        for row in connection.execute(select(*own)).all():
+            here = [column == value for column, value in zip(own, row, strict=True)]
+            content = connection.execute(select(table.c.text).where(*here)).scalar_one()
+            connection.execute(update(table).where(*here).values(digest=digest_of(content)))
+
+
 #: Migrations from version k + 1 to k + 2, in order; a released one is never edited.
-MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_missing_tables, _kept_versions)
+MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_missing_tables, _kept_versions, _digests)
 SCHEMA_VERSION = 1 + len(MIGRATIONS)
 
 

@@ -164,7 +164,7 @@ def test_what_is_missing_or_damaged_is_told(data, tmp_path):
     result = CliRunner().invoke(app, ["--data", str(data), "backup", str(tmp_path / "b.tar")])
     assert result.exit_code == 0, result.output
     assert f"warning: {uploads[0].relative_to(data)} is missing, though referred to" in result.stderr
-    assert f"warning: {uploads[1].relative_to(data)} is not what was uploaded any more" in result.stderr
+    assert f"warning: {uploads[1].relative_to(data)} is not what was stored any more" in result.stderr
     assert len(restore(tmp_path / "b.tar", tmp_path / "new").missing) == 1
 
 

@@ -156,7 +156,7 @@ def test_a_campaign_needs_its_machine_and_goes_with_it(store, kept):
     assert store.machines.delete("A", kept.machine)
     assert store.campaigns.get("A", kept.id) is None
     assert store.recordings.list("A", kept.id, "", 9) == []
-    assert store.recordings.kept("A") == set()
+    assert store.recordings.kept("A") == {}
 
 
 def test_a_repeated_query_makes_one_campaign(store, kept):
@@ -271,7 +271,7 @@ def test_recordings_and_their_campaign_go_together_whoever_is_first(store, kept)
         deleting = threads.submit(store.campaigns.delete, "A", kept.id)
     assert deleting.result()
     assert {each.result() for each in putting} <= {True, False}
-    assert store.recordings.kept("A") == set()
+    assert store.recordings.kept("A") == {}
 
 
 def test_a_restart_keeps_everything(tmp_path):

@@ -155,7 +155,7 @@ def test_a_store_from_before_versions_gets_them(request, tmp_path, kind):
     machine = store.machines.add(Machine(new_id(), "A", "HPM", "", now())).id
     store.identifications.put(Document("A", machine, "found", "{}", digest_of("found"), now()))
     for name in ("T1", "T2"):
-        store.toolings.put(Document("A", name, f"{name} text", "{}", digest_of(name), "2026-01-01"))
+        store.toolings.put(Document("A", name, f"{name} text", "{}", digest_of(f"{name} text"), "2026-01-01"))
     key, _ = make_key("A", ("read",), "presetting")
     store.keys.add(key)
     job = store.jobs.add(queued(machine), {}, 9)
