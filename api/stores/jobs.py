@@ -178,7 +178,7 @@ class Jobs(Protocol):
         """Cancel an open job, and return the job and whether it was open."""
 
     def open(self) -> Sequence[Job]:
-        """Return all jobs that are queued or running, oldest first."""
+        """Return all jobs that are queued or running, in the order of their turn: groups take turns, each with its oldest first."""
 
     def begin(self, id: str, worker: str, when: str) -> Job | None:
         """Assign a job to a worker and return it; None where it is over."""

@@ -91,9 +91,18 @@ class SqlJobs:
             return Job(**connection.execute(select(t).where(*here)).one()._asdict()), cancelled
 
     def open(self) -> Sequence[Job]:
-        t = tables.jobs
+        t, other = tables.jobs, tables.jobs.alias()
+        here = t.c.state.in_(OPEN)
+        line = (t.c.kind, t.c.group)
+        waiting = select(*line).where(here).distinct().subquery()
+        same = (other.c.kind == waiting.c.kind) & (other.c.group == waiting.c.group)
+        served = select(waiting, func.max(other.c.started).label("last")).join(other, same)
+        last = served.group_by(waiting.c.kind, waiting.c.group).subquery()
+        # whoever has fewest before it in its own group, which begins with what runs; then whose group was served longest ago
+        place = func.row_number().over(partition_by=line, order_by=(t.c.state == "queued", t.c.id))
+        query = select(t).join(last, (last.c.kind == t.c.kind) & (last.c.group == t.c.group)).where(here)
         with self.store.reading() as connection:
-            rows = connection.execute(select(t).where(t.c.state.in_(OPEN)).order_by(t.c.id)).all()
+            rows = connection.execute(query.order_by(place, func.coalesce(last.c.last, ""), t.c.id)).all()
         return [Job(**row._asdict()) for row in rows]
 
     def begin(self, id: str, worker: str, when: str) -> Job | None:
