@@ -8,6 +8,7 @@ import logging
 import re
 import secrets
 import time
+from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Any
 
@@ -17,7 +18,6 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
 from api.components import Components
-from api.connections import Connections
 from api.problems import Problem, document
 from api.stores.entities import Destroyed, Unavailable
 from api.work.pool import Busy
@@ -25,6 +25,8 @@ from api.work.pool import Busy
 log = logging.getLogger("rcsa_ident.service")
 _ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 RETRY = {"Retry-After": "2"}
+#: Of a body that nobody will read, what is dropped after the answer [bytes, s].
+DROPPED, DROP_SECONDS = 1_000_000, 1.0
 #: Time limit of a body that is not an upload [s], its extension per received byte [s], and time limit [s] and size of a request's head.
 BODY_SECONDS, BYTE_SECONDS, HEAD_SECONDS, HEAD_BYTES = 60.0, 1e-4, 20.0, 262_144
 
@@ -56,7 +58,13 @@ class AccessMonitor:
                     # the rest of a body that nobody will read need not be sent
                     extra.append((b"connection", b"close"))
                 message = {**message, "headers": [*message.get("headers", []), *extra]}
-            await send(message)
+            if message["type"] != "http.response.body" or message.get("more_body", False) or body.read:
+                await send(message)
+                return
+            # the whole answer, and only then its end, with which the connection is closed
+            await send({**message, "more_body": True})
+            await body.drop()
+            await send({"type": "http.response.body", "body": b""})
 
         try:
             await self.app(scope, body.receive, observed)
@@ -66,7 +74,9 @@ class AccessMonitor:
                 await document(request, Problem(503, "the service is shutting down", headers=RETRY))(scope, receive, observed)
         except Exception as error:
             problem = _problem(error)
-            log.error("unexpected" if problem.status == 500 else "unavailable", exc_info=error, extra={"fields": {"request_id": id}})
+            if not isinstance(error, Busy):
+                # who is refused because others are there already leaves one line, that of the request
+                log.error("unexpected" if problem.status == 500 else "unavailable", exc_info=error, extra={"fields": {"request_id": id}})
             if status == 0:
                 await document(request, problem)(scope, receive, observed)
         finally:
@@ -103,6 +113,16 @@ class _Body:
                 return message
         raise HTTPException(413, f"at most {self.most} bytes")
 
+    async def drop(self) -> None:
+        """Read what a client still sends, for a short time: a connection that is closed over unread bytes takes the answer with it."""
+        left = DROPPED
+        with suppress(TimeoutError):
+            async with asyncio.timeout(DROP_SECONDS):
+                while left > 0 and not self.read:
+                    message = await self.source()
+                    left -= len(message.get("body", b""))
+                    self.read = not message.get("more_body", False)
+
     async def _in_time(self) -> Message:
         """The next part within the time limit; routes that raise the size limit have a time limit of their own."""
         if self.read or self.most != self.usual:
@@ -115,15 +135,13 @@ class _Body:
 
 
 class TimedHeadProtocol(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
-    """HTTP connection, one of so many, that is closed when the head of a request takes too long or grows too large."""
+    """HTTP connection that is closed when the head of a request takes too long or grows too large."""
 
-    seconds, most, counted = HEAD_SECONDS, HEAD_BYTES, Connections()
+    seconds, most = HEAD_SECONDS, HEAD_BYTES
 
     def connection_made(self, transport: Any) -> None:
         super().connection_made(transport)
         self.waiting, self.came = self.loop.call_later(self.seconds, self._over), 0
-        if not self.counted.admit(transport):
-            transport.abort()
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
@@ -145,7 +163,6 @@ class TimedHeadProtocol(AutoHTTPProtocol):  # type: ignore[misc, valid-type]
 
     def connection_lost(self, exc: Exception | None) -> None:
         self.waiting.cancel()
-        self.counted.release(self.transport)
         super().connection_lost(exc)
 
 

@@ -48,6 +48,7 @@ from api.schemas.forces import ForceQuery, ForceUpload
 from api.schemas.jobs import PartialLobes
 from api.security import HEADER
 from api.settings import Settings
+from api.shares import Shares
 from api.stores.entities import Store
 from api.stores.sql import open_store
 from api.streams.hub import Hub, StreamLimits
@@ -84,15 +85,17 @@ def create_app(
         data_folder.check(settings.data)
     kept = open_store(settings.database_url) if store is None else store
     most = QueryLimits(settings.query_seconds, settings.query_memory)
-    workers = Pool(settings.workers, settings.queue, settings.kept_machines, most) if work is None else work
+    several = settings.asks_for_keys
+    workers = Pool(settings.workers, settings.queue, settings.kept_machines, most, several) if work is None else work
     files = Files(settings.data / "files", settings.group_bytes, settings.free_bytes)
     limits = Limits(settings.reader_memory, settings.reader_seconds, settings.reader_wall_seconds, settings.reader_calls)
     readers = Reader(limits, 2 * settings.uploads) if reader is None else reader
-    uploads = Uploads(kept, files, readers, settings.uploads)
+    uploads = Uploads(kept, files, readers, Shares(settings.uploads, several))
     rates, metrics = Rates(settings.requests_per_minute, settings.burst), Metrics(lambda: float(workers.waiting))
+    feeds = EventFeeds(kept.jobs, Shares(settings.watchers, several))
     hub = Hub(StreamProcess() if host is None else host, _stream_limits(settings), metrics)
     metrics.streams.set_function(lambda: float(len(hub.sessions)))
-    feeds, made = EventFeeds(kept.jobs, settings.watchers), Examples(uploads, workers)
+    made = Examples(uploads, workers)
     components = Components(settings, kept, workers, files, readers, uploads, rates, metrics, hub, feeds, made, supervisor)
     metrics.registry.register(JobCounts(kept.jobs))
 
@@ -134,7 +137,8 @@ def create_app(
 
 
 def _stream_limits(settings: Settings) -> StreamLimits:
-    return StreamLimits(settings.streams, settings.streams_per_group, settings.stream_listeners, settings.stream_idle_seconds)
+    several, idle = settings.asks_for_keys, settings.stream_idle_seconds
+    return StreamLimits(settings.streams, settings.streams_per_group, settings.stream_listeners, several, idle)
 
 
 def _openapi(app: FastAPI) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from starlette.requests import HTTPConnection
 
 from api.components import Components, components_of
 from api.problems import Problem
+from api.shares import GROUP
 from api.stores.changes import Note
 from api.stores.entities import Key, Unavailable
 
@@ -170,6 +171,7 @@ class Guarded(APIRoute):
             components = components_of(request)
             caller = await run_in_threadpool(caller_of, request, components)
             request.state.caller = caller
+            GROUP.set(caller.group)
             if not caller.may(scope):
                 raise Problem(403, f"the API key does not have the scope {scope}")
             seconds = components.rates.wait(caller.id)

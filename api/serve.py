@@ -202,7 +202,7 @@ def _listen(service: Any, settings: Any) -> None:
     import uvicorn
 
     from api.access import TimedHeadProtocol
-    from api.connections import Connections, SmallHelloProtocol
+    from api.connections import Connections, SmallHelloProtocol, listeners
 
     fields = {"store": (settings.database and "database by URL") or str(settings.data), "workers": settings.workers}
     log = logging.getLogger("rcsa_ident.service")
@@ -212,11 +212,17 @@ def _listen(service: Any, settings: Any) -> None:
     # open streams of events and forces would delay the end
     # no compression: measured samples do not shrink
     limits: dict[str, Any] = {"timeout_graceful_shutdown": 1, "ws_per_message_deflate": False}
-    counted = {"counted": Connections(settings.connections, settings.connections_per_address)}
+    counted = Connections(settings.connections, settings.connections_per_address)
     # all that wait are accepted at once, before one of them is closed: fewer than the files that are left
     limits["backlog"] = 128
-    limits |= {"http": type("Http", (TimedHeadProtocol,), counted), "ws": type("WebSocket", (SmallHelloProtocol,), counted)}
-    uvicorn.run(service, host=settings.host, port=settings.port, log_config=None, access_log=False, server_header=False, **limits)
+    limits |= {"http": TimedHeadProtocol, "ws": SmallHelloProtocol}
+    try:
+        sockets = listeners(settings.host, settings.port, counted)
+    except OSError as error:
+        address = f"{settings.host}:{settings.port}"
+        _fail(InputError("RCSA_IDENT_HOST, RCSA_IDENT_PORT", f"{address} ({error.strerror})", "an address of this machine and a free port"))
+    config = uvicorn.Config(service, log_config=None, access_log=False, server_header=False, **limits)
+    uvicorn.Server(config).run(sockets)
 
 
 def _fail(error: InputError) -> None:

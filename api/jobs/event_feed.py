@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
+from api.shares import Shares
 from api.stores.entities import Unavailable
 from api.stores.jobs import Event, Jobs
 
@@ -15,7 +16,7 @@ LOOK, BATCH = 0.3, 500
 
 
 class Crowded(Exception):
-    """The limit of event streams is reached."""
+    """The limit of event streams is reached, of the group or of all."""
 
 
 class EventFeeds:
@@ -24,28 +25,26 @@ class EventFeeds:
     Parameters
     ----------
     jobs : Jobs
-    most : int
+    places : Shares
         Simultaneous streams.
     """
 
-    def __init__(self, jobs: Jobs, most: int) -> None:
-        self.jobs, self.most = jobs, most
-        self.streams = 0
+    def __init__(self, jobs: Jobs, places: Shares) -> None:
+        self.jobs, self.places = jobs, places
         self.numbers: dict[str, int] = {}
         self.bells: dict[str, set[asyncio.Event]] = {}
         self.readings: dict[tuple[str, int], tuple[float, asyncio.Task[Sequence[Event]]]] = {}
         self.looking: asyncio.Task[None] | None = None
 
     @contextmanager
-    def stream(self) -> Iterator[None]:
+    def stream(self, group: str) -> Iterator[None]:
         """Count a stream while it is open; raises `Crowded` where there are too many."""
-        if self.streams >= self.most:
+        if not self.places.take(group):
             raise Crowded
-        self.streams += 1
         try:
             yield
         finally:
-            self.streams -= 1
+            self.places.give(group)
 
     async def events(self, job: str, after: int) -> Sequence[Event]:
         """Return the events after a number; concurrent requests share one read."""

@@ -141,12 +141,19 @@ class JobWorker:
         self.jobs.leave(self.id, self.token)
 
     def submit_accepted(self) -> None:
-        """Hand all accepted jobs to the engine, including those whose service died between row and submission."""
-        open = {job.id: job for job in self.jobs.open()}
-        for id, job in open.items():
-            if id not in self.submitted:
-                self.backend.submit(id, job.kind)
-        self.submitted = set(open)
+        """Hand jobs to the engine: all that have begun, and of each kind the one whose turn it is, once this worker has none of it.
+
+        What waits stays in the store: whose turn it is shows when a place is free, not when a job is accepted.
+        """
+        open = [job for job in self.jobs.open() if job.kind in self.carriers]
+        self.submitted &= {job.id for job in open}
+        handed = (job for job in open if (job.id in self.submitted if job.state == "queued" else job.worker == self.token))
+        busy = {job.kind for job in handed}
+        for job in open:
+            if job.id not in self.submitted and (job.state == "running" or job.kind not in busy):
+                self.backend.submit(job.id, job.kind)
+                self.submitted.add(job.id)
+                busy |= {job.kind} if job.state == "queued" else set()
 
     def reconcile(self) -> None:
         """Take over jobs of dead workers, delete finished ones from the engine, and submit again those that it has lost."""

@@ -146,10 +146,10 @@ async def events(components: Components, caller: Caller, id: str, kind: str, see
     """Return the stream of a job's events after a number; it ends when the caller's key does."""
     job = await run_in_threadpool(job_of, components, caller.group, id, kind)
     try:
-        watching = components.feeds.stream()
+        watching = components.feeds.stream(caller.group)
         watching.__enter__()
     except Crowded:
-        raise Problem(503, "too many event streams of jobs are open", headers={"Retry-After": "30"}) from None
+        raise Problem(503, "too many event streams of jobs are open, of this group or of all", headers={"Retry-After": "30"}) from None
 
     async def stream() -> AsyncIterator[str]:
         try:

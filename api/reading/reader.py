@@ -8,7 +8,6 @@ import logging
 import signal
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
@@ -16,6 +15,7 @@ from typing import Any
 from api.files import Full, no_room
 from api.processes import Child, limit_memory, spawn_context
 from api.reading import reader_tasks
+from api.shares import FairThreads
 from api.work.pool import Busy
 from rcsa_ident.errors import InputError
 
@@ -66,11 +66,11 @@ class Reader:
 
     def __init__(self, limits: Limits, queue: int, prepare: Callable[[], None] = reader_tasks.warm) -> None:
         self.limits, self.queue, self.prepare, self.waiting = limits, queue, prepare, 0
-        self.threads: ThreadPoolExecutor | None = None
+        self.threads: FairThreads | None = None
         self.child: _Reading | None = None
 
     def start(self) -> None:
-        self.threads = ThreadPoolExecutor(1, "reader")
+        self.threads = FairThreads(1, "reader")
         self.child = _Reading(self.limits, self.prepare)
 
     @property

@@ -18,6 +18,7 @@ from api.files import NORMALISED, UPLOADS, Files, Full, Partial, sha256_of
 from api.reading import reader_tasks
 from api.reading.campaign_text import Upload, files_of
 from api.reading.stored import is_whole, samples_of
+from api.shares import Shares
 from api.stores.campaigns import Campaign, FileKey, Recording
 from api.stores.changes import Note
 from api.stores.entities import Damaged, Store, Taken, Unavailable
@@ -48,26 +49,24 @@ class Uploads:
     store : Store
     files : Files
     reader : Work
-    most : int
+    places : Shares
         Simultaneous uploads.
     """
 
-    def __init__(self, store: Store, files: Files, reader: Work, most: int) -> None:
-        self.store, self.files, self.reader, self.most = store, files, reader, most
-        self.running = 0
+    def __init__(self, store: Store, files: Files, reader: Work, places: Shares) -> None:
+        self.store, self.files, self.reader, self.places = store, files, reader, places
         self.writing: set[tuple[str, str]] = set()
         self.settling: weakref.WeakValueDictionary[str, asyncio.Lock] = weakref.WeakValueDictionary()
 
     @contextmanager
-    def admitted(self) -> Iterator[None]:
-        """Count an upload while it runs; raises `Busy` where too many do."""
-        if self.running >= self.most:
+    def admitted(self, group: str) -> Iterator[None]:
+        """Count an upload while it runs; raises `Busy` where too many do, of the group or of all."""
+        if not self.places.take(group):
             raise Busy
-        self.running += 1
         try:
             yield
         finally:
-            self.running -= 1
+            self.places.give(group)
 
     async def take(self, campaign: Campaign, name: str, received: Received, replacing: bool = False) -> tuple[int, Recording]:
         """Store a file as a recording of the campaign; return 201, or 200 where it existed already, and the recording.

@@ -72,7 +72,7 @@ async def estimate(request: Request, components: ThisService, caller: WhoAsks) -
         query = body_of(ForceQuery, await request.body())
         found = await run_in_threadpool(_of_campaign, components, caller.group, query)
         return await _answered(request, components, caller.group, *found, csv)
-    with components.uploads.admitted():
+    with components.uploads.admitted(caller.group):
         async with form(request, components, caller.group, ("query",), ("recording", "air")) as (texts, files):
             missing = "query" if "query" not in texts else "recording" if "recording" not in files else ""
             if missing:

@@ -46,7 +46,7 @@ async def post(id: CampaignId, request: Request, components: ThisService, caller
     campaign = await run_in_threadpool(known_campaign, components, caller.group, id)
     refuse_encoded(request)
     known = files_of(campaign.text)
-    with components.uploads.admitted():
+    with components.uploads.admitted(caller.group):
         await check_room(components, caller.group, announced_length(request))
         items: list[UploadItem] = []
         name, part, seen = "", None, 0

@@ -71,7 +71,7 @@ async def put(
     campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
     digest = announced_digest(request, "Repr-Digest", "Content-Digest")
     refuse_encoded(request)
-    with components.uploads.admitted():
+    with components.uploads.admitted(caller.group):
         await check_room(components, caller.group, announced_length(request))
         async with new_part(components, caller.group) as part:
             await append(request, components, caller.group, part)

@@ -106,7 +106,7 @@ async def patch(
         raise Problem(503, "another request is writing this recording", headers={"Retry-After": "2"})
     components.uploads.writing.add(key)
     try:
-        with components.uploads.admitted():
+        with components.uploads.admitted(caller.group):
             state = await _go_on(components, campaign, name, offset, length)
             state = replaced(state, group=caller.group, campaign=campaign.id, name=name, replacing=replace)
             path = components.files.partial(caller.group, partial_name(campaign.id, name))[0]

@@ -24,6 +24,7 @@ from api.problems import Problem
 from api.schemas.common import body_of
 from api.schemas.forces import Hello, ReplayHello, StreamHello, StreamsAnswer, StreamSummary, WatchHello
 from api.security import HEADER, Caller, Guarded, WhoAsks, caller_of, is_foreign, new_id
+from api.shares import GROUP
 from api.streams.frames import TooLarge, WrongKind, object_of
 from api.streams.session import End, Session
 
@@ -113,6 +114,7 @@ async def _serve(websocket: WebSocket, components: Components, caller: Caller | 
     hello = body_of(kind, raw.encode("utf-8", "replace"))
     if caller is None:
         caller = await run_in_threadpool(caller_of, websocket, components, hello.key)
+    GROUP.set(caller.group)
     _check_rate(components, caller.id)
     scope = "read" if isinstance(hello, WatchHello) and not caller.may("run") else "run"
     if not caller.may(scope):

@@ -180,7 +180,7 @@ class Jobs(Protocol):
         """Cancel an open job, and return the job and whether it was open."""
 
     def open(self) -> Sequence[Job]:
-        """Return all jobs that are queued or running, oldest first."""
+        """Return all jobs that are queued or running, in the order of their turn: groups take turns, each with its oldest first."""
 
     def places(self, ids: Sequence[str]) -> dict[str, tuple[int, int]]:
         """Return (place, waiting) of each of these jobs that waits: its place among all jobs of its kind that do, and their number."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from sqlalchemy import Connection, delete, func, insert, select, update
+from sqlalchemy import Connection, Subquery, delete, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from api.stores import tables
@@ -93,16 +93,17 @@ class SqlJobs:
             return Job(**connection.execute(select(t).where(*here)).one()._asdict()), cancelled
 
     def open(self) -> Sequence[Job]:
-        t = tables.jobs
+        t, turn = tables.jobs, _turns()
+        query = select(t).join(turn, turn.c.id == t.c.id).order_by(turn.c.place, turn.c.served, t.c.id)
         with self.store.reading() as connection:
-            rows = connection.execute(select(t).where(t.c.state.in_(OPEN)).order_by(t.c.id)).all()
+            rows = connection.execute(query).all()
         return [Job(**row._asdict()) for row in rows]
 
     def places(self, ids: Sequence[str]) -> dict[str, tuple[int, int]]:
-        t = tables.jobs
-        place = func.row_number().over(partition_by=t.c.kind, order_by=t.c.id).label("place")
-        waiting = func.count().over(partition_by=t.c.kind).label("waiting")
-        rank = select(t.c.id, place, waiting).where(t.c.state == "queued").subquery()
+        turn = _turns()
+        place = func.row_number().over(partition_by=turn.c.kind, order_by=(turn.c.place, turn.c.served, turn.c.id)).label("place")
+        waiting = func.count().over(partition_by=turn.c.kind).label("waiting")
+        rank = select(turn.c.id, place, waiting).where(turn.c.state == "queued").subquery()
         with self.store.reading() as connection:
             rows = connection.execute(select(rank).where(rank.c.id.in_(ids))).all()
         return {row.id: (row.place, row.waiting) for row in rows}
@@ -211,6 +212,19 @@ class SqlJobs:
         with self.store.writing() as connection:
             connection.execute(update(t).where(t.c.worker == token, t.c.state == "running").values(attempts=0))
             connection.execute(delete(w).where(w.c.id == id, w.c.token == token))
+
+
+def _turns() -> Subquery:
+    """Open jobs and their turn: place within the group, which begins with what runs, and when the group was served last."""
+    t, other = tables.jobs, tables.jobs.alias()
+    here, line = t.c.state.in_(OPEN), (t.c.kind, t.c.group)
+    waiting = select(*line).where(here).distinct().subquery()
+    same = (other.c.kind == waiting.c.kind) & (other.c.group == waiting.c.group)
+    last = select(waiting, func.max(other.c.started).label("last")).join(other, same).group_by(waiting.c.kind, waiting.c.group).subquery()
+    place = func.row_number().over(partition_by=line, order_by=(t.c.state == "queued", t.c.id)).label("place")
+    served = func.coalesce(last.c.last, "").label("served")
+    joined = (last.c.kind == t.c.kind) & (last.c.group == t.c.group)
+    return select(t.c.id, t.c.kind, t.c.state, place, served).join(last, joined).where(here).subquery()
 
 
 def _append(connection: Connection, job: str, last: int, events: Sequence[Event]) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from api.metrics import Metrics
+from api.shares import Shares
 from api.streams.engine import BLOCK, CLOSE, FAILED, FORCES, OPEN, REFUSED, Message
 from api.streams.listener import Listener
 from api.streams.process import Host
@@ -34,6 +35,8 @@ class StreamLimits:
     ----------
     sessions, sessions_per_group, listeners : int
         Most sessions of the service and of a group, most listeners of a session.
+    several : bool
+        Whether the sessions are shared by groups.
     idle : float [s]
         Time without a new sample after which a session ends.
     drift : float
@@ -43,6 +46,7 @@ class StreamLimits:
     sessions: int = 16
     sessions_per_group: int = 8
     listeners: int = 16
+    several: bool = False
     idle: float = 30.0
     drift: float = 2e-3
 
@@ -63,6 +67,7 @@ class Hub:
 
     def __init__(self, host: Host, limits: StreamLimits, metrics: Metrics) -> None:
         self.host, self.limits, self.metrics = host, limits, metrics
+        self.places = Shares(limits.sessions, limits.several)
         self.sessions: dict[str, Session] = {}
         self.numbers = itertools.count(1)
         self.by_number: dict[int, Session] = {}
@@ -98,6 +103,8 @@ class Hub:
             raise Full(f"{self.limits.sessions} streams are open, which is the limit of the service")
         if len(self.list(about.group)) >= self.limits.sessions_per_group:
             raise Full(f"{self.limits.sessions_per_group} streams of this group are open, which is its limit")
+        if not self.places.take(about.group):
+            raise Full(f"{len(self.list(about.group))} streams of this group are open; the places that are left are for other groups")
         session = Session(about, next(self.numbers))
         self.sessions[about.id] = self.by_number[session.number] = session
         return session
@@ -112,6 +119,7 @@ class Hub:
         """End a session and remove it."""
         session.finish(end)
         if self.sessions.pop(session.about.id, None) is not None:
+            self.places.give(session.about.group)
             self.by_number.pop(session.number, None)
             self.host.post(Message(CLOSE, session.number))
             self.metrics.missed(0, session.held)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from queue import SimpleQueue
 from typing import Any, Protocol, TypeVar
 
+from api.shares import GROUP, FairThreads, Shares
 from api.work.worker import Killed, QueryLimits, Worker
 
 T = TypeVar("T")
@@ -41,7 +41,7 @@ class Work(Protocol):
 
 
 class Pool:
-    """Pool of spawned worker processes.
+    """Pool of spawned worker processes; the next call is of the group that has fewest at work.
 
     A process is replaced when its query exceeds a limit or is withdrawn: nothing else ends a computation that has begun.
 
@@ -54,15 +54,28 @@ class Pool:
         Machines that each worker caches.
     limits : QueryLimits
         Of each call.
+    several : bool
+        Whether the queue is shared by groups.
     """
 
-    def __init__(self, workers: int, queue: int, machines: int, limits: QueryLimits = QueryLimits()) -> None:  # noqa: B008 - frozen
-        self.workers, self.queue, self.machines, self.limits = workers, queue, machines, limits
-        self.threads: ThreadPoolExecutor | None = None
+    def __init__(
+        self,
+        workers: int,
+        queue: int,
+        machines: int,
+        limits: QueryLimits = QueryLimits(),  # noqa: B008 - frozen
+        several: bool = False,
+    ) -> None:
+        self.workers, self.machines, self.limits = workers, machines, limits
+        self.places = Shares(workers + queue, several)
+        self.threads: FairThreads | None = None
         self.members: list[Worker] = []
         self.free: SimpleQueue[Worker] = SimpleQueue()
         self.lock = threading.Lock()
-        self.waiting = 0
+
+    @property
+    def waiting(self) -> int:
+        return self.places.total
 
     @property
     def ready(self) -> bool:
@@ -70,7 +83,7 @@ class Pool:
 
     def start(self) -> None:
         # a thread for each process: a call waits for both at once
-        self.threads = ThreadPoolExecutor(self.workers, "work")
+        self.threads = FairThreads(self.workers, "work")
         self.members = [self._worker() for _ in range(self.workers)]
         for member in self.members:
             self.free.put(member)
@@ -85,13 +98,13 @@ class Pool:
         Raises
         ------
         Busy
-            The queue is full, or a worker was killed from outside.
+            The queue is full, or the group's share of it, or a worker was killed from outside.
         TooLong, InputError
             The call has exceeded the limit of time, or of memory.
         """
-        if self.threads is None or self.waiting >= self.workers + self.queue:
+        group = GROUP.get()
+        if self.threads is None or not self.places.take(group):
             raise Busy
-        self.waiting += 1
         asked = _Call(guarded, (call, *arguments))
         try:
             answer: T = await asyncio.wrap_future(self.threads.submit(self._answer, asked))
@@ -102,7 +115,7 @@ class Pool:
             asked.withdraw()
             raise
         finally:
-            self.waiting -= 1
+            self.places.give(group)
 
     def _answer(self, asked: _Call) -> Any:
         """In a thread: have a free process answer, and replace it where it is of no further use."""

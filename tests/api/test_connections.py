@@ -13,7 +13,7 @@ import uvicorn
 
 from api import access
 from api.access import TimedHeadProtocol
-from api.connections import FIRST_MESSAGE, Connections, SmallHelloProtocol
+from api.connections import FIRST_MESSAGE, Connections, SmallHelloProtocol, listeners, network_of
 from api.main import create_app
 from api.settings import Settings
 from tests.api.in_process import Here, Near
@@ -25,17 +25,15 @@ class Hasty(TimedHeadProtocol):
 
 
 @contextmanager
-def listening(app, http=Hasty, ws=SmallHelloProtocol):
+def listening(app, http=Hasty, counted=None, **further):
     """A server on a free port."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    server = uvicorn.Server(uvicorn.Config(app, port=port, http=http, ws=ws, log_config=None, lifespan="on"))
-    thread = threading.Thread(target=server.run)
+    sockets = listeners("127.0.0.1", 0, counted or Connections())
+    server = uvicorn.Server(uvicorn.Config(app, http=http, ws=SmallHelloProtocol, log_config=None, lifespan="on", **further))
+    thread = threading.Thread(target=server.run, args=(sockets,))
     thread.start()
     try:
         until(lambda: server.started)
-        yield port
+        yield sockets[0].getsockname()[1]
     finally:
         server.should_exit = True
         thread.join()
@@ -99,40 +97,66 @@ def test_a_head_without_an_end(port):
     assert b"200" not in told(port, GET, *[b"X-A: " + b"a" * 5000 + b"\r\n"] * 200)
 
 
+@pytest.mark.parametrize("kind", [b"Content-Length: 900000\r\n\r\n", b"Transfer-Encoding: chunked\r\n\r\ndbba0\r\n"])
+def test_who_is_refused_early_is_told_and_not_cut_off(port, kind):
+    """The answer comes before the body, which may be sent to its end."""
+    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
+        link.sendall(b"POST /v1/machines HTTP/1.1\r\nHost: localhost\r\nContent-Type: text/plain\r\n" + kind)
+        answer = link.recv(65536)
+        assert answer.startswith(b"HTTP/1.1 415")
+        for _ in range(90):
+            link.sendall(b"x" * 10_000)
+        if b"chunked" in kind:
+            link.sendall(b"\r\n0\r\n\r\n")
+        while data := link.recv(65536):
+            answer += data
+    assert b"allowed is application/json" in answer
+    assert b"connection: close" in answer.lower()
+
+
+def test_a_body_that_nobody_reads_is_not_read_for_ever(port):
+    """Neither one without an end nor one that does not come."""
+    head = b"POST /v1/machines HTTP/1.1\r\nHost: localhost\r\nContent-Type: text/plain\r\nContent-Length: 100000000000\r\n\r\n"
+    assert told(port, head).startswith(b"HTTP/1.1 415")
+    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
+        link.sendall(head)
+        with pytest.raises(OSError, match=r"reset|pipe"):
+            link.sendall(b"x" * 100_000_000)
+
+
 @pytest.fixture
 def few(store, tmp_path):
     """A server that takes three connections."""
     counted = Connections(3, 3)
-    http, ws = (type("Few", (kind,), {"counted": counted}) for kind in (TimedHeadProtocol, SmallHelloProtocol))
-    with listening(create_app(Settings(data=tmp_path), store, Here(), Here(), Near()), http, ws) as found:
+    with listening(create_app(Settings(data=tmp_path), store, Here(), Here(), Near()), TimedHeadProtocol, counted) as found:
         yield found, counted
 
 
 def test_connections_beyond_the_limit_are_closed_and_hardly_told(few, caplog):
     port, counted = few
     links = [socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) for _ in range(3)]
-    until(lambda: len(counted.open) == 3)
+    until(lambda: counted.open.total() == 3)
     for _ in range(20):
         assert told(port, GET + b"\r\n") == b""
     assert sum("too many connections" in each.message for each in caplog.records) == 1
     links.pop().close()
-    until(lambda: len(counted.open) == 2)
+    until(lambda: counted.open.total() == 2)
     assert told(port, GET + b"Connection: close\r\n\r\n").startswith(b"HTTP/1.1 200")
     for each in links:
         each.close()
-    until(lambda: not counted.open and not counted.of_address)
+    until(lambda: not counted.open)
 
 
 def test_an_address_has_a_share_of_all_connections():
-    class Link:
-        def __init__(self, address):
-            self.address = address
-
-        def get_extra_info(self, _):
-            return (self.address, 1)
-
     counted = Connections(5, 2)
-    assert [counted.admit(Link(each)) for each in "aaabbbccc"] == [True, True, False, True, True, False, True, False, False]
+    assert [counted.admit(each) for each in "aaabbbccc"] == [True, True, False, True, True, False, True, False, False]
+
+
+def test_a_client_has_a_whole_network_of_ipv6():
+    same = ("2001:db8::1", "2001:db8::2:3", "2001:db8:0:0:ffff::1%eth0")
+    assert {network_of(each) for each in same} == {"2001:db8::/64"}
+    assert network_of("2001:db8:0:1::1") != network_of("2001:db8::1")
+    assert [network_of(each) for each in ("10.0.0.1", "::ffff:10.0.0.1", "nobody")] == ["10.0.0.1", "10.0.0.1", "nobody"]
 
 
 def test_a_websocket_without_a_small_first_message_is_closed(few):
@@ -150,21 +174,33 @@ def test_a_websocket_without_a_small_first_message_is_closed(few):
     until(lambda: not counted.open)
 
 
-@pytest.mark.slow
-def test_a_later_message_may_be_large(tmp_path):
-    from websockets.sync.client import connect
+async def lasting(receive, send):
+    """The lifespan of an application that has nothing to do in it."""
+    for kind in ("startup", "shutdown"):
+        await receive()
+        await send({"type": f"lifespan.{kind}.complete"})
 
-    async def count(scope, receive, send):
+
+def answering(answer):
+    """A WebSocket application that answers each text."""
+
+    async def app(scope, receive, send):
         if scope["type"] == "lifespan":
-            for kind in ("startup", "shutdown"):
-                await receive()
-                await send({"type": f"lifespan.{kind}.complete"})
+            await lasting(receive, send)
             return
         await receive()
         await send({"type": "websocket.accept"})
         while (message := await receive())["type"] == "websocket.receive":
-            await send({"type": "websocket.send", "text": str(len(message["text"]))})
+            await send({"type": "websocket.send", "text": answer(message["text"])})
 
+    return app
+
+
+@pytest.mark.slow
+def test_a_later_message_may_be_large():
+    from websockets.sync.client import connect
+
+    count = answering(lambda text: str(len(text)))
     with listening(count) as port, connect(f"ws://127.0.0.1:{port}/", compression=None) as link:
         for size in (10, 5 * FIRST_MESSAGE):
             link.send("x" * size)
@@ -180,14 +216,12 @@ def test_requests_behind_each_other_are_all_answered(port):
 
 
 @pytest.mark.slow
-def test_an_answer_may_take_longer_than_a_head(store, tmp_path):
+def test_an_answer_may_take_longer_than_a_head():
     async def slow(scope, receive, send):
         import asyncio
 
         if scope["type"] == "lifespan":
-            for kind in ("startup", "shutdown"):
-                await receive()
-                await send({"type": f"lifespan.{kind}.complete"})
+            await lasting(receive, send)
             return
         await asyncio.sleep(1.2)
         await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"2")]})
@@ -198,21 +232,10 @@ def test_an_answer_may_take_longer_than_a_head(store, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_websocket_stays_open(store, tmp_path):
+def test_a_websocket_stays_open():
     from websockets.sync.client import connect
 
-    async def echo(scope, receive, send):
-        if scope["type"] == "lifespan":
-            for kind in ("startup", "shutdown"):
-                await receive()
-                await send({"type": f"lifespan.{kind}.complete"})
-            return
-        await receive()
-        await send({"type": "websocket.accept"})
-        while (message := await receive())["type"] == "websocket.receive":
-            await send({"type": "websocket.send", "text": message["text"]})
-
-    with listening(echo) as port, connect(f"ws://127.0.0.1:{port}/") as link:
+    with listening(answering(str)) as port, connect(f"ws://127.0.0.1:{port}/") as link:
         for word in ("a", "b"):
             time.sleep(1.0)
             link.send(word)

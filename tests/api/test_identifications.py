@@ -21,6 +21,7 @@ from api.jobs import identification as work
 from api.jobs.event_feed import Crowded, EventFeeds
 from api.jobs.job_context import STARTS_OVER, JobContext
 from api.security import new_id, now
+from api.shares import Shares
 from api.stores.entities import Machine
 from api.stores.jobs import Event, Job, Outcome
 from rcsa_ident.cli import app
@@ -415,7 +416,7 @@ def test_many_watch_at_the_cost_of_one(store):
         return [event.data for event in seen if event.kind == "trace"]
 
     async def main():
-        feeds = EventFeeds(Counted(), 3)
+        feeds = EventFeeds(Counted(), Shares(3))
         seen = [[] for _ in range(100)]
         watching = [asyncio.create_task(watch(feeds, each)) for each in seen]
         for k in range(4):
@@ -431,11 +432,11 @@ def test_many_watch_at_the_cost_of_one(store):
 
 
 def test_too_many_watchers_are_told_so(store):
-    feeds = EventFeeds(store.jobs, 1)
-    with feeds.stream(), pytest.raises(Crowded), feeds.stream():
+    feeds = EventFeeds(store.jobs, Shares(1))
+    with feeds.stream("A"), pytest.raises(Crowded), feeds.stream("B"):
         pass
-    with feeds.stream():
-        assert feeds.streams == 1
+    with feeds.stream("A"):
+        assert feeds.places.total == 1
 
 
 @pytest.mark.slow

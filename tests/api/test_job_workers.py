@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import subprocess
@@ -20,7 +21,8 @@ from api.jobs.backend import VERSION, Carried
 from api.jobs.codec import encode
 from api.jobs.job_context import JobContext
 from api.jobs.worker import LEASE, JobWorker, carry, gone, place, process
-from api.security import now
+from api.security import new_id, now
+from api.stores.entities import Machine
 from api.stores.jobs import Outcome, Worker
 from rcsa_ident.errors import InputError
 from tests.api.identifying import Steps, job, left, running
@@ -312,7 +314,7 @@ class Fake:
 
 
 def worker_of(store, *carried):
-    found = JobWorker(store.jobs, Fake(*carried), {}, 3)
+    found = JobWorker(store.jobs, Fake(*carried), dict.fromkeys(("identification", "lobes")), 3)
     found.id = "me"
     store.jobs.claim(Worker("me", found.place, process(os.getpid()), found.token), None)
     return found
@@ -324,6 +326,35 @@ def test_what_was_accepted_is_handed_over_once(store, machine):
     worker.submit_accepted()
     worker.submit_accepted()
     assert worker.backend.calls == [("submit", ids[0], "identification"), ("submit", ids[1], "lobes")]
+
+
+def test_groups_take_turns(store, machine):
+    """One worker: of a group that waits with many jobs one is carried out, then one of each of the others."""
+    machines = {"A": machine} | {group: store.machines.add(Machine(new_id(), group, "M", "", now())).id for group in "BC"}
+    ids = {f"{group}{k}": f"{group}{k}" for group in "ABC" for k in range(3)}
+    for id in ids:
+        store.jobs.add(job(machines[id[0]], id=id, group=id[0]), {}, 10)
+    worker, moments = worker_of(store), itertools.count(10)
+    while store.jobs.open():
+        worker.submit_accepted()
+        worker.submit_accepted()
+        _, id, _ = worker.backend.calls[-1]
+        store.jobs.begin(id, worker.token, f"2026-01-01T00:00:{next(moments)}")
+        worker.submit_accepted()
+        store.jobs.finish(id, worker.token, Outcome("done", now()))
+    assert [id for _, id, _ in worker.backend.calls] == ["A0", "B0", "C0", "A1", "B1", "C1", "A2", "B2", "C2"]
+
+
+def test_several_workers_carry_out_jobs_of_one_group_beside_each_other(store, machine):
+    first, second = worker_of(store), worker_of(store)
+    ids = [store.jobs.add(job(machine), {}, 10).id for _ in range(3)]
+    first.submit_accepted()
+    store.jobs.begin(ids[0], first.token, now())
+    for each in (first, second):
+        each.submit_accepted()
+    # what runs elsewhere is handed over as well: the engine may have lost it
+    assert first.backend.calls == [("submit", ids[0], 10)]
+    assert second.backend.calls == [("submit", ids[0], 10), ("submit", ids[1], 10)]
 
 
 def test_what_the_engine_has_lost_is_handed_over_again(store, machine):

@@ -227,7 +227,7 @@ def test_an_event_stream_ends_with_its_key(guarded_http, store, machine, monkeyp
 
     assert "progress" in asyncio.run(followed())
     assert asyncio.run(asyncio.wait_for(withdrawn(), PATIENCE)) == []
-    assert http.app.state.components.feeds.streams == 0
+    assert http.app.state.components.feeds.places.total == 0
 
 
 def test_a_bucket_of_tokens():

@@ -138,6 +138,18 @@ def test_a_second_service_on_a_folder_says_so_and_ends(tmp_path):
 
 
 @pytest.mark.slow
+def test_a_port_that_is_taken_is_told_in_words(tmp_path):
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        words, environment = command(tmp_path / "data", "--port", str(other.getsockname()[1]))
+        found = subprocess.run(words, env=environment, capture_output=True, text=True, check=False, timeout=PATIENCE)
+    assert found.returncode == 2
+    assert "RCSA_IDENT_PORT: found 127.0.0.1:" in found.stderr
+    assert "Traceback" not in found.stderr
+
+
+@pytest.mark.slow
 def test_a_service_without_keys_says_so_and_cuts_off_a_body_without_an_end(tmp_path):
     """In chunks, whose sum nobody tells before; the connection ends when the limit is passed."""
     with serving(tmp_path / "data", RCSA_IDENT_MAX_BODY_BYTES="100000") as served:
