@@ -30,7 +30,7 @@ export function identifyCard(campaign) {
       "div",
       { class: "row-of-buttons" },
       button,
-      h("span", { class: "soft" }, `from ${campaign.usable} usable cuts; it takes about a minute for 80`),
+      h("span", { class: "soft" }, `from ${campaign.usable} usable cuts; it takes about half a minute`),
     ),
     few ? h("p", { class: "soft" }, `Too few for an identification that can be relied on: it needs two toolings with ${NEEDED.cuts} usable cuts each, better 20.`) : null,
     h(
@@ -56,6 +56,7 @@ export function identifyCard(campaign) {
           { campaign: campaign.id, seed: seed.input.base, method: method.value, start: start.checked, apply: apply.checked },
           { headers: once() },
         );
+        window.dispatchEvent(new Event("job-begun"));
         go(`identifications/${job.id}`);
       } catch (error) {
         failed(form, error);
