@@ -19,7 +19,7 @@ from tests.fixtures.service import Served, serving
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLES = ROOT / "data" / "sample_runs"
 CHROMIUM = shutil.which("chromium")
-_QUIET = (
+QUIET = (
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update",
     "--disable-sync",
 )  # fmt: skip
@@ -52,7 +52,7 @@ def browser() -> Iterator[Browser]:
     # reached only where something is wrong, and long enough for a machine under load
     expect.set_options(timeout=30_000)
     with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=list(_QUIET))
+        found = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=list(QUIET))
         yield found
         found.close()
 

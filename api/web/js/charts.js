@@ -83,10 +83,13 @@ function layoutOf(given) {
 
 /**
  * A chart of Plotly: `figure()` returns {data, layout}, and is asked again when light turns to dark or millimetres to inches.
- * `say` is what it shows, in words, for those who do not see it.
+ * `say` is what it shows, in words, for those who do not see it; `before` stands there until there is something to draw.
  */
-export function chart(say, kind = "") {
-  const box = h("div", { class: `chart ${kind}`.trim(), role: "img", "aria-label": say }, waiting("drawing …"));
+export function chart(say, kind = "", before = "drawing …") {
+  // the picture itself says nothing to those who hear the page, and its buttons are no part of what is said of it
+  const words = h("span", { class: "unseen", role: "img", "aria-label": say });
+  const plot = h("div", { class: "plot" }, waiting(before));
+  const box = h("div", { class: `chart ${kind}`.trim() }, words, plot);
   let make = null;
   let drawn = false;
   let observer = null;
@@ -94,21 +97,22 @@ export function chart(say, kind = "") {
     if (!make) return;
     const Plotly = await plotly();
     if (!box.isConnected) return;
-    const { data, layout, say: words } = make();
-    if (words) box.setAttribute("aria-label", words);
-    if (!drawn) fill(box);
+    const { data, layout, say: now } = make(plot.clientWidth);
+    if (now) words.setAttribute("aria-label", now);
+    if (!drawn) fill(plot);
     drawn = true;
     const buttons = ["select2d", "lasso2d", "autoScale2d", "toggleSpikelines", "hoverClosestCartesian", "hoverCompareCartesian"];
-    await Plotly.react(box, data, layoutOf(layout), {
+    await Plotly.react(plot, data, layoutOf(layout), {
       displaylogo: false,
       modeBarButtonsToRemove: buttons,
       displayModeBar: "hover",
       responsive: false,
       toImageButtonOptions: { format: "svg", filename: "rcsa-ident" },
     });
+    for (const drawing of plot.querySelectorAll("svg.main-svg")) drawing.setAttribute("aria-hidden", "true");
     if (!observer) {
       observer = new ResizeObserver(() => {
-        if (box.isConnected && box.clientWidth) Plotly.Plots.resize(box);
+        if (box.isConnected && plot.clientWidth) Plotly.Plots.resize(plot);
       });
       observer.observe(box);
     }

@@ -1,7 +1,9 @@
 // The frame: header, sections, and which view belongs to which address.
 import { Problem } from "./api.js";
 import { choices, fill, h, icon, note } from "./dom.js";
+import { shareOf } from "./jobs.js";
 import { mayLeave, route, show, to, where } from "./router.js";
+import { runningFor, watchJobs } from "./running.js";
 import { allMachines, choose, forgetAll, knownMachines, machine } from "./state.js";
 import { isInch, setInch } from "./units.js";
 import { askForKey, keyButton } from "./views/keys.js";
@@ -46,7 +48,7 @@ function steps() {
   const known = here?.identification;
   const states = {
     machines: here ? `${knownMachines().length} known` : "begin here",
-    identification: known ? known.status : "",
+    identification: underWay(here) || (known ? known.status : ""),
   };
   const items = SECTIONS.map(([name, long, short, path]) =>
     h(
@@ -67,6 +69,14 @@ function steps() {
     ),
   );
   fill(document.getElementById("steps"), h("ol", null, items));
+}
+
+/** How far the identification of a machine is, where one runs: so every tab shows it. */
+function underWay(machine) {
+  const job = machine && runningFor(machine.id);
+  if (!job) return "";
+  const share = shareOf(job);
+  return job.state === "queued" ? "waiting" : share === null ? "running" : `running, ${Math.round(100 * share)} %`;
 }
 
 function picker() {
@@ -166,6 +176,7 @@ window.addEventListener("machines", () => {
   top();
   steps();
 });
+window.addEventListener("running", steps);
 window.addEventListener("refresh", () => refresh());
 window.addEventListener("key-changed", async () => {
   forgetAll();
@@ -193,3 +204,4 @@ async function start() {
 }
 
 await start();
+watchJobs();

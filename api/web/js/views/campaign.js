@@ -3,7 +3,9 @@ import { get, getBlob, hasKey, send } from "../api.js";
 import { add, choices, fill, h, head, link, note, save } from "../dom.js";
 import { dropZone } from "../drop.js";
 import { confirmed, failed } from "../forms.js";
+import { filling, makeExample } from "../next_step.js";
 import { go, to } from "../router.js";
+import { knownMachines } from "../state.js";
 import { queueFor } from "../uploads.js";
 import { text } from "../units.js";
 import { identifyCard } from "./identify_card.js";
@@ -26,6 +28,7 @@ export async function view({ id }, query, place) {
   const list = h("div");
   const detail = h("div", { class: "view" });
   const next = h("div");
+  const example = knownMachines().some((m) => m.id === campaign.machine && m.example);
   add(
     place,
     head(
@@ -39,12 +42,14 @@ export async function view({ id }, query, place) {
     counts,
     next,
     strangers,
-    dropZone(
-      "Drop recordings here",
-      "Files are known by their names; more than once does no harm.",
-      (files) => queue.add(campaign, files),
-      { small: true },
-    ),
+    example
+      ? null
+      : dropZone(
+          "Drop recordings here",
+          "Files are known by their names; more than once does no harm.",
+          (files) => queue.add(campaign, files),
+          { small: true },
+        ),
     h(
       "section",
       { class: "card" },
@@ -144,8 +149,10 @@ export async function view({ id }, query, place) {
 
   let asked = null;
   function onward() {
-    const ready = campaign.usable > 0 && !queue.running;
+    const made = example ? filling(campaign) : null;
+    const ready = campaign.usable > 0 && !queue.running && (made?.done ?? true);
     const mode = `${ready} ${campaign.usable}`;
+    if (made && !made.done) add(counts, made.box);
     if (mode === asked) return;
     asked = mode;
     fill(next, ready ? identifyCard(campaign) : null);
@@ -161,7 +168,7 @@ export async function view({ id }, query, place) {
       failed(fault, error);
     }
     draw();
-    if (stale) {
+    if (stale || (example && !filling(campaign).done)) {
       stale = false;
       timer = setTimeout(fresh, 700);
     }
@@ -186,6 +193,11 @@ export async function view({ id }, query, place) {
   };
   queue.addEventListener("change", onchange);
   draw();
+  if (example && !filling(campaign).done) {
+    // where the service was stopped meanwhile, it goes on
+    makeExample().catch((error) => failed(fault, error));
+    timer = setTimeout(fresh, 700);
+  }
   return () => {
     clearTimeout(timer);
     queue.removeEventListener("change", onchange);

@@ -2,6 +2,7 @@
 import { all, get, post, Problem } from "../api.js";
 import { add, empty, fill, h, head, link, note, waiting } from "../dom.js";
 import { busy, clearFaults, field, quantity, select, showProblem } from "../forms.js";
+import { nextStep } from "../next_step.js";
 import { remember, to } from "../router.js";
 import { allMachines, choose, machine } from "../state.js";
 import { followLobes } from "../jobs.js";
@@ -24,21 +25,7 @@ export async function view(_args, query, place) {
   if (asked && machines.some((m) => m.id === asked)) choose(asked);
   const here = machine();
   add(place, head("Tool change", "Tooltip FRF and stability lobes of any tooling, also one that never cut."));
-  if (!here)
-    return void add(
-      place,
-      empty("No machine yet", "Lobes need a machine that has been identified or measured.", link(to(""), "Begin with a machine", "button primary")),
-    );
-  if (!here.identification || !here.identification.axes.length) {
-    return void add(
-      place,
-      empty(
-        `${here.name} has not been identified`,
-        "Drop in recordings of ordinary cuts, and identify it from them. After that every tooling has its lobes.",
-        link(to("recordings"), "To the recordings", "button primary"),
-      ),
-    );
-  }
+  if (!here?.identification?.axes.length) return void add(place, await nextStep(here, "After that every tooling has its lobes."));
   if (!toolings.length) {
     return void add(
       place,

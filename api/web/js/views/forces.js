@@ -1,7 +1,8 @@
 // Forces from the same sensor: of a recording, and live.
 import { all, get, part, Problem, problemOf, send } from "../api.js";
-import { add, card, empty, fill, h, head, link, save, waiting } from "../dom.js";
+import { add, card, fill, h, head, save, waiting } from "../dom.js";
 import { busy, clearFaults, field, quantity, select, showProblem } from "../forms.js";
+import { nextStep } from "../next_step.js";
 import { remember, to } from "../router.js";
 import { allMachines, machine } from "../state.js";
 import { forceResults } from "./force_results.js";
@@ -14,11 +15,7 @@ export async function ground(place, title) {
   add(
     place,
     head(title, null),
-    empty(
-      here ? `${here.name} has not been identified` : "No machine yet",
-      "Forces come through the machine's dynamics: identify it first.",
-      link(to(here ? "recordings" : ""), here ? "To the recordings" : "Begin with a machine", "button primary"),
-    ),
+    await nextStep(here, "Forces come through the machine's dynamics."),
   );
   return null;
 }

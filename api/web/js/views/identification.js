@@ -1,7 +1,7 @@
 // One identification: while it runs its cost over time and the fit so far, afterwards its modes and what could not be told.
 import { follow, get, getBlob, getText, hasKey, Problem, send } from "../api.js";
 import { add, card, fill, h, head, link, mark, note, save } from "../dom.js";
-import { chart, legend, SERIES } from "../charts.js";
+import { chart, legend, plotly, SERIES } from "../charts.js";
 import { busy, failed } from "../forms.js";
 import { kindOf, RUNNING, shareOf, wordsOf } from "../jobs.js";
 import { to } from "../router.js";
@@ -18,8 +18,10 @@ export async function view({ id }, _query, place) {
   const cancel = h("button", { type: "button", class: "danger" }, "Cancel");
   const reports = h("span", { class: "row-of-buttons" });
   const result = h("div", { class: "view" });
-  const cost = chart("Misfit over time");
-  const fit = chart("Measured points and model");
+  const cost = chart("Misfit over time", "", "Every try of the search appears here as it comes.");
+  const fit = chart("Measured points and model", "", "The lines of all cuts appear here with the first fit, and the model beside them.");
+  // it takes a while to load, and is there when the first point comes
+  plotly();
   const trace = new Map();
   const fits = new Map();
   const axesKey = () =>
@@ -35,15 +37,9 @@ export async function view({ id }, _query, place) {
     legend(["X", "Y", "both"].map((axis, k) => ({ name: axis === "both" ? "both axes" : axis, series: SERIES[k] }))),
     cost,
   );
-  add(
-    place,
-    head("Identification", null, reports, cancel),
-    fault,
-    state,
-    story,
-    h("div", { class: "split live" }, costCard, card("Measured points and model", null, axesKey(), fit)),
-    result,
-  );
+  const fitCard = card("Measured points and model", null, axesKey(), fit);
+  const live = h("div", { class: "split live" }, costCard, fitCard);
+  add(place, head("Identification", null, reports, cancel), fault, state, story, live);
   cancel.addEventListener(
     "click",
     busy(cancel, async () => {
@@ -95,7 +91,7 @@ export async function view({ id }, _query, place) {
       timer = null;
       const now = due;
       due = new Set();
-      if (now.has("cost")) cost.draw(() => costFigure(trace));
+      if (now.has("cost")) cost.draw((width) => costFigure(trace, width));
       if (now.has("fit") && !over) fit.draw(() => fitFigure(fits));
     }, 250);
   }
@@ -135,6 +131,8 @@ export async function view({ id }, _query, place) {
       draw();
       if (!trace.size) costCard.hidden = true;
       if (job.state !== "done") return;
+      // the answer comes first; how it was found is there for those who ask
+      live.replaceWith(result, fitCard, trace.size ? h("details", null, h("summary", null, "How it was found"), costCard) : "");
       const [modes, frf] = await Promise.all([get(`identifications/${id}/modes`), get(`identifications/${id}/frf`)]);
       over = true;
       fit.draw(() => fitFigure(measured(frf)));

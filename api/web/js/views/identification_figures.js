@@ -15,10 +15,32 @@ function stagesOf(points) {
   return found;
 }
 
-/** Misfit over seconds: every try as a point, the best so far of each stage as a line. */
-export function costFigure(trace) {
+/** Rows of stage labels above the chart, their height, and the width of a letter in them [px]. */
+const ROWS = 3;
+const ROW = 15;
+const LETTER = 6.6;
+
+/** Labels beside each other, in as many rows as there are; one that finds no room is left to the tips over the points. */
+function placed(labels, width, longest) {
+  const pixels = Math.max(width - 80, 100) / Math.max(longest, 1e-9);
+  const ends = Array(ROWS).fill(-Infinity);
+  return labels
+    .toSorted((a, b) => a.x - b.x)
+    .flatMap((label) => {
+      const from = label.x * pixels;
+      const to = from + label.text.length * LETTER;
+      const row = ends.findIndex((end) => end < from);
+      if (row < 0 || to > longest * pixels + 60) return [];
+      ends[row] = to;
+      return [{ ...label, yshift: row * ROW }];
+    });
+}
+
+/** Misfit over seconds: every try as a point, the best so far of each stage as a line; `width` is the chart's [px]. */
+export function costFigure(trace, width) {
   const data = [];
-  const annotations = [];
+  const labels = [];
+  let longest = 0;
   for (const [name, all] of trace) {
     const ink = inkOf(name);
     for (const { stage, points } of stagesOf(all)) {
@@ -41,28 +63,17 @@ export function costFigure(trace) {
         hoverinfo: "skip",
         hovertemplate: undefined,
       });
-      const length = points.at(-1).seconds - points[0].seconds;
-      if (length > 1.5 || stage === "search") {
-        annotations.push({
-          x: points[0].seconds,
-          y: 1,
-          yref: "paper",
-          yanchor: "bottom",
-          xanchor: "left",
-          yshift: name === "Y" ? 0 : 15,
-          text: safe(`${name}: ${stage}`),
-          showarrow: false,
-          font: { size: 11, color: ink },
-        });
-      }
+      longest = Math.max(longest, points.at(-1).seconds);
+      const where = { x: points[0].seconds, y: 1, yref: "paper", yanchor: "bottom", xanchor: "left", showarrow: false };
+      labels.push({ ...where, text: safe(`${name}: ${stage}`), font: { size: 11, color: ink } });
     }
   }
   return {
     data,
     layout: {
       hovermode: "closest",
-      annotations,
-      margin: { l: 56, r: 14, t: 40, b: 44 },
+      annotations: placed(labels, width, longest),
+      margin: { l: 56, r: 14, t: ROWS * ROW + 8, b: 44 },
       xaxis: axis("Time [s]", { rangemode: "tozero" }),
       yaxis: axis("Misfit", { type: "log", exponentformat: "e", dtick: 1 }),
     },

@@ -1,9 +1,12 @@
 // Identifications of a machine, newest first.
 import { all } from "../api.js";
-import { add, card, empty, h, head, link, mark, table } from "../dom.js";
+import { add, card, h, head, link, mark, table } from "../dom.js";
 import { kindOf, wordsOf } from "../jobs.js";
+import { noMachine, nextStep } from "../next_step.js";
 import { to } from "../router.js";
 import { allMachines, machine } from "../state.js";
+
+const again = () => window.dispatchEvent(new Event("refresh"));
 
 export async function view({ id = null }, _query, place) {
   const machines = await allMachines();
@@ -12,32 +15,13 @@ export async function view({ id = null }, _query, place) {
     return void add(
       place,
       head("Identification", null),
-      empty(
-        "No machine yet",
-        "An identification needs recordings of a machine's cuts.",
-        link(to(""), "Begin with a machine", "button primary"),
-      ),
+      noMachine("An identification needs recordings of a machine's cuts."),
     );
   }
   const [jobs, campaigns] = await Promise.all([all(`identifications?machine=${here.id}`), all(`machines/${here.id}/campaigns`)]);
   const names = new Map(campaigns.map((c) => [c.id, c.name]));
-  const last = campaigns.at(-1);
   add(place, head("Identification", here.name, here.identification ? link(to(`machines/${here.id}`), "Modes now", "button") : null));
-  if (!jobs.length) {
-    const words = last
-      ? `“${last.name}” has ${last.usable} usable cuts of ${last.cuts}.`
-      : "Drop in recordings of ordinary stable cuts first.";
-    return void add(
-      place,
-      empty(
-        "Nothing was identified here yet",
-        words,
-        last
-          ? link(to(`campaigns/${last.id}`), "To the campaign", "button primary")
-          : link(to("recordings"), "To the recordings", "button primary"),
-      ),
-    );
-  }
+  if (!jobs.length) return void add(place, await nextStep(here, "Its modes and its joint come with it."));
   add(
     place,
     card(
@@ -57,10 +41,13 @@ export async function view({ id = null }, _query, place) {
             number: true,
             cell: (j) => (j.started && j.finished ? `${Math.round((new Date(j.finished) - new Date(j.started)) / 1000)} s` : "–"),
           },
-          { name: "", cell: (j) => h("span", { class: "soft" }, j.problem?.detail ?? "") },
+          { name: "Remark", cell: (j) => h("span", { class: "soft" }, j.problem?.detail ?? "") },
         ],
         jobs,
       ),
     ),
   );
+  // another tab, or another person, has begun one, or it has come further
+  window.addEventListener("running", again);
+  return () => window.removeEventListener("running", again);
 }

@@ -25,7 +25,7 @@ export function identifyCard(campaign) {
       "div",
       { class: "row-of-buttons" },
       button,
-      h("span", { class: "soft" }, `from ${campaign.usable} usable cuts; it takes about a minute for 80`),
+      h("span", { class: "soft" }, `from ${campaign.usable} usable cuts; it takes about half a minute`),
     ),
     campaign.too_few ? h("p", { class: "soft" }, campaign.too_few) : null,
     h(
@@ -51,6 +51,7 @@ export function identifyCard(campaign) {
           { campaign: campaign.id, seed: seed.input.base, method: method.value, start: start.checked, apply: apply.checked },
           { headers: once() },
         );
+        window.dispatchEvent(new Event("job-begun"));
         go(`identifications/${job.id}`);
       } catch (error) {
         failed(form, error);

@@ -1,9 +1,10 @@
 // One machine: what is known of it, where that comes from, and what one can do next.
 import { get, getText, Problem, send } from "../api.js";
-import { add, card, empty, fill, h, head, link, mark, note, save } from "../dom.js";
+import { add, card, fill, h, head, link, mark, note, save } from "../dom.js";
 import { chart, legend, SERIES } from "../charts.js";
 import { across, frfFigure } from "../figures.js";
 import { confirmed, failed } from "../forms.js";
+import { nextStep } from "../next_step.js";
 import { go, to } from "../router.js";
 import { allMachines } from "../state.js";
 import { plain } from "../units.js";
@@ -38,10 +39,9 @@ export async function view({ id }, _query, place) {
   if (!known) {
     add(
       place,
-      empty(
-        "Not identified yet",
-        "Record ordinary stable cuts with the displacement sensor at the flange: two toolings, twenty to forty speeds each, and each speed in the air as well. Drop them in; the identification takes it from there.",
-        link(to(`machines/${id}/recordings`), "To the recordings", "button primary"),
+      await nextStep(
+        machine,
+        "It takes ordinary stable cuts, recorded with the displacement sensor at the flange: two toolings, twenty to forty speeds each, and each speed in the air as well.",
       ),
       upload(machine, fault),
     );
@@ -178,13 +178,13 @@ async function forget(machine, fault) {
   if (
     !(await confirmed(
       `Forget ${machine.name}?`,
-      "Its identification and its campaigns go with it. This cannot be undone.",
+      `Its identification and its campaigns go with it${machine.example ? ", and the toolings of the example" : ""}. This cannot be undone.`,
       "Forget it",
     ))
   )
     return;
   try {
-    await send("DELETE", `machines/${machine.id}`);
+    await send("DELETE", machine.example ? "examples/campaign" : `machines/${machine.id}`);
     await allMachines(true);
     go("");
   } catch (error) {

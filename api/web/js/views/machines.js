@@ -3,7 +3,9 @@ import { get, getBlob, once, part, post } from "../api.js";
 import { add, card, fill, h, head, link, save } from "../dom.js";
 import { dropZone } from "../drop.js";
 import { busy, failed, field, showProblem } from "../forms.js";
+import { exampleCard, tryButton } from "../next_step.js";
 import { go, to } from "../router.js";
+import { runningFor } from "../running.js";
 import { allMachines, choose } from "../state.js";
 import { intake } from "./intake.js";
 import { statusMark } from "./machine.js";
@@ -24,6 +26,7 @@ export async function view(_args, _query, place) {
         "Recordings of cuts you make anyway go in. Tooltip FRFs, stability lobes and forces of any tooling come out.",
       ),
       box,
+      exampleCard(box),
       zone,
       h(
         "ol",
@@ -42,7 +45,7 @@ export async function view(_args, _query, place) {
     h("div", { class: "columns" }, machines.map(machineCard)),
     box,
     zone,
-    h("div", { class: "columns" }, makeCard(), examples(box)),
+    h("div", { class: "columns" }, makeCard(), examples(box, !machines.some((m) => m.example))),
   );
 }
 
@@ -67,7 +70,9 @@ function machineCard(machine) {
       { class: "row-of-buttons" },
       known && known.axes.length
         ? link(to("change", { machine: machine.id }), "Tool change", "button primary")
-        : link(to(`machines/${machine.id}/recordings`), "Recordings", "button primary"),
+        : runningFor(machine.id)
+          ? link(to(`identifications/${runningFor(machine.id).id}`), "Watch its identification", "button primary")
+          : link(to(`machines/${machine.id}/recordings`), "Recordings", "button primary"),
       link(to(`machines/${machine.id}`), "Look closer", "button"),
     ),
   );
@@ -105,7 +110,7 @@ function makeCard() {
 }
 
 /** Files to try the service with: downloaded, or a campaign taken in right here. */
-function examples(box) {
+function examples(box, offered = false) {
   const list = h("div");
   const fetched = (item) => getBlob(`examples/${part(item.name)}`);
   const acting = (item, label, work) => {
@@ -135,7 +140,8 @@ function examples(box) {
           /campaign\.zip$/.test(item.name) ? acting(item, "Take it in", (blob) => intake(box, [new File([blob], item.name)])) : null,
         ),
       );
-      fill(list, card("Example files", null, h("ul", { class: "plain" }, lines)));
+      const trial = offered ? h("div", { class: "row-of-buttons" }, tryButton(box, "")) : null;
+      fill(list, card("Example files", null, trial, h("ul", { class: "plain" }, lines)));
     })
     .catch((error) => failed(list, error));
   return list;

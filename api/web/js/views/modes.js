@@ -125,7 +125,7 @@ function joint(values) {
 export function notes(modes) {
   const told = modes.notes.filter((each) => each !== modes.both_planes?.in_words);
   if (!told.length) return null;
-  return card(
+  const box = card(
     "What the cuts could not tell",
     mark("idle", `${told.length}`),
     note(
@@ -137,4 +137,6 @@ export function notes(modes) {
       ),
     ),
   );
+  box.classList.add("wide");
+  return box;
 }

@@ -2,6 +2,7 @@
 import { all } from "../api.js";
 import { add, card, empty, h, head, link, mark, table } from "../dom.js";
 import { dropZone } from "../drop.js";
+import { tryButton } from "../next_step.js";
 import { to } from "../router.js";
 import { allMachines, machine } from "../state.js";
 import { intake } from "./intake.js";
@@ -24,8 +25,8 @@ export async function view({ id = null }, _query, place) {
       ? campaignTable(campaigns)
       : empty(
           "No campaign yet",
-          "A campaign is a folder of recordings of ordinary stable cuts, with a campaign.toml that says at which speeds. Example files are on the machines' page.",
-          link(to(""), "To the example files", "button"),
+          "A campaign is a folder of recordings of ordinary stable cuts, with a campaign.toml that says at which speeds. Drop one above, describe the cuts by hand, or look first how it goes with an example.",
+          tryButton(box, ""),
         ),
   );
 }
@@ -43,7 +44,7 @@ function campaignTable(campaigns) {
         { name: "Uploaded", number: true, cell: (c) => String(c.uploaded) },
         { name: "Usable", number: true, cell: (c) => String(c.usable) },
         {
-          name: "",
+          name: "State",
           cell: (c) => {
             if (c.missing) return mark("idle", c.uploaded < c.cuts ? "files are missing" : "air cuts are missing");
             if (!c.usable) return mark("bad", "nothing usable");

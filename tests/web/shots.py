@@ -1,0 +1,90 @@
+"""Pictures of every view, light and dark, wide and on a phone: ``python -m tests.web.shots FOLDER``, to be looked at."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from api.client import Client
+from tests.fixtures.service import serving
+from tests.fixtures.waiting import until
+from tests.web.conftest import CHROMIUM, QUIET
+
+SIZES = {"wide": {"width": 1440, "height": 900}, "phone": {"width": 390, "height": 844}}
+SCHEMES = ("light", "dark")
+
+
+def example_job(client: Client) -> tuple[str, str, str]:
+    """Have the example made and identified, and return the ids of machine, campaign and job."""
+    made = client.make_example()
+    until(lambda: all(cut.verdict and cut.air and cut.air.uploaded for cut in client.campaign(made.campaign).cuts))
+    return made.machine, made.campaign, client.wait(client.identify_campaign(made.campaign).id).id
+
+
+def views(machine: str, campaign: str, job: str) -> dict[str, str]:
+    """Return the addresses of all views, by names for files."""
+    recording = "S1-ER32-03_cut.h5"
+    return {
+        "machines": "#/",
+        "machine": f"#/machines/{machine}",
+        "recordings": "#/recordings",
+        "campaign": f"#/campaigns/{campaign}",
+        "recording": f"#/campaigns/{campaign}/{recording}",
+        "by_hand": "#/campaigns/new",
+        "identifications": "#/identification",
+        "identification": f"#/identifications/{job}",
+        "toolings": "#/toolings",
+        "tooling": "#/toolings/edit/Example S3-PG25-long",
+        "new_tooling": "#/toolings/new",
+        "changes": "#/changes",
+        "change": f"#/change?machine={machine}&tooling=Example S4-shrink",
+        "compare": f"#/change?machine={machine}&tooling=Example S3-PG25-long&tooling=Example S4-shrink",
+        "tool_card": f"#/card?machine={machine}&tooling=Example S4-shrink",
+        "forces": f"#/forces?machine={machine}",
+        "live": "#/forces/live",
+    }
+
+
+def settled(page: Page) -> None:
+    """Wait until a view shows what it will show."""
+    page.wait_for_selector("h1")
+    page.wait_for_function("() => !document.querySelector('main .waiting, main [aria-busy=\"true\"]')", timeout=120_000)
+    page.wait_for_timeout(300)
+
+
+def pages(browser: Browser, url: str) -> Iterator[tuple[str, Page]]:
+    """Yield a page for each size and scheme, with a name for it."""
+    for size, viewport in SIZES.items():
+        for scheme in SCHEMES:
+            context = browser.new_context(viewport=viewport, color_scheme=scheme, reduced_motion="reduce", device_scale_factor=1)
+            page = context.new_page()
+            page.goto(url)
+            yield f"{size}-{scheme}", page
+            context.close()
+
+
+def main(folder: Path, *chosen: str) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory() as data, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=list(QUIET))
+        with serving(Path(data) / "store", RCSA_IDENT_JOB_WORKERS="1") as served, Client(served.url) as client:
+            for name, page in pages(browser, served.url):
+                settled(page)
+                page.screenshot(path=folder / f"empty-{name}.png", full_page=True)
+            known = views(*example_job(client))
+            for name, page in pages(browser, served.url):
+                for view, address in known.items():
+                    if chosen and view not in chosen:
+                        continue
+                    page.goto(f"{served.url}/{address}")
+                    settled(page)
+                    page.screenshot(path=folder / f"{view}-{name}.png", full_page=True)
+        browser.close()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), *sys.argv[2:])
