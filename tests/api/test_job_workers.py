@@ -353,8 +353,8 @@ def test_several_workers_carry_out_jobs_of_one_group_beside_each_other(store, ma
     for each in (first, second):
         each.submit_accepted()
     # what runs elsewhere is handed over as well: the engine may have lost it
-    assert first.backend.calls == [("submit", ids[0], 10)]
-    assert second.backend.calls == [("submit", ids[0], 10), ("submit", ids[1], 10)]
+    assert first.backend.calls == [("submit", ids[0], "identification")]
+    assert second.backend.calls == [("submit", ids[0], "identification"), ("submit", ids[1], "identification")]
 
 
 def test_what_the_engine_has_lost_is_handed_over_again(store, machine):
