@@ -39,7 +39,8 @@ class HeadRequests:
             pass
         finally:
             # what the access log tells of the route
-            scope |= {name: asked[name] for name in ("route",) if name in asked}
+            if "route" in asked:
+                scope["route"] = asked["route"]
 
     def _is_there(self, scope: Scope) -> bool:
         return any(route.matches(dict(scope))[0] is Match.FULL for route in self.router.routes)

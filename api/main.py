@@ -20,6 +20,7 @@ from api.jobs.supervisor import Supervisor
 from api.metrics import JobCounts, Metrics
 from api.reading.reader import Limits, Reader
 from api.reading.uploads import Uploads
+from api.retention import Lifetimes, maintain
 from api.routes import (
     campaigns,
     examples,
@@ -38,6 +39,7 @@ from api.routes import (
     streams,
     tool_change,
     toolings,
+    usage,
     versions,
 )
 from api.schemas.campaigns import NewCampaign
@@ -79,7 +81,7 @@ def create_app(
     if store is None and not settings.database:
         data_folder.make(settings.data)
         data_folder.check(settings.data)
-    kept = open_store(settings.database_url) if store is None else store
+    kept = open_store(settings.database_url, settings.group_database_bytes) if store is None else store
     most = QueryLimits(settings.query_seconds, settings.query_memory)
     workers = Pool(settings.workers, settings.queue, settings.kept_machines, most) if work is None else work
     files = Files(settings.data / "files", settings.group_bytes, settings.free_bytes)
@@ -101,7 +103,8 @@ def create_app(
         await hub.start()
         if supervisor is not None:
             supervisor.start()
-        maintenance = asyncio.create_task(uploads.maintain())
+        lifetimes = Lifetimes(settings.keep_events_days, settings.keep_results_days, settings.keep_versions_days)
+        maintenance = asyncio.gather(uploads.maintain(), maintain(kept, lifetimes))
         yield
         maintenance.cancel()
         # beside each other: every one of them gives its processes time
@@ -121,7 +124,7 @@ def create_app(
     problems.install(app)
     app.include_router(health.router)
     app.include_router(static_files.router)
-    about = (keys, machines, toolings, versions, libraries, holders, materials, examples)
+    about = (keys, usage, machines, toolings, versions, libraries, holders, materials, examples)
     for each in (*about, campaigns, recordings, resumable_upload, multi_upload, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(HeadRequests, router=app.router)
