@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -16,6 +17,8 @@ from api.stores.entities import Destroyed, NoRoom, Unavailable
 from rcsa_ident.errors import InputError
 
 _BUSY_MS = 5000
+#: Time [s] for which a count of a group's rows is added to instead of taken again: among very many rows it takes a while.
+COUNTED = 5.0
 #: Codes by which SQLite and PostgreSQL say that a file is no database, or that pages of it are damaged.
 _DESTROYED = {11, 26, "XX001", "XX002"}
 
@@ -81,6 +84,8 @@ class Database:
 
     def __init__(self, engine: Engine, group_bytes: int = 1 << 62) -> None:
         self.engine, self.group_bytes, self.destroyed = engine, group_bytes, False
+        #: When a group's rows were last counted, and what they have come to since; who is refused is counted again first.
+        self.counted: dict[str, tuple[float, int]] = {}
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:
@@ -116,8 +121,12 @@ class Database:
 
     def check_room(self, connection: Connection, group: str, more: int) -> None:
         """Raise `NoRoom` where so many more bytes of a group do not fit; what frees room is never refused."""
-        used = sum(_usage(connection, group).values())
-        if used + more > self.group_bytes:
+        counted, used = self.counted.get(group, (-COUNTED, 0))
+        if time.monotonic() - counted >= COUNTED or used + more > self.group_bytes:
+            counted, used = time.monotonic(), sum(_usage(connection, group).values())
+        fits = used + more <= self.group_bytes
+        self.counted[group] = (counted, used + more if fits else used)
+        if not fits:
             raise NoRoom(used, self.group_bytes)
 
     def check(self) -> None:

@@ -10,7 +10,7 @@ from sqlalchemy import String, func, select, text
 
 from api.files import NORMALISED, PARTS, UPLOADS
 from api.security import make_key, new_id, now
-from api.stores import tables
+from api.stores import database, tables
 from api.stores.campaigns import Campaign, Recording
 from api.stores.entities import Document, Machine, NoRoom, digest_of
 from api.stores.jobs import Applied, Event, Outcome
@@ -137,6 +137,27 @@ def test_what_does_not_fit_is_refused_and_what_frees_room_is_not(store, machine)
     assert store.campaigns.delete("A", campaign.id)
     assert store.machines.delete("A", machine)
     store.keys.add(key)
+
+
+def test_rows_are_not_counted_again_for_every_call(store, machine, monkeypatch):
+    """A count is added to, but nobody is refused by one that is not fresh."""
+    counts, usage = [], database._usage
+    monkeypatch.setattr(database, "_usage", lambda *each: (counts.append(each), usage(*each))[1])
+    monkeypatch.setattr(database, "COUNTED", 1e9)
+    store.counted.clear()
+    for k in range(9):
+        store.toolings.put(document(f"T{k}", "x" * 1000))
+    assert len(counts) == 1
+    store.group_bytes = sum(store.usage("A").values()) + 2500
+    counts.clear()
+    store.toolings.put(document("T9", "x" * 1000))
+    with pytest.raises(NoRoom):
+        store.toolings.put(document("T10", "x" * 1000))
+    assert len(counts) == 1
+    # room that somebody else has made is found
+    store.machines.delete("A", machine)
+    store.group_bytes += 2500
+    store.toolings.put(document("T10", "x" * 1000))
 
 
 def test_small_requests_that_store_much_are_counted(tmp_path):
