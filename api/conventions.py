@@ -39,7 +39,7 @@ _WHY = {
     408: "The body arrives too slowly.",
     409: "The name, or the idempotency key with another body, is already in use.",
     412: "The stored content does not match If-Match or If-None-Match.",
-    413: "The body is too large.",
+    413: "The body is too large, or the group has no room left for it.",
     415: "The body is of another type.",
     416: "The file ends before the part that Range asks for.",
     422: "The input is not usable; the fields at fault are named.",

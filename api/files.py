@@ -172,22 +172,15 @@ class Files:
 
     def check_space(self, group: str, more: int = 0) -> None:
         """Raise `TooLarge` or `Full` where so many more bytes do not fit."""
-        used = self.used(group)
+        used = sum(self.usage(group).values())
         if used + more > self.group_bytes:
             raise TooLarge(f"the group keeps {used} bytes, and may keep {self.group_bytes}")
         if shutil.disk_usage(self.of_group(group, PARTS)).free - more < self.free_bytes:
             raise Full
 
-    def used(self, group: str) -> int:
-        """Return the size of all files of a group, including parts [bytes]."""
-        total = 0
-        for kind in (UPLOADS, NORMALISED, PARTS):
-            for entry in os.scandir(self.of_group(group, kind)):
-                try:
-                    total += entry.stat().st_size
-                except FileNotFoundError:
-                    continue
-        return total
+    def usage(self, group: str) -> dict[str, int]:
+        """Return the size of all files of a group, including parts, by kind [bytes]."""
+        return {kind: sum(map(_size, os.scandir(self.of_group(group, kind)))) for kind in (UPLOADS, NORMALISED, PARTS)}
 
     def keep(self, group: str, kind: str, key: str, source: Path) -> None:
         """Rename a synced part to its final name, replacing an equal file. The caller holds `lock`."""
@@ -267,6 +260,14 @@ def sha256_of(path: Path) -> str:
 def no_room(error: BaseException) -> bool:
     """Whether an error says that a disk, or a quota on it, is full."""
     return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
+def _size(entry: os.DirEntry[str]) -> int:
+    try:
+        return entry.stat().st_size
+    except FileNotFoundError:
+        # removed meanwhile
+        return 0
 
 
 def _folder_name(group: str) -> str:

@@ -21,6 +21,7 @@ from api.metrics import JobCounts, Metrics
 from api.reading.example_campaign import Examples
 from api.reading.reader import Limits, Reader
 from api.reading.uploads import Uploads
+from api.retention import Lifetimes, maintain
 from api.routes import (
     campaigns,
     example_campaign,
@@ -40,6 +41,7 @@ from api.routes import (
     streams,
     tool_change,
     toolings,
+    usage,
     versions,
 )
 from api.schemas.campaigns import NewCampaign
@@ -83,7 +85,7 @@ def create_app(
     if store is None and not settings.database:
         data_folder.make(settings.data)
         data_folder.check(settings.data)
-    kept = open_store(settings.database_url) if store is None else store
+    kept = open_store(settings.database_url, settings.group_database_bytes) if store is None else store
     most = QueryLimits(settings.query_seconds, settings.query_memory)
     several = settings.asks_for_keys
     workers = Pool(settings.workers, settings.queue, settings.kept_machines, most, several) if work is None else work
@@ -106,7 +108,8 @@ def create_app(
         await hub.start()
         if supervisor is not None:
             supervisor.start()
-        maintenance = asyncio.create_task(uploads.maintain())
+        lifetimes = Lifetimes(settings.keep_events_days, settings.keep_results_days, settings.keep_versions_days)
+        maintenance = asyncio.gather(uploads.maintain(), maintain(kept, lifetimes))
         yield
         maintenance.cancel()
         await made.stop()
@@ -127,7 +130,7 @@ def create_app(
     problems.install(app)
     app.include_router(health.router)
     app.include_router(static_files.router)
-    about = (keys, machines, toolings, versions, libraries, holders, materials, examples, example_campaign)
+    about = (keys, usage, machines, toolings, versions, libraries, holders, materials, examples, example_campaign)
     for each in (*about, campaigns, recordings, resumable_upload, multi_upload, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(HeadRequests, router=app.router)

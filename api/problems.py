@@ -13,7 +13,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
-from api.stores.entities import Damaged
+from api.stores.entities import Damaged, NoRoom
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.validated_table import describe
 
@@ -80,6 +80,15 @@ def of_input(error: InputError) -> Problem:
     return Problem(422, f"{field}: found {found}, allowed is {error.allowed}", [_entry(field, found, error.allowed)])
 
 
+def of_room(error: NoRoom) -> Problem:
+    """Return the problem of a group that keeps as much as it may."""
+    detail = (
+        f"the group keeps {error.used} bytes in the database, and may keep {error.allowed}: "
+        "delete machines or campaigns that nobody needs any more (GET /v1/usage tells what takes the room)"
+    )
+    return Problem(413, detail, [_entry("group", f"{error.used} bytes", f"{error.allowed} bytes")])
+
+
 def of_validation(errors: Sequence[Any]) -> Problem:
     """Return the problem of a body, query or path that does not match its schema; long values are cut."""
     entries = []
@@ -125,6 +134,10 @@ def install(app: FastAPI) -> None:
         log.error("damaged", extra={"fields": {"request_id": getattr(request.state, "request_id", ""), "found": str(error)}})
         return document(request, Problem(500, str(error)))
 
+    def full(request: Request, error: Exception) -> Response:
+        assert isinstance(error, NoRoom)
+        return document(request, of_room(error))
+
     def malformed(request: Request, error: Exception) -> Response:
         assert isinstance(error, RequestValidationError)
         return document(request, of_validation(error.errors()))
@@ -148,5 +161,6 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(Problem, known)
     app.add_exception_handler(InputError, unusable)
     app.add_exception_handler(Damaged, damaged)
+    app.add_exception_handler(NoRoom, full)
     app.add_exception_handler(RequestValidationError, malformed)
     app.add_exception_handler(HTTPException, plain)

@@ -59,6 +59,8 @@ class Settings:
         Uploads at once.
     group_bytes : int
         That all uploads of a group may take, what is read from them included.
+    group_database_bytes : int
+        That everything else of a group may take in the database.
     free_bytes : int
         That uploads leave free on the disk.
     upload_seconds, upload_idle_seconds : float [s]
@@ -82,6 +84,10 @@ class Settings:
         Times that a job is taken up again without coming further before it is given up.
     job_work_seconds : float [s]
         Estimated work of lobes as a job; longer ones are refused.
+    keep_events_days, keep_results_days : float [days]
+        After the end of a job, for which its events and its results are kept; 0 for ever.
+    keep_versions_days : float [days]
+        For which entries of the trail are kept with their versions, except the newest of each thing; 0 for ever.
     examples : Path
         Folder of a campaign that may be downloaded as an example, where it is there.
     dask : str
@@ -116,6 +122,7 @@ class Settings:
     max_upload_bytes: int = 2000 * MEGABYTE
     uploads: int = 16
     group_bytes: int = 200_000 * MEGABYTE
+    group_database_bytes: int = 2000 * MEGABYTE
     free_bytes: int = 1000 * MEGABYTE
     upload_seconds: float = 3600.0
     upload_idle_seconds: float = 30.0
@@ -130,6 +137,9 @@ class Settings:
     job_queue: int = 50
     job_attempts: int = 10
     job_work_seconds: float = 4.0 * 3600.0
+    keep_events_days: float = 0.0
+    keep_results_days: float = 0.0
+    keep_versions_days: float = 0.0
     examples: Path = field(default_factory=lambda: Path("data/sample_runs"))
     dask: str = ""
     watchers: int = 200
@@ -144,10 +154,12 @@ class Settings:
             ("streams", 0, 1000), ("streams_per_group", 0, 1000), ("stream_listeners", 0, 1000), ("stream_idle_seconds", 1.0, 3600.0),
             ("stream_buffer_seconds", 6.0, 120.0),
             ("max_upload_bytes", 1000, 10**12), ("uploads", 1, 1000), ("group_bytes", 1000, 10**15), ("free_bytes", 0, 10**15),
+            ("group_database_bytes", 1000, 10**15),
             ("upload_seconds", 1.0, 10**6), ("upload_idle_seconds", 0.1, 3600.0), ("upload_bytes_per_second", 0, 10**9),
             ("reader_memory", 512, 10**6), ("reader_seconds", 0.1, 10**4), ("reader_wall_seconds", 0.1, 10**5), ("reader_calls", 1, 10**6),
             ("job_workers", 0, 256), ("lobe_workers", 0, 256), ("job_nice", 0, 19),
             ("job_queue", 1, 10**6), ("job_attempts", 1, 1000), ("job_work_seconds", 1.0, 10**7),
+            ("keep_events_days", 0.0, 36_500.0), ("keep_results_days", 0.0, 36_500.0), ("keep_versions_days", 0.0, 36_500.0),
             ("watchers", 1, 10**5), ("watch_seconds", 0.1, 10**6),
         ):  # fmt: skip
             if not least <= getattr(self, name) <= most:

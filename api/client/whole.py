@@ -23,6 +23,7 @@ from api.schemas.machines import Frf, Identification, IdentificationSummary, Mac
 from api.schemas.materials import MaterialAnswer, Materials
 from api.schemas.queries import AdviceAnswer, TipAnswer
 from api.schemas.toolings import ToolingAnswer, ToolingSummary
+from api.schemas.usage import Usage
 from api.schemas.versions import ChangeAnswer, Differences, ToolingVersion
 
 
@@ -208,6 +209,10 @@ class Client(Uploads, Jobs):
     def keys(self, limit: int = 50) -> Iterator[KeyAnswer]:
         """Yield all keys."""
         return self.all("/keys", Page[KeyAnswer], limit)
+
+    def usage(self) -> Usage:
+        """Return what the group keeps, and what it may keep."""
+        return read(Usage, self.send("GET", "/usage"))
 
     def withdraw_key(self, id: str) -> None:
         """Revoke an API key."""

@@ -139,7 +139,10 @@ def finished(components: Components, group: str, id: str, kind: str, name: str) 
     job = job_of(components, group, id, kind)
     if job.state != "done":
         raise Problem(409, f"the job has no result: its state is {job.state}", headers={"Retry-After": AGAIN} if job.state in OPEN else {})
-    return found_or_404(components.store.jobs.text(id, name), "result")
+    text, days = components.store.jobs.text(id, name), components.settings.keep_results_days
+    if text is None and days:
+        raise Problem(404, f"the result of the job is not there any more: results are kept for {days:g} days")
+    return found_or_404(text, "result")
 
 
 async def events(components: Components, caller: Caller, id: str, kind: str, seen: str | None) -> StreamingResponse:

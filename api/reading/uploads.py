@@ -21,7 +21,7 @@ from api.reading.stored import is_whole, samples_of
 from api.shares import Shares
 from api.stores.campaigns import Campaign, FileKey, Recording
 from api.stores.changes import Note
-from api.stores.entities import Damaged, Store, Taken, Unavailable
+from api.stores.entities import Damaged, NoRoom, Store, Taken, Unavailable
 from api.work.pool import Busy, Work
 from rcsa_ident.errors import InputError
 
@@ -127,8 +127,8 @@ class Uploads:
         for path, state in await asyncio.to_thread(lambda: list(self.files.complete())):
             try:
                 await self.finish(path, state)
-            except (Taken, Busy, Full):
-                # the client may still replace the other content; the next round takes the others
+            except (Taken, Busy, Full, NoRoom, Damaged):
+                # the client may still replace the other content, or mend it; the next round takes the others
                 continue
             except InputError as error:
                 log.warning("a complete upload cannot be read", extra={"fields": {"recording": state.name, "error": str(error)}})
@@ -167,7 +167,7 @@ class Uploads:
             before = None
             try:
                 before = self.store.recordings.put(recording, replacing)
-            except (Taken, KeyError):
+            except (Taken, NoRoom, KeyError):
                 self._release(group, files_named(recording))
                 raise
             if before is not None:
@@ -287,6 +287,16 @@ class Uploads:
             kept = {group: self.store.recordings.kept(group) for group in list(self.store.recordings.groups())}
             return self.files.sweep(kept)
 
+    async def _settle_if_whole(self, group: str, id: str) -> None:
+        try:
+            campaign = await asyncio.to_thread(self.store.campaigns.get, group, id)
+        except Damaged as error:
+            # the others are judged all the same
+            log.error("damaged", extra={"fields": {"campaign": id, "found": str(error)}})
+            return
+        if campaign is not None:
+            await self.settle(campaign)
+
     async def maintain(self) -> None:
         """At the start and every hour: remove orphaned files, store uploads that are complete, and judge recordings without a verdict."""
         while True:
@@ -296,9 +306,7 @@ class Uploads:
                     log.info("orphaned files removed", extra={"fields": {"files": swept}})
                 await self._finish_all()
                 for group, id in await asyncio.to_thread(self.store.campaigns.unsettled):
-                    campaign = await asyncio.to_thread(self.store.campaigns.get, group, id)
-                    if campaign is not None:
-                        await self.settle(campaign)
+                    await self._settle_if_whole(group, id)
             except (Unavailable, OSError) as error:
                 log.warning("maintenance of uploads is postponed", extra={"fields": {"error": type(error).__name__}})
             await asyncio.sleep(_ROUND)

@@ -9,13 +9,14 @@ from api.components import Components, ThisService
 from api.conventions import BODY, CampaignId, guard, problems
 from api.files import Part
 from api.lookups import known_campaign
-from api.problems import Problem, of_input
+from api.problems import Problem, of_input, of_room
 from api.reading.campaign_text import files_of
 from api.routes.recordings import answer, take
 from api.schemas.campaigns import ItemProblem, UploadAnswer, UploadItem
 from api.schemas.common import Fault
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign
+from api.stores.entities import Damaged, NoRoom
 from api.transfer.body_stream import announced_length, check_room, complete, refuse_encoded, write
 from api.transfer.multipart import FORM, Head, events
 from api.work.pool import Busy
@@ -81,6 +82,10 @@ async def _item(components: Components, campaign: Campaign, name: str, part: Par
         problem = error
     except InputError as error:
         problem = of_input(error)
+    except NoRoom as error:
+        problem = of_room(error)
+    except Damaged as error:
+        problem = Problem(500, str(error))
     except Busy:
         problem = Problem(503, "too many uploads are waiting to be read")
     faults = [Fault.model_validate(each) for each in problem.errors] or None

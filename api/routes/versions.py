@@ -80,7 +80,7 @@ def tooling_version(name: ToolingName, version: Version, components: ThisService
     summary="Write a version of a tooling again, also one that was deleted",
     description="If-Match or If-None-Match: * protect against overwriting concurrent changes. What it replaces stays as a version.",
     openapi_extra=guard("upload"),
-    responses={201: {"model": ToolingAnswer, "description": "It was deleted before."}, **problems(404, 412, 422)},
+    responses={201: {"model": ToolingAnswer, "description": "It was deleted before."}, **problems(404, 412, 413, 422, 500)},
 )
 def restore_tooling(
     name: ToolingName, version: Version, request: Request, response: Response, components: ThisService, caller: WhoAsks, why: Why = ""
@@ -112,7 +112,7 @@ def identification_version(id: MachineId, version: Version, components: ThisServ
     summary="Write a version of a machine's identification again",
     description="If-Match or If-None-Match: * protect against overwriting concurrent changes. What it replaces stays as a version.",
     openapi_extra=guard("upload"),
-    responses={201: {"model": IdentificationSummary, "description": "The machine had none before."}, **problems(404, 412, 422)},
+    responses={201: {"model": IdentificationSummary, "description": "The machine had none before."}, **problems(404, 412, 413, 422, 500)},
 )
 def restore_identification(
     id: MachineId, version: Version, request: Request, response: Response, components: ThisService, caller: WhoAsks, why: Why = ""

@@ -86,3 +86,6 @@ class Changes(Protocol):
 
     def get(self, group: str, kind: str, name: str, version: int) -> Change | None:
         """Return an entry."""
+
+    def forget(self, before: str) -> int:
+        """Remove entries of all groups from before a time, except the newest of each thing, and return how many."""

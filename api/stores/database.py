@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import sqlite3
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event, text
+from sqlalchemy import Connection, Engine, create_engine, event, func, select, text
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, IntegrityError, NoSuchModuleError, OperationalError, TimeoutError
 
 from api.stores import tables
-from api.stores.entities import Destroyed, Unavailable
+from api.stores.entities import Destroyed, NoRoom, Unavailable
 from rcsa_ident.errors import InputError
 
 _BUSY_MS = 5000
+#: Time [s] for which a count of a group's rows is added to instead of taken again: among very many rows it takes a while.
+COUNTED = 5.0
 #: Codes by which SQLite and PostgreSQL say that a file is no database, or that pages of it are damaged.
 _DESTROYED = {11, 26, "XX001", "XX002"}
 
@@ -70,10 +73,19 @@ def _begin(connection: Connection) -> None:
 
 
 class Database:
-    """Transactions on one database."""
+    """Transactions on one database.
 
-    def __init__(self, engine: Engine) -> None:
-        self.engine, self.destroyed = engine, False
+    Parameters
+    ----------
+    engine : Engine
+    group_bytes : int
+        That the rows of a group may take.
+    """
+
+    def __init__(self, engine: Engine, group_bytes: int = 1 << 62) -> None:
+        self.engine, self.group_bytes, self.destroyed = engine, group_bytes, False
+        #: When a group's rows were last counted, and what they have come to since; who is refused is counted again first.
+        self.counted: dict[str, tuple[float, int]] = {}
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:
@@ -103,6 +115,20 @@ class Database:
                 raise Unavailable from error
             raise
 
+    def usage(self, group: str) -> dict[str, int]:
+        with self.reading() as connection:
+            return _usage(connection, group)
+
+    def check_room(self, connection: Connection, group: str, more: int) -> None:
+        """Raise `NoRoom` where so many more bytes of a group do not fit; what frees room is never refused."""
+        counted, used = self.counted.get(group, (-COUNTED, 0))
+        if time.monotonic() - counted >= COUNTED or used + more > self.group_bytes:
+            counted, used = time.monotonic(), sum(_usage(connection, group).values())
+        fits = used + more <= self.group_bytes
+        self.counted[group] = (counted, used + more if fits else used)
+        if not fits:
+            raise NoRoom(used, self.group_bytes)
+
     def check(self) -> None:
         if self.destroyed:
             raise Destroyed
@@ -111,3 +137,13 @@ class Database:
 
     def close(self) -> None:
         self.engine.dispose()
+
+
+def _usage(connection: Connection, group: str) -> dict[str, int]:
+    """Size of a group's rows by kind: sums over indexes, without a look at the rows."""
+    found = {}
+    for kind, counted in tables.COUNTED.items():
+        sums = [select(func.coalesce(func.sum(t.c.stored), 0)).where(t.c.group == group).scalar_subquery() for t in counted]
+        found[kind] = select(sum(sums[1:], sums[0])).scalar_subquery()
+    row = connection.execute(select(*(each.label(kind) for kind, each in found.items()))).one()
+    return {kind: int(size) for kind, size in row._mapping.items()}

@@ -1,9 +1,13 @@
-"""Entities of the store and the protocols of its parts; nothing else of it is visible to routes."""
+"""Entities of the store and the protocols of its parts; nothing else of it is visible to routes.
+
+Whatever adds to what a group keeps raises `NoRoom` where that is more than it may keep.
+"""
 
 from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Protocol
 
 from api.stores.campaigns import Campaigns, Recordings
@@ -28,6 +32,14 @@ class Unavailable(Exception):
 
 class Destroyed(Unavailable):
     """The database is there, but its file or its pages are damaged."""
+
+
+class NoRoom(Exception):
+    """A group's rows would take more of the database than they may: bytes that they take, and that they may take."""
+
+    def __init__(self, used: int, allowed: int) -> None:
+        super().__init__(used, allowed)
+        self.used, self.allowed = used, allowed
 
 
 class Damaged(Exception):
@@ -196,6 +208,13 @@ class Store(Protocol):
     campaigns: Campaigns
     recordings: Recordings
     jobs: Jobs
+    group_bytes: int
+
+    def usage(self, group: str) -> dict[str, int]:
+        """Return what the rows of a group take, by kind [bytes]."""
+
+    def forget_repeats(self, now: datetime) -> None:
+        """Forget idempotency keys that are older than a day."""
 
     def check(self) -> None:
         """Raise `Unavailable` unless the database answers."""

@@ -32,6 +32,6 @@ def earlier(connection: Connection, table: Table, group: str, repeat: tuple[str,
     return row
 
 
-def forget_old(connection: Connection, table: Table) -> None:
+def forget_old(connection: Connection, table: Table, now: datetime | None = None) -> None:
     """Remove expired keys."""
-    connection.execute(delete(table).where(table.c.created < (datetime.now(UTC) - REMEMBERED).isoformat()))
+    connection.execute(delete(table).where(table.c.created < ((now or datetime.now(UTC)) - REMEMBERED).isoformat()))

@@ -212,6 +212,12 @@ class Jobs(Protocol):
     def text(self, id: str, name: str) -> str | None:
         """Return an input or result of a job; raises `Damaged` where it is not what was written."""
 
+    def forget_events(self, before: str) -> int:
+        """Remove the events of jobs of all groups that ended before a time, except their end, and return of how many jobs."""
+
+    def forget_texts(self, before: str) -> int:
+        """Remove inputs and results of jobs of all groups that ended before a time, and return of how many jobs."""
+
     def counts(self) -> Sequence[tuple[str, str, int, float]]:
         """Return (kind, state, jobs, seconds that they took) over all groups."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from datetime import datetime
 from typing import Any
 
 from sqlalchemy import Engine, Select, Table, delete, insert, select, update
@@ -19,17 +20,19 @@ from api.stores.sql_campaigns import SqlCampaigns, SqlRecordings, delete_campaig
 from api.stores.sql_changes import SqlChanges, log_deleted, log_document, log_machine
 from api.stores.sql_jobs import SqlJobs, forget_jobs
 
+_KEY, _MACHINE = tables.columns_of(tables.keys, Key), tables.columns_of(tables.machines, Machine)
 
-def open_store(url: str) -> SqlStore:
-    """Return the store of a database, made or migrated where needed."""
-    return SqlStore(open_engine(url))
+
+def open_store(url: str, group_bytes: int = 1 << 62) -> SqlStore:
+    """Return the store of a database, made or migrated where needed; each group may keep so many bytes in it."""
+    return SqlStore(open_engine(url), group_bytes)
 
 
 class SqlStore(Database):
     """The store in one database."""
 
-    def __init__(self, engine: Engine) -> None:
-        super().__init__(engine)
+    def __init__(self, engine: Engine, group_bytes: int = 1 << 62) -> None:
+        super().__init__(engine, group_bytes)
         self.keys: Keys = SqlKeys(self)
         self.machines: Machines = SqlMachines(self)
         self.identifications: Documents = SqlDocuments(self, tables.identifications, IDENTIFICATION)
@@ -38,6 +41,11 @@ class SqlStore(Database):
         self.campaigns: Campaigns = SqlCampaigns(self)
         self.recordings: Recordings = SqlRecordings(self)
         self.jobs: Jobs = SqlJobs(self)
+
+    def forget_repeats(self, now: datetime) -> None:
+        with self.writing() as connection:
+            for table in tables.COUNTED["repeated_calls"]:
+                forget_old(connection, table, now)
 
 
 class SqlKeys:
@@ -48,11 +56,13 @@ class SqlKeys:
 
     def add(self, key: Key) -> None:
         with self.store.writing() as connection:
-            connection.execute(insert(tables.keys).values(asdict(key) | {"scopes": " ".join(key.scopes)}))
+            row = asdict(key) | {"scopes": " ".join(key.scopes)}
+            self.store.check_room(connection, key.group, tables.size_of(row))
+            connection.execute(insert(tables.keys).values(row))
 
     def get(self, id: str) -> Key | None:
         with self.store.reading() as connection:
-            row = connection.execute(select(tables.keys).where(tables.keys.c.id == id)).first()
+            row = connection.execute(select(*_KEY).where(tables.keys.c.id == id)).first()
         return None if row is None else _key(row)
 
     def use(self, id: str, when: str) -> None:
@@ -62,7 +72,7 @@ class SqlKeys:
     def list(self, group: str, after: str, limit: int) -> list[Key]:
         t = tables.keys
         with self.store.reading() as connection:
-            rows = connection.execute(select(t).where(t.c.group == group, t.c.id > after).order_by(t.c.id).limit(limit)).all()
+            rows = connection.execute(select(*_KEY).where(t.c.group == group, t.c.id > after).order_by(t.c.id).limit(limit)).all()
         return [_key(row) for row in rows]
 
     def delete(self, group: str, id: str) -> bool:
@@ -96,6 +106,7 @@ class SqlMachines:
                     if first is not None:
                         return _first(first)
                     connection.execute(insert(r).values(asdict(machine) | {"key": repeat[0], "digest": repeat[1]}))
+                self.store.check_room(connection, machine.group, tables.size_of(asdict(machine)))
                 connection.execute(insert(tables.machines).values(asdict(machine)))
                 log_machine(connection, machine.group, machine.id, machine.created, note)
                 return machine
@@ -110,13 +121,13 @@ class SqlMachines:
     def get(self, group: str, id: str) -> Machine | None:
         t = tables.machines
         with self.store.reading() as connection:
-            row = connection.execute(select(t).where(t.c.group == group, t.c.id == id)).first()
+            row = connection.execute(select(*_MACHINE).where(t.c.group == group, t.c.id == id)).first()
         return None if row is None else Machine(**row._asdict())
 
     def list(self, group: str, after: str, limit: int) -> list[Machine]:
         t = tables.machines
         with self.store.reading() as connection:
-            rows = connection.execute(select(t).where(t.c.group == group, t.c.id > after).order_by(t.c.id).limit(limit)).all()
+            rows = connection.execute(select(*_MACHINE).where(t.c.group == group, t.c.id > after).order_by(t.c.id).limit(limit)).all()
         return [Machine(**row._asdict()) for row in rows]
 
     def delete(self, group: str, id: str, note: Note = UNSIGNED) -> bool:
@@ -138,19 +149,24 @@ class SqlDocuments:
 
     def __init__(self, store: SqlStore, table: Table, kind: str) -> None:
         self.store, self.table, self.kind = store, table, kind
+        self.columns = tables.columns_of(table, Document)
 
     def put(self, document: Document, expected: str | None = None, note: Note = UNSIGNED) -> bool:
         t, data = self.table, asdict(document)
+        size = tables.size_of(data)
         here = (t.c.group == document.group, t.c.name == document.name)
         try:
             with self.store.writing() as connection:
                 there = connection.execute(select(t.c.digest).where(*here).with_for_update()).scalar()
                 if expected is not None and (there or ABSENT) != expected:
                     raise Stale
+                if there != document.digest:
+                    # the version that it leaves is as large
+                    self.store.check_room(connection, document.group, 2 * size)
                 if there is None:
                     connection.execute(insert(t).values(data))
                 else:
-                    connection.execute(update(t).where(*here).values(data))
+                    connection.execute(update(t).where(*here).values(data | {"stored": size}))
                 if there != document.digest:
                     log_document(connection, self.kind, data, note, there is None)
                 return there is None
@@ -161,7 +177,7 @@ class SqlDocuments:
     def get(self, group: str, name: str) -> Document | None:
         t = self.table
         with self.store.reading() as connection:
-            row = connection.execute(select(t).where(t.c.group == group, t.c.name == name)).first()
+            row = connection.execute(select(*self.columns).where(t.c.group == group, t.c.name == name)).first()
         if row is None:
             return None
         what = f"tooling {name}" if self.kind == TOOLING else "identification of the machine"
@@ -175,7 +191,7 @@ class SqlDocuments:
         return None if row is None else Document(**row._asdict(), text="")
 
     def _brief(self) -> Select[Any]:
-        return select(*(column for column in self.table.c if column.name != "text"))
+        return select(*(column for column in self.columns if column.name != "text"))
 
     def list(self, group: str, after: str, limit: int) -> list[Document]:
         t = self.table

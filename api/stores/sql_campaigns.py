@@ -17,8 +17,7 @@ from api.stores.entities import Taken, digest_of, whole
 from api.stores.idempotency import earlier, forget_old
 
 _C, _R, _K = tables.campaigns, tables.recordings, tables.campaign_repeats
-_CAMPAIGN = [_C.c[name] for name in Campaign.__dataclass_fields__]
-_RECORDING = [_R.c[name] for name in Recording.__dataclass_fields__]
+_CAMPAIGN, _RECORDING = tables.columns_of(_C, Campaign), tables.columns_of(_R, Recording)
 
 
 class SqlCampaigns:
@@ -43,6 +42,7 @@ class SqlCampaigns:
                 if connection.execute(machine).first() is None:
                     raise KeyError(campaign.machine)
                 row = asdict(campaign) | {"digest": digest_of(campaign.text), "changes": 0, "settled": 0}
+                self.store.check_room(connection, campaign.group, tables.size_of(row))
                 connection.execute(insert(_C).values(row))
                 return campaign
         except IntegrityError:
@@ -115,6 +115,7 @@ class SqlRecordings:
             row = connection.execute(select(*_RECORDING).where(*here)).first()
             there = None if row is None else Recording(**row._asdict())
             if there is None:
+                self.store.check_room(connection, recording.group, _row(recording)["stored"])
                 connection.execute(insert(_R).values(_row(recording)))
             elif there.sha256 != recording.sha256:
                 if not replace:
@@ -182,7 +183,8 @@ def _keys(rows: Sequence[Any]) -> list[FileKey]:
 
 
 def _row(recording: Recording) -> dict[str, Any]:
-    return asdict(recording) | {"usable": int(json.loads(recording.found)["verdict"]["usable"])}
+    row = asdict(recording)
+    return row | {"usable": int(json.loads(recording.found)["verdict"]["usable"]), "stored": tables.size_of(row)}
 
 
 def _changed(connection: Connection, group: str, campaign: str) -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import Any
 
-from sqlalchemy import Connection, func, insert, select, update
+from sqlalchemy import Connection, delete, func, insert, select, update
 
 from api.stores import tables
 from api.stores.changes import CHANGED, DELETED, IDENTIFICATION, MACHINE, MADE, RESTORED, TOOLING, Change, Note
 from api.stores.database import Database
 from api.stores.entities import whole
+
+_CHANGE = tables.columns_of(tables.changes, Change)
 
 
 class SqlChanges:
@@ -21,7 +23,7 @@ class SqlChanges:
 
     def list(self, group: str, before: int | None, limit: int, kind: str | None = None, name: str | None = None) -> list[Change]:
         t = tables.changes
-        query = select(*(column for column in t.c if column.name != "text")).where(t.c.group == group)
+        query = select(*(column for column in _CHANGE if column.name != "text")).where(t.c.group == group)
         for column, wanted in ((t.c.kind, kind), (t.c.name, name)):
             query = query if wanted is None else query.where(column == wanted)
         query = query if before is None else query.where(t.c.id < before)
@@ -33,10 +35,16 @@ class SqlChanges:
         t = tables.changes
         here = (t.c.group == group, t.c.kind == kind, t.c.name == name, t.c.version == version)
         with self.store.reading() as connection:
-            row = connection.execute(select(t).where(*here)).first()
+            row = connection.execute(select(*_CHANGE).where(*here)).first()
         if row is not None and row.text:
             whole(row.text, row.digest, f"version {version} of {row.title}", "restore another one, or a backup")
         return None if row is None else Change(**row._asdict())
+
+    def forget(self, before: str) -> int:
+        t = tables.changes
+        newest = select(func.max(t.c.id)).group_by(t.c.group, t.c.kind, t.c.name)
+        with self.store.writing() as connection:
+            return connection.execute(delete(t).where(t.c.created < before, t.c.id.not_in(newest))).rowcount
 
 
 def log_document(connection: Connection, kind: str, row: dict[str, Any], note: Note, new: bool) -> None:
@@ -53,7 +61,8 @@ def log_deleted(connection: Connection, kind: str, group: str, name: str, note: 
     t = tables.changes
     if kind == MACHINE:
         here = (t.c.group == group, t.c.kind == IDENTIFICATION, t.c.name == name)
-        connection.execute(update(t).where(*here).values(text="", summary=""))
+        freed = tables.bytes_of(connection, t.c.text) + tables.bytes_of(connection, t.c.summary)
+        connection.execute(update(t).where(*here).values(text="", summary="", stored=t.c.stored - freed))
 
 
 def log_machine(connection: Connection, group: str, id: str, when: str, note: Note) -> None:

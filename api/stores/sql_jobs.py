@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from sqlalchemy import Connection, Subquery, delete, func, insert, select, update
+from sqlalchemy import ColumnElement, Connection, Subquery, Table, delete, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from api.stores import tables
@@ -16,6 +16,8 @@ from api.stores.entities import digest_of, whole
 from api.stores.idempotency import earlier, forget_old
 from api.stores.jobs import OPEN, PARTIAL, Event, Full, Job, Outcome, Worker
 from api.stores.sql_changes import log_document
+
+_JOB = tables.columns_of(tables.jobs, Job)
 
 
 class SqlJobs:
@@ -43,9 +45,11 @@ class SqlJobs:
                 if repeat is not None:
                     row = {"group": job.group, "key": repeat[0], "digest": repeat[1], "id": job.id, "created": job.created}
                     connection.execute(insert(r).values(row))
+                self.store.check_room(connection, job.group, tables.size_of(asdict(job)) + sum(map(len, texts.values())))
                 connection.execute(insert(t).values(asdict(job)))
                 for name, text in texts.items():
                     connection.execute(insert(x).values(job=job.id, name=name, text=text, digest=digest_of(text)))
+                _measure(connection, job.id)
                 return job
         except IntegrityError:
             # the same key arrived twice at the same moment
@@ -57,7 +61,7 @@ class SqlJobs:
 
     def _first(self, connection: Connection, group: str, repeat: tuple[str, str]) -> Job | None:
         row, t = earlier(connection, tables.job_repeats, group, repeat), tables.jobs
-        found = None if row is None else connection.execute(select(t).where(t.c.id == row.id)).first()
+        found = None if row is None else connection.execute(select(*_JOB).where(t.c.id == row.id)).first()
         return None if found is None else Job(**found._asdict())
 
     def get(self, group: str, id: str) -> Job | None:
@@ -66,12 +70,12 @@ class SqlJobs:
 
     def find(self, id: str) -> Job | None:
         with self.store.reading() as connection:
-            row = connection.execute(select(tables.jobs).where(tables.jobs.c.id == id)).first()
+            row = connection.execute(select(*_JOB).where(tables.jobs.c.id == id)).first()
         return None if row is None else Job(**row._asdict())
 
     def list(self, group: str, wanted: Mapping[str, str], before: str, limit: int) -> list[Job]:
         t = tables.jobs
-        query = select(t).where(t.c.group == group, *(t.c[name] == value for name, value in wanted.items()))
+        query = select(*_JOB).where(t.c.group == group, *(t.c[name] == value for name, value in wanted.items()))
         if before:
             query = query.where(t.c.id < before)
         with self.store.reading() as connection:
@@ -90,11 +94,11 @@ class SqlJobs:
                 connection.execute(update(t).where(*here).values(state="cancelled", finished=when))
                 _forget_partial(connection, id)
                 _append(connection, id, found.events, [Event(0, "end", "")])
-            return Job(**connection.execute(select(t).where(*here)).one()._asdict()), cancelled
+            return Job(**connection.execute(select(*_JOB).where(*here)).one()._asdict()), cancelled
 
     def open(self) -> Sequence[Job]:
         t, turn = tables.jobs, _turns()
-        query = select(t).join(turn, turn.c.id == t.c.id).order_by(turn.c.place, turn.c.served, t.c.id)
+        query = select(*_JOB).join(turn, turn.c.id == t.c.id).order_by(turn.c.place, turn.c.served, t.c.id)
         with self.store.reading() as connection:
             rows = connection.execute(query).all()
         return [Job(**row._asdict()) for row in rows]
@@ -117,7 +121,7 @@ class SqlJobs:
             values: dict[str, Any] = {"state": "running", "worker": worker, "attempts": found.attempts + 1}
             connection.execute(update(t).where(t.c.id == id).values(values | {"started": found.started or when}))
             _append(connection, id, found.events, [Event(0, "progress", "")])
-            return Job(**connection.execute(select(t).where(t.c.id == id)).one()._asdict())
+            return Job(**connection.execute(select(*_JOB).where(t.c.id == id)).one()._asdict())
 
     def take(self, id: str, dead: str | None, worker: str) -> bool:
         t = tables.jobs
@@ -175,6 +179,24 @@ class SqlJobs:
         with self.store.reading() as connection:
             found = connection.execute(select(x.c.text, x.c.digest).where(x.c.job == id, x.c.name == name)).first()
         return None if found is None else whole(found.text, found.digest, f"{name} of the job {id}", "ask for the job once more")
+
+    def forget_events(self, before: str) -> int:
+        return self._forget(tables.job_events, before, tables.job_events.c.kind != "end")
+
+    def forget_texts(self, before: str) -> int:
+        return self._forget(tables.job_texts, before)
+
+    def _forget(self, part: Table, before: str, *wanted: ColumnElement[bool]) -> int:
+        """Remove a part of the jobs that ended before a time, one job after the other: nobody waits long for the database."""
+        t = tables.jobs
+        with self.store.reading() as connection:
+            old = select(part.c.job).distinct().join(t, t.c.id == part.c.job).where(t.c.finished < before, *wanted)
+            ids = list(connection.execute(old).scalars())
+        for id in ids:
+            with self.store.writing() as connection:
+                connection.execute(delete(part).where(part.c.job == id, *wanted))
+                _measure(connection, id)
+        return len(ids)
 
     def counts(self) -> Sequence[tuple[str, str, int, float]]:
         t = tables.jobs
@@ -238,6 +260,13 @@ def _append(connection: Connection, job: str, last: int, events: Sequence[Event]
     rows = [asdict(event) | {"job": job, "number": last + 1 + i} for i, event in enumerate(lasting)]
     connection.execute(insert(e), rows)
     connection.execute(update(t).where(t.c.id == job).values(events=last + len(rows)))
+    _measure(connection, job)
+
+
+def _measure(connection: Connection, job: str) -> None:
+    """Count what a job says and comes to."""
+    t = tables.jobs
+    connection.execute(update(t).where(t.c.id == job).values(stored=tables.size_of_job(connection)))
 
 
 def _forget_partial(connection: Connection, job: str) -> None:

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from sqlalchemy import (
     BigInteger,
     Column,
+    ColumnElement,
     Connection,
     Float,
     Index,
     Integer,
+    LargeBinary,
     MetaData,
     String,
     Table,
     Text,
     UniqueConstraint,
+    cast,
     func,
     insert,
     inspect,
@@ -29,9 +33,24 @@ from sqlalchemy.schema import CreateColumn
 from api.stores.entities import digest_of
 from rcsa_ident.errors import InputError
 
+#: What a row counts for beside its texts [bytes].
+ROW = 100
 metadata = MetaData()
 # names compare by their bytes: the order of lists must not depend on the database's locale
 _Name = String(128).with_variant(String(128, collation="C"), "postgresql")
+
+
+def size_of(row: Mapping[str, Any]) -> int:
+    """Return what a row counts for in its group's quota [bytes]."""
+    return ROW + sum(len(value.encode("utf-8", "replace")) for value in row.values() if isinstance(value, str))
+
+
+def _stored() -> Column[int]:
+    """Size of a row, counted where the row is inserted; who changes its texts counts again."""
+    return Column(
+        "stored", BigInteger, nullable=False, server_default="0", default=lambda context: size_of(context.get_current_parameters())
+    )
+
 
 meta = Table("meta", metadata, Column("schema_version", Integer, nullable=False))
 keys = Table(
@@ -45,6 +64,8 @@ keys = Table(
     Column("created", String(40), nullable=False),
     Column("expires", String(40)),
     Column("used", String(40)),
+    _stored(),
+    Index("ix_keys_stored", "group", "stored"),
 )
 machines = Table(
     "machines",
@@ -54,7 +75,9 @@ machines = Table(
     Column("name", _Name, nullable=False),
     Column("description", Text, nullable=False),
     Column("created", String(40), nullable=False),
+    _stored(),
     UniqueConstraint("group", "name"),
+    Index("ix_machines_stored", "group", "stored"),
 )
 
 
@@ -69,6 +92,8 @@ def _repeats(name: str, *further: Column) -> Table:
         Column("id", _Name, nullable=False),
         *further,
         Column("created", String(40), nullable=False, index=True),
+        _stored(),
+        Index(f"ix_{name}_stored", "group", "stored"),
     )
 
 
@@ -85,6 +110,8 @@ def _documents(name: str) -> Table:
         Column("summary", Text, nullable=False),
         Column("digest", String(64), nullable=False),
         Column("changed", String(40), nullable=False),
+        _stored(),
+        Index(f"ix_{name}_stored", "group", "stored"),
     )
 
 
@@ -109,7 +136,9 @@ changes = Table(
     Column("summary", Text, nullable=False),
     Column("digest", String(64), nullable=False),
     UniqueConstraint("group", "kind", "name", "version"),
+    _stored(),
     Index("ix_changes_group", "group", "id"),
+    Index("ix_changes_stored", "group", "stored"),
 )
 _FileName = String(200).with_variant(String(200, collation="C"), "postgresql")
 campaigns = Table(
@@ -125,7 +154,9 @@ campaigns = Table(
     Column("created", String(40), nullable=False),
     Column("changes", Integer, nullable=False),
     Column("settled", Integer, nullable=False),
+    _stored(),
     Index("ix_campaigns_machine", "group", "machine"),
+    Index("ix_campaigns_stored", "group", "stored"),
 )
 campaign_repeats = _repeats("campaign_idempotency_keys")
 recordings = Table(
@@ -143,6 +174,8 @@ recordings = Table(
     Column("judged_with", String(64), nullable=False),
     Column("created", String(40), nullable=False),
     Column("samples", String(64), nullable=False, server_default=""),
+    _stored(),
+    Index("ix_recordings_stored", "group", "stored"),
 )
 
 jobs = Table(
@@ -167,7 +200,9 @@ jobs = Table(
     Column("events", Integer, nullable=False),
     Column("key", _Name, nullable=False, server_default=""),
     Column("who", String(200), nullable=False, server_default=""),
+    _stored(),
     Index("ix_jobs_group", "group", "kind", "id"),
+    Index("ix_jobs_stored", "group", "stored"),
 )
 job_repeats = _repeats("job_idempotency_keys")
 job_events = Table(
@@ -178,6 +213,7 @@ job_events = Table(
     Column("kind", String(16), nullable=False),
     Column("data", Text, nullable=False),
     Column("topic", String(32), nullable=False),
+    _stored(),
 )
 job_texts = Table(
     "job_texts",
@@ -186,6 +222,7 @@ job_texts = Table(
     Column("name", String(32), primary_key=True),
     Column("text", Text, nullable=False),
     Column("digest", String(64), nullable=False, server_default=""),
+    _stored(),
 )
 job_workers = Table(
     "job_workers",
@@ -230,7 +267,8 @@ def _first_versions(connection: Connection) -> None:
     ):
         who = (literal(""), literal(""), literal("it was there before versions were kept"))
         query = select(table.c.group, literal(kind), name, title, *unknown, when, *who, *content).order_by(name)
-        connection.execute(insert(changes).from_select([column.name for column in changes.c if column.name != "id"], query))
+        names = [column.name for column in changes.c if column.name not in ("id", "stored")]
+        connection.execute(insert(changes).from_select(names, query, include_defaults=False))
 
 
 def _digests(connection: Connection) -> None:
@@ -245,8 +283,53 @@ def _digests(connection: Connection) -> None:
             connection.execute(update(table).where(*here).values(digest=digest_of(content)))
 
 
+#: What the groups' quotas count, by the names that people read; what jobs say and come to counts with them.
+COUNTED = {
+    "machines": (machines,),
+    "toolings": (toolings,),
+    "identifications": (identifications,),
+    "versions": (changes,),
+    "campaigns": (campaigns,),
+    "recordings": (recordings,),
+    "jobs": (jobs,),
+    "keys": (keys,),
+    "repeated_calls": (repeats, campaign_repeats, job_repeats),
+}
+
+
+def _sizes(connection: Connection) -> None:
+    """A size of every row, and an index that sums them for each group."""
+    counted = [table for each in COUNTED.values() for table in each]
+    _add_columns(connection, *counted, job_events, job_texts)
+    for table in (*counted, job_events, job_texts):
+        for index in table.indexes:
+            index.create(connection, checkfirst=True)
+        texts = [column for column in table.c if isinstance(column.type, String)]
+        connection.execute(update(table).values(stored=sum((func.coalesce(bytes_of(connection, c), 0) for c in texts), literal(ROW))))
+    connection.execute(update(jobs).values(stored=size_of_job(connection)))
+
+
+def bytes_of(connection: Connection, column: ColumnElement[str]) -> ColumnElement[int]:
+    """Return the length of a text in UTF-8."""
+    if connection.dialect.name == "sqlite":
+        # its own function for this is younger than the libraries of some systems
+        return func.length(cast(column, LargeBinary))
+    return func.octet_length(column)
+
+
+def size_of_job(connection: Connection) -> ColumnElement[int]:
+    """Return the size of a job with its events, inputs and results."""
+    parts = (select(func.coalesce(func.sum(t.c.stored), 0)).where(t.c.job == jobs.c.id).scalar_subquery() for t in (job_events, job_texts))
+    return sum(parts, literal(ROW) + bytes_of(connection, jobs.c.request))
+
+
+def columns_of(table: Table, entity: Any) -> list[Column[Any]]:
+    """Return the columns that an entity is made of."""
+    return [table.c[name] for name in entity.__dataclass_fields__]
+
+
 #: Migrations from version k + 1 to k + 2, in order; a released one is never edited.
-MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_missing_tables, _kept_versions, _digests)
+MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_missing_tables, _kept_versions, _digests, _sizes)
 SCHEMA_VERSION = 1 + len(MIGRATIONS)
 
 

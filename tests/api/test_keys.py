@@ -42,6 +42,7 @@ CALLS = [
     ("GET", "/materials", None, "read"),
     ("GET", "/holders", None, "read"),
     ("GET", "/holders/taper/chuck", None, "read"),
+    ("GET", "/usage", None, "read"),
     ("GET", "/examples", None, "read"),
     ("GET", "/examples/n", None, "read"),
     ("POST", "/examples/campaign", None, "upload"),

@@ -83,7 +83,9 @@ def test_examples_are_what_they_show(model):
 
 _HOLDER = {"taper": "HSK-A63", "chuck": "ER40"}
 #: Calls that take nothing, so that nothing about them can be wrong.
-NOTHING_TO_SAY = ("/health", "/ready", "/metrics", "/v1/keys", "/v1/forces/streams", "/v1/examples", "/v1/materials", "/v1/holders")
+NOTHING_TO_SAY = (
+    "/health", "/ready", "/metrics", "/v1/keys", "/v1/usage", "/v1/forces/streams", "/v1/examples", "/v1/materials", "/v1/holders",
+)  # fmt: skip
 
 
 @pytest.fixture
