@@ -274,7 +274,8 @@ def workers(processes: int | None, early: Sequence[str] = EARLY) -> Iterator[Wor
     except BaseException:
         for child in multiprocessing.active_children():
             if child not in others:
-                child.terminate()
+                # a shell may have had SIGTERM ignored, which they inherit; they hold nothing that a kill would leave behind
+                child.kill()
         raise
     finally:
         pool.shutdown(cancel_futures=True)

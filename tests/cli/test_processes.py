@@ -177,23 +177,29 @@ def main():
     except KeyboardInterrupt:
         print("interrupted", flush=True)
 if __name__ == "__main__":
-    # whoever started this may have had the signal ignored, which is inherited
+    # whoever started this may have had signals ignored, which is inherited: Ctrl-C is what this is about, and the others do not matter
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    for each in {ignored!r}:
+        signal.signal(each, signal.SIG_IGN)
     main()
 """
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="no process groups")
-@pytest.mark.parametrize("at_work", [0, 3], ids=["while they start", "while they work"])
-def test_ctrl_c_ends_all_of_them_without_a_word(tmp_path, at_work):
+@pytest.mark.parametrize(
+    ("at_work", "ignored"),
+    [(0, ()), (3, ()), (3, ("SIGTERM", "SIGHUP", "SIGQUIT"))],
+    ids=["while they start", "while they work", "from a shell that ignores signals"],
+)
+def test_ctrl_c_ends_all_of_them_without_a_word(tmp_path, at_work, ignored):
     """At once, and when each process has begun with a task."""
     place = tmp_path / "begun"
     place.mkdir()
     script = tmp_path / "script.py"
     root = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
     (tmp_path / "long_work.py").write_text(WORK.format(place=str(place)), encoding="utf-8")
-    script.write_text(CTRL_C.format(root=root), encoding="utf-8")
+    script.write_text(CTRL_C.format(root=root, ignored=[int(signal.Signals[name]) for name in ignored]), encoding="utf-8")
     with subprocess.Popen(
         [sys.executable, str(script)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as running:
