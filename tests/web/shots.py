@@ -51,8 +51,9 @@ def views(machine: str, campaign: str, job: str) -> dict[str, str]:
 
 def settled(page: Page) -> None:
     """Wait until a view shows what it will show."""
-    page.wait_for_selector("h1")
-    page.wait_for_function("() => !document.querySelector('main .waiting, main [aria-busy=\"true\"]')", timeout=120_000)
+    page.wait_for_selector("h1, main .note")
+    # asked from here: the page's policy lets nobody evaluate again and again inside it
+    until(lambda: not page.locator("main .waiting, main [aria-busy=true]").count())
     page.wait_for_timeout(300)
 
 

@@ -127,21 +127,47 @@ export function choices(label, options, chosen, onpick) {
   return box;
 }
 
-/** A table; a column is {name, unit, number, cell(row)}; it scrolls inside itself. */
+/** Say in a cell which column it belongs to, for a phone, where each row is a card; a unit follows the switch. */
+export function labelled(cell, name, unit = null) {
+  const say = () => (cell.dataset.label = unit?.textContent ? `${name} [${unit.textContent}]` : name);
+  say();
+  if (unit?.quantity) {
+    cell.quantity = say;
+    cell.dataset.quantity = unit.dataset.quantity;
+  }
+  return cell;
+}
+
+/** A table; a column is {name, unit, number, cell(row)}; it scrolls inside itself, and on a phone its rows are cards. */
 export function table(caption, columns, rows, { tall = false, row = null } = {}) {
   const headings = columns.map((c) =>
-    h("th", { scope: "col", class: c.number ? "number" : null }, c.name, c.unit && h("span", { class: "unit" }, c.unit)),
+    h("th", { scope: "col", role: "columnheader", class: c.number ? "number" : null }, c.name, c.unit && h("span", { class: "unit" }, c.unit)),
   );
   const body = rows.map((each, i) => {
     const cells = columns.map((c, k) =>
-      h(k === 0 ? "th" : "td", { class: c.number ? "number" : null, scope: k === 0 ? "row" : null }, c.cell(each, i)),
+      labelled(
+        h(
+          k === 0 ? "th" : "td",
+          { class: c.number ? "number" : null, scope: k === 0 ? "row" : null, role: k === 0 ? "rowheader" : "cell" },
+          c.cell(each, i),
+        ),
+        c.name,
+        c.unit instanceof Node ? c.unit : c.unit && h("span", null, c.unit),
+      ),
     );
-    return h("tr", row ? row(each, i) : null, cells);
+    return h("tr", { role: "row", ...(row ? row(each, i) : null) }, cells);
   });
   return h(
     "div",
     { class: `scrolls${tall ? " tall" : ""}`, tabindex: "0", role: "region", "aria-label": caption },
-    h("table", null, h("caption", { class: "unseen" }, caption), h("thead", null, h("tr", null, headings)), h("tbody", null, body)),
+    // said twice: laid out as cards, an element is no table any more unless its role says so
+    h(
+      "table",
+      { class: "stacks", role: "table" },
+      h("caption", { class: "unseen" }, caption),
+      h("thead", { role: "rowgroup" }, h("tr", { role: "row" }, headings)),
+      h("tbody", { role: "rowgroup" }, body),
+    ),
   );
 }
 

@@ -24,7 +24,29 @@ async function walk(entry, found) {
   }
 }
 
-/** A field to drop files on, with buttons for those who choose them. */
+/** Take what is let go anywhere over the page, as long as the field for it is there. */
+function wholeView(zone, onfiles) {
+  let depth = 0;
+  const ways = {
+    dragenter: () => over((depth += 1)),
+    dragleave: () => over((depth -= 1)),
+    drop: async (event) => {
+      event.preventDefault();
+      over((depth = 0));
+      onfiles(await filesOf(event.dataTransfer));
+    },
+  };
+  const over = (count) => zone.classList.toggle("over", count > 0);
+  for (const [name, way] of Object.entries(ways)) {
+    window.addEventListener(name, function heard(event) {
+      // a view that was left takes nothing any more; a field for files takes its own
+      if (!zone.isConnected) window.removeEventListener(name, heard);
+      else if (!event.target.closest?.("input[type=file], dialog")) way(event);
+    });
+  }
+}
+
+/** A field for files that are let go anywhere over the page, with buttons for those who choose them. */
 export function dropZone(title, words, onfiles, { small = false } = {}) {
   const picked = (input) => {
     if (input.files.length) onfiles([...input.files]);
@@ -61,20 +83,6 @@ export function dropZone(title, words, onfiles, { small = false } = {}) {
     files,
     folder,
   );
-  let depth = 0;
-  zone.addEventListener("dragenter", () => {
-    depth += 1;
-    zone.classList.add("over");
-  });
-  zone.addEventListener("dragleave", () => {
-    depth -= 1;
-    if (depth <= 0) zone.classList.remove("over");
-  });
-  zone.addEventListener("drop", async (event) => {
-    event.preventDefault();
-    depth = 0;
-    zone.classList.remove("over");
-    onfiles(await filesOf(event.dataTransfer));
-  });
+  wholeView(zone, onfiles);
   return zone;
 }

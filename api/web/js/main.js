@@ -28,6 +28,7 @@ route("toolings/new", "toolings", view("tooling"));
 route("toolings/edit/:name", "toolings", view("tooling"));
 route("changes", "toolings", view("changes"));
 route("change", "change", view("change"));
+route("card", "change", view("tool_card"));
 route("forces", "forces", view("forces"));
 route("forces/live", "forces", view("live"));
 

@@ -17,6 +17,10 @@ const KINDS = {
     ["mm", 1, 4],
     ["in", 1 / INCH, 5],
   ],
+  feed_rate: [
+    ["mm/min", 1, 0],
+    ["in/min", 1 / INCH, 2],
+  ],
   displacement: [
     ["µm", 1, 2],
     ["µin", 1000 / INCH, 1],

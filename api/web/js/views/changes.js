@@ -43,7 +43,7 @@ const COLUMNS = (fault) => [
   { name: "When", cell: (change) => new Date(change.created).toLocaleString() },
   { name: "What happened", cell: inWords },
   { name: "Version", number: true, cell: (change) => String(change.version) },
-  { name: "", cell: (change) => (change.etag && change.kind !== "machine" ? restoreButton(change, fault) : null) },
+  { name: "Back", cell: (change) => (change.etag && change.kind !== "machine" ? restoreButton(change, fault) : null) },
 ];
 
 function restoreButton(change, fault) {

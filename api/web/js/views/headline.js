@@ -3,6 +3,7 @@ import { SERIES } from "../charts.js";
 import { h } from "../dom.js";
 import { libraryDrawing } from "../drawing.js";
 import { plain, q, text } from "../units.js";
+import { cardLink } from "./card_link.js";
 
 /** The recommended cuts of a tooling: within power and torque where these were asked for. */
 export const recommended = (found, i) => found.advice?.[i]?.highest_removal ?? found.lobes[i].recommended;
@@ -91,6 +92,7 @@ export function headline(found, question) {
         : null,
       cards === 1 ? reserve(found, question, lobes.recommended_by === null ? null : lobes.best_speeds[0]) : null,
       drawing,
+      cardLink(lobes.tooling),
     );
   });
   return h("section", { class: `bests${cards === 1 ? " one" : ""}`, "aria-label": "Recommended cuts" }, articles);

@@ -148,7 +148,7 @@ export async function view(_args, query, place) {
                   { name: "Samples", number: true, cell: (s) => plain(s.samples) },
                   { name: "Lost", number: true, cell: (s) => plain(s.lost) },
                   {
-                    name: "",
+                    name: "Watch",
                     cell: (s) =>
                       h(
                         "button",

@@ -1,5 +1,5 @@
 // A table of segments that one writes into; rows are added, moved and taken away with keys or pointer.
-import { h } from "../dom.js";
+import { h, labelled } from "../dom.js";
 import { quantityInput, u } from "../units.js";
 
 const COLUMNS = [
@@ -10,9 +10,9 @@ const COLUMNS = [
 ];
 const MATERIALS = ["carbide", "steel", "aluminium"];
 
-/** The table, `rows()`: the segments as the service wants them, and `lengthen()`. */
+/** The table, `rows()`: the segments as the service wants them, `replace()` and `lengthen()`. */
 export function segmentsTable(caption, name, segments, onchange) {
-  const body = h("tbody");
+  const body = h("tbody", { role: "rowgroup" });
   const known = [...new Set([...MATERIALS, ...segments.map((s) => s.material)])];
   for (const segment of segments) body.append(row(segment));
   number();
@@ -23,11 +23,11 @@ export function segmentsTable(caption, name, segments, onchange) {
       placeholder: placeholder ?? "",
     });
     tr.inputs[key] = input;
-    return h("td", { "data-field": "" }, input, h("div", { class: "fault", hidden: true }));
+    return labelled(h("td", { "data-field": "", role: "cell" }, input, h("div", { class: "fault", hidden: true })), label, u("length"));
   }
 
   function row(segment) {
-    const tr = h("tr");
+    const tr = h("tr", { role: "row" });
     tr.segment = segment;
     tr.inputs = {};
     const material = h(
@@ -37,12 +37,12 @@ export function segmentsTable(caption, name, segments, onchange) {
     );
     tr.inputs.material = material;
     tr.append(
-      h("th", { scope: "row" }),
+      h("th", { scope: "row", role: "rowheader" }),
       ...COLUMNS.map(([key, label, placeholder]) => cell(tr, key, label, placeholder, segment)),
-      h("td", { "data-field": "" }, material, h("div", { class: "fault", hidden: true })),
+      labelled(h("td", { "data-field": "", role: "cell" }, material, h("div", { class: "fault", hidden: true })), "Material"),
       h(
         "td",
-        { class: "nowrap" },
+        { class: "nowrap", role: "cell" },
         act("↑", "Move up", () => tr.previousElementSibling?.before(tr), tr),
         act("↓", "Move down", () => tr.nextElementSibling?.after(tr), tr),
         act(
@@ -113,18 +113,18 @@ export function segmentsTable(caption, name, segments, onchange) {
     { class: "scrolls", tabindex: "0", role: "region", "aria-label": caption },
     h(
       "table",
-      { class: "segments" },
+      { class: "segments stacks", role: "table" },
       h("caption", null, caption),
       h(
         "thead",
-        null,
+        { role: "rowgroup" },
         h(
           "tr",
-          null,
-          h("th", { scope: "col" }, "#"),
-          COLUMNS.map(([, label]) => h("th", { scope: "col" }, label, h("span", { class: "unit" }, u("length")))),
-          h("th", { scope: "col" }, "Material"),
-          h("th", { scope: "col" }, h("span", { class: "unseen" }, "Change")),
+          { role: "row" },
+          h("th", { scope: "col", role: "columnheader" }, "#"),
+          COLUMNS.map(([, label]) => h("th", { scope: "col", role: "columnheader" }, label, h("span", { class: "unit" }, u("length")))),
+          h("th", { scope: "col", role: "columnheader" }, "Material"),
+          h("th", { scope: "col", role: "columnheader" }, h("span", { class: "unseen" }, "Change")),
         ),
       ),
       body,
@@ -135,5 +135,10 @@ export function segmentsTable(caption, name, segments, onchange) {
     body.lastElementChild.inputs.length_mm.base += by;
     onchange();
   }
-  return { box, rows: () => [...body.children].map(values), lengthen };
+  /** Show other segments in their place. */
+  function replace(next) {
+    body.replaceChildren(...next.map(row));
+    number();
+  }
+  return { box, rows: () => [...body.children].map(values), lengthen, replace };
 }

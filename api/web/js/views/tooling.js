@@ -7,6 +7,7 @@ import { go, holdsEdits, to } from "../router.js";
 import { machine } from "../state.js";
 import { q, text } from "../units.js";
 import { trail } from "./changes.js";
+import { catalogueBox } from "./holder_catalogue.js";
 import { segmentsTable } from "./segments.js";
 import { SHAPES, START } from "./tooling_start.js";
 
@@ -52,6 +53,18 @@ export async function view({ name = "" }, query, place) {
     quantity(label, "none", keys.contact?.[key] ?? null, { name: `contact.${key}`, hint: unit }),
   ]);
 
+  /** The diameter of the tool where it is clamped. */
+  function shank() {
+    const last = tool.rows().at(-1);
+    return last.end_diameter_mm ?? last.outer_diameter_mm;
+  }
+  function takeHolder(found) {
+    holder.replace(found.segments);
+    deep = insertion.input.base = found.insertion_mm;
+    reclamp();
+    changed();
+  }
+
   // how deep the tool shall sit where it is long enough
   let deep = insertion.input.base;
   const offer = h("div", { role: "status" });
@@ -60,11 +73,9 @@ export async function view({ name = "" }, query, place) {
   /** A tool keeps its length: further out it sits less deep, and only a person makes it longer. */
   function reclamp() {
     offer.replaceChildren();
-    const pieces = tool.rows();
-    const last = pieces[pieces.length - 1];
-    const length = pieces.reduce((sum, each) => sum + each.length_mm, 0);
+    const length = tool.rows().reduce((sum, each) => sum + each.length_mm, 0);
     const out = stickout.input.base;
-    const least = Math.min(deep, LEAST_INSERTION * (last.end_diameter_mm ?? last.outer_diameter_mm));
+    const least = Math.min(deep, LEAST_INSERTION * shank());
     if (![length, out, least].every(Number.isFinite) || out === null || out <= 0) return;
     insertion.input.base = Math.max(least, Math.min(deep, Number((length - out).toFixed(6))));
     const short = Number((out + least - length).toFixed(6));
@@ -114,7 +125,7 @@ export async function view({ name = "" }, query, place) {
       offer,
     ),
     card("Tool", null, tool.box),
-    card("Holder", null, holder.box),
+    card("Holder", null, holder.box, catalogueBox(shank, takeHolder)),
     card(
       "Contact between tool and holder",
       null,
