@@ -9,9 +9,9 @@ import numpy as np
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.data import IdentificationData
-from rcsa_ident.identification.status import FEWEST_CUTS
 from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.result import Identification
+from rcsa_ident.identification.status import FEWEST_CUTS
 from rcsa_ident.machining_setup import Campaign
 from rcsa_ident.scaleout import Map
 from rcsa_ident.signals.measurement import Reading
