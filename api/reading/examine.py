@@ -10,7 +10,7 @@ import numpy as np
 from api.reading.campaign_text import Upload, campaign_of_text
 from api.reading.samples import read_normalised, write_normalised
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.recordings import in_si, read_signals
+from rcsa_ident.io.recordings import read_signals, recorded
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.remarks import Remark
 from rcsa_ident.report.summaries import recording_rows
@@ -32,7 +32,7 @@ def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None)
     try:
         found, signals = read_signals(upload.path, [sensor.name for sensor in sensors], rate, Path(upload.name).suffix)
         write_normalised(upload.target, found, signals, sensors)
-        return in_si(found, signals, sensors)
+        return recorded(found, signals, sensors)
     except InputError as error:
         raise _with_client_name(error, upload) from None
     except RecursionError:
@@ -60,7 +60,7 @@ def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) ->
     cut = next(each for each in campaign.cuts if each.id == cut_id)
     recording = read_upload(upload, campaign.sensors, campaign.sampling_rate)
     try:
-        beside = None if air is None else read_normalised(air)
+        beside = None if air is None else read_normalised(air, in_file=True)
     except InputError:
         # deleted meanwhile: the cut will be judged again
         beside = None
@@ -77,7 +77,8 @@ def judge(text: str, cut_id: str, cut: Path, air: Path | None) -> dict[str, Any]
     """Return the verdict on the stored samples of a cut."""
     campaign = campaign_of_text(text)
     declared = next(each for each in campaign.cuts if each.id == cut_id)
-    return judged(campaign, declared, read_normalised(cut), None if air is None else read_normalised(air), "cut")[0]
+    beside = None if air is None else read_normalised(air, in_file=True)
+    return judged(campaign, declared, read_normalised(cut, in_file=True), beside, "cut")[0]
 
 
 def among_fellows(toolings: list[str], alone: list[dict[str, Any]]) -> list[dict[str, Any]]:

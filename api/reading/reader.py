@@ -170,12 +170,12 @@ def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None]) -> Non
     """In the process: answer calls until the pipe is closed."""
     import resource
 
-    from rcsa_ident.io.hdf5 import LARGEST_DATA
+    from rcsa_ident.io.channels import LARGEST_STORED
 
     prepare()
     limit_memory(limits.memory)
     # no file larger than the largest result
-    resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_DATA + LARGEST_DATA // 8,) * 2)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_STORED + LARGEST_STORED // 8,) * 2)
     pipe.send_bytes(b"{}")
     while True:
         try:

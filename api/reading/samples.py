@@ -19,40 +19,51 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.hdf5 import LARGEST_CHUNK, RATE
-from rcsa_ident.io.recordings import in_si, read_signals
+from rcsa_ident.io.channels import RATE, Channel
+from rcsa_ident.io.hdf5 import LARGEST_CHUNK
+from rcsa_ident.io.recordings import in_si, read_signals, recorded
 from rcsa_ident.machining_setup import Cut
-from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+from rcsa_ident.signals.recording import BLOCK, Quantity, Recording, Sensor
 
 _SENSORS = "sensors"
 
 
-def write_normalised(path: Path, rate: float, signals: Sequence[FloatArray], sensors: tuple[Sensor, ...]) -> None:
-    """Write the signals of sensors, shape (n,) each, and sync them to the disk."""
+def write_normalised(path: Path, rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) -> None:
+    """Write the signals of sensors, shape (n,) each, block by block, and sync them to the disk."""
     with h5py.File(path, "w") as file:
         file.attrs[RATE] = float(rate)
         file.attrs[_SENSORS] = json.dumps([asdict(sensor) for sensor in sensors])
         for i, signal in enumerate(signals):
-            data = _smallest(np.asarray(signal))
-            chunk = int(min(max(rate, 1.0), LARGEST_CHUNK // 8, data.size))
+            kind = np.float32 if all(_single(block) for _, block in _blocks_of(signal)) else np.float64
+            chunk = int(min(max(rate, 1.0), LARGEST_CHUNK // 8, signal.size))
             # a channel's name may not be valid in HDF5
-            file.create_dataset(f"{i}", data=data, chunks=(chunk,), fletcher32=True, track_times=False)
+            dataset = file.create_dataset(f"{i}", (signal.size,), kind, chunks=(chunk,), fletcher32=True, track_times=False)
+            for start, block in _blocks_of(signal):
+                dataset[start : start + block.size] = block.astype(kind, copy=False)
     with path.open("rb+") as written:
         os.fsync(written.fileno())
 
 
-def _smallest(signal: np.ndarray) -> np.ndarray:
-    if signal.dtype == np.float32:
-        return signal
+def _blocks_of(signal: Channel) -> Iterator[tuple[int, FloatArray]]:
+    for start in range(0, signal.size, BLOCK):
+        yield start, signal[start : start + BLOCK]
+
+
+def _single(signal: FloatArray) -> bool:
+    """Whether float32 holds every sample."""
     double = signal.astype(np.float64, copy=False)
     with np.errstate(all="ignore"):
-        single = double.astype(np.float32)
-        same = np.array_equal(single.astype(np.float64), double, equal_nan=True)
-    return single if same else double
+        return signal.dtype == np.float32 or np.array_equal(double.astype(np.float32).astype(np.float64), double, equal_nan=True)
 
 
-def read_normalised(path: str | Path) -> Recording:
+def read_normalised(path: str | Path, in_file: bool = False) -> Recording:
     """Return the samples of an upload in SI.
+
+    Parameters
+    ----------
+    path : path
+    in_file : bool
+        Leave those of a long recording in the file.
 
     Raises
     ------
@@ -61,12 +72,12 @@ def read_normalised(path: str | Path) -> Recording:
     """
     sensors = _sensors(Path(path))
     rate, signals = read_signals(path, [f"{i}" for i in range(len(sensors))], suffix=".h5")
-    return in_si(rate, signals, sensors)
+    return (recorded if in_file else in_si)(rate, signals, sensors)
 
 
 def read_cut_normalised(cut: Cut) -> tuple[Recording, Recording | None]:
-    """Return the recordings of a cut with normalised files."""
-    return read_normalised(cut.recording), None if cut.air is None else read_normalised(cut.air)
+    """Return the recordings of a cut with normalised files; the samples of long ones stay in them."""
+    return read_normalised(cut.recording, in_file=True), None if cut.air is None else read_normalised(cut.air, in_file=True)
 
 
 def blocks(path: Path, samples: int) -> Iterator[tuple[int, Recording]]:

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import errno
+import os
+import tempfile
+import weakref
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,17 +16,92 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE
 from rcsa_ident.io.time_base import uniform
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.signals.recording import LONGEST
 
 RATE = "sampling_rate_hz"
 TIME_COLUMNS = ("time", "time_s")
 #: Of a file that is read as a whole, and of its channels as float64.
 LARGEST_FILE = 512 * MEGABYTE
 LARGEST_DATA = 512 * MEGABYTE
+#: Of channels that stay in the file, as float64.
+LARGEST_STORED = 2048 * MEGABYTE
 #: Declared bytes per byte on disk: measured signals hardly shrink at all.
 LARGEST_RATIO = 200
 
 
-def check_declared(samples: int, channels: int, size: int, where: str) -> None:
+@dataclass(frozen=True, slots=True)
+class StoredChannel:
+    """A channel that stays in its file: parts of it are read where they are asked for.
+
+    Parameters
+    ----------
+    size : int
+        Number of samples.
+    read : callable of (first, end)
+        Returns these samples, shape (end - first,).
+    """
+
+    size: int
+    read: Callable[[int, int], FloatArray]
+
+    def __getitem__(self, part: slice) -> FloatArray:
+        first, end, _ = part.indices(self.size)
+        return self.read(first, max(first, end))
+
+    def __array__(self, dtype: object = None, copy: bool | None = None) -> FloatArray:
+        return self.read(0, self.size)
+
+
+#: A channel's samples: an array, or what reads parts of one.
+Channel = FloatArray | StoredChannel
+
+
+class Scratch:
+    """A channel of a format that cannot be read in parts, as it comes: in memory, and a long one in a file that has no name.
+
+    The file stands in the folder for temporary files and is gone with the last who reads it.
+    """
+
+    def __init__(self) -> None:
+        self.size = self._waiting = 0
+        self._held: list[FloatArray] = []
+        self._file: int | None = None
+
+    def add(self, values: FloatArray) -> None:
+        """Add further samples, shape (n,)."""
+        self._held.append(np.array(values, dtype=float))
+        self.size, self._waiting = self.size + len(values), self._waiting + len(values)
+        if self._waiting > LONGEST:
+            self._write()
+
+    def channel(self) -> Channel:
+        """Return the channel; nothing may be added any more."""
+        if self._file is None:
+            return np.concatenate([np.empty(0), *self._held])
+        self._write()
+        return StoredChannel(self.size, self._read)
+
+    def _write(self) -> None:
+        if self._file is None:
+            self._file, name = tempfile.mkstemp()
+            os.unlink(name)
+            weakref.finalize(self, os.close, self._file)
+        left = np.concatenate([np.empty(0), *self._held]).data.cast("B")
+        self._held, self._waiting = [], 0
+        while left:
+            left = left[os.write(self._file, left) :]
+
+    def _read(self, first: int, end: int) -> FloatArray:
+        assert self._file is not None
+        return np.frombuffer(os.pread(self._file, 8 * (end - first), 8 * first))
+
+
+def kept(channel: StoredChannel) -> Channel:
+    """Return a channel as it is where it is long, else its samples."""
+    return channel if channel.size > LONGEST else channel[:]
+
+
+def check_declared(samples: int, channels: int, size: int, where: str, largest: int = LARGEST_DATA) -> None:
     """Refuse what no file of `size` bytes holds, before memory is asked for it.
 
     Parameters
@@ -32,11 +112,13 @@ def check_declared(samples: int, channels: int, size: int, where: str) -> None:
         Bytes of the file.
     where : str
         The file, for the messages.
+    largest : int
+        Bytes that are allowed, as float64.
     """
     declared = 8 * samples * channels
-    if declared > LARGEST_DATA:
+    if declared > largest:
         found = f"{declared / MEGABYTE:.3g} MB of declared samples"
-        raise InputError("recording", found, f"at most {LARGEST_DATA / MEGABYTE:.0f} MB", where)
+        raise InputError("recording", found, f"at most {largest / MEGABYTE:.0f} MB", where)
     if declared > LARGEST_RATIO * size:
         found = f"{declared} bytes declared in a file of {size} bytes"
         raise InputError("recording", found, f"at most {LARGEST_RATIO} times the file's size", where)
@@ -96,13 +178,13 @@ def snapped(rate: float, spread: float, expected: float | None = None) -> float:
     return rate
 
 
-def placed(time: FloatArray, channels: Sequence[FloatArray], expected: float | None) -> tuple[float, list[FloatArray]]:
+def placed(time: FloatArray, channels: Sequence[Channel], expected: float | None) -> tuple[float, list[Channel]]:
     """Return the rate [Hz] that times tell and the channels at their places; samples that the times skip are NaN.
 
     Parameters
     ----------
     time : array, shape (n,) [s]
-    channels : sequence of array, shape (n,) each
+    channels : sequence of Channel, shape (n,) each
     expected : float or None [Hz]
         The campaign's rate.
 
@@ -114,10 +196,10 @@ def placed(time: FloatArray, channels: Sequence[FloatArray], expected: float | N
     rate, index = uniform(time, expected)
     if index[-1] + 1 == index.size:
         return rate, list(channels)
-    padded = []
+    padded: list[Channel] = []
     for values in channels:
         full = np.full(index[-1] + 1, np.nan)
-        full[index] = values
+        full[index] = values[:]
         padded.append(full)
     return rate, padded
 
@@ -150,5 +232,8 @@ def cannot_be_read(error: Exception, allowed: str, where: str) -> InputError:
     where : str
         The file, for the messages.
     """
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        # a full disk is no fault of the file
+        raise error
     reason = " ".join((str(error) or type(error).__name__).split())
     return InputError("recording", f"one that cannot be read ({listed([reason[:90]])})", allowed, where)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 import os
 import secrets
 import shutil
@@ -12,6 +13,8 @@ from pathlib import Path
 from rcsa_ident.errors import InputError
 
 MEGABYTE = 1_000_000
+#: Bytes of a file, read or mapped: slices of either are bytes.
+Bytes = bytes | mmap.mmap
 
 
 def existing_file(path: str | Path, field: str, largest: int) -> Path:
@@ -56,6 +59,26 @@ def read_bytes(path: str | Path, field: str, largest: int) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise InputError(field, error.strerror or "an error on reading", "a file that can be read", str(path)) from None
+
+
+def mapped(path: str | Path, field: str, largest: int) -> Bytes:
+    """Return the file's bytes as `read_bytes`, but none of them is in memory before it is looked at.
+
+    Parameters
+    ----------
+    path : path
+    field : str
+        What the file is, for the message.
+    largest : int
+        Bytes that are allowed.
+    """
+    path = existing_file(path, field, largest)
+    try:
+        with path.open("rb") as file:
+            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    except (OSError, ValueError) as error:
+        found = getattr(error, "strerror", None) or "an error on reading"
+        raise InputError(field, found, "a file that can be read", str(path)) from None
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -17,15 +18,13 @@ from numpy.typing import ArrayLike
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.io.channels import LARGEST_DATA, LARGEST_RATIO, LARGEST_STORED, RATE, Channel, StoredChannel
 from rcsa_ident.io.files import MEGABYTE, existing_file, replacing
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.signals.recording import LONGEST
 
-RATE = "sampling_rate_hz"
-#: Of the file on disk, and of the channels as they are declared.
+#: Of the file on disk.
 LARGEST_FILE = 2048 * MEGABYTE
-LARGEST_DATA = 512 * MEGABYTE
-#: Declared bytes per byte on disk, over all channels that are read: measured signals hardly shrink at all.
-LARGEST_RATIO = 200
 LARGEST_CHUNK = 8 * MEGABYTE
 MOST_CHUNKS = 100_000
 MOST_OBJECTS = 10_000
@@ -35,6 +34,8 @@ FILTERS = {
     h5py.h5z.FILTER_FLETCHER32: "fletcher32",
     h5py.h5z.FILTER_LZF: "lzf",
 }
+#: What the library raises on a broken file.
+_BROKEN = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, zlib.error)
 _LINKS = {h5py.h5l.TYPE_SOFT: "a soft link", h5py.h5l.TYPE_EXTERNAL: "a link to another file"}
 
 
@@ -63,8 +64,8 @@ def write_hdf5(path: str | Path, rate: float, channels: Mapping[str, ArrayLike])
             file.create_dataset(name, data=values, track_times=False)
 
 
-def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[FloatArray]]:
-    """Return the sampling rate [Hz] and the named channels as they stand in the file, shape (n,) each.
+def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[Channel]]:
+    """Return the sampling rate [Hz] and the named channels as they stand in the file, shape (n,) each; long ones stay in it.
 
     Parameters
     ----------
@@ -82,11 +83,24 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
             datasets = [_dataset(file, name, present, where) for name in names]
             _check_size(datasets, names, size, where)
             rate = _rate(file, datasets, names, default_rate, where)
-            return rate, [dataset[()] for dataset in datasets]
+            return rate, [
+                StoredChannel(dataset.size, partial(_part, path, name)) if dataset.size > LONGEST else dataset[()]
+                for name, dataset in zip(names, datasets, strict=True)
+            ]
     except InputError:
         raise
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, zlib.error) as error:
+    except _BROKEN as error:
         raise InputError("recording", _cause(error), "a complete HDF5 file", where) from None
+
+
+def _part(path: Path, name: str, first: int, end: int) -> FloatArray:
+    """Samples of a dataset that was checked before."""
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            found: FloatArray = file[name][first:end]
+            return found
+    except _BROKEN as error:
+        raise InputError("recording", _cause(error), "a complete HDF5 file", str(path)) from None
 
 
 def read_vectors(path: Path, names: Sequence[str], wished: Sequence[str], kinds: Sequence[str]) -> dict[str, FloatArray]:
@@ -109,13 +123,13 @@ def read_vectors(path: Path, names: Sequence[str], wished: Sequence[str], kinds:
             datasets = [_dataset(file, name, present, where, vectors=True) for name in found]
             for name, dataset in zip(found, datasets, strict=True):
                 _check_kind(dataset, kinds, f"channel {name}", where)
-            _check_size(datasets[: len(names)], names, size, where)
+            _check_size(datasets[: len(names)], names, size, where, LARGEST_DATA)
             for name, dataset in zip(found[len(names) :], datasets[len(names) :], strict=True):
-                _check_size([dataset], [name], size, where)
+                _check_size([dataset], [name], size, where, LARGEST_DATA)
             return {name: dataset[()].ravel() for name, dataset in zip(found, datasets, strict=True)}
     except InputError:
         raise
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, zlib.error) as error:
+    except _BROKEN as error:
         raise InputError("recording", _cause(error), "a complete HDF5 file", where) from None
 
 
@@ -180,14 +194,12 @@ def _dataset(file: h5py.File, name: str, present: list[str], where: str, vectors
     return dataset
 
 
-def _check_size(datasets: list[h5py.Dataset], names: Sequence[str], size: int, where: str) -> None:
+def _check_size(datasets: list[h5py.Dataset], names: Sequence[str], size: int, where: str, largest: int = LARGEST_STORED) -> None:
     """Lengths agree, and what is declared is plausible for a file of `size` bytes and was really written."""
     lengths = {d.size for d in datasets}
     declared = sum(d.size * max(d.dtype.itemsize, 8) for d in datasets)
-    if declared > LARGEST_DATA:
-        raise InputError(
-            "recording", f"{declared / MEGABYTE:.3g} MB of declared samples", f"at most {LARGEST_DATA / MEGABYTE:.0f} MB", where
-        )
+    if declared > largest:
+        raise InputError("recording", f"{declared / MEGABYTE:.3g} MB of declared samples", f"at most {largest / MEGABYTE:.0f} MB", where)
     if declared > LARGEST_RATIO * size:
         found = f"{declared} bytes declared in a file of {size} bytes"
         raise InputError("recording", found, f"at most {LARGEST_RATIO} times the file's size", where)

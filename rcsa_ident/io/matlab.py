@@ -17,7 +17,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.io.channels import LARGEST_FILE, RATE, TIME_COLUMNS, check_declared, check_lengths, placed, the_only
+from rcsa_ident.io.channels import LARGEST_FILE, RATE, TIME_COLUMNS, Channel, check_declared, check_lengths, placed, the_only
 from rcsa_ident.io.files import existing_file, read_bytes
 from rcsa_ident.io.time_base import Irregular
 
@@ -39,7 +39,7 @@ _COMPLEX = 0x0800
 _LARGEST_HEAD = 4096
 
 
-def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[FloatArray]]:
+def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[Channel]]:
     """Return the sampling rate [Hz] and the named vectors as they stand in the file, shape (n,) each.
 
     The rate comes from a vector ``time`` in seconds, else from a number ``sampling_rate_hz`` or ``Fs``, else from the campaign.
@@ -62,7 +62,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         found = read_vectors(path, names, wished, (*_NUMBERS, "logical"))
     else:
         found = _read_version_5(read_bytes(path, "recording", LARGEST_FILE), names, wished, where)
-    channels = [found[name] for name in names]
+    channels: list[Channel] = [found[name] for name in names]
     check_lengths(names, [values.size for values in channels], where)
     rates = {name: values for name, values in found.items() if name in wished and name in RATES}
     for name, values in rates.items():

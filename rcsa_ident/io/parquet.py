@@ -19,6 +19,8 @@ from rcsa_ident.io.channels import (
     LARGEST_FILE,
     RATE,
     TIME_COLUMNS,
+    Channel,
+    Scratch,
     cannot_be_read,
     check_declared,
     check_lengths,
@@ -26,9 +28,10 @@ from rcsa_ident.io.channels import (
     placed,
     the_only,
 )
-from rcsa_ident.io.files import MEGABYTE, read_bytes
+from rcsa_ident.io.files import MEGABYTE, Bytes, mapped
 from rcsa_ident.io.time_base import Irregular
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.signals.recording import BLOCK
 
 COMPLETE = "a complete Parquet file"
 LARGEST_FOOTER = 2 * MEGABYTE
@@ -50,7 +53,7 @@ _DEEPEST = 8
 Struct = dict[tuple[int, int], Any]
 
 
-def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[FloatArray]]:
+def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[Channel]]:
     """Return the sampling rate [Hz] and the named columns as they stand in the file, shape (n,) each; a null is a lost sample.
 
     The rate comes from a column ``time`` in seconds, else from the file's metadata ``sampling_rate_hz``, else from the campaign.
@@ -64,7 +67,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         For a file that carries no rate.
     """
     where = str(path)
-    raw = read_bytes(path, "recording", LARGEST_FILE)
+    raw = mapped(path, "recording", LARGEST_FILE)
     if len(raw) < 12 or raw[:4] != _MAGIC or raw[-4:] != _MAGIC:
         raise InputError("recording", "a file that does not begin and end with PAR1", COMPLETE, where)
     footer = struct.unpack_from("<I", raw, len(raw) - 8)[0]
@@ -87,8 +90,11 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         with ParquetFile(pyarrow.BufferReader(raw), **options) as file:
             if file.metadata.num_rows != described[3, _I64]:
                 raise InputError("recording", "two numbers of rows", COMPLETE, where)
-            table = file.read(columns=wanted, use_threads=False)
-            columns = [_numbers(table, name, pyarrow) for name in wanted]
+            rows = [Scratch() for _ in wanted]
+            for batch in file.iter_batches(BLOCK, columns=wanted, use_threads=False):
+                for column, name in zip(rows, wanted, strict=True):
+                    column.add(_numbers(batch, name, pyarrow))
+            columns = [column.channel() for column in rows]
     except InputError:
         raise
     except Exception as error:
@@ -99,17 +105,17 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
             raise InputError(RATE, "nothing", f"a column 'time' [s], the file's metadata {RATE}, or the campaign's rate [Hz]", where)
         return positive(RATE, rate, "Hz"), columns
     try:
-        return placed(columns[-1], columns[:-1], rate)
+        return placed(columns[-1][:], columns[:-1], rate)
     except Irregular as error:
         raise InputError(f"column {wanted[-1]} row {error.row + 1}", error.found, error.allowed, where) from None
 
 
 def _numbers(table: Any, name: str, pyarrow: Any) -> FloatArray:
     # a null becomes NaN on the way to numpy
-    return table.column(name).cast(pyarrow.float64(), safe=False).to_numpy()
+    return table.column(name).cast(pyarrow.float64(), safe=False).to_numpy(zero_copy_only=False)
 
 
-def _checked(described: Struct, names: Sequence[str], default: float | None, raw: bytes, where: str) -> tuple[list[str], float | None]:
+def _checked(described: Struct, names: Sequence[str], default: float | None, raw: Bytes, where: str) -> tuple[list[str], float | None]:
     """Columns to read, the time last where there is one, and the rate that the file or the campaign says."""
     schema = _structs(described, 2)
     if not schema or any(column.get((5, _I32)) for column in schema[1:]) or schema[0].get((5, _I32)) != len(schema) - 1:
@@ -157,7 +163,7 @@ def _rate(pairs: Sequence[Struct], default: float | None, where: str) -> float |
     return default
 
 
-def _check_groups(groups: Sequence[Struct], places: Sequence[int], rows: int, raw: bytes, where: str) -> None:
+def _check_groups(groups: Sequence[Struct], places: Sequence[int], rows: int, raw: Bytes, where: str) -> None:
     """The pages of every wanted column lie in the file, hold as many rows as there are, and unpack to what a recording may have."""
     if len(groups) > MOST_GROUPS:
         raise InputError("recording", f"{len(groups)} row groups", f"at most {MOST_GROUPS}", where)
@@ -181,7 +187,7 @@ def _check_groups(groups: Sequence[Struct], places: Sequence[int], rows: int, ra
         raise InputError("recording", f"{found} rows in groups", f"{rows}, as the file states", where)
 
 
-def _page_sizes(raw: bytes, chunk: Struct, where: str) -> list[int]:
+def _page_sizes(raw: Bytes, chunk: Struct, where: str) -> list[int]:
     """What each page of a column's chunk unpacks to [bytes]."""
     place, dictionary = chunk.get((9, _I64), -1), chunk.get((11, _I64), 0)
     # as the library does it
@@ -210,7 +216,7 @@ def _structs(outer: Struct, number: int) -> list[Struct]:
     return items
 
 
-def _struct(raw: bytes, place: int, depth: int = 0) -> tuple[Struct, int]:
+def _struct(raw: Bytes, place: int, depth: int = 0) -> tuple[Struct, int]:
     """Read a structure in Thrift's compact protocol; returns where it ends, too."""
     found: Struct = {}
     number = 0
@@ -227,7 +233,7 @@ def _struct(raw: bytes, place: int, depth: int = 0) -> tuple[Struct, int]:
     return found, place + 1
 
 
-def _value(raw: bytes, place: int, kind: int, depth: int) -> tuple[Any, int]:
+def _value(raw: Bytes, place: int, kind: int, depth: int) -> tuple[Any, int]:
     if depth > _DEEPEST:
         raise IndexError
     if kind in (_TRUE, _FALSE, _I8):
@@ -254,12 +260,12 @@ def _value(raw: bytes, place: int, kind: int, depth: int) -> tuple[Any, int]:
     return (head & 15, items), place
 
 
-def _zigzag(raw: bytes, place: int) -> tuple[int, int]:
+def _zigzag(raw: Bytes, place: int) -> tuple[int, int]:
     value, place = _varint(raw, place)
     return (value >> 1) ^ -(value & 1), place
 
 
-def _varint(raw: bytes, place: int) -> tuple[int, int]:
+def _varint(raw: Bytes, place: int) -> tuple[int, int]:
     value = 0
     for shift in range(0, 70, 7):
         value |= (raw[place] & 0x7F) << shift

@@ -5,22 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
+from rcsa_ident.io.channels import LARGEST_DATA, Channel, StoredChannel
+from rcsa_ident.io.files import MEGABYTE
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 
-Reader = Callable[[Path, Sequence[str], float | None], tuple[float, list[FloatArray]]]
+Reader = Callable[[Path, Sequence[str], float | None], tuple[float, Sequence[Channel]]]
 
 
 def _of(module: str) -> Reader:
     """A format's reader, imported with its library when the first file of that format is read."""
 
-    def read(path: Path, names: Sequence[str], rate: float | None) -> tuple[float, list[FloatArray]]:
-        found: tuple[float, list[FloatArray]] = import_module(f"rcsa_ident.io.{module}").read_channels(path, names, rate)
+    def read(path: Path, names: Sequence[str], rate: float | None) -> tuple[float, Sequence[Channel]]:
+        found: tuple[float, Sequence[Channel]] = import_module(f"rcsa_ident.io.{module}").read_channels(path, names, rate)
         return found
 
     return read
@@ -65,8 +68,8 @@ def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: 
 
 def read_signals(
     path: str | Path, names: Sequence[str], default_rate: float | None = None, suffix: str | None = None
-) -> tuple[float, list[FloatArray]]:
-    """Return the sampling rate [Hz] and the named channels as they stand in a file, shape (n,) each.
+) -> tuple[float, Sequence[Channel]]:
+    """Return the sampling rate [Hz] and the named channels as they stand in a file, shape (n,) each; long ones may stay in it.
 
     Parameters
     ----------
@@ -96,7 +99,32 @@ def read_signals(
             raise (error if error.where else error.at(str(path))) from None
 
 
-def in_si(rate: float, signals: Sequence[FloatArray], sensors: tuple[Sensor, ...]) -> Recording:
+class StoredSamples:
+    """Samples of a long recording in SI, read where they are asked for: of an array, shape (n, c), it has the shape and slices.
+
+    Parameters
+    ----------
+    rate : float [Hz]
+    signals : sequence of Channel
+    sensors : tuple of Sensor
+    """
+
+    def __init__(self, rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) -> None:
+        self.rate, self.signals, self.sensors = rate, signals, sensors
+        self.ndim, self.shape = 2, (signals[0].size, len(sensors))
+
+    def __getitem__(self, part: slice) -> FloatArray:
+        return in_si(self.rate, [signal[part] for signal in self.signals], self.sensors).samples
+
+
+def recorded(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) -> Recording:
+    """Return signals in SI as `in_si`, but leave those of a long recording where they are."""
+    if any(isinstance(signal, StoredChannel) for signal in signals):
+        return Recording(rate, cast(FloatArray, StoredSamples(rate, signals, sensors)), sensors)
+    return in_si(rate, signals, sensors)
+
+
+def in_si(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) -> Recording:
     """Return signals, shape (n,) each, divided by their sensors' sensitivities; a trigger stays as it is.
 
     Parameters
@@ -106,10 +134,14 @@ def in_si(rate: float, signals: Sequence[FloatArray], sensors: tuple[Sensor, ...
         As they stand in the file.
     sensors : tuple of Sensor
     """
+    size = 8 * signals[0].size * len(sensors)
+    if size > LARGEST_DATA:
+        found = f"{size / MEGABYTE:.3g} MB of samples"
+        raise InputError("recording", found, f"at most {LARGEST_DATA / MEGABYTE:.0f} MB where all of them are needed at once")
     samples = np.empty((signals[0].size, len(sensors)))
     with np.errstate(all="ignore"):
         for i, (sensor, values) in enumerate(zip(sensors, signals, strict=True)):
-            samples[:, i] = values
+            samples[:, i] = values[:]
             if sensor.quantity is not Quantity.TRIGGER:
                 samples[:, i] /= sensor.sensitivity
     # an overflow in the acquisition is a lost sample like any other
@@ -119,7 +151,7 @@ def in_si(rate: float, signals: Sequence[FloatArray], sensors: tuple[Sensor, ...
 
 
 def read_cut(sensors: tuple[Sensor, ...], default_rate: float | None, cut: Cut) -> tuple[Recording, Recording | None]:
-    """Return the recordings of a cut: the cut itself, and its air cut where there is one.
+    """Return the recordings of a cut: the cut itself, and its air cut where there is one; the samples of long ones stay in their files.
 
     Parameters
     ----------
@@ -128,8 +160,13 @@ def read_cut(sensors: tuple[Sensor, ...], default_rate: float | None, cut: Cut) 
         For files that carry no rate.
     cut : Cut
     """
-    recording = read_recording(cut.recording, sensors, default_rate)
-    return recording, None if cut.air is None else read_recording(cut.air, sensors, default_rate)
+
+    def read(path: Path) -> Recording:
+        if not sensors:
+            raise InputError("sensors", "none", "at least one sensor", str(path))
+        return recorded(*read_signals(path, [sensor.name for sensor in sensors], default_rate), sensors)
+
+    return read(cut.recording), None if cut.air is None else read(cut.air)
 
 
 def write_recording(path: str | Path, recording: Recording) -> None:

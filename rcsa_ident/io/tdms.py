@@ -6,7 +6,6 @@ cut off, and objects, properties and samples have to fit into the file.
 
 from __future__ import annotations
 
-import io
 import math
 import re
 import struct
@@ -16,10 +15,20 @@ from typing import Any
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.io.channels import LARGEST_FILE, RATE, cannot_be_read, check_declared, check_lengths, lacks, snapped, the_only
-from rcsa_ident.io.files import read_bytes
+from rcsa_ident.io.channels import (
+    LARGEST_STORED,
+    RATE,
+    Channel,
+    Scratch,
+    cannot_be_read,
+    check_declared,
+    check_lengths,
+    lacks,
+    snapped,
+    the_only,
+)
+from rcsa_ident.io.files import Bytes, mapped
 from rcsa_ident.io.validated_table import listed
 
 COMPLETE = "a complete TDMS file"
@@ -40,8 +49,8 @@ _WIDTHS = {1: 1, 2: 2, 3: 4, 4: 8, 5: 1, 6: 2, 7: 4, 8: 8, 9: 4, 10: 8, 0x19: 4,
 _LEAD_IN = 28
 
 
-def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[FloatArray]]:
-    """Return the sampling rate [Hz] and the named channels in the file's own units, shape (n,) each.
+def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[Channel]]:
+    """Return the sampling rate [Hz] and the named channels in the file's own units, shape (n,) each; long ones on the disk.
 
     A channel is called by its name, or as ``group/channel`` where two groups have one of that name. The rate is the waveform's
     (``wf_increment``), else the campaign's.
@@ -55,7 +64,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         For a file that carries no rate.
     """
     where = str(path)
-    raw = read_bytes(path, "recording", LARGEST_FILE)
+    raw = mapped(path, "recording", LARGEST_STORED)
     if raw[:4] != b"TDSm":
         raise InputError("recording", "a file that does not begin with TDSm", COMPLETE, where)
     _check_structure(raw, where)
@@ -67,7 +76,8 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     # what the library only warns of is an error here
     log_manager.set_level(100)
     try:
-        with np.errstate(all="ignore"), TdmsFile.open(io.BytesIO(raw), raw_timestamps=True) as file:
+        # opened here: given a path, the library would also read an index beside the file
+        with np.errstate(all="ignore"), path.open("rb") as opened, TdmsFile.open(opened, raw_timestamps=True) as file:
             return _channels(file, names, default_rate, len(raw), where)
     except InputError:
         raise
@@ -75,7 +85,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         raise cannot_be_read(error, COMPLETE, where) from None
 
 
-def _check_structure(raw: bytes, where: str) -> None:
+def _check_structure(raw: Bytes, where: str) -> None:
     """Walk all segments: every one is complete, and the library's lists of objects stay small."""
     place, segments, entries = 0, 0, 0
     present: set[bytes] = set()
@@ -159,7 +169,7 @@ def _segment_paths(raw: bytes, order: str, size: int, most: int, where: str) -> 
     return paths, properties
 
 
-def _channels(file: Any, names: Sequence[str], default: float | None, size: int, where: str) -> tuple[float, list[FloatArray]]:
+def _channels(file: Any, names: Sequence[str], default: float | None, size: int, where: str) -> tuple[float, list[Channel]]:
     present = [channel for group in file.groups() for channel in group.channels()]
     short = [channel.name for channel in present]
     plain = [f"{c.group_name}/{c.name}" if short.count(c.name) > 1 else c.name for c in present]
@@ -173,25 +183,23 @@ def _channels(file: Any, names: Sequence[str], default: float | None, size: int,
         if channel.dtype.kind not in "biuf":
             raise InputError(f"channel {name}", f"values of type {channel.dtype}", "real numbers", where)
     check_lengths(names, [len(channel) for channel in found], where)
-    check_declared(len(found[0]), len(found), size, where)
+    check_declared(len(found[0]), len(found), size, where, LARGEST_STORED)
     rate = _rate(found, names, default, where)
     if file.file_status.incomplete_final_segment or file.file_status.channel_statuses:
         raise InputError("recording", "a last segment that is not complete", COMPLETE, where)
     return rate, [_values(channel, f"channel {name}", where) for name, channel in zip(names, found, strict=True)]
 
 
-def _values(channel: Any, field: str, where: str) -> FloatArray:
-    values = np.empty(len(channel))
-    end = 0
+def _values(channel: Any, field: str, where: str) -> Channel:
+    """A channel's samples; its chunks lie between those of the others, so that a long one is written down as they come."""
+    values = Scratch()
     for count, chunk in enumerate(channel.data_chunks()):
         if count >= MOST_CHUNKS:
             raise InputError(field, f"more than {MOST_CHUNKS} chunks", f"at most {MOST_CHUNKS} chunks", where)
-        block = chunk[:]
-        values[end : end + len(block)] = block
-        end += len(block)
-    if end != values.size:
-        raise InputError(field, f"{end} of {values.size} samples", COMPLETE, where)
-    return values
+        values.add(chunk[:])
+    if values.size != len(channel):
+        raise InputError(field, f"{values.size} of {len(channel)} samples", COMPLETE, where)
+    return values.channel()
 
 
 def _check_scales(properties: Mapping[str, Any], field: str, where: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,12 +10,15 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.io.channels import TIME_COLUMNS, placed
-from rcsa_ident.io.files import MEGABYTE, read_bytes
+from rcsa_ident.io.channels import TIME_COLUMNS, Channel, Scratch, placed
+from rcsa_ident.io.files import MEGABYTE, existing_file, read_bytes
 from rcsa_ident.io.time_base import Irregular
 from rcsa_ident.io.validated_table import listed
 
 LARGEST_TEXT = 256 * MEGABYTE
+#: Bytes of a part, in which recordings are read.
+_PART = 4 * MEGABYTE
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
 DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}
 
 
@@ -92,30 +95,87 @@ def read_table(path: str | Path, field: str, largest: int = LARGEST_TEXT) -> Tex
 
 def table_of(text: str, field: str, where: str) -> TextTable:
     """Return the table of a text, as `read_table` does of a file; `where` is named in the messages."""
-    lines = text.replace('"', "").splitlines()
-    numbers = [i for i, line in enumerate(lines, start=1) if line and not line.isspace()]
-    while numbers and lines[numbers[0] - 1].lstrip().startswith("#"):
-        numbers.pop(0)
-    if len(numbers) < 2:
-        raise InputError(field, f"{len(numbers)} lines", "a line of column names and at least one line of numbers", where)
-    first = lines[numbers.pop(0) - 1]
-    delimiter = next((d for d in DELIMITERS if d in first), ",")
-    header = tuple(name.strip() for name in first.split(delimiter))
-    if _is_number(header[0]):
-        raise InputError(f"{field} header", header[0], "column names in the first line", where)
-    rows = [lines[i - 1] for i in numbers]
-    width = len(header)
-    for row, number in zip(rows, numbers, strict=True):
-        if row.count(delimiter) != width - 1:
-            found = f"{row.count(delimiter) + 1} cells"
-            raise InputError(field, found, f"{width} cells as in the header, divided by {DELIMITERS[delimiter]}", f"{where} line {number}")
-    if delimiter != ",":
-        rows = _decimal_point(rows, numbers, field, where)
-    return TextTable(where, header, delimiter, rows, numbers)
+    return _Parts(field, where).next(text)
 
 
-def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[FloatArray]]:
-    """Return the sampling rate [Hz] and the named channels of a recording, shape (n,) each.
+class _Parts:
+    """A table that comes in parts, each of whole lines; the first one has the header.
+
+    Parameters
+    ----------
+    field, where : str
+        What the file is, and the file, for the messages.
+    """
+
+    def __init__(self, field: str, where: str) -> None:
+        self.field, self.where, self.lines = field, where, 0
+        self.header: tuple[str, ...] = ()
+        self.delimiter = ","
+        self.comma: tuple[int, str] | None = None
+        self.point: tuple[int, str] | None = None
+
+    def next(self, text: str) -> TextTable:
+        """Return the next part; its rows are checked against the header and the signs of the parts before."""
+        lines = text.replace('"', "").splitlines()
+        behind, self.lines = self.lines, self.lines + len(lines)
+        numbers = [i for i, line in enumerate(lines, start=1) if line and not line.isspace()]
+        if not self.header:
+            self._read_header(lines, numbers)
+        rows = [lines[i - 1] for i in numbers]
+        numbers = [behind + i for i in numbers]
+        width, delimiter = len(self.header), self.delimiter
+        for row, number in zip(rows, numbers, strict=True):
+            if row.count(delimiter) != width - 1:
+                found, allowed = f"{row.count(delimiter) + 1} cells", f"{width} cells as in the header, divided by {DELIMITERS[delimiter]}"
+                raise InputError(self.field, found, allowed, f"{self.where} line {number}")
+        if delimiter != ",":
+            rows = self._decimal_point(rows, numbers)
+        return TextTable(self.where, self.header, delimiter, rows, numbers)
+
+    def _read_header(self, lines: list[str], numbers: list[int]) -> None:
+        """Take comments and the header away from the numbers of the lines."""
+        while numbers and lines[numbers[0] - 1].lstrip().startswith("#"):
+            numbers.pop(0)
+        if len(numbers) < 2:
+            raise InputError(self.field, f"{len(numbers)} lines", "a line of column names and at least one line of numbers", self.where)
+        first = lines[numbers.pop(0) - 1]
+        self.delimiter = next((d for d in DELIMITERS if d in first), ",")
+        self.header = tuple(name.strip() for name in first.split(self.delimiter))
+        if _is_number(self.header[0]):
+            raise InputError(f"{self.field} header", self.header[0], "column names in the first line", self.where)
+
+    def _decimal_point(self, rows: list[str], numbers: list[int]) -> list[str]:
+        """Turn decimal commas into points; a file with both signs could mean thousands by either, so it is refused."""
+        self.comma = self.comma or _first(",", rows, numbers)
+        self.point = self.point or _first(".", rows, numbers)
+        if self.comma is None:
+            return rows
+        if self.point is not None:
+            number, text = max(self.comma, self.point)
+            raise InputError(self.field, text, "one decimal sign in the whole file, comma or point", f"{self.where} line {number}")
+        return [row.replace(",", ".") for row in rows]
+
+
+def _first(sign: str, rows: list[str], numbers: list[int]) -> tuple[int, str] | None:
+    return next(((number, row.strip()) for row, number in zip(rows, numbers, strict=True) if sign in row), None)
+
+
+def _parts(path: Path, field: str, largest: int) -> Iterator[TextTable]:
+    """Yield a text table in parts of a few megabytes."""
+    parts, where = _Parts(field, str(path)), str(path)
+    existing_file(path, field, largest)
+    try:
+        with path.open("rb") as file:
+            while block := file.read(_PART):
+                # UTF-16 has no byte that is a line's end
+                whole = block.startswith(_UTF16) and not parts.header
+                yield parts.next(_text(block + (file.read() if whole else file.readline()), field, where))
+    except OSError as error:
+        raise InputError(field, error.strerror or "an error on reading", "a file that can be read", where) from None
+
+
+def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[Channel]]:
+    """Return the sampling rate [Hz] and the named channels of a recording, shape (n,) each; long ones on the disk.
 
     The rate comes from a column ``time`` in seconds, else from the campaign. Samples that the time column skips are NaN.
 
@@ -127,7 +187,31 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     default_rate : float or None [Hz]
         For a file that carries no rate.
     """
-    table = read_table(path, "recording")
+    where = str(path)
+    time: list[str] = []
+    scratch: list[Scratch] = []
+    numbers: list[np.ndarray] = []
+    for table in _parts(path, "recording", LARGEST_TEXT):
+        if not scratch:
+            time = _time_column(table, names)
+            scratch = [Scratch() for _ in (*time, *names)]
+        for column, values in zip(scratch, table.columns([*time, *names]), strict=True):
+            column.add(values)
+        numbers.append(np.array(table.numbers, dtype=np.int32))
+    columns = [column.channel() for column in scratch]
+    if not time:
+        if default_rate is None:
+            raise InputError("sampling_rate_hz", "nothing", "a column 'time' [s], or the campaign's rate [Hz]", where)
+        return positive("sampling_rate_hz", default_rate, "Hz"), columns
+    try:
+        return placed(columns[0][:], columns[1:], default_rate)
+    except Irregular as error:
+        line = np.concatenate(numbers)[error.row]
+        raise InputError("column time", error.found, error.allowed, f"{where} line {line}") from None
+
+
+def _time_column(table: TextTable, names: Sequence[str]) -> list[str]:
+    """The column of times, if there is one, of a table that has all the named ones."""
     for name in names:
         if table.header.count(name) != 1:
             found = "no such channel" if name not in table.header else "two columns of that name"
@@ -135,19 +219,11 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     time = [name for name in table.header if name.lower() in TIME_COLUMNS and name not in names]
     if len(time) > 1:
         raise InputError("time", f"columns {' and '.join(time)}", "one time column", table.where)
-    columns = table.columns([*time, *names])
-    if not time:
-        if default_rate is None:
-            raise InputError("sampling_rate_hz", "nothing", "a column 'time' [s], or the campaign's rate [Hz]", table.where)
-        return positive("sampling_rate_hz", default_rate, "Hz"), columns
-    try:
-        return placed(columns[0], columns[1:], default_rate)
-    except Irregular as error:
-        raise InputError("column time", error.found, error.allowed, table.at(error.row)) from None
+    return time
 
 
 def _text(raw: bytes, field: str, where: str) -> str:
-    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+    if raw.startswith(_UTF16):
         encodings = ["utf-16"]
     elif b"\0" in raw:
         raise InputError(field, "binary data", "a text table", where)
@@ -167,15 +243,3 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _decimal_point(rows: list[str], numbers: list[int], field: str, where: str) -> list[str]:
-    """Turn decimal commas into points; a file with both signs could mean thousands by either, so it is refused."""
-    commas = next((i for i, row in enumerate(rows) if "," in row), None)
-    if commas is None:
-        return rows
-    points = next((i for i, row in enumerate(rows) if "." in row), None)
-    if points is not None:
-        line = max(commas, points)
-        raise InputError(field, rows[line].strip(), "one decimal sign in the whole file, comma or point", f"{where} line {numbers[line]}")
-    return [row.replace(",", ".") for row in rows]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -11,8 +12,8 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.channels import LARGEST_FILE, RATE, check_declared, the_only
-from rcsa_ident.io.files import read_bytes
+from rcsa_ident.io.channels import LARGEST_STORED, RATE, Channel, StoredChannel, check_declared, kept, the_only
+from rcsa_ident.io.files import Bytes, mapped
 from rcsa_ident.io.validated_table import listed
 
 COMPLETE = "a complete WAV file"
@@ -25,8 +26,8 @@ _LARGEST_NAMES = 65536
 _MOST_CHUNKS = 10_000
 
 
-def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[FloatArray]]:
-    """Return the sampling rate [Hz] and the named channels, full scale 1, shape (n,) each.
+def read_channels(path: Path, names: Sequence[str], default_rate: float | None) -> tuple[float, list[Channel]]:
+    """Return the sampling rate [Hz] and the named channels, full scale 1, shape (n,) each; long ones stay in the file.
 
     Channels are called ch1, ch2, ...; where the file names its tracks (iXML), these names count, too.
 
@@ -39,7 +40,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         For a file that carries no rate.
     """
     where = str(path)
-    raw = read_bytes(path, "recording", LARGEST_FILE)
+    raw = mapped(path, "recording", LARGEST_STORED)
     order, chunks = _chunks(raw, where)
     for name in ("fmt ", "data"):
         if name not in chunks:
@@ -53,12 +54,21 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     present = [*channels, *(track for track in tracks if track and track not in channels)]
     places = [the_only(name, present, where) if name not in tracks else the_only(name, tracks, where) for name in names]
     samples = size // (count * width)
-    check_declared(samples, len(names), len(raw), where)
-    table = np.frombuffer(raw, np.uint8, size, start).reshape(samples, count, width)
-    return float(rate), [_decoded(table[:, place, :], encoding, order) for place in places]
+    check_declared(samples, len(names), len(raw), where, LARGEST_STORED)
+
+    def part(place: int, first: int, end: int) -> FloatArray:
+        # read, not mapped: pages of a mapped file stay in memory as long as there is some
+        with path.open("rb", buffering=0) as file:
+            file.seek(start + first * count * width)
+            block = file.read((end - first) * count * width)
+        if len(block) < (end - first) * count * width:
+            raise InputError("recording", "a file that became shorter while it was read", COMPLETE, where)
+        return _decoded(np.frombuffer(block, np.uint8).reshape(end - first, count, width)[:, place, :], encoding, order)
+
+    return float(rate), [kept(StoredChannel(samples, partial(part, place))) for place in places]
 
 
-def _chunks(raw: bytes, where: str) -> tuple[str, dict[str, tuple[int, int]]]:
+def _chunks(raw: Bytes, where: str) -> tuple[str, dict[str, tuple[int, int]]]:
     """Byte order, and place and size of each chunk, the first of its name."""
     if raw[:4] not in (b"RIFF", b"RIFX", b"RF64", b"BW64") or raw[8:12] != b"WAVE":
         raise InputError("recording", "a file that does not begin with RIFF and WAVE", COMPLETE, where)
@@ -81,7 +91,7 @@ def _chunks(raw: bytes, where: str) -> tuple[str, dict[str, tuple[int, int]]]:
     return order, chunks
 
 
-def _format(raw: bytes, start: int, size: int, order: str, where: str) -> tuple[int, int, int, str]:
+def _format(raw: Bytes, start: int, size: int, order: str, where: str) -> tuple[int, int, int, str]:
     """Channels, rate, bytes of a sample and its encoding."""
     if size < 16:
         raise InputError("recording", f"a chunk 'fmt' of {size} bytes", "16 bytes at least", where)

@@ -1,4 +1,4 @@
-"""Fourier sums at multiples of one frequency; arrays and scalars only."""
+"""Fourier sums at multiples of one frequency, runs of equal samples; arrays and scalars only."""
 
 from __future__ import annotations
 
@@ -65,3 +65,73 @@ def order_signal(amplitude, step, n):
                 quadrature[t] = power[t] * sine[t] + quadrature[t] * cosine[t]
                 power[t] = turned
     return values.T.copy()
+
+
+@numba.njit(cache=True)
+def follow_runs(x, at, values, counts, lengths, levels, front):
+    """Go on through a channel's samples, shape (n,), the first of which has the index `at`; the state begins with `NEW_VALUES` and zeros.
+
+    State: values (low, next to it, high, next to it, the run's value, least jump, first); counts (lost, first lost, start and length of
+    the run that goes on, samples at each of the four levels, runs and samples in runs of three at low and at high, distinct levels, longest
+    run that has ended); lengths[k] runs of k samples, the last entry those that are longer; levels, the first distinct ones; front,
+    shape (k, 3), (start, length, jump behind it) of long runs none of which is both shorter than an earlier one and followed by less.
+    """
+    for t in range(x.size):
+        value = x[t]
+        if not math.isfinite(value):
+            if counts[0] == 0:
+                counts[1] = at + t
+            counts[0] += 1
+        elif counts[3] == 0:
+            values[4], values[6], counts[2], counts[3] = value, value, at + t, 1
+        elif value == values[4]:
+            counts[3] += 1
+        else:
+            end_run(abs(value - values[4]), values, counts, lengths, levels, front)
+            values[4], counts[2], counts[3] = value, at + t, 1
+
+
+@numba.njit(cache=True)
+def end_run(jump, values, counts, lengths, levels, front):
+    """Count the run that goes on; `jump` is to the value behind it, below 0 where the record ends."""
+    value, start, length = values[4], counts[2], counts[3]
+    lengths[min(length, lengths.size - 1)] += 1
+    _level(value, length, 1.0, values[0:2], counts[4:6], counts[8:10])
+    _level(value, length, -1.0, values[2:4], counts[6:8], counts[10:12])
+    known = False
+    for k in range(counts[12]):
+        known = known or levels[k] == value
+    if not known and counts[12] < levels.size:
+        levels[counts[12]] = value
+        counts[12] += 1
+    if jump < 0.0:
+        return
+    values[5] = min(values[5], jump)
+    counts[13] = max(counts[13], length)
+    if length < front[0, 1]:
+        return
+    place = 1
+    while place < front.shape[0] and front[place, 1] > 0.0:
+        if front[place, 1] >= length and front[place, 2] >= jump:
+            return
+        place += 1
+    if place < front.shape[0]:
+        front[place, 0], front[place, 1], front[place, 2] = start, length, jump
+
+
+@numba.njit(cache=True)
+def _level(value, length, sign, extremes, samples, runs):
+    """Keep the lowest (sign 1) or highest (-1) value, the one next to it, how often they come, and runs of three at the extreme."""
+    if sign * value < sign * extremes[0]:
+        extremes[1], samples[1] = extremes[0], samples[0]
+        extremes[0], samples[0] = value, 0
+        runs[:] = 0
+    if value == extremes[0]:
+        samples[0] += length
+        if length >= 3:
+            runs[0] += 1
+            runs[1] += length
+    elif value == extremes[1]:
+        samples[1] += length
+    elif sign * value < sign * extremes[1]:
+        extremes[1], samples[1] = value, length

@@ -58,8 +58,8 @@ def align(cut: ComplexArray, air: ComplexArray, teeth: int, highest: int = 16) -
     return angle % (2.0 * np.pi), float(min(std, unknown[1]))
 
 
-def trigger_edge(recording: Recording, speed: float) -> tuple[float, float] | None:
-    """Return the time of the first trigger edge, from all edges of the record together, and its standard deviation [s].
+def trigger_edge(recording: Recording, speed: float, window: slice = slice(None)) -> tuple[float, float] | None:
+    """Return the time of the first trigger edge, from all edges of the record (or a window) together, and its standard deviation [s].
 
     A sampled edge is seen at the first sample behind it. Each one thus bounds the first edge's time from both sides;
     the time lies in what all bounds share, as wide as it is. Where edges jitter by more than a sample nothing is shared
@@ -70,17 +70,19 @@ def trigger_edge(recording: Recording, speed: float) -> tuple[float, float] | No
     recording : Recording
     speed : float [rad/s]
         Spindle speed, as found in the record.
+    window : slice
+        Where the speed was found, if not in the whole record.
 
     Returns
     -------
     (float, float) [s] or None
         None without a trigger, or if its edges do not come at the spindle's pace.
     """
-    found = recording.channel(Quantity.TRIGGER)
+    found = recording.channel(Quantity.TRIGGER, None, window)
     if found is None:
         return None
     sensor, x = found
-    edges = _rising(x)
+    edges = _rising(x) + (window.start or 0)
     if edges.size < 2:
         return None
     period = 2.0 * np.pi / speed / sensor.pulses_per_revolution * recording.rate
@@ -110,7 +112,7 @@ def angle_to_air(cut: SteadyRecord, air: SteadyRecord, teeth: int) -> tuple[floa
     cut, air : SteadyRecord
     teeth : int
     """
-    edges = trigger_edge(cut.recording, cut.spindle_speed), trigger_edge(air.recording, air.spindle_speed)
+    edges = [trigger_edge(each.recording, each.spindle_speed, each.window) for each in (cut, air)]
     if edges[0] is None or edges[1] is None:
         return align(cut.flange, air.flange, teeth)
     turned, std = ((air.spindle_speed * a, cut.spindle_speed * c) for a, c in zip(edges[1], edges[0], strict=True))
@@ -121,7 +123,7 @@ def angle_to_air(cut: SteadyRecord, air: SteadyRecord, teeth: int) -> tuple[floa
     return float(trial[best]), float(np.hypot(*std))
 
 
-def trigger_delay(recording: Recording, speed: float, teeth: int) -> tuple[float | None, float | None, bool]:
+def trigger_delay(recording: Recording, speed: float, teeth: int, window: slice = slice(None)) -> tuple[float | None, float | None, bool]:
     """Return when tooth 1 stands at immersion 0, its standard deviation [s], and whether the tooth angle at the edge is known.
 
     Where it is not, the time is that of the edge: the delay is later by the angle, the same in all cuts of a clamping. With
@@ -134,8 +136,10 @@ def trigger_delay(recording: Recording, speed: float, teeth: int) -> tuple[float
     speed : float [rad/s]
         Spindle speed, as found in the record.
     teeth : int
+    window : slice
+        Where the speed was found, if not in the whole record.
     """
-    edge = trigger_edge(recording, speed)
+    edge = trigger_edge(recording, speed, window)
     sensor = None if edge is None else _trigger(recording)
     if edge is None or sensor is None or teeth % sensor.pulses_per_revolution != 0:
         return None, None, True

@@ -20,7 +20,7 @@ from rcsa_ident.signals.alignment import angle_to_air, trigger_delay
 from rcsa_ident.signals.frf import AxisLines, Estimator, LineEstimator, turned_air
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
-from rcsa_ident.signals.verdict import RecordCode, Verdict, chatter, implausible, raw_faults, silence, speed_faults, tooth_count_fault
+from rcsa_ident.signals.verdict import RecordCode, Verdict, chatter, examined, raw_faults, silence, speed_faults, tooth_count_fault
 
 #: Highest line that is used [Hz].
 MAX_FREQUENCY = 4300.0
@@ -128,18 +128,20 @@ def measure_cut(
     axes = measured_axes(cut)
     if not axes:
         raise InputError("sensors", "no displacement", "a displacement sensor for X or Y", cut_id)
-    programmed, notes = conditions.spindle_speed, implausible(cut)
+    programmed, looked_at = conditions.spindle_speed, examined(cut)
+    notes = looked_at.notes
 
     def left_out(reasons: tuple[Remark, ...], speed: float | None = None, harmonics: Mapping[Dof, int] | None = None) -> Reading:
         return Reading(cut_id, tooling, programmed, Verdict(reasons, notes), None, speed, harmonics or {})
 
-    faults = raw_faults(cut) + tuple(fault.of("air cut") for fault in (raw_faults(air) if air is not None else ()))
+    faults = looked_at.reasons + tuple(fault.of("air cut") for fault in (raw_faults(air) if air is not None else ()))
     if faults:
         return left_out(faults)
     try:
         steady = steady_record(cut, axes, programmed, max_frequency, cutter.teeth)
     except Unsteady as error:
         return left_out((_not_steady(error),))
+    notes += _in_part(steady)
     found = steady.spindle_speed, _harmonics(steady)
     faults = _speed_faults(steady, programmed)
     if faults:
@@ -170,7 +172,7 @@ def measure_cut(
     lines = estimator.lines(steady, still, angle, harmonic, own, slope[:, measured])
     both = {a: replace(lines[a], across=force[:, o], across_slope=slope[:, o]) for a, o in zip(axes, other, strict=True)}
     kept = {axis: both[axis].of(k) for axis, k in zip(axes, strong.T, strict=True) if k.any()}
-    measurement = CutMeasurement(cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth))
+    measurement = CutMeasurement(cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth, steady.window))
     verdict = Verdict((), notes if air is not None else (*notes, NO_AIR))
     return Reading(cut_id, tooling, programmed, verdict, measurement, *found)
 
@@ -191,18 +193,27 @@ def judge_air(cut_id: str, tooling: str, air: Recording, conditions: CuttingCond
     InputError
         If no displacement channel is there.
     """
-    axes, notes, programmed = measured_axes(air), implausible(air), conditions.spindle_speed
+    axes, programmed = measured_axes(air), conditions.spindle_speed
     if not axes:
         raise InputError("sensors", "no displacement", "a displacement sensor for X or Y")
-    faults = raw_faults(air)
-    if faults:
-        return Reading(cut_id, tooling, programmed, Verdict(faults, notes))
+    looked_at = examined(air)
+    if not looked_at.usable:
+        return Reading(cut_id, tooling, programmed, looked_at)
     try:
         still = steady_record(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
     except Unsteady as error:
-        return Reading(cut_id, tooling, programmed, Verdict((_not_steady(error),), notes))
-    verdict = Verdict(_speed_faults(still, programmed), notes)
+        return Reading(cut_id, tooling, programmed, Verdict((_not_steady(error),), looked_at.notes))
+    verdict = Verdict(_speed_faults(still, programmed), (*looked_at.notes, *_in_part(still)))
     return Reading(cut_id, tooling, programmed, verdict, None, still.spindle_speed, _harmonics(still))
+
+
+def _in_part(steady: SteadyRecord) -> tuple[Remark, ...]:
+    """A note where a long recording was looked at in a window only."""
+    seconds, rate = steady.recording.samples.shape[0] / steady.recording.rate, steady.recording.rate
+    first, last = steady.window.start / rate, steady.window.stop / rate
+    if last - first >= seconds:
+        return ()
+    return (Remark(RecordCode.LONG, f"long: of {seconds:.4g} s those from {first:.4g} to {last:.4g} s are used, where the cut is steady"),)
 
 
 def _not_steady(error: Unsteady) -> Remark:

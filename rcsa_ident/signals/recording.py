@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -11,6 +12,11 @@ from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.shown import Drawn
+
+#: Samples of a block, in which recordings are gone through.
+BLOCK = 1 << 18
+#: Samples that are analysed together, and beyond which a recording stays in its file: what is kept in memory does not grow with its length.
+LONGEST = 1 << 20
 
 
 class Quantity(StrEnum):
@@ -88,7 +94,7 @@ class Recording(Drawn):
     ----------
     rate : float [Hz]
     samples : array, shape (n, c) [m, m/s^2, N; a trigger as it is]
-        A sample that was lost is NaN.
+        A sample that was lost is NaN. Those of a long recording may stand in its file; then slices of them are arrays.
     sensors : tuple of Sensor, length c
 
     Examples
@@ -105,7 +111,8 @@ class Recording(Drawn):
 
     def __post_init__(self) -> None:
         positive("sampling_rate_hz", self.rate, "Hz")
-        object.__setattr__(self, "samples", frozen(self.samples))
+        if isinstance(self.samples, np.ndarray):
+            object.__setattr__(self, "samples", frozen(self.samples))
         if self.samples.ndim != 2 or self.samples.shape[1] != len(self.sensors):
             raise InputError("samples", self.samples.shape, f"(samples, {len(self.sensors)} channels)")
 
@@ -114,12 +121,19 @@ class Recording(Drawn):
         """Time from the first sample, shape (n,) [s]."""
         return np.arange(self.samples.shape[0]) / self.rate
 
-    def channel(self, quantity: Quantity, axis: Dof | None = None) -> tuple[Sensor, FloatArray] | None:
-        """Return the first channel of this quantity and axis with its samples, or None."""
-        for i, sensor in enumerate(self.sensors):
-            if sensor.quantity is quantity and (axis is None or sensor.axis is axis):
-                return sensor, self.samples[:, i]
-        return None
+    def blocks(self) -> Iterator[tuple[int, FloatArray]]:
+        """Yield the samples block by block, shape (b, c), each with the index of its first."""
+        for start in range(0, self.samples.shape[0], BLOCK):
+            yield start, self.samples[start : start + BLOCK]
+
+    def sensor(self, quantity: Quantity, axis: Dof | None = None) -> Sensor | None:
+        """Return the first sensor of this quantity and axis, or None."""
+        return next((s for s in self.sensors if s.quantity is quantity and (axis is None or s.axis is axis)), None)
+
+    def channel(self, quantity: Quantity, axis: Dof | None = None, part: slice = slice(None)) -> tuple[Sensor, FloatArray] | None:
+        """Return the first channel of this quantity and axis with its samples, or those of a part, or None."""
+        found = self.sensor(quantity, axis)
+        return None if found is None else (found, self.samples[part][:, self.sensors.index(found)])
 
     def __str__(self) -> str:
         seconds = self.samples.shape[0] / self.rate

@@ -12,7 +12,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum, refine_speed, segment_lines
-from rcsa_ident.signals.steady_part import steady_part
+from rcsa_ident.signals.steady_part import steady_part, steady_window
 
 #: Least number of revolutions of a steady part.
 LEAST_REVOLUTIONS = 8.0
@@ -29,7 +29,8 @@ class SteadyRecord:
         Machine axes with a displacement sensor.
     columns : tuple of int
         Channels of the recording that matter: the axes' displacements, then the fixture's accelerations.
-    part : slice
+    window, part : slice
+        What was looked at (all of a recording that is not long, see `steady_window`), and the steady part in it.
     teeth : int
         1 for an air cut.
     lines : LineSpectrum
@@ -43,6 +44,7 @@ class SteadyRecord:
     recording: Recording
     axes: tuple[Dof, ...]
     columns: tuple[int, ...]
+    window: slice
     part: slice
     teeth: int
     lines: LineSpectrum
@@ -61,7 +63,7 @@ class SteadyRecord:
 
     def has_fixture(self, axis: Dof) -> bool:
         """Return whether the fixture's motion along an axis was recorded."""
-        return self.recording.channel(Quantity.ACCELERATION, axis) is not None
+        return self.recording.sensor(Quantity.ACCELERATION, axis) is not None
 
     @property
     def spindle_speed(self) -> float:
@@ -89,7 +91,7 @@ class SteadyRecord:
 
 def measured_axes(recording: Recording) -> tuple[Dof, ...]:
     """Return the axes with a displacement sensor."""
-    return tuple(axis for axis in (Dof.X, Dof.Y) if recording.channel(Quantity.DISPLACEMENT, axis) is not None)
+    return tuple(axis for axis in (Dof.X, Dof.Y) if recording.sensor(Quantity.DISPLACEMENT, axis) is not None)
 
 
 def steady_record(recording: Recording, axes: Sequence[Dof], programmed: float, max_frequency: float, teeth: int) -> SteadyRecord:
@@ -119,14 +121,17 @@ def steady_record(recording: Recording, axes: Sequence[Dof], programmed: float, 
     if n < least:
         raise _no_steady_part(f"too short: {n / rate:.3g} s hold fewer than {LEAST_REVOLUTIONS:.0f} revolutions")
     columns = _columns(recording, axes)
-    displacement = recording.samples[:, columns[: len(axes)]]
+    window = steady_window(recording, columns[: len(axes)], programmed, teeth)
+    samples = recording.samples[window][:, columns]
+    displacement = samples[:, : len(axes)]
     rough = refine_speed(displacement, rate, programmed)
-    part = steady_part(displacement, rate, rough, teeth)
-    if part.stop - part.start < least:
+    steady = steady_part(displacement, rate, rough, teeth)
+    if steady.stop - steady.start < least:
         raise _no_steady_part(f"no steady part of at least {LEAST_REVOLUTIONS:.0f} revolutions")
-    whole = part == slice(0, n)
-    speed = rough if whole else refine_speed(displacement[part], rate, rough)
-    lines = line_spectrum(recording.samples[part][:, columns], rate, speed, max_frequency)
+    whole = steady == slice(0, samples.shape[0])
+    speed = rough if whole else refine_speed(displacement[steady], rate, rough)
+    lines = line_spectrum(samples[steady], rate, speed, max_frequency)
+    part = slice(window.start + steady.start, window.start + steady.stop)
     if part.start:
         shift = np.exp(-1j * np.arange(lines.amplitude.shape[0]) * speed * part.start / rate)
         lines = LineSpectrum(speed, lines.amplitude * shift[:, None], lines.variance, lines.scatter, lines.rest, lines.rate)
@@ -135,7 +140,7 @@ def steady_record(recording: Recording, axes: Sequence[Dof], programmed: float, 
     kinds = [slice(0, len(axes)), slice(len(axes), None)][: 1 if len(columns) == len(axes) else 2]
     outputs = np.stack([np.einsum("mc,mca->ma", lines.amplitude[:, k], weight[:, k]) for k in kinds], axis=2)
     variance = np.stack([np.einsum("mc,mca->ma", noise[:, k], np.abs(weight[:, k]) ** 2) for k in kinds], axis=2)
-    return SteadyRecord(recording, tuple(axes), columns, part, teeth, lines, outputs, variance)
+    return SteadyRecord(recording, tuple(axes), columns, window, part, teeth, lines, outputs, variance)
 
 
 def _no_steady_part(found: str) -> Unsteady:

@@ -10,21 +10,16 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
+from rcsa_ident.signals.channel_scan import scan
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, follow_speed, line_spectrum, refine_speed
 from rcsa_ident.signals.steady_part import hann
 from rcsa_ident.units import to_rpm
 
-#: Equal samples in a row that a live analogue channel does not produce.
-FROZEN_SAMPLES = 12
 #: Least and largest swing, peak to peak, of what a milling spindle does and a sensor tells.
 PLAUSIBLE = {Quantity.DISPLACEMENT: (2e-9, 2e-3, "m"), Quantity.ACCELERATION: (1e-4, 1e5, "m/s^2")}
 #: A peak off the spindle's orders is chatter above this share of the largest tooth-passing line.
 CHATTER_SHARE = 0.3
-#: A signal with fewer levels is too coarsely resolved to tell a limit from a peak.
-LEAST_LEVELS = 12
-#: An extreme value is a limit if it is this many times more frequent than the level next to it.
-PILED_UP = 5.0
 #: Share of the programmed speed within which a wrong one is looked for.
 WIDE_SEARCH = 0.12
 #: Share of its power by which a tooth-passing line stands above what run-out does at other orders.
@@ -36,7 +31,7 @@ DRIFT_PHASE = 0.5
 
 
 class RecordCode(StrEnum):
-    """What may be said of a record; the last two speak of one that may be used."""
+    """What may be said of a record; the last three speak of one that may be used."""
 
     UNREADABLE = "unreadable"
     NOT_FINITE = "not-finite"
@@ -52,6 +47,7 @@ class RecordCode(StrEnum):
     CHATTER = "chatter"
     TOOTH_COUNT = "tooth-count"
     IMPLAUSIBLE = "implausible"
+    LONG = "long"
     NO_AIR_CUT = "no-air-cut"
 
 
@@ -79,85 +75,41 @@ class Verdict(Shown):
         return "usable" if self.usable else f"left out: {'; '.join(self.reasons)}"
 
 
+def examined(recording: Recording) -> Verdict:
+    """Return what the samples themselves say, in one pass over them: why they are left out (`raw_faults`), and notes (`implausible`)."""
+    columns = [i for i, sensor in enumerate(recording.sensors) if sensor.quantity in PLAUSIBLE]
+    reasons, notes = [], []
+    for i, found in zip(columns, scan(recording, columns), strict=True):
+        sensor = recording.sensors[i]
+        if found.lost:
+            first = found.first_lost / recording.rate
+            words = f"drop-outs: {found.lost} samples of {sensor.name} are missing, the first at {first:.4g} s"
+            reasons.append(Remark(RecordCode.LOST_SAMPLES, words))
+        elif found.low == found.high:
+            reasons.append(Remark(RecordCode.NO_SIGNAL, f"no signal: {sensor.name} has the constant value {found.first:.4g}"))
+        elif found.clipped:
+            words = f"saturation: {found.clipped} samples of {sensor.name} are at its limits, {found.low:.4g} and {found.high:.4g}"
+            reasons.append(Remark(RecordCode.SATURATED, words))
+        elif found.frozen is not None:
+            start, length = found.frozen
+            words = f"drop-outs: {sensor.name} is frozen for {length} samples at {start / recording.rate:.4g} s"
+            reasons.append(Remark(RecordCode.FROZEN, words))
+        least, most, unit = PLAUSIBLE[sensor.quantity]
+        swing = max(found.high - found.low, 0.0)
+        if swing > most or 0.0 < swing < least:
+            words = f"{sensor.name} has a peak-to-peak amplitude of {swing:.3g} {unit}: check its unit and sensitivity"
+            notes.append(Remark(RecordCode.IMPLAUSIBLE, words))
+    return Verdict(tuple(reasons), tuple(notes))
+
+
 def raw_faults(recording: Recording) -> tuple[Remark, ...]:
     """Return what is wrong with the samples themselves: lost, frozen, saturated, silent."""
-    found: list[Remark] = []
-
-    def fault(code: RecordCode, sentence: str) -> None:
-        found.append(Remark(code, sentence))
-
-    for i, sensor in enumerate(recording.sensors):
-        if sensor.quantity in (Quantity.TRIGGER, Quantity.FORCE):
-            continue
-        x = recording.samples[:, i]
-        lost = ~np.isfinite(x)
-        if lost.any():
-            first = float(np.argmax(lost)) / recording.rate
-            fault(RecordCode.LOST_SAMPLES, f"drop-outs: {lost.sum()} samples of {sensor.name} are missing, the first at {first:.4g} s")
-            continue
-        if np.ptp(x) == 0.0:
-            fault(RecordCode.NO_SIGNAL, f"no signal: {sensor.name} has the constant value {x[0]:.4g}")
-            continue
-        start, length = _runs(x)
-        clipped = _clipped(x, x[start], length)
-        if clipped:
-            words = f"saturation: {clipped} samples of {sensor.name} are at its limits, {x.min():.4g} and {x.max():.4g}"
-            fault(RecordCode.SATURATED, words)
-            continue
-        k = _frozen(x[start], length)
-        if k is not None:
-            words = f"drop-outs: {sensor.name} is frozen for {length[k]} samples at {start[k] / recording.rate:.4g} s"
-            fault(RecordCode.FROZEN, words)
-    return tuple(found)
+    return examined(recording).reasons
 
 
 def implausible(recording: Recording) -> tuple[Remark, ...]:
     """Return what speaks for a wrong unit or sensitivity: motion that no spindle makes, or that no sensor resolves."""
-    found = []
-    for i, sensor in enumerate(recording.sensors):
-        least, most, unit = PLAUSIBLE.get(sensor.quantity, (0.0, np.inf, ""))
-        x = recording.samples[:, i]
-        x = x[np.isfinite(x)]
-        swing = float(np.ptp(x)) if x.size else 0.0
-        if swing > most or 0.0 < swing < least:
-            words = f"{sensor.name} has a peak-to-peak amplitude of {swing:.3g} {unit}: check its unit and sensitivity"
-            found.append(Remark(RecordCode.IMPLAUSIBLE, words))
-    return tuple(found)
-
-
-def _runs(x: FloatArray) -> tuple[np.ndarray, np.ndarray]:
-    """Start and length of each run of equal values."""
-    start = np.concatenate([[0], np.flatnonzero(np.diff(x) != 0.0) + 1])
-    return start, np.diff(np.concatenate([start, [x.size]]))
-
-
-def _frozen(value: FloatArray, length: np.ndarray) -> int | None:
-    """The longest run that a live channel does not produce: longer than the others, and the signal has moved on after it.
-
-    A slow signal of coarse resolution also rests at its peaks, but goes on by one level.
-    """
-    jump = np.abs(np.diff(value))
-    ends = np.flatnonzero(length[:-1] >= max(FROZEN_SAMPLES, 4.0 * np.quantile(length, 0.97)))
-    ends = ends[jump[ends] > 1.5 * jump.min()]
-    if length[-1] >= 4.0 * FROZEN_SAMPLES and length[-1] >= 4.0 * length[:-1].max(initial=0):
-        return length.size - 1
-    return int(ends[np.argmax(length[ends])]) if ends.size else None
-
-
-def _clipped(x: FloatArray, value: FloatArray, length: np.ndarray) -> int:
-    """Samples that stand at a limit: several runs at an extreme that is far more frequent than the level next to it.
-
-    A coarsely resolved signal also repeats its extreme value, but the level beside it about as often.
-    """
-    limits = (x.min(), x.max())
-    runs = [length[(value == limit) & (length >= 3)] for limit in limits]
-    if max(run.size for run in runs) < 2:
-        return 0
-    level, count = np.unique(x, return_counts=True)
-    if level.size < LEAST_LEVELS:
-        return 0
-    piled = count[0] > PILED_UP * count[1], count[-1] > PILED_UP * count[-2]
-    return sum(int(run.sum()) for run, full in zip(runs, piled, strict=True) if full and run.size >= 2)
+    return examined(recording).notes
 
 
 def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) -> tuple[Remark, ...]:

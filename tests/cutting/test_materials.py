@@ -58,6 +58,23 @@ def test_forces_over_feed_are_those_of_the_table(name):
     assert "typical" in found.notes
 
 
+@pytest.mark.parametrize(
+    ("name", "at_one", "exponent", "thickness"),
+    [
+        ("Ductile cast iron EN-GJS-600 (GGG60)", 1350, 0.28, FEED),
+        ("Nickel alloy Inconel 718 (2.4668)", 3300, 0.24, np.array([0.05, 0.1, 0.15, 0.2, 0.3])),
+    ],
+)
+def test_forces_over_chip_thickness_are_those_of_the_law(name, at_one, exponent, thickness):
+    found = material(name)
+    slope, edge = np.polyfit(thickness, at_one * thickness ** (1.0 - exponent), 1)
+    assert found.coefficients.tangential == pytest.approx(slope * 1e6, rel=1e-3)
+    assert found.coefficients.tangential_edge == pytest.approx(edge * 1e3, rel=1e-3)
+    assert str(at_one) in found.source
+    assert str(exponent) in found.source
+    assert "typical" in found.notes
+
+
 @pytest.mark.parametrize(("rake", "tangential", "ratio"), [(12.0, 1510e6, 0.1421), (0.0, 1775e6, 0.3148)])
 def test_titanium_is_made_oblique_from_its_orthogonal_parameters(rake, tangential, ratio):
     """[altintas2012]: chip flow angle equal to the helix, shear angle from the chip ratio."""

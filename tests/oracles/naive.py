@@ -169,3 +169,32 @@ def milling_multiplier(
     monodromy = np.concatenate([state, *past[n : 2 * n]])
     values = scipy.sparse.linalg.eigs(monodromy, 6, v0=np.cos(np.arange(float(total))), tol=1e-10, return_eigenvectors=False)
     return complex(values[np.argmax(np.abs(values))])
+
+
+def runs_of_equal(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Start and length of each run of equal values."""
+    start = np.concatenate([[0], np.flatnonzero(np.diff(x) != 0.0) + 1])
+    return start, np.diff(np.concatenate([start, [x.size]]))
+
+
+def frozen_run(x: np.ndarray, least: int = 12) -> tuple[int, int] | None:
+    """Start and length of the longest run that a live channel does not produce, from all runs at once."""
+    start, length = runs_of_equal(x)
+    jump = np.abs(np.diff(x[start]))
+    if length[-1] >= 4 * least and length[-1] >= 4 * length[:-1].max(initial=0):
+        return int(start[-1]), int(length[-1])
+    ends = np.flatnonzero(length[:-1] >= max(least, 4.0 * np.quantile(length, 0.97)))
+    ends = ends[jump[ends] > 1.5 * jump.min()]
+    longest = ends[np.argmax(length[ends])] if ends.size else None
+    return None if longest is None else (int(start[longest]), int(length[longest]))
+
+
+def clipped_samples(x: np.ndarray) -> int:
+    """Samples in runs of three at an extreme value that is five times as frequent as the level next to it, from all levels at once."""
+    start, length = runs_of_equal(x)
+    runs = [length[(x[start] == limit) & (length >= 3)] for limit in (x.min(), x.max())]
+    level, count = np.unique(x, return_counts=True)
+    if max(run.size for run in runs) < 2 or level.size < 12:
+        return 0
+    piled = count[0] > 5.0 * count[1], count[-1] > 5.0 * count[-2]
+    return sum(int(run.sum()) for run, full in zip(runs, piled, strict=True) if full and run.size >= 2)
