@@ -1,6 +1,6 @@
 """A process that reads strangers' files cuts itself off first: from files, network, other processes and programs, where the kernel can.
 
-Linux's Landlock closes the file system and TCP, a seccomp filter the rest. Neither needs rights, neither can be taken back. The
+Linux's Landlock closes the file system, TCP and signals, a seccomp filter the rest. Neither needs rights, neither can be taken back. The
 numbers and structures are those of the kernel's headers linux/landlock.h, linux/seccomp.h and linux/filter.h.
 """
 
@@ -29,12 +29,12 @@ _TCP, _OUTSIDE = (1 << 2) - 1, (1 << 2) - 1
 
 _ALLOW, _DENY = 0x7FFF0000, 0x00050000 | errno.EACCES
 #: Architecture as the filter sees it, the call that installs one, and what is denied: socket, connect, ptrace, process_vm_readv and
-#: _writev, execve and execveat, kill, and (the same everywhere) io_uring_setup, pidfd_send_signal, pidfd_getfd.
+#: _writev, execve and execveat, and (the same everywhere) io_uring_setup and pidfd_getfd.
 _CALLS = {
-    "x86_64": (0xC000003E, 317, (41, 42, 101, 310, 311, 59, 322, 62)),
-    "aarch64": (0xC00000B7, 277, (198, 203, 117, 270, 271, 221, 281, 129)),
+    "x86_64": (0xC000003E, 317, (41, 42, 101, 310, 311, 59, 322)),
+    "aarch64": (0xC00000B7, 277, (198, 203, 117, 270, 271, 221, 281)),
 }
-_EVERYWHERE = (424, 425, 438)
+_EVERYWHERE = (425, 438)
 _FIRST_OF_X32 = 0x40000000
 
 
@@ -45,9 +45,9 @@ class Confinement:
     Parameters
     ----------
     files : bool
-        It opens nothing but what it was told.
+        It opens nothing but what it was told. From version 6 of Landlock it sends no signals either.
     network : bool
-        It makes no socket of any kind, starts no program and touches no other process.
+        It makes no socket of any kind, starts no program and looks into no other process.
     """
 
     files: bool = False
@@ -76,7 +76,8 @@ def confine(readable: Iterable[Path], writable: Iterable[Path] = ()) -> Confinem
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0) != 0:
         return Confinement()
-    return Confinement(_close_files(libc, [*readable, *_python()], writable), _close_calls(libc))
+    alone = len(os.listdir("/proc/self/task")) == 1
+    return Confinement(_close_files(libc, [*readable, *_python()], writable) and alone, _close_calls(libc))
 
 
 def _python() -> list[Path]:

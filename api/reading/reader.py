@@ -1,20 +1,28 @@
-"""The reader process: reads uploads within limits of memory and time, and is replaced where an upload exceeds them."""
+"""The reader process: reads uploads within limits of memory and time, and is replaced where an upload exceeds them.
+
+It is cut off from other files, network and processes, see `api.confinement`: it sees the files of its call alone, in its room.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import logging
 import signal
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
 
+from api.confinement import Confinement, confine
 from api.files import Full, no_room
-from api.processes import Child, limit_memory, spawn_context
+from api.processes import Child, follow_parent, limit_memory, spawn_context
 from api.reading import reader_tasks
+from api.reading.room import Room
 from api.shares import FairThreads
 from api.work.pool import Busy
 from rcsa_ident.errors import InputError
@@ -62,16 +70,20 @@ class Reader:
         Calls that may wait beyond the running one.
     prepare : callable
         Called first in the process, without limits.
+    folder : Path, optional
+        On the disk of the uploads, for the files of a call.
     """
 
-    def __init__(self, limits: Limits, queue: int, prepare: Callable[[], None] = reader_tasks.warm) -> None:
-        self.limits, self.queue, self.prepare, self.waiting = limits, queue, prepare, 0
+    def __init__(self, limits: Limits, queue: int, prepare: Callable[[], None] = reader_tasks.warm, folder: Path | None = None) -> None:
+        self.limits, self.queue, self.prepare, self.folder, self.waiting = limits, queue, prepare, folder, 0
         self.threads: FairThreads | None = None
         self.child: _Reading | None = None
 
     def start(self) -> None:
         self.threads = FairThreads(1, "reader")
-        self.child = _Reading(self.limits, self.prepare)
+        self.child = child = self._new()
+        # what holds is said at the service's start, not at its first upload
+        self.threads.submit(child.greet)
 
     @property
     def ready(self) -> bool:
@@ -91,7 +103,7 @@ class Reader:
         for _ in range(2):
             if self.threads is None:
                 break
-            self.child = child = self.child or _Reading(self.limits, self.prepare)
+            self.child = child = self.child or self._new()
             kind, answer = child.ask(call, arguments)
             if kind in ("costly", "killed") or child.calls >= self.limits.calls:
                 self._replace()
@@ -108,10 +120,13 @@ class Reader:
                 raise InputError("recording", "a file that cannot be read", "a complete file of its format")
         raise Busy
 
+    def _new(self) -> _Reading:
+        return _Reading(self.limits, self.prepare, Room(self.folder))
+
     def _replace(self) -> None:
         if self.child is not None:
             self.child.end()
-        self.child = None if self.threads is None else _Reading(self.limits, self.prepare)
+        self.child = None if self.threads is None else self._new()
 
     def stop(self) -> None:
         threads, self.threads = self.threads, None
@@ -126,23 +141,22 @@ class Reader:
 
 
 class _Reading:
-    """One reader process and the pipe to it."""
+    """One reader process, the pipe to it and its room."""
 
-    def __init__(self, limits: Limits, prepare: Callable[[], None]) -> None:
-        self.limits, self.calls, self.ready = limits, 0, False
+    def __init__(self, limits: Limits, prepare: Callable[[], None], room: Room) -> None:
+        self.limits, self.room, self.calls, self.ready = limits, room, 0, False
         self.pipe, theirs = spawn_context().Pipe()
-        self.process = Child(_serve, theirs, limits, prepare, name="reader")
+        self.process = Child(_serve, theirs, limits, prepare, room, name="reader", follows=False)
         theirs.close()
 
     def ask(self, call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:
         """Return the outcome of a call (answer, refused, failed, costly, full disk, or killed from outside) and its content."""
         try:
-            if not self.ready:
-                self._receive(_START)
-                self.ready = True
+            self._until_ready()
             self.calls += 1
-            self.pipe.send((call, arguments))
+            self.pipe.send((call, self.room.take_in(arguments)))
             kind, answer = self._receive(self.limits.wall_seconds)
+            self.room.give_out()
         except TimeoutError:
             self.process.kill()
             return "costly", None
@@ -152,7 +166,21 @@ class _Reading:
         except (EOFError, OSError):
             self.process.join(10.0)
             return "killed" if self.process.exitcode == -signal.SIGKILL or not self.ready else "costly", None
+        finally:
+            self.room.clear()
         return kind, answer
+
+    def greet(self) -> None:
+        """Wait until the process is ready, and say what holds in it."""
+        # whoever asks finds out what has happened
+        with contextlib.suppress(EOFError, OSError):
+            self._until_ready()
+
+    def _until_ready(self) -> None:
+        if not self.ready:
+            held = Confinement(*self._receive(_START))
+            log.info("reader process: %s", held, extra={"fields": {"files": held.files, "network": held.network}})
+            self.ready = True
 
     def _receive(self, seconds: float) -> Any:
         if not self.pipe.poll(seconds):
@@ -164,9 +192,10 @@ class _Reading:
         """End the process: by closing its pipe, else by SIGKILL."""
         self.pipe.close()
         self.process.end(0.5)
+        self.room.remove()
 
 
-def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None]) -> None:
+def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None], room: Room) -> None:
     """In the process: answer calls until the pipe is closed."""
     import resource
 
@@ -176,7 +205,11 @@ def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None]) -> Non
     limit_memory(limits.memory)
     # no file larger than the largest result
     resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_STORED + LARGEST_STORED // 8,) * 2)
-    pipe.send_bytes(b"{}")
+    tempfile.tempdir = str(room.made)
+    held = confine([room.given], [room.made])
+    # a thread that ran before would not be cut off
+    follow_parent()
+    pipe.send_bytes(json.dumps([held.files, held.network]).encode())
     while True:
         try:
             call, arguments = pipe.recv()

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import errno
+import json
 import os
 import signal
 import subprocess
 import sys
+import tempfile
+import threading
 import time
 from pathlib import Path
 
@@ -15,7 +19,7 @@ import pytest
 
 from api.files import Full
 from api.reading.previews import envelope, spectrum
-from api.reading.reader import Limits, Reader
+from api.reading.reader import Limits, Reader, _answer
 from api.reading.samples import blocks, length, read_normalised, write_normalised
 from api.work.pool import Busy
 from rcsa_ident.dynamics.coordinates import Dof
@@ -71,16 +75,17 @@ def end(by):
     os.kill(os.getpid(), by)
 
 
-def end_once(marker):
-    if not Path(marker).exists():
-        Path(marker).touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return "answered"
+def write(size):
+    with tempfile.TemporaryFile() as file:
+        return file.truncate(size)
 
 
-def write(path, size):
-    with open(path, "wb") as file:
-        file.truncate(size)
+def no_space():
+    raise OSError(errno.ENOSPC, "no space left on the device")
+
+
+def lines_of(text, path, other):
+    return [text, path.read_text(), other and other.read_text()]
 
 
 @pytest.fixture(scope="module")
@@ -129,8 +134,9 @@ def full():
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
 def test_a_full_disk_is_no_fault_of_the_file(reader):
+    assert json.loads(_answer(full, ())) == ["full", ""]
     with pytest.raises(Full):
-        ask(reader, full)
+        ask(reader, no_space)
 
 
 @pytest.mark.slow
@@ -166,16 +172,48 @@ def test_a_bug_costs_one_answer_and_tells_no_details(reader, call):
     assert "secret" not in str(refused.value)
 
 
-def test_no_file_grows_without_end(reader, tmp_path):
+def test_no_file_grows_without_end(reader):
+    assert ask(reader, write, 10**6) == 10**6
     with pytest.raises(InputError):
-        ask(reader, write, str(tmp_path / "x"), 10**10)
-    assert not (tmp_path / "x").exists() or (tmp_path / "x").stat().st_size == 0
+        ask(reader, write, 10**10)
+
+
+def test_a_call_sees_its_files_alone(reader, tmp_path):
+    """Under other names; what it has been given is as it was, and nothing is left for the next."""
+    paths = [tmp_path / name for name in ("one.csv", "two.csv")]
+    for path in paths:
+        path.write_text(path.stem)
+    assert ask(reader, lines_of, "x", *paths) == ["x", "one", "two"]
+    assert ask(reader, lines_of, "x", paths[0], None) == ["x", "one", None]
+    with pytest.raises(InputError, match="cannot be read"):
+        ask(reader, _read, str(paths[0]))
+    assert [path.read_text() for path in paths] == ["one", "two"]
+    room = reader.child.room
+    assert not list(room.given.iterdir())
+    assert not list(room.made.iterdir())
+
+
+def _read(path):
+    return Path(path).read_text()
 
 
 @pytest.mark.slow
-def test_who_is_killed_is_asked_again(reader, tmp_path):
+def test_who_is_killed_is_asked_again(reader):
     """Somebody else's doing says nothing about the upload."""
-    assert ask(reader, end_once, str(tmp_path / "marker")) == "answered"
+    assert ask(reader, pow, 2, 4) == 16
+    child = reader.child
+    before = child.calls
+
+    def kill():
+        until(lambda: child.calls > before)
+        child.process.kill()
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    assert ask(reader, time.sleep, 1.0) is None
+    killer.join()
+    assert reader.child is not child
+    assert not child.room.folder.exists()
     with pytest.raises(Busy):
         ask(reader, end, signal.SIGKILL)
     assert ask(reader, pow, 2, 5) == 32
@@ -237,7 +275,7 @@ def test_the_end_waits_for_nobody():
 
 CODE = """
 import asyncio, os, time
-from api.reading.reader import Limits, Reader
+from api.reading.reader import Limits, Reader, _answer
 if __name__ == "__main__":
     reader = Reader(Limits(), 1)
     reader.start()
