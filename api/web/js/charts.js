@@ -75,19 +75,21 @@ function layoutOf(given) {
 }
 
 /**
- * A chart of Plotly: `figure()` returns {data, layout}, and is asked again when light turns to dark or millimetres to inches.
+ * A chart of Plotly: `figure(box)` returns {data, layout}, and is asked again when light turns to dark or millimetres to inches.
  * `say` is what it shows, in words, for those who do not see it.
  */
 export function chart(say, kind = "") {
   const box = h("div", { class: `chart ${kind}`.trim(), role: "img", "aria-label": say }, waiting("drawing …"));
   let make = null;
   let drawn = false;
+  let width = 0;
   let observer = null;
   async function draw() {
     if (!make) return;
     const Plotly = await plotly();
     if (!box.isConnected) return;
-    const { data, layout, say: words } = make();
+    const { data, layout, say: words } = make(box);
+    width = box.clientWidth;
     if (words) box.setAttribute("aria-label", words);
     if (!drawn) fill(box);
     drawn = true;
@@ -101,7 +103,10 @@ export function chart(say, kind = "") {
     });
     if (!observer) {
       observer = new ResizeObserver(() => {
-        if (box.isConnected && box.clientWidth) Plotly.Plots.resize(box);
+        if (!box.isConnected || !box.clientWidth) return;
+        Plotly.Plots.resize(box);
+        // where labels find a place has changed
+        if (Math.abs(box.clientWidth - width) > 0.1 * width) draw();
       });
       observer.observe(box);
     }
