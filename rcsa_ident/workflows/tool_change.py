@@ -157,23 +157,23 @@ class ToolChange:
         zero_order = isinstance(self.method, ZeroOrder)
         each = self.method.seconds_per_speed + (_BAND_SECONDS if self.draws else 0.0)
         # lobes come closer as a spindle turns slower
-        found = each * self._teeth_factor * float(np.sum(4000.0 / to_rpm(pad_speeds(self.speeds, TOLERANCE))))
+        found = each * self._teeth_factor(self.method.name) * float(np.sum(4000.0 / to_rpm(pad_speeds(self.speeds, TOLERANCE))))
         if not (zero_order and self.machine.prepared):
             found += _CHANGING_SECONDS if self.machine.speed_range is not None else 0.0
             found += spread_seconds(self.machine, self.omega) if self.draws else 0.0
         if zero_order and self.recommend:
-            found += _FITTED_SPEEDS * _FITTING.seconds_per_speed * float(np.mean(4000.0 / to_rpm(self.speeds)))
+            each = _FITTING.seconds_per_speed * self._teeth_factor(_FITTING.name)
+            found += _FITTED_SPEEDS * each * float(np.mean(4000.0 / to_rpm(self.speeds)))
         return found
 
-    @property
-    def _teeth_factor(self) -> float:
-        """How many times as long it takes as with few equal teeth."""
+    def _teeth_factor(self, method: str) -> float:
+        """How many times as long a method takes as with few equal teeth."""
         cutter = self.process.cutter
         uneven = np.ptp(cutter.pitch) > 1e-9
-        if self.method.name == MethodName.ZERO_ORDER:
+        if method == MethodName.ZERO_ORDER:
             return _PITCH_FACTOR if uneven else 1.0
         factor = 1.0 + cutter.teeth / _TEETH_OF_PERIOD if uneven or np.ptp(cutter.runout) > 0.0 else 1.0
-        return factor * max(1.0, (cutter.teeth / _TEETH_OF_STEP) ** 2) if self.method.name == MethodName.TIME_DOMAIN else factor
+        return factor * max(1.0, (cutter.teeth / _TEETH_OF_STEP) ** 2) if method == MethodName.TIME_DOMAIN else factor
 
     def watched(self, watch: Watch) -> ToolChange:
         """Return the same question, whose method tells each speed's limit once it is known, where it asks speed by speed."""

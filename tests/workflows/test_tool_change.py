@@ -143,6 +143,13 @@ def test_a_machine_without_a_posterior_has_no_band():
     assert change(one_axis(known=False), [900.0]).limits().band is None
 
 
+def test_what_cuts_are_recommended_costs_more_where_teeth_differ(shop):
+    """Each revolution is then followed as a whole, also around the pockets of a preview of equal teeth."""
+    uneven = replace(shop, cut=replace(shop.cut, runout=(0.0, 8e-6, 0.0, 8e-6)))
+    assert uneven.seconds > shop.seconds
+    assert replace(uneven, recommend=False).seconds == replace(shop, recommend=False).seconds
+
+
 # what is drawn
 
 

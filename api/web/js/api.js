@@ -73,8 +73,8 @@ async function fetched(address, sent) {
 }
 
 /** Send, and return the answer; everything but 2xx and 304 is thrown as a `Problem`. */
-export async function send(method, path, { json, body, headers = {}, signal } = {}) {
-  const sent = { method, signal, headers: { ...keyHeaders(), ...headers } };
+export async function send(method, path, { json, body, headers = {}, signal, keepalive = false } = {}) {
+  const sent = { method, signal, keepalive, headers: { ...keyHeaders(), ...headers } };
   if (json !== undefined) {
     sent.body = JSON.stringify(json);
     sent.headers["Content-Type"] = "application/json";

@@ -82,7 +82,7 @@ function layoutOf(given) {
 }
 
 /**
- * A chart of Plotly: `figure()` returns {data, layout}, and is asked again when light turns to dark or millimetres to inches.
+ * A chart of Plotly: `figure(plot)` returns {data, layout}, and is asked again when light turns to dark or millimetres to inches.
  * `say` is what it shows, in words, for those who do not see it; `before` stands there until there is something to draw.
  */
 export function chart(say, kind = "", before = "drawing …") {
@@ -92,12 +92,14 @@ export function chart(say, kind = "", before = "drawing …") {
   const box = h("div", { class: `chart ${kind}`.trim() }, words, plot);
   let make = null;
   let drawn = false;
+  let width = 0;
   let observer = null;
   async function draw() {
     if (!make) return;
     const Plotly = await plotly();
     if (!box.isConnected) return;
-    const { data, layout, say: now } = make(plot.clientWidth);
+    const { data, layout, say: now } = make(plot);
+    width = plot.clientWidth;
     if (now) words.setAttribute("aria-label", now);
     if (!drawn) fill(plot);
     drawn = true;
@@ -112,7 +114,10 @@ export function chart(say, kind = "", before = "drawing …") {
     for (const drawing of plot.querySelectorAll("svg.main-svg")) drawing.setAttribute("aria-hidden", "true");
     if (!observer) {
       observer = new ResizeObserver(() => {
-        if (box.isConnected && plot.clientWidth) Plotly.Plots.resize(plot);
+        if (!box.isConnected || !plot.clientWidth) return;
+        Plotly.Plots.resize(plot);
+        // where labels find a place has changed
+        if (Math.abs(plot.clientWidth - width) > 0.1 * width) draw();
       });
       observer.observe(box);
     }

@@ -1,20 +1,28 @@
 // What the charts of a tool change show: lobes with bands, tooltip FRFs with bands.
 import { axis, colour, DASHES, safe, SERIES } from "./charts.js";
+import { apart } from "./labels.js";
 import { MARKS } from "./tested.js";
 import { factor, plain, text, unit } from "./units.js";
 
 const seriesOf = (i) => SERIES[i % SERIES.length];
+
+/** Where the lobes begin above the chatter frequencies, as a share of the chart's height. */
+const UPPER = 0.33;
 
 /** Material removed per depth and speed [cm^3/min per mm and rev/min]. */
 export function removalPer(tooling, immersion, feed) {
   return (tooling.diameter_mm * immersion * tooling.teeth * feed) / 1000;
 }
 
-/** Lobes of several toolings above, and below the frequency at which each would chatter. */
-export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested = [] }) {
+/**
+ * Lobes of several toolings above, and below the frequency at which each would chatter.
+ * `parts` are limits of another method, as far as they are known: the lobes themselves are then a preview, drawn as such.
+ * `box` is what it is drawn in.
+ */
+export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested = [], parts = null }, box) {
   const times = factor("depth");
   const data = [];
-  const annotations = [];
+  const tops = [];
   let highest = 0;
   lobes.forEach((each, i) => {
     const name = seriesOf(i);
@@ -24,7 +32,7 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
     const shown = (values) => values.map((v) => (v ?? maxDepth) * times);
     const y = shown(each.limit_depth_mm);
     highest = Math.max(highest, ...y);
-    if (each.limit_depth_low_mm) {
+    if (each.limit_depth_low_mm && !parts) {
       const common = { x, mode: "lines", line: { width: 0 }, hoverinfo: "skip", type: "scatter" };
       data.push({ ...common, y: shown(each.limit_depth_low_mm) });
       data.push({ ...common, y: shown(each.limit_depth_high_mm), fill: "tonexty", fillcolor: colour(name, 0.28) });
@@ -48,8 +56,8 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
       text: told,
       type: "scatter",
       mode: "lines",
-      line: { color: ink, width: 2.2, dash: DASHES[Math.floor(i / SERIES.length)] },
-      fill: lobes.length === 1 ? "tozeroy" : "none",
+      line: parts ? { color: ink, width: 1.2, dash: "dot" } : { color: ink, width: 2.2, dash: DASHES[Math.floor(i / SERIES.length)] },
+      fill: lobes.length === 1 && !parts ? "tozeroy" : "none",
       fillcolor: colour(name, 0.07),
       hovertemplate: lobes.length === 1 ? "%{text}<extra></extra>" : "%{text}",
     });
@@ -63,7 +71,14 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
       marker: { color: ink, size: 3.2 },
       hoverinfo: "skip",
     });
-    const best = each.best_speeds.slice(0, lobes.length > 3 ? 1 : 3);
+    const part = parts?.[i];
+    if (part) {
+      const common = { x: part.spindle_speed_rpm, type: "scatter", hoverinfo: "skip" };
+      const line = { color: ink, width: 2.2 };
+      data.push({ ...common, y: shown(part.limit_depth_mm), mode: "lines+markers", line, marker: { color: ink, size: 5 } });
+      highest = Math.max(highest, ...shown(part.limit_depth_mm));
+    }
+    const best = parts ? [] : each.best_speeds.slice(0, lobes.length > 3 ? 1 : 3);
     data.push({
       x: best.map((b) => b.spindle_speed_rpm),
       y: best.map((b) => (b.limit_depth_mm ?? maxDepth) * times),
@@ -83,18 +98,7 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
         hoverinfo: "skip",
       });
     }
-    best.forEach((b, k) =>
-      annotations.push({
-        x: b.spindle_speed_rpm,
-        y: (b.limit_depth_mm ?? maxDepth) * times,
-        text: plain(b.spindle_speed_rpm),
-        showarrow: false,
-        yshift: 14,
-        font: { color: ink, size: k === 0 ? 15 : 12, weight: k === 0 ? 700 : 400 },
-        bgcolor: colour("paper", 0.75),
-        borderpad: 1,
-      }),
-    );
+    best.forEach((b, k) => tops.push({ rpm: b.spindle_speed_rpm, depth: (b.limit_depth_mm ?? maxDepth) * times, ink, k }));
   });
   for (const [verdict, [symbol, , ink]] of Object.entries(MARKS)) {
     const cuts = tested.filter((cut) => cut.verdict === verdict);
@@ -110,16 +114,20 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
   }
   const deepest = Math.max(0, ...tested.map((cut) => cut.axial_depth_mm * times));
   const top = Math.max(Math.min(highest * 1.16, maxDepth * times * 1.1), deepest * 1.08) || 1;
+  const speeds = lobes[0].spindle_speed_rpm;
   const layout = {
     hovermode: "x unified",
-    annotations,
+    annotations: labelled(tops, speeds, top, box),
+    // what somebody has drawn near stays near while limits come
+    uirevision: "lobes",
     xaxis: axis("Spindle speed [rev/min]", {
       anchor: "y2",
+      ...(parts && speeds.length > 1 ? { range: [speeds[0], speeds.at(-1)] } : {}),
       tickformat: ",d",
       hoverformat: ",.0f",
       unifiedhovertitle: { text: "%{x:,.0f} rev/min" },
     }),
-    yaxis: axis(`Axial depth [${unit("depth")}]`, { domain: [0.33, 1], range: [0, top], fixedrange: false }),
+    yaxis: axis(`Axial depth [${unit("depth")}]`, { domain: [UPPER, 1], range: [0, top], fixedrange: false }),
     yaxis2: axis("Chatter [Hz]", { domain: [0, 0.25], rangemode: "normal", nticks: 4 }),
   };
   const words = lobes.map((l) => {
@@ -129,6 +137,29 @@ export function lobeFigure(lobes, { maxDepth, removal, recommended = [], tested 
       : l.tooling;
   });
   return { data, layout, say: `Stability lobes. ${words.join("; ")}.` };
+}
+
+/** The speeds of pockets' tops, none of which covers another: the highest of each tooling first. */
+function labelled(tops, speeds, top, box) {
+  // what axes and margins leave of it
+  const [width, height] = [box.clientWidth - 70, (1 - UPPER) * (box.clientHeight - 56)];
+  const scale = width / (speeds.at(-1) - speeds[0] || 1);
+  const labels = tops
+    .toSorted((a, b) => a.k - b.k || b.depth - a.depth)
+    .map((each) => {
+      const place = { x: (each.rpm - speeds[0]) * scale, y: (each.depth / top) * height };
+      return { ...each, ...place, size: each.k === 0 ? 15 : 12, text: plain(each.rpm) };
+    });
+  return apart(labels, 14).map(({ rpm, depth, ink, k, size, text: words, shift }) => ({
+    x: rpm,
+    y: depth,
+    text: words,
+    showarrow: false,
+    yshift: shift,
+    font: { color: ink, size, weight: k === 0 ? 700 : 400 },
+    bgcolor: colour("paper", 0.75),
+    borderpad: 1,
+  }));
 }
 
 const PARTS = {

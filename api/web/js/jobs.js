@@ -1,15 +1,21 @@
 // Work that takes its time: accepted as a job, followed until it is done.
-import { follow, get, send } from "./api.js";
+import { follow, get, Problem, send } from "./api.js";
 
 export const RUNNING = ["queued", "running"];
+const ORDINALS = ["first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth"];
 
-/** A job's state in words. */
+/** A job's state in words: who waits is told the place, who is at work how far it is. */
 export function wordsOf(job) {
-  if (job.state === "queued") return "waiting for a free worker";
-  if (job.state === "running")
-    return job.progress
-      ? `${job.progress.stage}${job.progress.total ? `, ${job.progress.done} of ${job.progress.total}` : ""}`
-      : "starting";
+  if (job.state === "queued") {
+    if (!job.queue || job.queue.waiting < 2) return "waiting for a free worker";
+    return `${ORDINALS[job.queue.place - 1] ?? `number ${job.queue.place}`} of ${job.queue.waiting} waiting for a free worker`;
+  }
+  if (job.state === "running") {
+    if (!job.progress) return "starting";
+    const { stage, done, total } = job.progress;
+    if (stage === "speeds") return `${done} of ${total} speeds`;
+    return `${stage}${total ? `, ${done} of ${total}` : ""}`;
+  }
   if (job.state === "failed") return "failed";
   if (job.state === "cancelled") return "cancelled";
   return job.status ?? "done";
@@ -22,24 +28,35 @@ export const kindOf = (job) =>
 
 export const shareOf = (job) => (job.progress?.total ? job.progress.done / job.progress.total : null);
 
-/** Lobes by a slower method: at once where the service answers so, else from a job; leaving cancels it. */
-export async function followLobes(question, signal, tell) {
-  const answer = await send("POST", "lobes", { json: question, signal, headers: { Prefer: "respond-async" } });
-  const first = await answer.json();
-  if (answer.status !== 202) return first;
-  tell("waiting for a free worker", null);
-  signal.addEventListener("abort", () => send("DELETE", `lobes/${first.id}`).catch(() => {}));
-  let last = first;
-  await follow(
-    `lobes/${first.id}/events`,
-    (event, data) => {
-      if (event === "progress" || event === "end") last = data;
-      tell(wordsOf(last), shareOf(last));
+/** How long a job has been in its state [s]. */
+export const secondsIn = (job) => (job.state === "queued" ? job.waited_s : job.running_s);
+
+/**
+ * Lobes by a slower method, from a job. `told(job)` hears of its state, `part(partial)` of the limits that are known so far.
+ * Whoever aborts the signal, leaves the view or closes the tab cancels it.
+ */
+export async function followLobes(question, signal, { told, part }) {
+  // never broken off: a job that the service has just accepted would go on for nobody
+  const job = await (await send("POST", "lobes", { json: question, headers: { Prefer: "respond-async" } })).json();
+  const path = `lobes/${job.id}`;
+  const cancel = () => send("DELETE", path, { keepalive: true }).catch(() => {});
+  if (signal.aborted) return void cancel();
+  signal.addEventListener("abort", cancel);
+  window.addEventListener("pagehide", cancel);
+  try {
+    told(job);
+    const on = (event, data) => {
+      if (event === "partial") part(data);
+      else if (event === "progress" || event === "end") told(data);
       return event === "end";
-    },
-    signal,
-  );
-  const done = await get(`lobes/${first.id}`, { signal });
-  if (done.answer) return done.answer;
-  throw new Error(done.job.problem?.detail ?? `the job is ${done.job.state}`);
+    };
+    await follow(`${path}/events`, on, signal);
+    if (signal.aborted) return;
+    const { answer, job: ended } = await get(path, { signal });
+    if (answer) return answer;
+    throw new Problem(0, ended.problem ?? { detail: `The job is ${ended.state}.` });
+  } finally {
+    signal.removeEventListener("abort", cancel);
+    window.removeEventListener("pagehide", cancel);
+  }
 }

@@ -47,6 +47,19 @@ export function testedCuts(name, text) {
   });
 }
 
+/** Cuts as an address holds them: speed, depth and the verdict's first letter. */
+export const asAddress = (cuts) => cuts.map((cut) => `${cut.spindle_speed_rpm}:${cut.axial_depth_mm}:${cut.verdict[0]}`).join(" ");
+
+/** The cuts of an address; what is none is left out. */
+export function fromAddress(written) {
+  return written.split(" ").flatMap((each) => {
+    const [, speed, depth, letter] = /^([\d.e+-]+):([\d.e+-]+):([scm])$/.exec(each) ?? [];
+    const verdict = VERDICTS.find((word) => word[0] === letter);
+    const cut = { spindle_speed_rpm: Number(speed), axial_depth_mm: Number(depth), verdict };
+    return verdict && Number.isFinite(cut.spindle_speed_rpm + cut.axial_depth_mm) ? [cut] : [];
+  });
+}
+
 /** How a tooling's limits stand to them, in words. */
 export function toldRight(tally) {
   const right = tally.stable_stable + tally.chatter_chatter;

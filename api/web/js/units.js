@@ -162,6 +162,24 @@ export function quantityInput(kind, value, props = {}) {
   return input;
 }
 
+/** An input for several quantities with blanks or semicolons between them: `base` is their list, null where nothing is written. */
+export function quantityListInput(kind, values, props = {}) {
+  const input = h("input", { type: "text", autocomplete: "off", ...props });
+  let base = values;
+  const show = () => {
+    input.value = (base ?? []).map((value) => (Number.isFinite(value) ? trimmed(value * factor(kind)) : "?")).join(" ");
+  };
+  input.addEventListener("input", () => {
+    const written = input.value.split(/[\s;]+|,\s+/).filter(Boolean);
+    base = written.length ? written.map((each) => Number(each.replace(",", ".")) / factor(kind)) : null;
+  });
+  Object.defineProperty(input, "base", { get: () => base });
+  input.quantity = show;
+  input.dataset.quantity = kind;
+  show();
+  return input;
+}
+
 /** As a person would type it: few digits, powers of ten where zeros are hard to count. */
 function trimmed(value) {
   const short = Number(value.toPrecision(7));

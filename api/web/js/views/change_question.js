@@ -11,7 +11,7 @@ export async function methods() {
   return names.map((name) => [name, name[0].toUpperCase() + name.slice(1) + (name === QUICK ? ": at once" : "")]);
 }
 
-// what an address may say: name in the query, kind, default, where it goes in the body, least and most; without an end the service
+// what an address may say beside choices and run-out: name in the query, kind, default, where it goes in the body, least and most; without an end the service
 // knows what is possible, and says what is usual beside it
 export const NUMBERS = [
   ["im", "percent", 50, "cut.immersion", 0.1, 100, "Radial immersion"],
@@ -24,9 +24,13 @@ export const NUMBERS = [
   ["krc", "none", null, "cut.krc", -Infinity, Infinity, "Radial over tangential"],
   ["land", "displacement", null, "cut.wear_land_um", 0.01, 1000, "Wear land"],
   ["dent", "indentation", null, "cut.indentation", 1e9, 1e17, "Indentation"],
+  ["mu", "none", 0.3, "cut.friction", 0, 2, "Friction of the worn land"],
   ["power", "power", null, "max_power_kw", 1e-3, 10_000, "Spindle power, at most"],
   ["torque", "torque", null, "max_torque_nm", 1e-3, 1e6, "Spindle torque, at most"],
 ];
+
+/** Most that an edge may stand out [µm]. */
+const OUT = 1000;
 
 export function bodyOf(id, names, fields, { strategy, direction, method, material, tested }) {
   const value = (key) => fields[key].input.base;
@@ -39,6 +43,9 @@ export function bodyOf(id, names, fields, { strategy, direction, method, materia
     ["dent", "indentation"],
   ])
     if (value(key) !== null) cut[name] = value(key);
+  // only a worn land rubs
+  if (value("land") !== null) cut.friction = value("mu");
+  if (value("runout") !== null) cut.runout_um = value("runout");
   if (material) cut.material = material;
   const speeds = { from_rpm: value("from"), to_rpm: value("to"), step_rpm: value("step") };
   const lobes = { machine: id, toolings: names, cut, speeds, max_depth_mm: value("deep"), method };
@@ -59,6 +66,11 @@ export function checked(fields, chosen) {
     else if (!(base >= least && base <= most)) {
       errors.push({ field: name, found: value, allowed: `From ${text(kind, least, { bare: true })} to ${text(kind, most)}` });
     }
+  }
+  const out = fields.runout.input.base ?? [];
+  if (!out.every((each) => Math.abs(each) <= OUT)) {
+    const allowed = `A number for each tooth, from ${text("displacement", -OUT, { bare: true })} to ${text("displacement", OUT)}`;
+    errors.push({ field: "cut.runout_um", found: fields.runout.input.value, allowed });
   }
   const [from, upTo] = [fields.from.input.base, fields.to.input.base];
   if (!errors.length && upTo < from)

@@ -1,6 +1,6 @@
 // What to set, in words: a speed, the recommended depth beside the stability limit, and why.
 import { SERIES } from "../charts.js";
-import { h } from "../dom.js";
+import { fill, h } from "../dom.js";
 import { libraryDrawing } from "../drawing.js";
 import { plain, q, text } from "../units.js";
 import { cardLink } from "./card_link.js";
@@ -96,6 +96,12 @@ export function headline(found, question) {
     );
   });
   return h("section", { class: `bests${cards === 1 ? " one" : ""}`, "aria-label": "Recommended cuts" }, articles);
+}
+
+/** Say that a recommended cut, which was to come, does not. */
+export function notComputed(best) {
+  best.removeAttribute("aria-busy");
+  fill(best.querySelector("p"), "The lobes are a preview. No recommended cut has been computed.");
 }
 
 /** The stability limit of a cut or a speed; null is none up to the depth that was asked for. */

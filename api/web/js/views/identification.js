@@ -91,7 +91,7 @@ export async function view({ id }, _query, place) {
       timer = null;
       const now = due;
       due = new Set();
-      if (now.has("cost")) cost.draw((width) => costFigure(trace, width));
+      if (now.has("cost")) cost.draw((plot) => costFigure(trace, plot.clientWidth));
       if (now.has("fit") && !over) fit.draw(() => fitFigure(fits));
     }, 250);
   }

@@ -1,0 +1,186 @@
+// The form of a tool change: toolings, cut, speeds, and what is asked more rarely; an address fills it.
+import { h, fill } from "../dom.js";
+import { field, quantity, select } from "../forms.js";
+import { asAddress, fromAddress } from "../tested.js";
+import { plain, q, quantityListInput, text, unit } from "../units.js";
+import { bodyOf, checked, NUMBERS, QUICK } from "./change_question.js";
+
+const MOST = 12;
+/** What is folded away until an address says something of it. */
+const FURTHER = ["method", "material", "deep", "ktc", "krc", "runout", "land", "dent", "mu", "power", "torque"];
+
+/**
+ * The form: `element`, `button`, `state()` for the address, `body()` for the service, `problem()`, `slow()`, `tested`, `tell()`.
+ * `onchange(now)` is called when something else is asked.
+ */
+export function changeForm({ machine, toolings, materials, kinds, query, onchange }) {
+  const named = query.getAll("tooling").filter((name) => toolings.some((tooling) => tooling.name === name));
+  const chosen = new Set(named.length ? named.slice(0, MOST) : [toolings.at(-1).name]);
+  const fields = Object.fromEntries(
+    NUMBERS.map(([key, kind, usual, name, , , label]) => {
+      const given = query.get(key);
+      return [key, quantity(label, kind, given === null || given === "" ? usual : Number(given), { name })];
+    }),
+  );
+  const out = query.get("runout")?.split(" ").filter(Boolean).map(Number);
+  const runout = quantityListInput("displacement", out?.length ? out : null, { placeholder: "of each tooth, as 0 8" });
+  fields.runout = field("Run-out", runout, { name: "cut.runout_um", unit: "displacement" });
+  fields.runout.input = runout;
+  const picked = (name, options, usual) => {
+    const given = query.get(name) ?? usual;
+    return select(options, options.some(([value]) => value === given) ? given : usual);
+  };
+  const strategies = [
+    ["down", "Down milling"],
+    ["up", "Up milling"],
+  ];
+  const strategy = picked("st", strategies, "down");
+  const direction = picked("fd", ["+X", "-X", "+Y", "-Y"].map((d) => [d, d.replace("-", "−")]), "+X");
+  const method = picked("method", kinds, QUICK);
+  // a measured flange says nothing of a workpiece
+  const measured = machine.identification.status === "measured";
+  const unsaid = measured ? "Choose one, or write coefficients" : "As in the identification";
+  const material = picked("material", [["", unsaid], ...materials.map((each) => [each.name, each.name])], "");
+  const button = h("button", { class: "primary" }, "Compute");
+  const form = { tested: { name: query.get("cutfile") ?? "", cuts: fromAddress(query.get("cuts") ?? "") }, button };
+  const slow = () => method.value !== QUICK;
+
+  // what stands behind a material of the library
+  const source = h("p", { class: "small soft below" });
+  const follow = () => {
+    const found = materials.find((each) => each.name === material.value);
+    const words = found && [
+      q("pressure", found.ktc_mpa),
+      `, radial ${plain(found.krc, 3)}, ±\u202f${plain(found.ktc_spread_percent)} %: ${found.condition} (${found.source})`,
+    ];
+    fill(source, words ?? null);
+    source.hidden = !words;
+    button.hidden = !slow();
+  };
+
+  // on a phone the answer stands higher than the conditions, which are told in a line
+  const inShort = h("span", { class: "soft" });
+  const conditions = h(
+    "details",
+    { class: "conditions", open: matchMedia("(min-width: 1100px)").matches },
+    h("summary", null, h("strong", null, "Cut and speeds"), inShort),
+    h(
+      "fieldset",
+      null,
+      h("legend", { class: "unseen" }, "Cut"),
+      h(
+        "div",
+        { class: "fields" },
+        fields.im,
+        field("Strategy", strategy, { name: "cut.strategy" }),
+        fields.fz,
+        field("Feed direction", direction, { name: "cut.feed_direction" }),
+      ),
+    ),
+    h("fieldset", null, h("legend", { class: "unseen" }, "Speeds"), h("div", { class: "fields" }, fields.from, fields.to, fields.step)),
+  );
+  const { ktc, krc, power, torque, deep, land, dent, mu } = fields;
+  const element = h(
+    "form",
+    { class: "card change-form", novalidate: true },
+    h(
+      "fieldset",
+      { "data-field": "toolings" },
+      h("legend", null, "Toolings"),
+      toolingPicks(toolings, chosen, () => onchange(true)),
+      h("div", { class: "fault", id: "toolings-fault", hidden: true }),
+    ),
+    conditions,
+    h(
+      "details",
+      { open: measured || FURTHER.some((key) => query.has(key) && query.get(key) !== QUICK) },
+      h("summary", null, "Material, spindle, method"),
+      field("Material", material, { name: "cut.material" }),
+      source,
+      h("div", { class: "fields" }, ktc, krc, power, torque, deep, field("Method", method, { name: "method" }), fields.runout, mu, land, dent),
+      h(
+        "p",
+        { class: "small soft" },
+        "Empty coefficients are those of the material. Wear land, indentation and friction: process damping, which zero order leaves out, ",
+        "as it does run-out.",
+      ),
+    ),
+    button,
+  );
+  element.addEventListener("input", (event) => {
+    if (event.target.closest(".picks, .picks-box")) return;
+    follow();
+    onchange(false);
+  });
+  follow();
+
+  const choice = () => ({ strategy: strategy.value, direction: direction.value, method: method.value, material: material.value });
+  const state = () => ({
+    machine: machine.id,
+    tooling: [...chosen],
+    st: strategy.value,
+    fd: direction.value,
+    method: method.value,
+    material: material.value,
+    ...Object.fromEntries(NUMBERS.map(([key, , usual]) => [key, fields[key].input.base === usual ? null : fields[key].input.base])),
+    runout: runout.base?.join(" "),
+    cuts: asAddress(form.tested.cuts),
+    cutfile: form.tested.cuts.length ? form.tested.name : null,
+  });
+  /** Say in a line what is asked. */
+  const tell = () => {
+    const shown = (key, kind) => `${fields[key].input.value}\u00a0${unit(kind)}`;
+    const speeds = `${fields.from.input.value} to ${shown("to", "speed")}`;
+    const cut = `${strategy.selectedOptions[0].textContent}, ${shown("im", "percent")} immersion, ${shown("fz", "feed")} per tooth`;
+    fill(inShort, `${cut}, ${speeds}`);
+  };
+  const body = () => bodyOf(machine.id, [...chosen], fields, { ...choice(), tested: form.tested.cuts });
+  return Object.assign(form, { element, state, tell, slow, body, problem: () => checked(fields, chosen) });
+}
+
+function toolingPicks(toolings, chosen, onchange) {
+  const boxes = toolings.map((tooling) => {
+    const box = h("input", {
+      type: "checkbox",
+      checked: chosen.has(tooling.name),
+      onchange: () => {
+        if (box.checked) chosen.add(tooling.name);
+        else chosen.delete(tooling.name);
+        limit();
+        onchange();
+      },
+    });
+    const words = h(
+      "span",
+      null,
+      h("strong", null, tooling.name),
+      " ",
+      h(
+        "span",
+        { class: "soft small" },
+        `${tooling.teeth} × Ø${text("length", tooling.diameter_mm, { digits: 0 })}, ${text("length", tooling.stickout_mm, { digits: 1 })} out`,
+      ),
+    );
+    return { box, item: h("li", { dataset: { name: tooling.name.toLowerCase() } }, h("label", { class: "check" }, box, words)) };
+  });
+  function limit() {
+    for (const { box } of boxes) box.disabled = !box.checked && chosen.size >= MOST;
+  }
+  limit();
+  const list = h(
+    "ul",
+    { class: "picks" },
+    boxes.map((b) => b.item),
+  );
+  if (toolings.length <= 8) return list;
+  const search = h("input", {
+    type: "search",
+    placeholder: "Search …",
+    "aria-label": "Search toolings",
+    oninput: () => {
+      const wanted = search.value.trim().toLowerCase();
+      for (const { item, box } of boxes) item.hidden = !box.checked && !item.dataset.name.includes(wanted);
+    },
+  });
+  return h("div", { class: "picks-box" }, search, list);
+}
