@@ -42,7 +42,7 @@ from api.routes import (
 from api.schemas.campaigns import NewCampaign
 from api.schemas.common import ProblemDocument
 from api.schemas.forces import ForceQuery, ForceUpload
-from api.security import HEADER
+from api.security import HEADER, WRONG_KEYS
 from api.settings import Settings
 from api.shares import Shares
 from api.stores.entities import Store
@@ -90,7 +90,7 @@ def create_app(
     feeds = EventFeeds(kept.jobs, Shares(settings.watchers, several))
     hub = Hub(StreamProcess() if host is None else host, _stream_limits(settings), metrics)
     metrics.streams.set_function(lambda: float(len(hub.sessions)))
-    components = Components(settings, kept, workers, files, readers, uploads, rates, metrics, hub, feeds, supervisor)
+    components = Components(settings, kept, workers, files, readers, uploads, rates, Rates(*WRONG_KEYS), metrics, hub, feeds, supervisor)
     metrics.registry.register(JobCounts(kept.jobs))
 
     @asynccontextmanager
