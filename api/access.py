@@ -54,6 +54,8 @@ class AccessMonitor:
             if message["type"] == "http.response.start":
                 status = message["status"]
                 extra = [(b"x-request-id", id.encode()), (b"x-content-type-options", b"nosniff")]
+                if scope["scheme"] == "https":
+                    extra.append((b"strict-transport-security", b"max-age=31536000"))
                 if not body.read:
                     # the rest of a body that nobody will read need not be sent
                     extra.append((b"connection", b"close"))

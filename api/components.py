@@ -21,6 +21,9 @@ from api.stores.entities import Store
 from api.streams.hub import Hub
 from api.work.pool import Work
 
+#: Keys or addresses that one limiter remembers.
+MOST_BUCKETS = 10_000
+
 
 class Rates:
     """Token-bucket rate limiter, one bucket per key: `burst` requests at once, refilled at `per_minute`.
@@ -40,20 +43,21 @@ class Rates:
     def wait(self, key: str) -> float:
         """Take a token and return 0, or return the time [s] until there is one."""
         with self.lock:
-            now = self.clock()
-            level, seen = self.buckets.get(key, (self.burst, now))
+            now, buckets = self.clock(), self.buckets
+            level, seen = buckets.pop(key, (self.burst, now))
             level = min(self.burst, level + (now - seen) * self.rate)
-            self.buckets[key] = (level - 1.0 if level >= 1.0 else level, now)
-            if len(self.buckets) > 10_000:
-                # a key whose bucket is full again needs no entry
-                full = self.burst / self.rate
-                self.buckets = {k: v for k, v in self.buckets.items() if now - v[1] < full}
+            # the first one is the one that has not been asked for longest
+            buckets[key] = (level - 1.0 if level >= 1.0 else level, now)
+            while len(buckets) > MOST_BUCKETS or now - buckets[next(iter(buckets))][1] >= self.burst / self.rate:
+                # one that is full again needs no entry
+                del buckets[next(iter(buckets))]
             return 0.0 if level >= 1.0 else (1.0 - level) / self.rate
 
 
 @dataclass(frozen=True, slots=True)
 class Components:
-    """Settings, store, workers, files and uploads, rate limits, metrics, force streams, event feeds of jobs, examples, supervisor."""
+    """Settings, store, workers, files and uploads, rate limits (also of wrong keys), metrics, force streams, event feeds of jobs, examples,
+    supervisor."""
 
     settings: Settings
     store: Store
@@ -62,6 +66,7 @@ class Components:
     reader: Work
     uploads: Uploads
     rates: Rates = field(repr=False)
+    wrong_keys: Rates = field(repr=False)
     metrics: Metrics = field(repr=False)
     streams: Hub = field(repr=False)
     feeds: EventFeeds = field(repr=False)

@@ -48,7 +48,7 @@ from api.schemas.campaigns import NewCampaign
 from api.schemas.common import ProblemDocument
 from api.schemas.forces import ForceQuery, ForceUpload
 from api.schemas.jobs import PartialLobes
-from api.security import HEADER
+from api.security import HEADER, WRONG_KEYS
 from api.settings import Settings
 from api.shares import Shares
 from api.stores.entities import Store
@@ -97,8 +97,8 @@ def create_app(
     feeds = EventFeeds(kept.jobs, Shares(settings.watchers, several))
     hub = Hub(StreamProcess() if host is None else host, _stream_limits(settings), metrics)
     metrics.streams.set_function(lambda: float(len(hub.sessions)))
-    made = Examples(uploads, workers)
-    components = Components(settings, kept, workers, files, readers, uploads, rates, metrics, hub, feeds, made, supervisor)
+    made, wrong = Examples(uploads, workers), Rates(*WRONG_KEYS)
+    components = Components(settings, kept, workers, files, readers, uploads, rates, wrong, metrics, hub, feeds, made, supervisor)
     metrics.registry.register(JobCounts(kept.jobs))
 
     @asynccontextmanager

@@ -7,6 +7,7 @@ import hmac
 import math
 import re
 import secrets
+from asyncio import sleep
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from fastapi.routing import APIRoute
 from starlette.requests import HTTPConnection
 
 from api.components import Components, components_of
+from api.connections import network_of
 from api.problems import Problem
 from api.shares import GROUP
 from api.stores.changes import Note
@@ -34,6 +36,8 @@ LOCAL_GROUP = LOCAL_KEY = "local"
 PREFIX = "ri"
 #: Longest life of a key that expires [days], and how exactly its last use is known [s].
 LONGEST, USED = 3650, 60.0
+#: Wrong keys of an address that are answered at once: each minute, and in a burst.
+WRONG_KEYS = (20, 20)
 #: What a proxy adds to a request that it passes on, beside X-Forwarded-…
 _PASSED_ON = ("forwarded", "x-real-ip", "via")
 _LOCAL_NAME = re.compile(r"(localhost|127\.0\.0\.1|\[::1\])(:\d{1,5})?", re.IGNORECASE)
@@ -99,6 +103,23 @@ def hash_of(secret: str) -> str:
     return hashlib.sha256(secret.encode("utf-8", "replace")).hexdigest()
 
 
+class WrongKey(Problem):
+    """A key that nobody has."""
+
+
+async def admitted(request: HTTPConnection, components: Components, given: str | None = None) -> Caller:
+    """Return the caller as `caller_of` does; an address that sends many wrong keys waits for the answer to the next wrong one."""
+    try:
+        return await run_in_threadpool(caller_of, request, components, given)
+    except WrongKey:
+        # a right key is answered all the same: others may share the address
+        seconds = components.wrong_keys.wait(network_of(request.client.host) if request.client is not None else "")
+        if seconds <= 0.0:
+            raise
+        await sleep(seconds)
+        raise Problem(429, "too many wrong API keys from this address", headers={"Retry-After": str(math.ceil(seconds))}) from None
+
+
 def caller_of(request: HTTPConnection, components: Components, given: str | None = None) -> Caller:
     """Return the caller; without a key only where none is required.
 
@@ -117,7 +138,8 @@ def caller_of(request: HTTPConnection, components: Components, given: str | None
     # an unknown id takes as long as a wrong secret: no timing attack on ids
     kept = key.secret_hash if key is not None else hash_of("")
     if not hmac.compare_digest(hash_of(secret), kept) or key is None:
-        raise Problem(401, f"a valid API key is required in the header {HEADER}", headers=_ASK)
+        kind = WrongKey if text else Problem
+        raise kind(401, f"a valid API key is required in the header {HEADER}", headers=_ASK)
     if _expired(key):
         raise Problem(401, f"the API key has expired on {key.expires}", headers=_ASK)
     if key.used is None or datetime.now(UTC) - datetime.fromisoformat(key.used) > timedelta(seconds=USED):
@@ -169,7 +191,7 @@ class Guarded(APIRoute):
 
         async def handler(request: Request) -> Response:
             components = components_of(request)
-            caller = await run_in_threadpool(caller_of, request, components)
+            caller = await admitted(request, components)
             request.state.caller = caller
             GROUP.set(caller.group)
             if not caller.may(scope):

@@ -10,7 +10,7 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from threading import Event
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -183,22 +183,24 @@ def _run(settings: object) -> None:
     from api.jobs.supervisor import Supervisor
     from api.main import create_app
     from api.settings import Settings
+    from api.tls import Certificate
 
     assert isinstance(settings, Settings)
     _log()
     with ExitStack() as held:
         try:
             held.enter_context(alone(settings.data))
+            certificate = None if settings.tls_certificate is None else Certificate(settings.tls_certificate, settings.tls_key)
             crew = _crew(settings.job_workers, settings.lobe_workers)
             service = create_app(settings, supervisor=Supervisor(crew, settings, settings.job_nice))
         except InputError as error:
             _fail(error)
         except OSError as error:
             _fail(InputError("RCSA_IDENT_DATA", error.strerror or "an error", "a folder that can be made and written to"))
-        _listen(service, settings)
+        _listen(service, settings, certificate)
 
 
-def _listen(service: Any, settings: Any) -> None:
+def _listen(service: Any, settings: Any, certificate: Any) -> None:
     import uvicorn
 
     from api.access import TimedHeadProtocol
@@ -206,7 +208,8 @@ def _listen(service: Any, settings: Any) -> None:
 
     fields = {"store": (settings.database and "database by URL") or str(settings.data), "workers": settings.workers}
     log = logging.getLogger("rcsa_ident.service")
-    log.info("starting", extra={"fields": fields | {"address": f"http://{settings.host}:{settings.port}"}})
+    scheme = "http" if certificate is None else "https"
+    log.info("starting", extra={"fields": fields | {"address": f"{scheme}://{settings.host}:{settings.port}"}})
     if not settings.asks_for_keys:
         log.warning("no keys are asked for: everybody on this machine may do everything (RCSA_IDENT_KEYS=on asks for them)")
     # open streams of events and forces would delay the end
@@ -221,11 +224,14 @@ def _listen(service: Any, settings: Any) -> None:
     except OSError as error:
         address = f"{settings.host}:{settings.port}"
         _fail(InputError("RCSA_IDENT_HOST, RCSA_IDENT_PORT", f"{address} ({error.strerror})", "an address of this machine and a free port"))
-    config = uvicorn.Config(service, log_config=None, access_log=False, server_header=False, **limits)
+    believed = {"proxy_headers": bool(settings.proxies), "forwarded_allow_ips": settings.proxies}
+    config = uvicorn.Config(service, log_config=None, access_log=False, server_header=False, **limits, **believed)
+    config.load()
+    config.ssl = None if certificate is None else certificate.context
     uvicorn.Server(config).run(sockets)
 
 
-def _fail(error: InputError) -> None:
+def _fail(error: InputError) -> NoReturn:
     typer.echo(f"error: {error}", err=True)
     raise typer.Exit(2)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import ipaddress
 import os
 from collections.abc import Callable, Mapping
@@ -14,6 +15,8 @@ from rcsa_ident.scaleout import ADDRESS
 
 PREFIX = "RCSA_IDENT_"
 MEGABYTE = 1_000_000
+#: Variables of the same beginning that tests and benchmarks read.
+_OTHERS = ("RCSA_IDENT_NO_SKIPS", "RCSA_IDENT_OBSERVER_RESULT")
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,10 +29,16 @@ class Settings:
         Folder of the embedded store; made where it is missing.
     database : str
         URL of a database in its place, as ``postgresql+psycopg://user@host/name``; empty for SQLite in the data folder.
+    database_file : Path or None
+        File with that URL, so that its password is in no environment.
     host, port
         Where the service listens.
     keys : bool or None
         Whether a key is asked for; None asks for one unless the service listens on loopback alone.
+    tls_certificate, tls_key : Path or None
+        PEM files of certificate and private key; with them the service speaks TLS alone.
+    proxies : str
+        Addresses or networks, separated by commas, that are believed where they say from whom and by which protocol a request came.
     workers : int
         Processes that compute.
     queue : int
@@ -100,9 +109,13 @@ class Settings:
 
     data: Path = field(default_factory=lambda: Path("rcsa-ident-data"))
     database: str = ""
+    database_file: Path | None = None
     host: str = "127.0.0.1"
     port: int = 8000
     keys: bool | None = None
+    tls_certificate: Path | None = None
+    tls_key: Path | None = None
+    proxies: str = ""
     workers: int = field(default_factory=lambda: max(1, min(os.cpu_count() or 1, 8)))
     queue: int = 64
     connections: int = 800
@@ -166,6 +179,18 @@ class Settings:
                 raise InputError(PREFIX + name.upper(), getattr(self, name), f"a number from {least:g} to {most:g}")
         if self.query_seconds < self.work_seconds:
             raise InputError(f"{PREFIX}QUERY_SECONDS", self.query_seconds, f"at least {PREFIX}WORK_SECONDS, {self.work_seconds:g} s")
+        if (self.tls_certificate is None) != (self.tls_key is None):
+            missing = "TLS_KEY" if self.tls_key is None else "TLS_CERTIFICATE"
+            raise InputError(PREFIX + missing, "nothing", "a PEM file, since certificate and private key belong together")
+        for each in filter(None, self.proxies.split(",")):
+            try:
+                ipaddress.ip_network(each.strip(), strict=False)
+            except ValueError:
+                raise InputError(
+                    f"{PREFIX}PROXIES", each.strip(), "addresses or networks separated by commas, as 10.0.0.7,10.1.0.0/16"
+                ) from None
+        if self.database_file is not None:
+            object.__setattr__(self, "database", _url_in(self.database_file, self.database))
         if self.dask and not ADDRESS.fullmatch(self.dask):
             raise InputError(f"{PREFIX}DASK", self.dask, "the address of a Dask scheduler, as tcp://host:8786")
         if self.keys is False and not self.loopback:
@@ -198,7 +223,15 @@ class Settings:
 def from_environment(environment: Mapping[str, str]) -> Settings:
     """Return the settings of ``RCSA_IDENT_DATA``, ``RCSA_IDENT_PORT`` and so on; what is not there keeps its default."""
     given: dict[str, Any] = {}
-    for name, kind in get_type_hints(Settings).items():
+    kinds = get_type_hints(Settings)
+    known = [name.upper() for name in kinds]
+    for name in environment:
+        given_name = name.removeprefix(PREFIX)
+        if name != given_name and given_name not in known and name not in _OTHERS:
+            near = difflib.get_close_matches(given_name, known, 1, 0.5)
+            hint = f"; did you mean {PREFIX}{near[0]}?" if near else ""
+            raise InputError(name, "an unknown setting", f"one that docs/service.md lists{hint}")
+    for name, kind in kinds.items():
         text = environment.get(PREFIX + name.upper(), "").strip()
         if text:
             try:
@@ -209,10 +242,24 @@ def from_environment(environment: Mapping[str, str]) -> Settings:
     return Settings(**given)
 
 
+def _url_in(path: Path, database: str) -> str:
+    """Return the URL that a file holds; no message repeats it, since it may hold a password."""
+    field, allowed = f"{PREFIX}DATABASE_FILE", "a file with one line: the URL of the database"
+    try:
+        lines = path.read_text(encoding="utf-8").split()
+    except (OSError, ValueError):
+        raise InputError(field, f"{path}, which cannot be read", allowed) from None
+    if len(lines) != 1:
+        raise InputError(field, f"{path} with {len(lines)} words", allowed)
+    if database not in ("", lines[0]):
+        raise InputError(field, f"a file beside {PREFIX}DATABASE", "one of the two")
+    return lines[0]
+
+
 def _switch(text: str) -> bool:
     if text.lower() not in ("on", "off", "true", "false", "1", "0"):
         raise ValueError(text)
     return text.lower() in ("on", "true", "1")
 
 
-_READERS: dict[Any, Callable[[str], Any]] = {Path: Path, str: str, int: int, float: float, bool | None: _switch}
+_READERS: dict[Any, Callable[[str], Any]] = {Path: Path, Path | None: Path, str: str, int: int, float: float, bool | None: _switch}

@@ -9,13 +9,13 @@ import logging
 import math
 
 from fastapi import APIRouter, WebSocket
-from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import JSONResponse
 from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocketDisconnect, WebSocketState
 
 from api import problems
 from api.components import Components, ThisService
+from api.connections import network_of
 from api.conventions import guard
 from api.conventions import problems as documented
 from api.live.stream_connection import LINGER, UNEXPECTED, end_of, serve_owner, serve_viewer
@@ -23,7 +23,7 @@ from api.live.stream_opening import open_logger, open_replay
 from api.problems import Problem
 from api.schemas.common import body_of
 from api.schemas.forces import Hello, ReplayHello, StreamHello, StreamsAnswer, StreamSummary, WatchHello
-from api.security import HEADER, Caller, Guarded, WhoAsks, caller_of, is_foreign, new_id
+from api.security import HEADER, Caller, Guarded, WhoAsks, admitted, is_foreign, new_id
 from api.shares import GROUP
 from api.streams.frames import TooLarge, WrongKind, object_of
 from api.streams.session import End, Session
@@ -93,11 +93,11 @@ async def _admit(websocket: HTTPConnection, components: Components) -> Caller | 
     """Return the caller, None where the first message has the key; pages of other origins are refused, whatever the browser would send."""
     if is_foreign(websocket):
         raise Problem(403, "a page of another origin cannot open a stream")
-    where = websocket.client.host if websocket.client is not None else "nobody"
+    where = network_of(websocket.client.host) if websocket.client is not None else "nobody"
     _check_rate(components, f"open {where}")
     if components.settings.asks_for_keys and not websocket.headers.get(HEADER):
         return None
-    return await run_in_threadpool(caller_of, websocket, components)
+    return await admitted(websocket, components)
 
 
 def _check_rate(components: Components, who: str) -> None:
@@ -113,7 +113,7 @@ async def _serve(websocket: WebSocket, components: Components, caller: Caller | 
     kind: type[Hello] = WatchHello if "watch" in data else ReplayHello if "replay" in data else StreamHello
     hello = body_of(kind, raw.encode("utf-8", "replace"))
     if caller is None:
-        caller = await run_in_threadpool(caller_of, websocket, components, hello.key)
+        caller = await admitted(websocket, components, hello.key)
     GROUP.set(caller.group)
     _check_rate(components, caller.id)
     scope = "read" if isinstance(hello, WatchHello) and not caller.may("run") else "run"

@@ -25,10 +25,13 @@ class Hasty(TimedHeadProtocol):
 
 
 @contextmanager
-def listening(app, http=Hasty, counted=None, **further):
+def listening(app, http=Hasty, counted=None, certificate=None):
     """A server on a free port."""
     sockets = listeners("127.0.0.1", 0, counted or Connections())
-    server = uvicorn.Server(uvicorn.Config(app, http=http, ws=SmallHelloProtocol, log_config=None, lifespan="on", **further))
+    config = uvicorn.Config(app, http=http, ws=SmallHelloProtocol, log_config=None, lifespan="on")
+    config.load()
+    config.ssl = certificate and certificate.context
+    server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run, args=(sockets,))
     thread.start()
     try:

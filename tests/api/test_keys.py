@@ -8,7 +8,7 @@ import itertools
 import pytest
 
 from api.client import Client
-from api.components import Rates
+from api.components import MOST_BUCKETS, Rates
 from api.live.jobs import events
 from api.security import SCOPES, Caller
 from tests.api.identifying import job
@@ -229,6 +229,54 @@ def test_an_event_stream_ends_with_its_key(guarded_http, store, machine, monkeyp
     assert "progress" in asyncio.run(followed())
     assert asyncio.run(asyncio.wait_for(withdrawn(), PATIENCE)) == []
     assert http.app.state.components.feeds.places.total == 0
+
+
+def test_wrong_keys_of_an_address_are_slowed_and_the_right_one_is_not(store, tmp_path, monkeypatch):
+    from api.security import make_key
+
+    monkeypatch.setattr("api.main.WRONG_KEYS", (1, 3))
+    key, text = make_key("A", ("read",), "")
+    store.keys.add(key)
+    slept = []
+
+    async def sleep(seconds):
+        slept.append(seconds)
+
+    monkeypatch.setattr("api.security.sleep", sleep)
+    with service(store, tmp_path, keys=True) as http:
+
+        def status(key):
+            return http.get("/v1/machines", headers={} if key is None else {"X-API-Key": key})
+
+        assert [status(text + "x").status_code for _ in range(3)] == [401] * 3
+        assert slept == []
+        told = [status(f"ri_{k:024d}_x") for k in range(2)]
+        assert [each.status_code for each in told] == [429, 429]
+        assert told[0].headers["retry-after"] == "60"
+        assert "wrong API keys" in told[0].json()["detail"]
+        assert len(slept) == 2
+        assert all(0.0 < each <= 60.0 for each in slept)
+        # who has a key, or sends none, is answered at once
+        assert status(text).status_code == 200
+        assert status(None).status_code == 401
+        with http.websocket_connect("/v1/forces/stream") as link:
+            link.send_text('{"watch": "s", "key": "ri_0_x"}')
+            assert link.receive_json()["problem"]["status"] == 429
+        assert len(slept) == 3
+
+
+def test_a_table_of_buckets_is_bounded_whoever_asks():
+    now = itertools.count(0.0, 1e-6)
+    rates = Rates(60, 3, lambda: next(now))
+    for k in range(MOST_BUCKETS + 500):
+        rates.wait(f"address {k}")
+    assert len(rates.buckets) == MOST_BUCKETS
+    # those that were used last stay
+    assert f"address {MOST_BUCKETS + 499}" in rates.buckets
+    # one that is full again needs no entry
+    now = itertools.count(10.0, 1.0)
+    rates.wait("b")
+    assert list(rates.buckets) == ["b"]
 
 
 def test_a_bucket_of_tokens():

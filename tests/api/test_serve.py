@@ -46,6 +46,47 @@ def test_a_setting_that_is_none_is_named(name, value):
         from_environment({f"RCSA_IDENT_{name}": value})
 
 
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [("WORKER", "WORKERS"), ("JOB_WORKER", "JOB_WORKERS"), ("MAX_BODY_BYTE", "MAX_BODY_BYTES"), ("TLS_CERT", "TLS_CERTIFICATE")],
+)
+def test_a_mistyped_setting_is_refused_with_its_nearest_name(name, near):
+    with pytest.raises(InputError, match=f"^RCSA_IDENT_{name}: found an unknown setting, .*; did you mean RCSA_IDENT_{near}\\?$"):
+        from_environment({f"RCSA_IDENT_{name}": "1"})
+
+
+def test_the_database_may_be_told_by_a_file(tmp_path):
+    file = tmp_path / "database"
+    file.write_text("postgresql+psycopg://shop:secret@db/shop\n")
+    found = from_environment({"RCSA_IDENT_DATABASE_FILE": str(file)})
+    assert found.database_url == found.engine_url == "postgresql+psycopg://shop:secret@db/shop"
+    for text, also, words in (
+        (None, "", "cannot be read"),
+        ("", "", "with 0 words"),
+        ("secret\nsecret", "", "with 2 words"),
+        ("secret://a", "b", "beside RCSA_IDENT_DATABASE"),
+    ):
+        file.unlink(missing_ok=True)
+        if text is not None:
+            file.write_text(text)
+        with pytest.raises(InputError, match=f"RCSA_IDENT_DATABASE_FILE: found .*{words}") as error:
+            from_environment({"RCSA_IDENT_DATABASE_FILE": str(file), "RCSA_IDENT_DATABASE": also})
+        assert "secret" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"TLS_CERTIFICATE": "c.pem"}, "RCSA_IDENT_TLS_KEY: found nothing"),
+        ({"TLS_KEY": "k.pem"}, "RCSA_IDENT_TLS_CERTIFICATE: found nothing"),
+        ({"PROXIES": "10.0.0.1,*"}, r"RCSA_IDENT_PROXIES: found \*, allowed is addresses"),
+    ],
+)
+def test_settings_of_the_network_that_do_not_fit(given, words):
+    with pytest.raises(InputError, match=words):
+        from_environment({f"RCSA_IDENT_{name}": value for name, value in given.items()})
+
+
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.0.7", "::", "example.org"])
 def test_keys_are_off_on_loopback_only(host):
     assert from_environment({"RCSA_IDENT_HOST": host}).asks_for_keys
