@@ -332,6 +332,7 @@ class PlannedAnswer(Answer):
     spindle_speed_rpm: float
     axial_depth_mm: float
     stable: bool
+    method: str = Field(description="By which it was judged; zero-order limits are a preview.")
     limit_depth_mm: float | None
     robust_limit_mm: float | None
     margin: float | None = Field(description="Share of the depth by which the limit lies above it.")

@@ -15,6 +15,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.report.summaries import ModeRow, RecordingRow, WholeModeRow, coefficient_rows, mode_rows, two_digits, whole_mode_rows
 from rcsa_ident.stability.advice import Advice, Bound, OperatingPoint, PlannedCut, SpeedWindow
+from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.tested_cuts import Tally
 from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
 
@@ -236,7 +237,8 @@ def show_planned(cuts: Sequence[PlannedCut], name: str) -> None:
         about = f"{escape(name)}: " if name else ""
         verdict = "[green]stable[/]" if cut.stable else "[red]chatter[/]"
         limit = f"limit {1e3 * cut.limit:.2f} mm, margin {100.0 * cut.margin:+.0f} %" if cut.limit < np.inf else "no limit found"
-        words = [f"{about}{to_rpm(cut.spindle_speed):.0f} rev/min, {1e3 * cut.depth:.2f} mm: {verdict}, {limit}"]
+        by = f"{cut.method}, a preview" if cut.method == MethodName.ZERO_ORDER else cut.method
+        words = [f"{about}{to_rpm(cut.spindle_speed):.0f} rev/min, {1e3 * cut.depth:.2f} mm: {verdict} by {by}, {limit}"]
         if cut.probability is not None:
             words.append(f"stable with a probability of {100.0 * cut.probability:.0f} %")
         if cut.robust_limit < np.inf:

@@ -17,7 +17,12 @@ from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.stability.lobes import uncoupled_planes
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.tool_holder.geometry import ToolAssembly
-from rcsa_ident.units import from_hz
+from rcsa_ident.units import from_hz, to_hz
+
+#: Share of the highest frequency from which on a receptance is at its end.
+_END = 0.97
+#: Damping ratio of a tool's own mode, and share of the flexibility below from which on one above the end is told.
+_USUAL_DAMPING, _CRITICAL = 0.03, 0.7
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,6 +41,23 @@ class KnownTip(TipSource):
     def band(self) -> None:
         """A tip that was measured says itself where it ends."""
         return
+
+    @property
+    def ends(self) -> bool:
+        """True where it was measured."""
+        return not isinstance(self.known, TipModes)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Directions in which a measured tip still gives way at its end as it does below a mode, enough for that mode to be the limit."""
+        if isinstance(self.known, TipModes):
+            return ()
+        return tuple(
+            f"the receptance in {row.dof.upper()} ends at {to_hz(self.known.omega[-1]):.0f} Hz with a real part of {1e6 * end:.3g} µm/N, "
+            "as below a mode: true limits may be lower, which a measurement up to higher frequencies would tell"
+            for row, end in zip(self.known.rows, _ends(self.known), strict=True)
+            if end > 0.0
+        )
 
     def lines(self, beyond: float = 1.0) -> FloatArray:
         """Return the frequencies at which it was measured, or those that resolve its modes."""
@@ -57,6 +79,18 @@ class KnownTip(TipSource):
 
     def __str__(self) -> str:
         return f"of one tooling: {self.known}"
+
+
+def _ends(tip: Receptance) -> FloatArray:
+    """Real part at the upper end along X and Y [m/N], 0 where it cannot matter.
+
+    Modes below the end are negative there, so that at least so much comes from modes above. Half of that is left at rest of a mode that
+    lies at 1.4 times the end, and its real part sinks to that over 4 times its damping ratio below zero.
+    """
+    real = np.einsum("nii->ni", tip.values).real
+    end = np.median(real[tip.omega >= _END * tip.omega[-1]], axis=0)
+    matters = 0.5 * end / (4.0 * _USUAL_DAMPING) >= _CRITICAL * -np.minimum(real.min(axis=0), 0.0)
+    return np.where(matters & (end > 0.0), end, 0.0)
 
 
 def measured_tip(

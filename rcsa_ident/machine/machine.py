@@ -44,6 +44,11 @@ class TipSource(Shown, ABC):
         """Lowest and highest frequency at which it is known [rad/s]; None where it is known at all."""
 
     @property
+    def ends(self) -> bool:
+        """Whether it answers at no frequency beyond those that it is known at, as a measurement does."""
+        return False
+
+    @property
     def speed_range(self) -> tuple[float, float] | None:
         """Lowest and highest spindle speed [rad/s] between which it is known how it changes; None where it does not change."""
         return None
@@ -113,11 +118,6 @@ class Machine(TipSource, Drawn):
     @abstractmethod
     def parts(self) -> tuple[FlangePart, ...]:
         """Directions of the flange that feel each other, group by group."""
-
-    @property
-    def ends(self) -> bool:
-        """Whether it answers at no frequency beyond `band`, as a measurement does."""
-        return False
 
     @property
     def turning(self) -> float | None:

@@ -294,6 +294,7 @@ def _planned(cut: PlannedCut) -> dict[str, Any]:
         "spindle_speed_rpm": to_rpm(cut.spindle_speed, 6),
         "axial_depth_mm": cut.depth * 1e3,
         "stable": cut.stable,
+        "method": cut.method,
         "limit_depth_mm": finite(cut.limit, 1e3),
         "robust_limit_mm": finite(cut.robust_limit, 1e3),
         "margin": finite(cut.margin),

@@ -76,19 +76,29 @@ def follow_runs(x, at, values, counts, lengths, levels, front):
     run that has ended); lengths[k] runs of k samples, the last entry those that are longer; levels, the first distinct ones; front,
     shape (k, 3), (start, length, jump behind it) of long runs none of which is both shorter than an earlier one and followed by less.
     """
+    last, length = values[4], counts[3]
     for t in range(x.size):
         value = x[t]
+        if value == last:
+            length += 1
+            continue
         if not math.isfinite(value):
             if counts[0] == 0:
                 counts[1] = at + t
             counts[0] += 1
-        elif counts[3] == 0:
-            values[4], values[6], counts[2], counts[3] = value, value, at + t, 1
-        elif value == values[4]:
-            counts[3] += 1
+            continue
+        if length == 0:
+            values[6] = value
+        elif length == 1 and values[1] < last < values[3] and counts[12] == levels.size:
+            # what nearly every sample of a fine signal is: a run of its own between the extremes
+            lengths[1] += 1
+            values[5] = min(values[5], abs(value - last))
+            counts[13] = max(counts[13], 1)
         else:
-            end_run(abs(value - values[4]), values, counts, lengths, levels, front)
-            values[4], counts[2], counts[3] = value, at + t, 1
+            values[4], counts[3] = last, length
+            end_run(abs(value - last), values, counts, lengths, levels, front)
+        last, length, counts[2] = value, 1, at + t
+    values[4], counts[3] = last, length
 
 
 @numba.njit(cache=True)

@@ -291,6 +291,8 @@ class PlannedCut(Shown):
     power : float [W]
     torque : float [N m]
     removal_rate : float [m^3/s]
+    method : str
+        By which it was judged; zero-order limits are a preview.
     """
 
     spindle_speed: float
@@ -305,6 +307,7 @@ class PlannedCut(Shown):
     power: float
     torque: float
     removal_rate: float
+    method: str
 
     @property
     def stable(self) -> bool:
@@ -320,7 +323,7 @@ class PlannedCut(Shown):
         limit = "no stability limit in the depths asked for" if self.limit == np.inf else f"stability limit {1e3 * self.limit:.2f} mm"
         sure = "" if self.probability is None else f", stable with {100.0 * self.probability:.0f} % probability"
         state = "stable" if self.stable else "chatter"
-        return f"{to_rpm(self.spindle_speed):.0f} rev/min, {1e3 * self.depth:.2f} mm: {state}, {limit}{sure}"
+        return f"{to_rpm(self.spindle_speed):.0f} rev/min, {1e3 * self.depth:.2f} mm: {state} by {self.method}, {limit}{sure}"
 
 
 def planned_cut(
@@ -361,6 +364,7 @@ def planned_cut(
         load.power,
         load.torque,
         load.removal_rate,
+        lobes.method,
     )
 
 

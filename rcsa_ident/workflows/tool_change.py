@@ -403,16 +403,22 @@ def _modes_above(machine: TipSource, tooling: Tooling, omega: FloatArray) -> lis
     What a limit depends on is how negative the real part of the tip's receptance is. A measurement says nothing beyond its end: the
     flange is then held at rest, which leaves the tool-holder's modes about where they are.
     """
-    if not isinstance(machine, Machine):
+    if not (isinstance(machine, Machine) or machine.ends):
         return []
     source, top = machine.at(None), float(omega[-1])
     above = np.arange(top, ABOVE * top, _ABOVE_STEP)
-    known = _lowest_real_part(source.tip(tooling, omega[::-_ABOVE_EVERY][::-1], spread=False))[1]
+
+    def tip(at: FloatArray) -> Receptance:
+        found = source.tip(tooling, at, spread=False)
+        assert not isinstance(found, TipModes)
+        return found
+
+    known = _lowest_real_part(tip(omega[::-_ABOVE_EVERY][::-1]))[1]
     if machine.ends:
         rest = Receptance(above, np.zeros((above.size, 2, 2)), plane("flange"), plane("flange"))
         beyond = couple(tool_holder_receptance(tooling.assembly, above), rest, None).block((Coordinate("tip", Dof.X),))
     else:
-        beyond = source.tip(tooling, above, spread=False)
+        beyond = tip(above)
     where, least = _lowest_real_part(beyond)
     # at the top itself it is the flank of a mode that the limits see
     if where == top or least >= min(CRITICAL * known, 0.0):

@@ -235,6 +235,7 @@ def test_advice_stands_by_the_lobes(shop):
     (lobes,) = client.lobes(id, "T1", speeds=SPEEDS).toolings
     limit = dict(zip(lobes.spindle_speed_rpm, lobes.limit_depth_mm, strict=True))[7000.0]
     (one,) = told.planned
+    assert one.method == "zero-order"
     assert one.limit_depth_mm == pytest.approx(limit, rel=1e-9)
     assert one.margin == pytest.approx(limit / 0.5 - 1.0, rel=1e-9)
     assert one.stable == (limit >= 0.5)

@@ -19,6 +19,7 @@ from rcsa_ident.stability.tip_modes import TipModes
 from tests.fixtures import by_hand
 
 FREQUENCY = np.arange(200.0, 2000.0, 2.0)
+TIP_Y = (Coordinate("tip", Dof.Y),)
 OMEGA = 2.0 * np.pi * FREQUENCY
 SPEEDS = np.array([600.0, 800.0, 1100.0])
 
@@ -79,6 +80,19 @@ def test_a_measured_tip_answers_for_itself_whatever_is_asked():
     ((model, places),) = source.models(SPEEDS)
     assert model is source
     np.testing.assert_array_equal(places, [0, 1, 2])
+
+
+@pytest.mark.parametrize(("own_hz", "flexibility", "told"), [(2600.0, 3.0, True), (12_000.0, 0.05, False), (1500.0, 3.0, False)])
+def test_a_measurement_that_ends_below_the_tools_own_mode_says_so(own_hz, flexibility, told):
+    # a machine's mode that is seen, and the tool's, so many times as flexible
+    frequency = np.arange(20.0, 2001.0, 2.0)
+    modes = normal_modes(
+        2.0 * np.pi * np.array([700.0, own_hz]), np.array([0.04, 0.02]), np.array([[1.0], [flexibility**0.5 * own_hz / 700.0]]), TIP_Y
+    )
+    values = np.asarray(modes.receptance(2.0 * np.pi * frequency).values)[:, 0, 0]
+    noisy = values * (1.0 + 0.02 * np.random.default_rng(1).standard_normal(values.size))
+    found = KnownTip(measured_tip({Dof.Y: (frequency, noisy)})).remarks
+    assert [remark.startswith("the receptance in Y ends at 2000 Hz with a real part of") for remark in found] == [True] * told
 
 
 def test_modes_of_a_tip_stay_modes():

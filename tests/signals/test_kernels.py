@@ -48,3 +48,21 @@ def test_long_sums_keep_their_digits():
     found = _kernels.order_sums(samples, step, order + order // 10)[:, 0] / n
     assert abs(found[order] - 0.5) < 1e-10
     assert np.abs(np.delete(found, order)).max() < 1e-10
+
+
+@pytest.mark.parametrize("kernel", compiled_and_plain("follow_runs"))
+def test_runs_go_on_across_blocks(kernel):
+    x = np.array([1.0, 1.0, 1.0, 2.0, 3.0, 3.0, np.nan, 3.0, 0.5, 4.0, 4.0, 4.0, 2.0])
+    values = np.array([np.inf, np.inf, -np.inf, -np.inf, np.nan, np.inf, np.nan])
+    counts, lengths, levels, front = np.zeros(14, dtype=np.int64), np.zeros(8, dtype=np.int64), np.zeros(3), np.zeros((4, 3))
+    front[0, 1] = 3.0
+    for start in range(0, x.size, 5):
+        kernel(x[start : start + 5], start, values, counts, lengths, levels, front)
+    _kernels.end_run(-1.0, values, counts, lengths, levels, front)
+    # low and the level next to it, high and the level next to it, the last value, the least jump and the first value
+    np.testing.assert_array_equal(values, [0.5, 1.0, 4.0, 3.0, 2.0, 1.0, 1.0])
+    # one lost sample, the seventh; the last run; samples at the levels; runs of three at the extremes; levels; the longest that ended
+    np.testing.assert_array_equal(counts, [1, 6, 12, 1, 1, 3, 3, 3, 0, 0, 1, 3, 3, 3])
+    np.testing.assert_array_equal(lengths, [0, 3, 0, 3, 0, 0, 0, 0])
+    # the last run of three is as long as the one before and followed by less
+    np.testing.assert_array_equal(front[1:4], [[0.0, 3.0, 1.0], [4.0, 3.0, 2.5], [0.0, 0.0, 0.0]])

@@ -117,6 +117,8 @@ def test_a_planned_cut_and_its_way_to_the_limit():
         np.array([1.0, 3.0, 4.0, 1.0, np.inf]) * 1e-3, drawn=np.array([[1.0, 3.0, 1.0, 1.0, 3.0], [1.0, 3.0, 4.0, 1.0, 9.0]]) * 1e-3
     )
     cut = planned_cut(here, PROCESS, SpindleDrive.flat(power=1e3), 700.0, 2e-3, tolerance=0.0)
+    assert cut.method == here.method
+    assert f"stable by {here.method}" in str(cut)
     assert cut.stable
     assert cut.margin == pytest.approx(1.0)
     assert (cut.slower, cut.faster) == (pytest.approx(550.0), pytest.approx(700.0 + 200.0 / 3.0))

@@ -255,6 +255,15 @@ def test_chatter_outside_the_band_is_said():
     assert replace(asked, machine=KnownTip(tip)).remarks(lobes([1e-3], chatter=10.0)) == ()
 
 
+@pytest.mark.parametrize(("top_hz", "told"), [(1000.0, True), (1500.0, True), (2000.0, False), (4000.0, False)])
+def test_a_measured_tip_that_ends_below_the_tools_mode_is_said(top_hz, told):
+    # the tool's first mode on this machine is at 1.7 kHz
+    tip = one_axis().tip(by_hand.tooling(), 2.0 * np.pi * np.arange(100.0, top_hz + 1.0, 5.0), spread=False)
+    found = change(KnownTip(tip), [900.0]).remarks(lobes([1e-3]))
+    starts = [f"the receptance in X ends at {top_hz:.0f} Hz with a real part of", "a mode of this tool-holder at about 1740 Hz lies above"]
+    assert [remark.startswith(start) for remark, start in zip(found, starts, strict=told)] == [True, True] * told
+
+
 def test_what_speaks_against_the_machine_and_the_limits_is_said_once():
     machine = replace(one_axis(), status=Status.SUSPECT, reasons=("few cuts",))
     told = replace(lobes([1e-3]), warnings=("interrupted cut", "interrupted cut"))
