@@ -190,7 +190,9 @@ def _run(settings: object) -> None:
     with ExitStack() as held:
         try:
             held.enter_context(alone(settings.data))
-            certificate = None if settings.tls_certificate is None else Certificate(settings.tls_certificate, settings.tls_key)
+            certificate = None
+            if settings.tls_certificate is not None and settings.tls_key is not None:
+                certificate = Certificate(settings.tls_certificate, settings.tls_key)
             crew = _crew(settings.job_workers, settings.lobe_workers)
             service = create_app(settings, supervisor=Supervisor(crew, settings, settings.job_nice))
         except InputError as error:
