@@ -122,7 +122,7 @@ def test_modules_take_from_each_other_what_there_is(path):
         source = (path.parent / target).resolve()
         assert source in SCRIPTS, target
         for name in (each.strip() for each in names.split(",") if each.strip()):
-            offered = re.search(rf"^export (async )?(function|const|class) {name}\b", source.read_text(), flags=re.MULTILINE)
+            offered = re.search(rf"^export (async )?(function\*?|const|class) {name}\b", source.read_text(), flags=re.MULTILINE)
             assert offered, f"{name} of {target}"
             assert re.search(rf"\b{name}\b", text.replace(statement, "")), f"{name} is not used"
 
