@@ -92,6 +92,7 @@ class SqlJobs:
             cancelled = found.state in OPEN
             if cancelled:
                 connection.execute(update(t).where(*here).values(state="cancelled", finished=when))
+                _drop_texts(connection, id)
                 _append(connection, id, found.events, [Event(0, "end", "")])
             return Job(**connection.execute(select(*_JOB).where(*here)).one()._asdict()), cancelled
 
@@ -140,8 +141,8 @@ class SqlJobs:
                 return False
             names = ("state", "status", "problem", "finished", "seconds")
             connection.execute(update(t).where(t.c.id == id).values({name: getattr(outcome, name) for name in names}))
+            _drop_texts(connection, id)
             for name, text in outcome.texts.items():
-                connection.execute(delete(x).where(x.c.job == id, x.c.name == name))
                 connection.execute(insert(x).values(job=id, name=name, text=text, digest=digest_of(text)))
             _append(connection, id, found.events, [Event(0, "end", "")])
             # a machine that was deleted meanwhile stays deleted
@@ -236,6 +237,11 @@ def _append(connection: Connection, job: str, last: int, events: Sequence[Event]
     connection.execute(insert(e), rows)
     connection.execute(update(t).where(t.c.id == job).values(events=last + len(rows)))
     _measure(connection, job)
+
+
+def _drop_texts(connection: Connection, job: str) -> None:
+    """Drop the inputs of a job that is over: they may be much larger than the request, and nobody reads them again."""
+    connection.execute(delete(tables.job_texts).where(tables.job_texts.c.job == job))
 
 
 def _measure(connection: Connection, job: str) -> None:
