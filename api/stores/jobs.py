@@ -177,7 +177,7 @@ class Jobs(Protocol):
         """Return jobs of a group with the wanted values, before an id ("" for all), newest first."""
 
     def cancel(self, group: str, id: str, when: str) -> tuple[Job, bool] | None:
-        """Cancel an open job, and return the job and whether it was open."""
+        """Cancel an open job, whose inputs are dropped, and return the job and whether it was open."""
 
     def open(self) -> Sequence[Job]:
         """Return all jobs that are queued or running, in the order of their turn: groups take turns, each with its oldest first."""
@@ -201,7 +201,10 @@ class Jobs(Protocol):
         """
 
     def finish(self, id: str, worker: str | None, outcome: Outcome) -> bool:
-        """Store the outcome of a job in one transaction; False where it is over or another worker's. Worker None matches any."""
+        """Store the outcome of a job in one transaction, in the place of its inputs; False where it is over or another worker's.
+
+        Worker None matches any.
+        """
 
     def events(self, id: str, after: int, limit: int) -> Sequence[Event]:
         """Return the events after a number."""

@@ -93,6 +93,7 @@ class SqlJobs:
             if cancelled:
                 connection.execute(update(t).where(*here).values(state="cancelled", finished=when))
                 _forget_partial(connection, id)
+                _drop_texts(connection, id)
                 _append(connection, id, found.events, [Event(0, "end", "")])
             return Job(**connection.execute(select(*_JOB).where(*here)).one()._asdict()), cancelled
 
@@ -152,8 +153,8 @@ class SqlJobs:
             names = ("state", "status", "problem", "finished", "seconds")
             connection.execute(update(t).where(t.c.id == id).values({name: getattr(outcome, name) for name in names}))
             _forget_partial(connection, id)
+            _drop_texts(connection, id)
             for name, text in outcome.texts.items():
-                connection.execute(delete(x).where(x.c.job == id, x.c.name == name))
                 connection.execute(insert(x).values(job=id, name=name, text=text, digest=digest_of(text)))
             _append(connection, id, found.events, [Event(0, "end", "")])
             # a machine that was deleted meanwhile stays deleted
@@ -261,6 +262,11 @@ def _append(connection: Connection, job: str, last: int, events: Sequence[Event]
     connection.execute(insert(e), rows)
     connection.execute(update(t).where(t.c.id == job).values(events=last + len(rows)))
     _measure(connection, job)
+
+
+def _drop_texts(connection: Connection, job: str) -> None:
+    """Drop the inputs of a job that is over: they may be much larger than the request, and nobody reads them again."""
+    connection.execute(delete(tables.job_texts).where(tables.job_texts.c.job == job))
 
 
 def _measure(connection: Connection, job: str) -> None:

@@ -160,6 +160,20 @@ def test_rows_are_not_counted_again_for_every_call(store, machine, monkeypatch):
     store.toolings.put(document("T10", "x" * 1000))
 
 
+@BOTH
+def test_the_inputs_of_a_job_do_not_outlive_it(store, machine):
+    """A question holds the text of its machine, however small the request was that asked it."""
+    texts = {"question": "q" * 100_000}
+    ended, cancelled = (store.jobs.add(job(machine), texts, 9).id for _ in range(2))
+    assert store.usage("A")["jobs"] > 200_000
+    store.jobs.begin(ended, "w", now())
+    store.jobs.finish(ended, "w", Outcome("done", now(), texts={"answer": "found"}))
+    store.jobs.cancel("A", cancelled, now())
+    assert [store.jobs.text(ended, name) for name in ("question", "answer")] == [None, "found"]
+    assert store.jobs.text(cancelled, "question") is None
+    assert store.usage("A")["jobs"] < 3000
+
+
 def test_small_requests_that_store_much_are_counted(tmp_path):
     """Each of these declares a campaign in a kilobyte, and copies four megabytes of toolings into it."""
     with closing(embedded(tmp_path)) as store, service(store, tmp_path) as http:
