@@ -105,6 +105,10 @@ class _Body:
         self.declared = int(text[:20]) if text.isdecimal() and text.isascii() else 0
         self.read = self.declared == 0 and "transfer-encoding" not in request.headers
 
+    def limit(self, most: int) -> None:
+        """Allow no more than this, whatever the settings say."""
+        self.most = self.usual = min(self.usual, most)
+
     async def receive(self) -> Message:
         """Return the next part of the body; raises 413 beyond the limit and 408 where it arrives too slowly."""
         if self.declared <= self.most:

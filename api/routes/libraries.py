@@ -47,7 +47,7 @@ _BODY = {
     "/import",
     summary="Import the toolings of a Fusion 360 or HSM tool library",
     description="JSON, or a .tools container. Entries are independent; existing toolings are skipped unless replace=true.",
-    openapi_extra=guard("upload", requestBody=_BODY, **{"x-content-types": (JSON, ZIP)}),
+    openapi_extra=guard("upload", requestBody=_BODY, **{"x-content-types": (JSON, ZIP), "x-parsed-elsewhere": True}),
     responses=problems(404, *BODY),
 )
 async def import_library(

@@ -87,7 +87,7 @@ def forget(id: MachineId, components: ThisService, caller: WhoAsks, why: Why = "
     "/{id}/identification",
     summary="Write the dynamics of a machine: RESULT.json of `rcsa-ident identify`, or FLANGE.csv of a measured or decoupled flange",
     description="If-Match or If-None-Match: * protect against overwriting concurrent changes.",
-    openapi_extra=guard("upload", requestBody=_RESULT, **{"x-content-types": (JSON, CSV)}),
+    openapi_extra=guard("upload", requestBody=_RESULT, **{"x-content-types": (JSON, CSV), "x-parsed-elsewhere": True}),
     responses={201: {"model": IdentificationSummary, "description": "The machine had none before."}, **problems(404, 412, *BODY)},
 )
 async def identify(

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Generic, TypeVar
+from typing import Annotated, Any, Generic, TypeVar
 
 from fastapi.exceptions import RequestValidationError
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
 #: Names given by users: no paths, no control characters.
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 ._+()-]{0,63}$"
@@ -14,6 +14,8 @@ Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN)]
 Id = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
 #: Free text without control characters, which not every database accepts.
 Line = Annotated[str, StringConstraints(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+#: Keys of a body or of a part of it, and items of one key.
+MOST_KEYS, MOST_ITEMS = 100, 5000
 Item = TypeVar("Item")
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -22,6 +24,18 @@ class Body(BaseModel):
     """Body of a request: unknown keys and non-finite numbers are refused, and types are not coerced."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _few(cls, data: Any) -> Any:
+        """Refuse at once what would have hundreds of thousands of faults, each of which costs a kilobyte."""
+        if isinstance(data, dict):
+            if len(data) > MOST_KEYS:
+                raise ValueError(f"at most {MOST_KEYS} keys are allowed, found {len(data)}")
+            for key, value in data.items():
+                if isinstance(value, list | dict) and len(value) > MOST_ITEMS:
+                    raise ValueError(f"at most {MOST_ITEMS} items are allowed, found {len(value)} in {str(key)[:80]}")
+        return data
 
 
 class Answer(BaseModel):

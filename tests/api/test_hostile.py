@@ -51,6 +51,29 @@ def test_numbers_out_of_reach(http, number):
     problem(http.put("/v1/toolings/t", content=body, headers=JSON), 422)
 
 
+@pytest.mark.parametrize("path", ["/machines", "/tooltip", "/lobes", "/advice", "/forces", "/identifications", "/toolings/drawing"])
+def test_a_large_body_is_refused_before_it_is_parsed(http, path):
+    """A million empty lists take sixty times their text."""
+    told = problem(http.post(f"/v1{path}", content=b"[" + b"[]," * 400_000 + b"[]]", headers=JSON), 413)
+    assert "too large" in told["detail"] or "at most" in told["detail"]
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "words"),
+    [
+        ("/machines/{id}/campaigns", '{"cuts": [' + "[]," * 300_000 + "[]]}", "at most 5000 items are allowed, found 300001 in cuts"),
+        ("/machines/{id}/campaigns", '{"sensors": {' + '"a%d": 0,' * 30_000 % (*range(30_000),) + '"b": 0}}', "found 30001 in sensors"),
+        ("/lobes", "{" + '"a%d": 0,' * 60_000 % (*range(60_000),) + '"b": 0}', "at most 100 keys are allowed, found 60001"),
+        ("/lobes", '{"toolings": [{' + '"a%d": 0,' * 300 % (*range(300),) + '"b": 0}]}', "at most 100 keys are allowed, found 301"),
+    ],
+)
+def test_faults_without_number_are_one_fault(http, path, body, words):
+    machine = http.post("/v1/machines", json={"name": f"m{next(NUMBERS)}"}).json()["id"]
+    told = problem(http.post(f"/v1{path.replace('{id}', machine)}", content=body, headers=JSON), 422)
+    assert any(words in error["allowed"] for error in told["errors"])
+    assert len(told["errors"]) < 10
+
+
 def test_a_number_of_very_many_digits(http):
     problem(http.post("/v1/lobes", content=LOBES % ("1" * 100_000), headers=JSON), 400, 422)
     problem(http.put("/v1/toolings/t", content='{"cutter": {"teeth": %s}}' % ("1" * 100_000), headers=JSON), 413, 422)
