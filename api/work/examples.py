@@ -27,7 +27,7 @@ def make_cut(number: int, cut: Path, air: Path) -> None:
     machine = sample_machine()
     toolings = [read_tooling(path) for path in machine.toolings]
     # each cut has its own share of chance: alone it is what it is among all
-    (made,) = simulate(machine, toolings, 1, lambda run, jobs: [run(list(jobs)[number])])
+    (made,) = simulate(machine, toolings, 1, lambda run, jobs: [run(job) for k, job in enumerate(jobs) if k == number])
     for kind, path in (("cut", cut), ("air", air)):
         write_hdf5(path, machine.sensors.rate, made.records[kind].channels)
         with path.open("rb+") as file:

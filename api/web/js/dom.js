@@ -138,37 +138,37 @@ export function labelled(cell, name, unit = null) {
   return cell;
 }
 
-/** A table; a column is {name, unit, number, cell(row)}; it scrolls inside itself, and on a phone its rows are cards. */
-export function table(caption, columns, rows, { tall = false, row = null } = {}) {
+/** What stands around the rows of a table: it scrolls inside itself, and on a phone its rows are cards; a column is {name, unit, number}. */
+export function tableFrame(caption, columns, body, { tall = false } = {}) {
   const headings = columns.map((c) =>
     h("th", { scope: "col", role: "columnheader", class: c.number ? "number" : null }, c.name, c.unit && h("span", { class: "unit" }, c.unit)),
   );
-  const body = rows.map((each, i) => {
-    const cells = columns.map((c, k) =>
-      labelled(
-        h(
-          k === 0 ? "th" : "td",
-          { class: c.number ? "number" : null, scope: k === 0 ? "row" : null, role: k === 0 ? "rowheader" : "cell" },
-          c.cell(each, i),
-        ),
-        c.name,
-        c.unit instanceof Node ? c.unit : c.unit && h("span", null, c.unit),
-      ),
-    );
-    return h("tr", { role: "row", ...(row ? row(each, i) : null) }, cells);
-  });
+  // what is said twice: laid out as cards, an element is no table any more unless its role says so
+  body.setAttribute("role", "rowgroup");
   return h(
     "div",
     { class: `scrolls${tall ? " tall" : ""}`, tabindex: "0", role: "region", "aria-label": caption },
-    // said twice: laid out as cards, an element is no table any more unless its role says so
     h(
       "table",
       { class: "stacks", role: "table" },
       h("caption", { class: "unseen" }, caption),
       h("thead", { role: "rowgroup" }, h("tr", { role: "row" }, headings)),
-      h("tbody", { role: "rowgroup" }, body),
+      body,
     ),
   );
+}
+
+/** A table; a column is {name, unit, number, cell(row)}. */
+export function table(caption, columns, rows, { tall = false, row = null } = {}) {
+  const body = rows.map((each, i) => {
+    const cells = columns.map((c, k) => {
+      const kind = { class: c.number ? "number" : null, scope: k === 0 ? "row" : null, role: k === 0 ? "rowheader" : "cell" };
+      const unit = c.unit instanceof Node ? c.unit : c.unit && h("span", null, c.unit);
+      return labelled(h(k === 0 ? "th" : "td", kind, c.cell(each, i)), c.name, unit);
+    });
+    return h("tr", { role: "row", ...(row ? row(each, i) : null) }, cells);
+  });
+  return tableFrame(caption, columns, h("tbody", null, body), { tall });
 }
 
 /** Hand a text or a blob to the person as a file. */

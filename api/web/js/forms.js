@@ -4,8 +4,8 @@ import { quantityInput, u } from "./units.js";
 
 let count = 0;
 
-/** A field: `name` is what the service calls it, so that its faults find it. */
-export function field(label, input, { name = "", hint = "", unit = "" } = {}) {
+/** A field: `name` is what the service calls it, so that its faults find it; `double` where long names have to be read in it. */
+export function field(label, input, { name = "", hint = "", unit = "", double = false } = {}) {
   const id = input.id || `f${(count += 1)}`;
   input.id = id;
   const fault = h("div", { class: "fault", id: `${id}-fault`, hidden: true });
@@ -14,7 +14,7 @@ export function field(label, input, { name = "", hint = "", unit = "" } = {}) {
   const control = unit
     ? h("div", { class: "with-unit" }, input, h("span", { class: "unit" }, typeof unit === "string" ? u(unit) : unit))
     : input;
-  return h("div", { class: "field", "data-field": name || null }, h("label", { for: id }, label), control, told, fault);
+  return h("div", { class: double ? "field double" : "field", "data-field": name || null }, h("label", { for: id }, label), control, told, fault);
 }
 
 /** A field for a quantity; its input is `.input`. */

@@ -1,12 +1,14 @@
 // A campaign described by hand, for recordings that come without a campaign.toml.
 import { all, once, post, Problem } from "../api.js";
-import { add, card, empty, fill, h, head, link } from "../dom.js";
+import { add, card, empty, fill, h, head, labelled, link, tableFrame } from "../dom.js";
 import { dropZone } from "../drop.js";
 import { busy, field, quantity, select, showProblem } from "../forms.js";
 import { go, holdsEdits, to } from "../router.js";
 import { allMachines, choose, machine } from "../state.js";
 import { quantityInput, u } from "../units.js";
 import { queueFor } from "../uploads.js";
+
+const SENSOR = ["Channel", "Measures", "Axis", "Sensitivity"];
 
 let kept = [];
 
@@ -99,7 +101,7 @@ export async function view(_args, _query, place) {
   const form = h(
     "form",
     { class: "view", novalidate: true },
-    card("Campaign", null, h("div", { class: "fields" }, field("Name", name, { name: "campaign.name" }), rate)),
+    card("Campaign", null, h("div", { class: "fields" }, field("Name", name, { name: "campaign.name", double: true }), rate)),
     card(
       "Sensors",
       null,
@@ -108,23 +110,10 @@ export async function view(_args, _query, place) {
         { class: "small soft" },
         "Channels by their names in the recordings. Sensitivity in V/m or V/(m/s²); 1 where the file is in SI. Leave a name empty for a channel that is not there.",
       ),
-      h(
-        "div",
-        { class: "scrolls", tabindex: "0", role: "region", "aria-label": "Sensors" },
-        h(
-          "table",
-          null,
-          h(
-            "thead",
-            null,
-            h(
-              "tr",
-              null,
-              ["Channel", "Measures", "Axis", "Sensitivity"].map((c) => h("th", { scope: "col" }, c)),
-            ),
-          ),
-          sensors,
-        ),
+      tableFrame(
+        "Sensors",
+        SENSOR.map((name) => ({ name })),
+        sensors,
       ),
     ),
     card("Workpiece", null, h("div", { class: "fields" }, field("Material", material, { name: "workpiece.name" }), ktc, krc)),
@@ -134,7 +123,7 @@ export async function view(_args, _query, place) {
       h(
         "div",
         { class: "fields" },
-        field("Tooling", common.tooling),
+        field("Tooling", common.tooling, { double: true }),
         common.depth,
         common.feed,
         common.immersion,
@@ -149,27 +138,7 @@ export async function view(_args, _query, place) {
       null,
       dropZone("Drop recordings here", "Names that hold “air” are air cuts of the cut of the same name.", take, { small: true }),
       count,
-      h(
-        "div",
-        { class: "scrolls tall", tabindex: "0", role: "region", "aria-label": "Cuts" },
-        h(
-          "table",
-          null,
-          h(
-            "thead",
-            null,
-            h(
-              "tr",
-              null,
-              h("th", { scope: "col" }, "Cut"),
-              h("th", { scope: "col" }, "Speed", h("span", { class: "unit" }, u("speed"))),
-              h("th", { scope: "col" }, "Tooling"),
-              h("th", { scope: "col" }, "Air cut"),
-            ),
-          ),
-          body,
-        ),
-      ),
+      tableFrame("Cuts", [{ name: "Cut" }, { name: "Speed", unit: u("speed") }, { name: "Tooling" }, { name: "Air cut" }], body, { tall: true }),
     ),
     h("p", null, button),
   );
@@ -190,11 +159,11 @@ export async function view(_args, _query, place) {
     const air = select([["", "none"], ...airs.map((a) => [a, a])], cut.air, { "aria-label": `Air cut of ${cut.id}` });
     const tr = h(
       "tr",
-      null,
-      h("th", { scope: "row" }, cut.id),
-      h("td", null, speed, h("div", { class: "fault", id: `cut-${i}-fault`, hidden: true })),
-      h("td", null, tooling),
-      h("td", null, air),
+      { role: "row" },
+      labelled(h("th", { scope: "row", role: "rowheader" }, cut.id), "Cut"),
+      labelled(h("td", { role: "cell" }, speed, h("div", { class: "fault", id: `cut-${i}-fault`, hidden: true })), "Speed", u("speed")),
+      labelled(h("td", { role: "cell" }, tooling), "Tooling"),
+      labelled(h("td", { role: "cell" }, air), "Air cut"),
     );
     Object.assign(tr, { cut, speed, tooling, air });
     return tr;
@@ -280,13 +249,16 @@ function sensorRow(channel, kind, axis) {
   inputs.channel.value = channel;
   const tr = h(
     "tr",
-    null,
-    Object.values(inputs).map((input) =>
-      h(
-        "td",
-        { "data-field": input === inputs.sensitivity ? `sensors.${channel}.sensitivity` : "" },
-        input,
-        input === inputs.sensitivity ? h("div", { class: "fault", hidden: true }) : null,
+    { role: "row" },
+    Object.values(inputs).map((input, k) =>
+      labelled(
+        h(
+          "td",
+          { role: "cell", "data-field": input === inputs.sensitivity ? `sensors.${channel}.sensitivity` : "" },
+          input,
+          input === inputs.sensitivity ? h("div", { class: "fault", hidden: true }) : null,
+        ),
+        SENSOR[k],
       ),
     ),
   );

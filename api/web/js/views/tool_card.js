@@ -64,6 +64,8 @@ async function versionOf(kind, name) {
 function sheet({ name, machine, keys, question, found, software, versions }) {
   const { cut, speeds } = question;
   const [ofTooling, ofMachine] = versions;
+  // a flange that was measured is taken for exact
+  const ofRecords = machine.identification?.status === "measured" ? "" : " that 95 % of the machines allowed by the records reach";
   return h(
     "article",
     { class: "card tool-card" },
@@ -73,7 +75,7 @@ function sheet({ name, machine, keys, question, found, software, versions }) {
     h(
       "p",
       { class: "small" },
-      "The recommended depth stays 10 % below the limit that 95 % of the machines reach which the records allow, with the speed right within 1 %.",
+      `The recommended depth stays 10 % below the stability limit${ofRecords}, with the speed right within 1 %.`,
       found.recommended_by ? ` Computed by ${found.recommended_by}.` : null,
       found.lowest === null ? null : [" Stable at any of the speeds below ", q("depth", found.lowest), "."],
     ),
@@ -82,7 +84,7 @@ function sheet({ name, machine, keys, question, found, software, versions }) {
     facts([
       ["Machine", machine.name],
       ["Strategy", cut.strategy === "up" ? "up milling" : "down milling"],
-      ["Radial immersion", [`${plain(100 * cut.immersion, 1)} %, `, q("length", cut.immersion * keys.cutter.diameter_mm), " wide"]],
+      ["Radial immersion", [`${plain(100 * cut.immersion, 1)} %, `, q("length", cut.immersion * keys.cutter.diameter_mm, { digits: 2 }), " wide"]],
       ["Feed per tooth", cut.feed_per_tooth_mm === undefined ? "not given" : q("feed", cut.feed_per_tooth_mm)],
       ["Feed direction", cut.feed_direction.replace("-", "−")],
       ["Material", cut.material ?? (cut.ktc_mpa ? q("pressure", cut.ktc_mpa) : "as in the identification")],

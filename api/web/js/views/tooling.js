@@ -112,7 +112,7 @@ export async function view({ name = "" }, query, place) {
       h(
         "div",
         { class: "fields" },
-        field("Name", called, { name: "name", hint: "Letters, digits and . _ + ( ) -" }),
+        field("Name", called, { name: "name", hint: "Letters, digits and . _ + ( ) -", double: true }),
         cutter.teeth,
         cutter.diameter_mm,
         cutter.helix_deg,
