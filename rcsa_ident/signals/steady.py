@@ -94,7 +94,9 @@ def measured_axes(recording: Recording) -> tuple[Dof, ...]:
     return tuple(axis for axis in (Dof.X, Dof.Y) if recording.sensor(Quantity.DISPLACEMENT, axis) is not None)
 
 
-def steady_record(recording: Recording, axes: Sequence[Dof], programmed: float, max_frequency: float, teeth: int) -> SteadyRecord:
+def steady_record(
+    recording: Recording, axes: Sequence[Dof], programmed: float, max_frequency: float, teeth: int, whole: bool = False
+) -> SteadyRecord:
     """Return the steady part of a recording with its speed and lines.
 
     Parameters
@@ -108,6 +110,8 @@ def steady_record(recording: Recording, axes: Sequence[Dof], programmed: float, 
         Highest line.
     teeth : int
         1 for an air cut.
+    whole : bool
+        Look at all of a long recording, not at a window: for who goes through all of it.
 
     Raises
     ------
@@ -121,15 +125,15 @@ def steady_record(recording: Recording, axes: Sequence[Dof], programmed: float, 
     if n < least:
         raise _no_steady_part(f"too short: {n / rate:.3g} s hold fewer than {LEAST_REVOLUTIONS:.0f} revolutions")
     columns = _columns(recording, axes)
-    window = steady_window(recording, columns[: len(axes)], programmed, teeth)
+    window = slice(0, n) if whole else steady_window(recording, columns[: len(axes)], programmed, teeth)
     samples = recording.samples[window][:, columns]
     displacement = samples[:, : len(axes)]
     rough = refine_speed(displacement, rate, programmed)
     steady = steady_part(displacement, rate, rough, teeth)
     if steady.stop - steady.start < least:
         raise _no_steady_part(f"no steady part of at least {LEAST_REVOLUTIONS:.0f} revolutions")
-    whole = steady == slice(0, samples.shape[0])
-    speed = rough if whole else refine_speed(displacement[steady], rate, rough)
+    everything = steady == slice(0, samples.shape[0])
+    speed = rough if everything else refine_speed(displacement[steady], rate, rough)
     lines = line_spectrum(samples[steady], rate, speed, max_frequency)
     part = slice(window.start + steady.start, window.start + steady.stop)
     if part.start:

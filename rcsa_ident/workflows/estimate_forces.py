@@ -148,7 +148,7 @@ def observe(
     assert machine.band is not None
     identified = machine.band
     top = min(identified[1], HIGHEST * 2.0 * np.pi * cut.rate)
-    steady = steady_record(cut, axes, programmed, top / (2.0 * np.pi), teeth)
+    steady = steady_record(cut, axes, programmed, top / (2.0 * np.pi), teeth, whole=True)
     speed = steady.spindle_speed
     notes: list[str] = [*speed_faults(steady.displacement, steady.lines, programmed)]
     _periodic(steady, programmed, notes)
@@ -262,7 +262,7 @@ def _run_out(
     if air is None:
         notes.append(NO_AIR)
         return None
-    still = steady_record(air, axes, programmed, 1.02 * top / (2.0 * np.pi), 1)
+    still = steady_record(air, axes, programmed, 1.02 * top / (2.0 * np.pi), 1, whole=True)
     angle, std = angle_to_air(cut, still, teeth)
     if std > LOOSE_ANGLE:
         notes.append(f"the angle between cut and air cut is known only to {np.degrees(std):.0f}°: run-out is not subtracted")

@@ -15,6 +15,7 @@ from rcsa_ident.io.recordings import StoredSamples, in_si, read_cut, read_record
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.measurement import measure_cut
 from rcsa_ident.signals.recording import LONGEST, Quantity, Recording, Sensor
+from rcsa_ident.signals.steady import steady_record
 from tests.fixtures.recording_formats import FORMATS
 
 pytestmark = pytest.mark.slow(20)
@@ -98,6 +99,9 @@ def test_a_long_recording_is_looked_at_where_it_cuts():
     first, last = (float(word) for word in note.split("from ")[1].split(" s are")[0].split(" to "))
     assert first >= 40.0
     assert last - first == pytest.approx(LONGEST / RATE, rel=1e-3)
+    # who goes through all of it asks for all of it
+    every = steady_record(recording, (Dof.X,), CONDITIONS.spindle_speed, 1000.0, 4, whole=True)
+    assert (every.window, every.part.stop) == (slice(0, samples), samples)
     # lines and trigger tell of the same moment, the record's start
     later = measured(Recording(RATE, recording.samples[800_000:1_000_000], SENSORS))
     turned = []
