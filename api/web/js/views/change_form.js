@@ -23,8 +23,8 @@ export function changeForm({ machine, toolings, materials, kinds, query, onchang
     }),
   );
   const out = query.get("runout")?.split(" ").filter(Boolean).map(Number);
-  const runout = quantityListInput("displacement", out?.length ? out : null, { placeholder: "of each tooth, as 0 8" });
-  fields.runout = field("Run-out", runout, { name: "cut.runout_um", unit: "displacement" });
+  const runout = quantityListInput("displacement", out?.length ? out : null, { placeholder: "0 8 0 8" });
+  fields.runout = field("Run-out, tooth by tooth", runout, { name: "cut.runout_um", unit: "displacement" });
   fields.runout.input = runout;
   const picked = (name, options, usual) => {
     const given = query.get(name) ?? usual;
@@ -97,7 +97,8 @@ export function changeForm({ machine, toolings, materials, kinds, query, onchang
       h("summary", null, "Material, spindle, method"),
       field("Material", material, { name: "cut.material" }),
       source,
-      h("div", { class: "fields" }, ktc, krc, power, torque, deep, field("Method", method, { name: "method" }), fields.runout, mu, land, dent),
+      field("Method", method, { name: "method" }),
+      h("div", { class: "fields" }, ktc, krc, power, torque, deep, fields.runout, land, dent, mu),
       h(
         "p",
         { class: "small soft" },
