@@ -325,44 +325,6 @@ def test_a_holder_of_the_catalogue_takes_the_place_of_the_one_there(opened, clie
     expect(page.locator(".note.bad")).to_contain_text("bore")
 
 
-def test_a_tool_card_prints_on_one_page(opened, shop: str):
-    page = opened(f"#/change?machine={shop}&tooling=T1&im=20")
-    page.get_by_role("link", name="Print tool card").click(timeout=60_000)
-    expect(page.locator("h1")).to_have_text("Tool card: T1")
-    card = page.locator(".tool-card")
-    expect(card).to_contain_text("Recommended cuts", timeout=60_000)
-    said = plain(card.inner_text())
-    for words in ("Shop", "20 %", "down milling", "rcsa-ident", "version 1", "identification"):
-        assert words in said
-    assert card.locator("tbody tr").count() >= 1
-    expect(card.locator("img.drawing")).to_be_visible()
-    assert page.pdf(format="A4").count(b"/Type /Page\n") == 1
-
-
-def test_the_whole_view_takes_what_is_dropped(opened, tmp_path: Path):
-    """Anywhere, and only once; a view that was left takes nothing any more."""
-    page = opened()
-    page.get_by_role("link", name="Toolings").click()
-    page.get_by_role("heading", name="Toolings", level=1).wait_for()
-    (tmp_path / "holiday.toml").write_text("[holiday]")
-    drop(page, "h1", [tmp_path / "holiday.toml"])
-    expect(page.locator("main")).to_contain_text("holiday")
-    assert [r.method for r in opened.watch.requests if "/v1/toolings/holiday" in r.url] == ["PUT"]
-    expect(page.locator("main")).not_to_contain_text("This is what was found")
-
-
-def test_tables_are_cards_on_a_phone(opened, served: Served, shop: str):
-    page = opened(f"#/machines/{shop}", viewport={"width": 390, "height": 844})
-    cell = page.locator("table.stacks tbody tr").first.locator("td").first
-    assert page.evaluate("(e) => getComputedStyle(e, '::before').content", cell.element_handle()) == '"Frequency [Hz]"'
-    assert page.evaluate("() => [...document.querySelectorAll('.scrolls')].every((e) => e.scrollWidth <= e.clientWidth)")
-    # it stays a table for those who hear it
-    expect(page.get_by_role("table").first.get_by_role("columnheader", name="Frequency")).to_have_count(1)
-    page.goto(f"{served.url}/#/toolings/edit/T1")
-    expect(page.get_by_role("cell").first).to_be_visible()
-    assert page.evaluate("() => [...document.querySelectorAll('.scrolls')].every((e) => e.scrollWidth <= e.clientWidth)")
-
-
 def test_names_of_others_are_text(opened, client: Client, served: Served, result: str):
     id = client.make_machine("Named by others", HOSTILE).id
     client.identify(id, result.replace("mode 1", HOSTILE))

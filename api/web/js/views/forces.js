@@ -59,7 +59,7 @@ export async function recordingPicker(here, query, { air = false } = {}) {
     any: campaigns.length > 0,
     which,
     recording,
-    fields: [field("Campaign", which, { name: "campaign" }), field("Recording", recording, { name: "recording" })],
+    fields: [field("Campaign", which, { name: "campaign", double: true }), field("Recording", recording, { name: "recording" })],
   };
 }
 
