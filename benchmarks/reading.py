@@ -23,8 +23,8 @@ import numpy as np
 RATE, SPEED_RPM, TEETH = 51200.0, 8000.0, 4
 NAMES = ("gap_x", "gap_y", "fixture_x", "fixture_y")
 FORMATS = ("wav", "h5", "tdms", "parquet", "uff", "csv")
-#: What a table in text may have; universal files and tables are refused above it [s].
-LONGEST = {"csv": 100.0, "uff": 100.0}
+#: Longer tables and universal files (with times point by point) are refused as larger than 256 MB [s].
+LONGEST = {"csv": 100.0, "uff": 75.0}
 _BLOCK = 1 << 18
 
 
