@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-import signal
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -14,7 +13,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from api.files import Full, no_room
-from api.processes import Child, limit_memory, spawn_context
+from api.processes import Child, limit, limit_memory, spawn_context
 from api.reading import reader_tasks
 from api.work.pool import Busy
 from rcsa_ident.errors import InputError
@@ -151,7 +150,7 @@ class _Reading:
             return "killed", None
         except (EOFError, OSError):
             self.process.join(10.0)
-            return "killed" if self.process.exitcode == -signal.SIGKILL or not self.ready else "costly", None
+            return "killed" if self.process.killed or not self.ready else "costly", None
         return kind, answer
 
     def _receive(self, seconds: float) -> Any:
@@ -168,14 +167,12 @@ class _Reading:
 
 def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None]) -> None:
     """In the process: answer calls until the pipe is closed."""
-    import resource
-
     from rcsa_ident.io.hdf5 import LARGEST_DATA
 
     prepare()
     limit_memory(limits.memory)
     # no file larger than the largest result
-    resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_DATA + LARGEST_DATA // 8,) * 2)
+    limit("RLIMIT_FSIZE", LARGEST_DATA + LARGEST_DATA // 8)
     pipe.send_bytes(b"{}")
     while True:
         try:
@@ -183,7 +180,7 @@ def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None]) -> Non
         except EOFError:
             return
         # CPU time counts from the start of the process
-        resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time() + limits.seconds) + 1, resource.RLIM_INFINITY))
+        limit("RLIMIT_CPU", int(time.process_time() + limits.seconds) + 1, -1)
         pipe.send_bytes(_answer(call, arguments))
 
 
