@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import fcntl
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
+from api.processes import held
 from rcsa_ident.errors import InputError
 
 LOCK = "service.lock"
@@ -60,9 +60,7 @@ def alone(folder: Path) -> Iterator[None]:
         Another service holds it.
     """
     make(folder)
-    with (folder / LOCK).open("a") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError("RCSA_IDENT_DATA", f"{folder}, which another service is using", "a folder of its own") from None
+    with held(folder / LOCK) as first:
+        if not first:
+            raise InputError("RCSA_IDENT_DATA", f"{folder}, which another service is using", "a folder of its own")
         yield

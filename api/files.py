@@ -138,7 +138,7 @@ class Files:
             folder.mkdir(parents=True, exist_ok=True)
             # the names of the folders are on the disk before anything in them counts
             for each in (folder.parent, self.folder, self.folder.parent):
-                _sync_folder(each)
+                sync_folder(each)
         return folder
 
     def path(self, group: str, kind: str, key: str) -> Path:
@@ -186,7 +186,7 @@ class Files:
         """Rename a synced part to its final name, replacing an equal file. The caller holds `lock`."""
         target = self.path(group, kind, key)
         os.replace(source, target)
-        _sync_folder(target.parent)
+        sync_folder(target.parent)
 
     def remove(self, group: str, keys: Iterable[tuple[str, str]]) -> None:
         """Remove files. The caller holds `lock` and has checked that no row refers to them."""
@@ -214,7 +214,7 @@ class Files:
             file.flush()
             os.fsync(file.fileno())
         os.replace(new, target)
-        _sync_folder(target.parent)
+        sync_folder(target.parent)
 
     def forget(self, path: Path) -> None:
         """Remove a resumable upload."""
@@ -274,8 +274,13 @@ def _folder_name(group: str) -> str:
     return hashlib.sha256(group.encode()).hexdigest()[:32]
 
 
-def _sync_folder(folder: Path) -> None:
-    handle = os.open(folder, os.O_RDONLY)
+def sync_folder(folder: Path) -> None:
+    """Return when the names in a folder are on the disk."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except PermissionError:
+        # Windows opens no folders: its file system writes names down by itself
+        return
     try:
         os.fsync(handle)
     finally:

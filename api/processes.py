@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import importlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from multiprocessing.context import SpawnContext, SpawnProcess
 from pathlib import Path
+from types import ModuleType
 from typing import Any
+
+import psutil
 
 #: A child that has lived this long [s] is not counted as one that fails at once.
 LIVED = 60.0
@@ -37,14 +43,49 @@ def follow_parent() -> None:
     threading.Thread(target=follow, daemon=True).start()
 
 
+def _resource() -> ModuleType | None:
+    """The module that limits what a process takes; Windows has none."""
+    try:
+        return importlib.import_module("resource")
+    except ImportError:
+        return None
+
+
+def memory_is_limited() -> bool:
+    """Whether the system keeps a process to the memory that `limit_memory` allows; macOS refuses."""
+    return _resource() is not None and sys.platform != "darwin"
+
+
+def limit(name: str, soft: int, hard: int | None = None) -> None:
+    """In a child: set one of the limits of `resource` by its name, where the system has it; -1 is none."""
+    resource = _resource()
+    if resource is not None:
+        resource.setrlimit(getattr(resource, name), (soft, soft if hard is None else hard))
+
+
 def limit_memory(mebibytes: int) -> None:
     """In a child: let it take so much address space beyond what it has now."""
-    import resource
-
-    taken = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (taken + mebibytes * MEBIBYTE,) * 2)
+    if memory_is_limited():
+        limit("RLIMIT_AS", psutil.Process().memory_info().vms + mebibytes * MEBIBYTE)
     # no core dump of a client's data
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    limit("RLIMIT_CORE", 0)
+
+
+@contextmanager
+def held(path: Path) -> Iterator[bool]:
+    """Hold a file as the only process that does, and yield whether it is; the system lets go of it however the process ends."""
+    import filelock
+
+    lock = filelock.FileLock(path, timeout=0)
+    try:
+        lock.acquire()
+    except filelock.Timeout:
+        yield False
+        return
+    try:
+        yield True
+    finally:
+        lock.release()
 
 
 class Child(SpawnProcess):
@@ -74,6 +115,11 @@ class Child(SpawnProcess):
         # Ctrl-C reaches the whole group of processes: the service takes it and ends its children
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         super().run()
+
+    @property
+    def killed(self) -> bool:
+        """Whether it was ended by force; not by itself, nor by a limit of processor time."""
+        return self.exitcode == -getattr(signal, "SIGKILL", signal.SIGTERM)
 
     def end(self, seconds: float) -> None:
         """Wait for the process, at most so long, then kill it."""

@@ -207,11 +207,14 @@ def _listen(service: Any, settings: Any, certificate: Any) -> None:
 
     from api.access import TimedHeadProtocol
     from api.connections import Connections, SmallHelloProtocol, listeners
+    from api.processes import memory_is_limited
 
     fields = {"store": (settings.database and "database by URL") or str(settings.data), "workers": settings.workers}
     log = logging.getLogger("rcsa_ident.service")
     scheme = "http" if certificate is None else "https"
     log.info("starting", extra={"fields": fields | {"address": f"{scheme}://{settings.host}:{settings.port}"}})
+    if not memory_is_limited():
+        log.warning("this system does not limit the memory of a process: uploads and queries that take too much are ended by time alone")
     if not settings.asks_for_keys:
         log.warning("no keys are asked for: everybody on this machine may do everything (RCSA_IDENT_KEYS=on asks for them)")
     # open streams of events and forces would delay the end

@@ -78,7 +78,7 @@ def write(path: Path, seconds: float) -> None:
         axes = {"abscissa_axis": UffAxis(17, "s"), "ordinate": UffAxis(0, "V")}
         write_uff(path, [UffFunction(1, np.arange(count) / RATE, whole[:, i], title=n, **axes) for i, n in enumerate(NAMES)], True)
     else:
-        with path.open("w") as file:
+        with path.open("w", encoding="utf-8") as file:
             file.write(",".join(NAMES) + "\n")
             for block in signal(seconds):
                 np.savetxt(file, block, fmt="%.7g", delimiter=",")

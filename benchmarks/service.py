@@ -99,7 +99,7 @@ def use(process: int) -> tuple[float, float]:
 def _memory(process: int) -> float:
     """What a process has in memory; of pages that several share, its part [MB]."""
     try:
-        lines = Path(f"/proc/{process}/smaps_rollup").read_text().splitlines()
+        lines = Path(f"/proc/{process}/smaps_rollup").read_text(encoding="utf-8").splitlines()
     except OSError:
         return 0.0
     return sum(int(line.split()[1]) for line in lines if line.startswith("Pss:")) / 1e3

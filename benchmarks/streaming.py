@@ -186,7 +186,7 @@ def told(found: dict[str, Any], count: int, true: np.ndarray, rate: float, besid
 
 def taken() -> float:
     """Return the time that the host of a virtual machine has kept its cores for others [s]."""
-    return int(Path("/proc/stat").read_text().split(maxsplit=9)[8]) / os.sysconf("SC_CLK_TCK")
+    return int(Path("/proc/stat").read_text(encoding="utf-8").split(maxsplit=9)[8]) / os.sysconf("SC_CLK_TCK")
 
 
 def hour(seconds: float) -> None:

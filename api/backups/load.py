@@ -14,7 +14,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from api.backups.members import BLOCK, ENGINE, FORMAT, MANIFEST, MEMBER, STORE, Account, copy, disk, sync
+from api.backups.members import BLOCK, ENGINE, FORMAT, MANIFEST, MEMBER, STORE, Account, copy, disk
+from api.files import sync_folder
 from api.stores.tables import SCHEMA_VERSION
 from rcsa_ident.errors import InputError
 
@@ -38,7 +39,7 @@ def restore(source: Path, data: Path) -> Account:
             account = _extract(source, temporary)
             _check(temporary)
             for folder in (path for path in (temporary, *temporary.rglob("*")) if path.is_dir()):
-                sync(folder)
+                sync_folder(folder)
             _place(temporary, data.absolute())
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
@@ -138,8 +139,8 @@ def _place(folder: Path, data: Path) -> None:
         for name in sorted(os.listdir(inside), key=lambda each: each == STORE):
             os.rename(inside / name, data / name)
         inside.rmdir()
-        sync(data)
-    sync(data.parent)
+        sync_folder(data)
+    sync_folder(data.parent)
 
 
 def _no_backup(found: str) -> InputError:

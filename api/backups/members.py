@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from api.files import NORMALISED, UPLOADS
@@ -55,11 +53,3 @@ def copy(source: Any, target: Any, size: int, digest: Any) -> None:
         digest.update(data)
         target.write(data)
         size -= len(data)
-
-
-def sync(folder: Path) -> None:
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

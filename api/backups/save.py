@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
@@ -16,8 +15,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from api.backups.members import BLOCK, ENGINE, FILES, FORMAT, MANIFEST, STORE, Account, copy, disk, sync
-from api.files import NORMALISED, UPLOADS, Files
+from api.backups.members import BLOCK, ENGINE, FILES, FORMAT, MANIFEST, STORE, Account, copy, disk
+from api.files import NORMALISED, UPLOADS, Files, sync_folder
+from api.processes import held
 from api.stores.sql import open_store
 from rcsa_ident.errors import InputError
 from rcsa_ident.version import __version__
@@ -49,7 +49,7 @@ def backup(data: Path, target: Path) -> Account:
                 file.flush()
                 os.fsync(file.fileno())
             _name(part, target)
-            sync(target.absolute().parent)
+            sync_folder(target.absolute().parent)
         finally:
             part.unlink(missing_ok=True)
     return account
@@ -61,19 +61,17 @@ def _name(part: Path, target: Path) -> None:
         os.link(part, target)
     except FileExistsError:
         raise InputError("FILE.tar", f"{target.name}, which exists already", "the name of a new file") from None
-    except OSError:
-        # a file system without hard links
+    except (AttributeError, OSError):
+        # a system or a file system without hard links
         os.rename(part, target)
 
 
 @contextmanager
 def _alone(data: Path) -> Iterator[Path]:
     """Staging folder on the data's own disk, for one backup at a time; remains of a killed backup are removed."""
-    with (data / "backup.lock").open("a") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError("RCSA_IDENT_DATA", "another backup in progress", "one at a time") from None
+    with held(data / "backup.lock") as first:
+        if not first:
+            raise InputError("RCSA_IDENT_DATA", "another backup in progress", "one at a time")
         for old in data.glob(f"{_STAGING}*"):
             shutil.rmtree(old, ignore_errors=True)
         staging = Path(tempfile.mkdtemp(prefix=_STAGING, dir=data))
@@ -112,8 +110,8 @@ def _link(source: Path, target: Path) -> None:
                 with suppress(FileNotFoundError, FileExistsError):
                     try:
                         os.link(entry.path, there / entry.name)
-                    except PermissionError:
-                        # a file system without hard links
+                    except (AttributeError, PermissionError):
+                        # a system or a file system without hard links
                         shutil.copyfile(entry.path, there / entry.name)
 
 

@@ -15,6 +15,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from api.jobs.backend import JobBackend, Remember
 from api.jobs.job_context import Faulty, JobContext, Outdated, Stopped
 from api.stores.entities import Damaged, Unavailable
@@ -225,8 +227,16 @@ def process(number: int) -> str:
         # after the name in parentheses, which may hold anything: field 3 is the state, field 22 the start time
         fields = Path(f"/proc/{number}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
     except OSError:
-        return f"{number}:"
+        return _elsewhere(number)
     return f"{number}:" if fields[0] == "Z" else f"{number}:{fields[19]}"
+
+
+def _elsewhere(number: int) -> str:
+    """The same of a system without ``/proc``."""
+    try:
+        return f"{number}:{psutil.Process(number).create_time()}"
+    except psutil.Error:
+        return f"{number}:"
 
 
 def gone(identity: str) -> bool:

@@ -9,7 +9,6 @@ import asyncio
 import contextlib
 import json
 import logging
-import signal
 import tempfile
 import time
 from collections.abc import Callable
@@ -20,7 +19,7 @@ from typing import Any
 
 from api.confinement import Confinement, confine
 from api.files import Full, no_room
-from api.processes import Child, follow_parent, limit_memory, spawn_context
+from api.processes import Child, follow_parent, limit, limit_memory, spawn_context
 from api.reading import reader_tasks
 from api.reading.room import Room
 from api.shares import FairThreads
@@ -165,7 +164,7 @@ class _Reading:
             return "killed", None
         except (EOFError, OSError):
             self.process.join(10.0)
-            return "killed" if self.process.exitcode == -signal.SIGKILL or not self.ready else "costly", None
+            return "killed" if self.process.killed or not self.ready else "costly", None
         finally:
             self.room.clear()
         return kind, answer
@@ -197,14 +196,12 @@ class _Reading:
 
 def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None], room: Room) -> None:
     """In the process: answer calls until the pipe is closed."""
-    import resource
-
     from rcsa_ident.io.channels import LARGEST_STORED
 
     prepare()
     limit_memory(limits.memory)
     # no file larger than the largest result
-    resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_STORED + LARGEST_STORED // 8,) * 2)
+    limit("RLIMIT_FSIZE", LARGEST_STORED + LARGEST_STORED // 8)
     tempfile.tempdir = str(room.made)
     held = confine([room.given], [room.made])
     # a thread that ran before would not be cut off
@@ -216,7 +213,7 @@ def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None], room: 
         except EOFError:
             return
         # CPU time counts from the start of the process
-        resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time() + limits.seconds) + 1, resource.RLIM_INFINITY))
+        limit("RLIMIT_CPU", int(time.process_time() + limits.seconds) + 1, -1)
         pipe.send_bytes(_answer(call, arguments))
 
 

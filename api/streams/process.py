@@ -101,7 +101,7 @@ async def _received(reader: asyncio.StreamReader) -> Message:
 
 def serve(connection: socket.socket) -> None:
     """Answer messages until the service closes its end."""
-    with contextlib.suppress(OSError), open("/proc/self/comm", "w") as name:
+    with contextlib.suppress(OSError), open("/proc/self/comm", "w", encoding="utf-8") as name:
         # its name in `ps` and `top`
         name.write("rcsa-streams")
     from rcsa_ident.workflows.compile_kernels import STEPS

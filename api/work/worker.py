@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -94,7 +93,7 @@ class Worker:
                 kind, answer = self.pipe.recv() if self.pipe.poll(self.limits.seconds) else ("too long", None)
         except (EOFError, OSError):
             self.process.join(10.0)
-            if self.process.exitcode != -signal.SIGKILL:
+            if not self.process.killed:
                 # a library that ends the process where it gets no memory
                 kind = "too large"
         self.fit = kind in ("answer", "raised")

@@ -77,7 +77,7 @@ def the_next_honest_one_is_read(campaign):
 
 def peak(reader: Reader) -> int:
     """Most memory that the process has held [bytes]."""
-    lines = Path(f"/proc/{reader.child.process.pid}/status").read_text().splitlines()
+    lines = Path(f"/proc/{reader.child.process.pid}/status").read_text(encoding="utf-8").splitlines()
     return int(next(line for line in lines if line.startswith("VmHWM")).split()[1]) << 10
 
 

@@ -194,7 +194,7 @@ def test_a_call_sees_its_files_alone(reader, tmp_path):
 
 
 def _read(path):
-    return Path(path).read_text()
+    return Path(path).read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
