@@ -101,13 +101,16 @@ def _close_files(libc: ctypes.CDLL, readable: Iterable[Path], writable: Iterable
         _allow(libc, rules, readable, (_READ_FILE | _READ_FOLDER) & rights)
         _allow(libc, rules, writable, (_FOR_A_FILE | _READ_FOLDER | _REMOVE_FILE | _MAKE_FILE) & rights)
         return libc.syscall(_RESTRICT_SELF, rules, 0) == 0
+    except OSError:
+        # better open, and said to be, than without what it needs
+        return False
     finally:
         os.close(rules)
 
 
 def _allow(libc: ctypes.CDLL, rules: int, paths: Iterable[Path], rights: int) -> None:
     for path in paths:
-        with contextlib.suppress(FileNotFoundError, PermissionError):
+        with contextlib.suppress(FileNotFoundError):
             place = os.open(path, os.O_PATH | os.O_CLOEXEC)
             try:
                 beneath = struct.pack("=Qi", rights if path.is_dir() else rights & _FOR_A_FILE, place)

@@ -5,13 +5,11 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from pathlib import Path
 
 import pytest
 
 from api.client import Client
 from tests.api.identifying import uploaded
-from tests.fixtures import other_system
 from tests.fixtures.paths import ROOT
 from tests.fixtures.service import command, example, serving
 from tests.fixtures.waiting import PATIENCE
@@ -20,7 +18,7 @@ from tests.fixtures.waiting import PATIENCE
 @pytest.fixture
 def elsewhere(tmp_path) -> dict[str, str]:
     """Settings of processes that find themselves on another system."""
-    shutil.copyfile(Path(other_system.__file__), tmp_path / "sitecustomize.py")
+    shutil.copyfile(ROOT / "tests" / "fixtures" / "other_system.py", tmp_path / "sitecustomize.py")
     return {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
 
 
