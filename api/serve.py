@@ -180,7 +180,8 @@ def _run(settings: object) -> None:
     with ExitStack() as held:
         try:
             held.enter_context(alone(settings.data))
-            certificate = None if settings.tls_certificate is None else Certificate(settings.tls_certificate, settings.tls_key)
+            files = settings.tls_certificate, settings.tls_key
+            certificate = Certificate(files[0], files[1]) if files[0] and files[1] else None
             service = create_app(settings, supervisor=Supervisor(settings.job_workers, job_worker, settings, settings.job_nice))
         except InputError as error:
             _fail(error)

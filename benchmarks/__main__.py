@@ -17,7 +17,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 #: Each is a module with ``run() -> list of rows``.
 CLAIMS = ("candidate", "lobes", "stability", "observer", "real_files", "service", "uploads", "published_modes", "bad_input")
 #: Each is a module with ``main(arguments)``.
-STUDIES = ("study", "search_trace", "lobes_truth", "tested_cuts", "first_page", "streaming", "live_chart", "durability", "recommendation")
+STUDIES = (
+    "study", "search_trace", "lobes_truth", "tested_cuts", "first_page", "streaming",
+    "live_chart", "durability", "recommendation", "hostile",
+)  # fmt: skip
 
 
 def main() -> None:
