@@ -28,6 +28,7 @@ STUDIES = (
     "durability",
     "recommendation",
     "reading",
+    "hostile",
 )
 
 
