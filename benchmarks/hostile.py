@@ -162,13 +162,13 @@ def _cost(port: int, process: int, words: str, method: str, path: str, headers: 
 
 
 def _seconds(process: int) -> float:
-    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    fields = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _peak(process: int, anew: bool = False) -> float:
     """Most memory that the process has had since the peak was set to what it has now [MB]."""
     if anew:
-        Path(f"/proc/{process}/clear_refs").write_text("5")
-    lines = Path(f"/proc/{process}/status").read_text().splitlines()
+        Path(f"/proc/{process}/clear_refs").write_text("5", encoding="utf-8")
+    lines = Path(f"/proc/{process}/status").read_text(encoding="utf-8").splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM:")) / 1e3
