@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from api.components import ThisService
@@ -101,12 +101,18 @@ def get(name: ToolingName, request: Request, parts: ThisService, caller: WhoAsks
         **problems(404, 422),
     },
 )
-def drawing(name: ToolingName, request: Request, parts: ThisService, caller: WhoAsks) -> Response:
+def drawing(
+    name: ToolingName,
+    request: Request,
+    parts: ThisService,
+    caller: WhoAsks,
+    brief: Annotated[bool, Query(description="As small as a stamp: with the stickout as its only words.")] = False,
+) -> Response:
     document = found_or_404(parts.store.toolings.get(caller.group, name), "tooling")
     if unchanged(request, document.digest):
         return Response(status_code=304, headers=tagged(document.digest))
     headers = tagged(document.digest) | _ALONE
-    return Response(tooling_svg(tooling_of(document.text)), media_type=SVG, headers=headers)
+    return Response(tooling_svg(tooling_of(document.text), brief), media_type=SVG, headers=headers)
 
 
 @router.post(

@@ -95,8 +95,14 @@ class _Sheet:
             self.parts.append(f'<polygon class="arrow" points="{points}"/>')
 
 
-def tooling_svg(tooling: Tooling) -> str:
+def tooling_svg(tooling: Tooling, brief: bool = False) -> str:
     """Return the drawing of a tooling as SVG text.
+
+    Parameters
+    ----------
+    tooling : Tooling
+    brief : bool
+        With the stickout as its only words, in letters that read where the drawing is as small as a stamp.
 
     Notes
     -----
@@ -108,7 +114,7 @@ def tooling_svg(tooling: Tooling) -> str:
     nose, tail = 1e3 * assembly.stickout, 1e3 * assembly.tool_length
     flange = nose + 1e3 * assembly.holder_length
     widest = max(1e3 * max(s.diameter, s.end) for s in (*assembly.tool, *assembly.holder))
-    sheet = _Sheet(letters=max(flange, tail, 2.0 * widest) / 52.0)
+    sheet = _Sheet(letters=max(flange, tail, 2.0 * widest) / (14.0 if brief else 52.0))
     tool, holder = list(_places(assembly.tool, 0.0)), list(_places(assembly.holder, nose))
     for x, segment in holder:
         _draw_holder(sheet, x, segment)
@@ -126,11 +132,14 @@ def tooling_svg(tooling: Tooling) -> str:
         sheet.polygon("hidden", outline, _dashes(sheet, 0.5, 0.4))
     if assembly.contact is not None and assembly.insertion > 0.0:
         _draw_contact(sheet, tool, nose, tail)
-    over = 1.5 * sheet.letters
+    over = (0.4 if brief else 1.5) * sheet.letters
     sheet.line("axis", -over, 0.0, max(flange, tail) + over, 0.0, dashes=(2.0, 0.4, 0.3, 0.4))
+    if brief:
+        sheet.dimensions([("stickout", 0.0, nose)], sheet.bottom + sheet.letters)
+        return _page(sheet, tooling, nose, flange, brief)
     _diameters(sheet, tooling, tool, holder, nose)
     _lengths(sheet, tool, holder, nose, tail, flange)
-    return _page(sheet, tooling, nose, flange)
+    return _page(sheet, tooling, nose, flange, brief)
 
 
 def _places(segments: Sequence[BeamSegment], start: float) -> Iterator[tuple[float, BeamSegment]]:
@@ -228,7 +237,7 @@ def _lengths(
         y = max(y + 1.9 * sheet.letters, sheet.bottom + 1.5 * sheet.letters)
 
 
-def _page(sheet: _Sheet, tooling: Tooling, nose: float, flange: float) -> str:
+def _page(sheet: _Sheet, tooling: Tooling, nose: float, flange: float, brief: bool) -> str:
     cutter, assembly = tooling.cutter, tooling.assembly
     teeth = f"{cutter.teeth} teeth" if cutter.teeth > 1 else "1 tooth"
     words = f"{teeth}, Ø{_figure(1e3 * cutter.diameter)}, helix {_figure(math.degrees(cutter.helix))}°"
@@ -240,11 +249,12 @@ def _page(sheet: _Sheet, tooling: Tooling, nose: float, flange: float) -> str:
     if contact is not None:
         stiffness = f"{1e-9 * contact.translational_stiffness:.3g} GN/m, {1e-6 * contact.rotational_stiffness:.3g} MN m/rad"
         joined = f"contact {stiffness} per m of insertion"
-    left, y = sheet.left, sheet.top - 5.6 * sheet.letters
-    sheet.text(tooling.name, left, y, anchor="start", size=1.5)
-    sheet.text(f"{words}; {scale}", left, y + 1.9 * sheet.letters, "small", "start")
-    sheet.text(joined, left, y + 3.5 * sheet.letters, "small" if contact is None else "joint", "start")
-    margin = 1.5 * sheet.letters
+    if not brief:
+        left, y = sheet.left, sheet.top - 5.6 * sheet.letters
+        sheet.text(tooling.name, left, y, anchor="start", size=1.5)
+        sheet.text(f"{words}; {scale}", left, y + 1.9 * sheet.letters, "small", "start")
+        sheet.text(joined, left, y + 3.5 * sheet.letters, "small" if contact is None else "joint", "start")
+    margin = (0.4 if brief else 1.5) * sheet.letters
     x, top = sheet.left - margin, sheet.top - margin
     width, height = sheet.right - sheet.left + 2.0 * margin, sheet.bottom - sheet.top + 2.0 * margin
     box = f"{_mm(x)} {_mm(top)} {_mm(width)} {_mm(height)}"

@@ -185,3 +185,15 @@ def test_one_bore_through_several_segments_has_one_label():
 def test_the_same_tooling_gives_the_same_drawing():
     assert tooling_svg(plain()) == tooling_svg(plain())
     assert "prefers-color-scheme:dark" in tooling_svg(plain())
+
+
+@pytest.mark.parametrize("path", TOOLINGS, ids=[p.stem for p in TOOLINGS])
+def test_a_brief_drawing_reads_where_it_is_small(path):
+    """The same shapes with one dimension, whose letters are a twentieth of the picture's width at least."""
+    tooling = read_tooling(path)
+    whole, brief = drawn(tooling), ElementTree.fromstring(tooling_svg(tooling, brief=True))
+    assert polygons(brief, "tool") == polygons(whole, "tool")
+    assert polygons(brief, "holder") == polygons(whole, "holder")
+    (text,) = brief.iter(f"{SVG}text")
+    assert float((text.text or "").removeprefix("stickout ")) == pytest.approx(1e3 * tooling.assembly.stickout, abs=0.01)
+    assert float(text.get("font-size", "0")) > float(brief.get("viewBox", "").split()[2]) / 20.0

@@ -36,10 +36,10 @@ export function picture(words) {
   return image;
 }
 
-/** The drawing of a tooling of the library. */
-export function libraryDrawing(name) {
+/** The drawing of a tooling of the library; a `brief` one reads where it is small. */
+export function libraryDrawing(name, { brief = false } = {}) {
   const image = picture(`Drawing of ${name}, to scale`);
-  send("GET", `toolings/${encodeURIComponent(name)}/drawing`)
+  send("GET", `toolings/${encodeURIComponent(name)}/drawing${brief ? "?brief=true" : ""}`)
     .then((answer) => answer.text())
     .then((text) => image.show(text))
     .catch(() => image.remove());

@@ -22,7 +22,7 @@ export function headline(found, question) {
   const cards = found.lobes.length;
   const articles = found.lobes.map((lobes, i) => {
     const [best, ...further] = recommended(found, i);
-    const drawing = h("div", { class: "mini" }, libraryDrawing(lobes.tooling));
+    const drawing = h("div", { class: "mini" }, libraryDrawing(lobes.tooling, { brief: true }));
     const key = h("span", { class: `key line ${SERIES[i % SERIES.length]}`, "aria-hidden": "true" });
     if (!best && isPreview(found, i)) {
       return h(
