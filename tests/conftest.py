@@ -8,6 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# chance has a seed: what is drawn is the same at every run, until a test changes
+settings.register_profile("seeded", derandomize=True)
+settings.load_profile("seeded")
 
 # one thread per test process: small matrices gain nothing from more, and lose much where processes share the cores
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):

@@ -29,7 +29,7 @@ def test_an_example_is_made_and_goes_as_a_whole(http, client):
     # the files count as every upload does
     stored = sum(each.size_bytes for each in client.recordings(made.campaign))
     files = http.app.state.components.files
-    assert stored < files.used("local") < LARGEST
+    assert stored < sum(files.usage("local").values()) < LARGEST
     # asked again, it is the same one
     assert client.make_example() == made
     client.write_tooling("Example S4-shrink", client.tooling_file("Example S4-shrink") + "# ours\n")
@@ -37,7 +37,7 @@ def test_an_example_is_made_and_goes_as_a_whole(http, client):
     assert list(client.machines()) == []
     # what somebody has changed stays
     assert [t.name for t in client.toolings()] == ["Example S4-shrink"]
-    assert files.used("local") == 0
+    assert sum(files.usage("local").values()) == 0
     assert refused(404, client.forget_example)
     # and again from the beginning
     assert client.make_example() == made

@@ -15,7 +15,8 @@ from api.stores.campaigns import Campaign, Recording
 from api.stores.entities import Document, Machine, NoRoom, digest_of
 from api.stores.jobs import Applied, Event, Outcome
 from api.stores.sql import open_store
-from api.work.toolings import LARGEST, toml_of
+from api.work.toolings import LARGEST
+from rcsa_ident.io.toml_text import toml_of
 from tests.api.identifying import job, running
 from tests.api.in_process import BOTH, embedded, refused, service
 from tests.api.recordings import TOOLING, content, declared

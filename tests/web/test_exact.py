@@ -19,7 +19,8 @@ from playwright.sync_api import Page, Route, expect
 #: What a method takes minutes for.
 SLOW = "method=semi-discretisation&from=3000&to=15000&step=10"
 #: Points of another method that are drawn over the preview.
-POINTS = """() => (document.querySelector('.chart.lobes').data ?? []).filter((t) => t.mode === 'lines+markers').map((t) => t.x.length)"""
+POINTS = """() => (document.querySelector('.chart.lobes .plot').data ?? [])
+  .filter((t) => t.mode === 'lines+markers').map((t) => t.x.length)"""
 
 
 def job_of(page: Page, opened: Callable[..., Page]) -> str:
@@ -63,7 +64,7 @@ def test_the_whole_answer_is_the_services(opened, client: Client, shop: str):
     cut = {"immersion": 0.5, "strategy": "down", "feed_direction": "+X", "feed_per_tooth_mm": 0.1}
     speeds = {"from_rpm": 8000, "to_rpm": 9000, "step_rpm": 250}
     (wanted,) = client.lobes(shop, "T1", cut=cut, speeds=speeds, method="full-discretisation").toolings
-    drawn = page.evaluate("document.querySelector('.chart.lobes').data.find((t) => t.name === 'T1').y")
+    drawn = page.evaluate("document.querySelector('.chart.lobes .plot').data.find((t) => t.name === 'T1').y")
     assert list(drawn) == pytest.approx([10.0 if depth is None else depth for depth in wanted.limit_depth_mm], rel=1e-12)
     expect(best).to_have_attribute("data-rpm", f"{wanted.recommended[0].spindle_speed_rpm:g}")
     expect(page.locator(".standing")).to_be_hidden()

@@ -41,7 +41,8 @@ def test_from_an_empty_page_to_a_best_speed(opened, client: Client, served: Serv
     expect(page.locator(".mark.busy")).to_be_visible()
     expect(page.get_by_text("drawing …")).to_have_count(0)
     # another tab knows of it without having begun it, and leads there
-    other = opened("#/change")
+    (example,) = (machine.id for machine in client.machines() if machine.example)
+    other = opened(f"#/change?machine={example}")
     expect(other.locator("#steps .state", has_text=re.compile("running|waiting"))).to_be_visible()
     expect(other.get_by_role("link", name="To the running identification")).to_be_visible()
     other.close()

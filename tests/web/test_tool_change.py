@@ -68,7 +68,7 @@ def test_tested_cuts_stand_beside_the_limit(opened, client: Client, shop: str, t
     )
     expect(page.locator(".tested-cuts .legend li")).to_have_text(["○stable", "✕chatter"])
     # the deepest cut is in the picture
-    assert page.evaluate("document.querySelector('.chart.lobes').layout.yaxis.range[1]") > 30.0
+    assert page.evaluate("document.querySelector('.chart.lobes .plot').layout.yaxis.range[1]") > 30.0
     chosen(page, ROOT / "api" / "examples" / "CUTS.csv")
     expect(page.locator(".tested-cuts .legend li")).to_have_text(["○stable", "✕chatter", "△marginal"])
     expect(told.first).to_contain_text("1 marginal")

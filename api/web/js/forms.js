@@ -10,7 +10,8 @@ export function field(label, input, { name = "", hint = "", unit = "", double = 
   input.id = id;
   const fault = h("div", { class: "fault", id: `${id}-fault`, hidden: true });
   const told = hint ? h("div", { class: "hint", id: `${id}-hint` }, hint) : null;
-  if (hint) input.setAttribute("aria-describedby", `${id}-hint`);
+  // a fault that is told there is read with the field
+  input.setAttribute("aria-describedby", hint ? `${id}-hint ${id}-fault` : `${id}-fault`);
   const control = unit
     ? h("div", { class: "with-unit" }, input, h("span", { class: "unit" }, typeof unit === "string" ? u(unit) : unit))
     : input;

@@ -161,7 +161,7 @@ function onerror(place, error) {
   if (error.name === "AbortError") return;
   if (!(error instanceof Problem)) console.error(error);
   const words = error.status === 404 ? "It is not there, or belongs to another group." : error.message;
-  fill(place, note("bad", h("h2", null, "This cannot be shown"), words, h("p", null, h("a", { href: to("") }, "To the machines"))));
+  fill(place, note("bad", h("h1", null, "This cannot be shown"), words, h("p", null, h("a", { href: to("") }, "To the machines"))));
 }
 
 async function refresh(moved = false) {

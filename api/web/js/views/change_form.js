@@ -3,7 +3,7 @@ import { h, fill } from "../dom.js";
 import { field, quantity, select } from "../forms.js";
 import { asAddress, fromAddress } from "../tested.js";
 import { plain, q, quantityListInput, text, unit } from "../units.js";
-import { bodyOf, checked, NUMBERS, QUICK } from "./change_question.js";
+import { bodyOf, checked, NUMBERS, QUICK, runoutOf } from "./change_question.js";
 
 const MOST = 12;
 /** What is folded away until an address says something of it. */
@@ -22,8 +22,7 @@ export function changeForm({ machine, toolings, materials, kinds, query, onchang
       return [key, quantity(label, kind, given === null || given === "" ? usual : Number(given), { name })];
     }),
   );
-  const out = query.get("runout")?.split(" ").filter(Boolean).map(Number);
-  const runout = quantityListInput("displacement", out?.length ? out : null, { placeholder: "0 8 0 8" });
+  const runout = quantityListInput("displacement", runoutOf(query), { placeholder: "0 8 0 8" });
   fields.runout = field("Run-out, tooth by tooth", runout, { name: "cut.runout_um", unit: "displacement" });
   fields.runout.input = runout;
   const picked = (name, options, usual) => {

@@ -32,6 +32,12 @@ export const NUMBERS = [
 /** Most that an edge may stand out [µm]. */
 const OUT = 1000;
 
+/** Run-out tooth by tooth as an address says it [µm]; null where it says none. */
+export function runoutOf(query) {
+  const out = query.get("runout")?.split(" ").filter(Boolean).map(Number);
+  return out?.length ? out : null;
+}
+
 export function bodyOf(id, names, fields, { strategy, direction, method, material, tested }) {
   const value = (key) => fields[key].input.base;
   const cut = { immersion: value("im") / 100, strategy, feed_direction: direction };

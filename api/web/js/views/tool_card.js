@@ -5,7 +5,7 @@ import { libraryDrawing } from "../drawing.js";
 import { followLobes } from "../jobs.js";
 import { to } from "../router.js";
 import { plain, q, u } from "../units.js";
-import { bodyOf, NUMBERS, QUICK } from "./change_question.js";
+import { bodyOf, NUMBERS, QUICK, runoutOf } from "./change_question.js";
 import { limitOf } from "./headline.js";
 
 export async function view(_args, query, place) {
@@ -37,6 +37,7 @@ export async function view(_args, query, place) {
 function questionOf(query, id, name) {
   const given = (key, usual) => (query.get(key) ? Number(query.get(key)) : usual);
   const fields = Object.fromEntries(NUMBERS.map(([key, , usual]) => [key, { input: { base: given(key, usual) } }]));
+  fields.runout = { input: { base: runoutOf(query) } };
   return bodyOf(id, [name], fields, {
     strategy: query.get("st") ?? "down",
     direction: query.get("fd") ?? "+X",
