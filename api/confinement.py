@@ -47,7 +47,7 @@ class Confinement:
     files : bool
         It opens nothing but what it was told. From version 6 of Landlock it sends no signals either.
     network : bool
-        It makes no socket of any kind, starts no program and looks into no other process.
+        It makes no socket that leads out of it, starts no program and looks into no other process.
     """
 
     files: bool = False

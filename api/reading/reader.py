@@ -9,6 +9,7 @@ import asyncio
 import contextlib
 import json
 import logging
+import shutil
 import tempfile
 import time
 from collections.abc import Callable
@@ -70,7 +71,7 @@ class Reader:
     prepare : callable
         Called first in the process, without limits.
     folder : Path, optional
-        On the disk of the uploads, for the files of a call.
+        On the disk of the uploads, for the files of a call; nothing else is in it.
     """
 
     def __init__(self, limits: Limits, queue: int, prepare: Callable[[], None] = reader_tasks.warm, folder: Path | None = None) -> None:
@@ -79,6 +80,9 @@ class Reader:
         self.child: _Reading | None = None
 
     def start(self) -> None:
+        if self.folder is not None:
+            # rooms of a service that was killed hold on to files that may be deleted since
+            shutil.rmtree(self.folder, ignore_errors=True)
         self.threads = FairThreads(1, "reader")
         self.child = child = self._new()
         # what holds is said at the service's start, not at its first upload

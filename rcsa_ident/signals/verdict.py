@@ -76,7 +76,8 @@ class Verdict(Shown):
 
 
 def examined(recording: Recording) -> Verdict:
-    """Return what the samples themselves say, in one pass over them: why they are left out (`raw_faults`), and notes (`implausible`)."""
+    """Return what the samples themselves say, in one pass over them: why they are left out (lost, frozen, saturated, silent), and what
+    speaks for a wrong unit or sensitivity: motion that no spindle makes, or that no sensor resolves."""
     columns = [i for i, sensor in enumerate(recording.sensors) if sensor.quantity in PLAUSIBLE]
     reasons, notes = [], []
     for i, found in zip(columns, scan(recording, columns), strict=True):
@@ -105,11 +106,6 @@ def examined(recording: Recording) -> Verdict:
 def raw_faults(recording: Recording) -> tuple[Remark, ...]:
     """Return what is wrong with the samples themselves: lost, frozen, saturated, silent."""
     return examined(recording).reasons
-
-
-def implausible(recording: Recording) -> tuple[Remark, ...]:
-    """Return what speaks for a wrong unit or sensitivity: motion that no spindle makes, or that no sensor resolves."""
-    return examined(recording).notes
 
 
 def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) -> tuple[Remark, ...]:

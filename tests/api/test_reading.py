@@ -193,6 +193,20 @@ def test_a_call_sees_its_files_alone(reader, tmp_path):
     assert not list(room.made.iterdir())
 
 
+def test_rooms_of_a_killed_service_are_removed(tmp_path):
+    left = tmp_path / "reading" / "reading-0" / "given"
+    left.mkdir(parents=True)
+    (left / "0.h5").write_bytes(b"deleted since")
+    found = Reader(LIMITS, 1, nothing, tmp_path / "reading")
+    found.start()
+    try:
+        assert not left.exists()
+        assert ask(found, pow, 2, 5) == 32
+    finally:
+        found.stop()
+    assert list((tmp_path / "reading").iterdir()) == []
+
+
 def _read(path):
     return Path(path).read_text(encoding="utf-8")
 

@@ -8,7 +8,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.measurement import judge_air
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
-from rcsa_ident.signals.verdict import implausible, raw_faults, tooth_count_fault
+from rcsa_ident.signals.verdict import examined, raw_faults, tooth_count_fault
 from tests.fixtures.synthetic import RATE, RPM, changed, conditions, drift, pair, profile, wave
 
 
@@ -221,11 +221,11 @@ def test_an_acceleration_in_the_wrong_unit_is_a_note(good):
     def scale(x):
         x[:, 2] *= 1e6
 
-    assert implausible(good.cut) == ()
-    assert ["fixture_x" in note for note in implausible(changed(good.cut, scale))] == [True]
+    assert examined(good.cut).notes == ()
+    assert ["fixture_x" in note for note in examined(changed(good.cut, scale)).notes] == [True]
     # lost samples and silence are told otherwise
     silent = Recording(RATE, np.full((100, 1), np.nan), (Sensor("x", Quantity.DISPLACEMENT, Dof.X),))
-    assert implausible(silent) == ()
+    assert examined(silent).notes == ()
 
 
 def test_speed_and_harmonics_are_told_of_what_is_not_usable_too(good):
