@@ -11,6 +11,7 @@ alone would have recommended.
 from __future__ import annotations
 
 import argparse
+import json
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
@@ -132,22 +133,37 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def _kept(path: Path | None) -> dict[int, dict[str, Any]]:
+    """Return the rows of an earlier run by the number of their case."""
+    if path is None or not path.exists():
+        return {}
+    rows = (json.loads(line) for line in path.read_text(encoding="utf-8").splitlines())
+    return {row.pop("case"): row for row in rows}
+
+
 def main(arguments: Sequence[str]) -> None:
     """Run the cases and print their table."""
     parser = argparse.ArgumentParser(
         prog="benchmarks recommendation", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--cases", type=int, default=CASES)
+    parser.add_argument("--first", type=int, default=0, help="the number of the first case, for a run in parts")
+    parser.add_argument("--rows", type=Path, help="file of one line a case; a case that stands there is not run again")
     given = parser.parse_args(arguments)
-    rows = []
+    kept_rows = _kept(given.rows)
     with tempfile.TemporaryDirectory(prefix="rcsa-ident-") as folder:
-        for number in range(given.cases):
+        for number in range(given.first, given.first + given.cases):
+            if number in kept_rows:
+                continue
             seed, place = FIRST_SEED + number // 4, number % 4
             kept = Path(folder) / str(seed)
             machine = read_machine(kept / "machine.toml" if kept.exists() else random_machine(seed, kept))
             tooling = read_tooling((*machine.toolings, *machine.truth_toolings)[place])
-            rows.append(case(machine, tooling, np.random.default_rng([seed, place])))
-            failed = rows[-1]["recommended"] is not None and not rows[-1]["recommended"]["holds"]
+            row = kept_rows[number] = case(machine, tooling, np.random.default_rng([seed, place]))
+            if given.rows:
+                with given.rows.open("a", encoding="utf-8") as rows:
+                    print(json.dumps({"case": number} | row), file=rows)
+            failed = row["recommended"] is not None and not row["recommended"]["holds"]
             if failed or given.cases <= 8:
-                print(f"machine {seed}, tooling {tooling.name}: {rows[-1]}", flush=True)
-    print(table(rows))
+                print(f"machine {seed}, tooling {tooling.name}: {row}", flush=True)
+    print(table(list(kept_rows.values())))
