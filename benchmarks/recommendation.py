@@ -112,7 +112,7 @@ def case(machine: MachineFile, tooling: Tooling, rng: np.random.Generator) -> di
 def table(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the summary over all cases."""
     seconds = np.array([row["seconds"] for row in rows])
-    agrees = [row["agrees"] for row in rows if row["agrees"] is not None]
+    agrees = [row["agrees"] for row in rows if row["agrees"] is not None] or [np.nan]
     lines = [
         f"{len(rows)} cases, {min(row['modes'] for row in rows)} to {max(row['modes'] for row in rows)} modes; an answer takes "
         f"{np.median(seconds):.2f} s of one core in the median, {seconds.max():.2f} s at most; by full discretisation "
@@ -124,6 +124,8 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
     ]
     for name in ("recommended", "zero-order"):
         found = [row[name] for row in rows if row[name] is not None]
+        if not found:
+            continue
         holds = sum(each["holds"] for each in found)
         shares = " | ".join(
             f"{np.median(values):.3f} ({np.quantile(values, 0.1):.2f}, {np.quantile(values, 0.9):.2f})"

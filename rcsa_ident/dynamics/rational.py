@@ -15,6 +15,8 @@ from rcsa_ident.errors import InputError
 
 #: Share of the largest part below which a residue's further rank-one parts are dropped.
 _RANK = 1e-6
+#: Times the band's end beyond which a pole is no more than a part of the constant, which it would nearly cancel.
+_FAR = 20.0
 
 
 class FitStatus(StrEnum):
@@ -166,7 +168,8 @@ def fitted_poles(
     tolerance : float
         As in `rational_fit`.
     damped_outside : float
-        Least damping ratio of poles outside the band: they stand for many modes and are nobody's.
+        Least damping ratio of poles outside the band: they stand for many modes and are nobody's. Above 0, the constant stands for
+        poles far above the band, which would ask whoever marches through time for steps of their own length.
 
     Raises
     ------
@@ -190,17 +193,19 @@ def fitted_poles(
 
 
 def _damped_outside(fit: RationalFit, omega: FloatArray, values: ComplexArray, zeta: float) -> RationalFit:
-    """The fit with well damped poles outside the band: residues by least squares, so that the peaks of the band stay what they are."""
+    """The fit with well damped poles outside the band, none far above it: residues by least squares, so that the peaks of the band stay
+    what they are."""
     size = np.abs(fit.pole)
     outside = ((size < omega[0]) | (size > omega[-1])) & (-fit.pole.real < zeta * size)
-    if not outside.any():
+    near = size <= _FAR * omega[-1] if zeta > 0.0 else np.ones(size.size, dtype=bool)
+    if near.all() and not outside.any():
         return fit
-    pole = np.where(outside, size * complex(-zeta, np.sqrt(1.0 - zeta**2)), fit.pole)
+    pole = np.where(outside, size * complex(-zeta, np.sqrt(1.0 - zeta**2)), fit.pole)[near]
     first, second = (1.0 / (1j * omega[:, None] - p) for p in (pole, pole.conj()))
     # the columns differ by many powers of ten
     basis = np.hstack([first + second, 1j * (first - second), np.ones((omega.size, 1))])
     scale = np.linalg.norm(basis, axis=0) + 1e-300
-    residue, constant = np.empty(fit.residue.shape, dtype=complex), np.empty(fit.constant.shape)
+    residue, constant = np.empty((pole.size, *fit.constant.shape), dtype=complex), np.empty(fit.constant.shape)
     for place in np.ndindex(fit.constant.shape):
         value = values[:, *place]
         columns, right = basis / scale, value

@@ -223,3 +223,17 @@ def test_what_cannot_be_fitted_is_refused(omega, values, options, message):
 def test_nothing_moves_has_no_modes():
     with pytest.raises(InputError, match="zero"):
         fitted_poles(OMEGA, np.zeros((OMEGA.size, 2, 2)))
+
+
+def test_no_pole_stands_far_above_the_band():
+    # a joint that damps has a compliance that grows with frequency: only a real pole far above and a constant that cancels it fit that
+    model = modal()
+    joint = 1.5e-8 / (1.0 + 1j * OMEGA / (2.0 * np.pi * 400e3)) - 1.4e-8
+    values = model.receptance(OMEGA).values + joint[:, None, None] * np.eye(2)
+    freely, _ = fitted_poles(OMEGA, values, 1e-5)
+    assert np.abs(freely.pole).max() > 20.0 * OMEGA[-1]
+    damped, error = fitted_poles(OMEGA, values, 1e-5, 0.1)
+    assert np.abs(damped.pole).max() < 20.0 * OMEGA[-1]
+    assert error < 2e-3
+    assert np.abs(freely.constant).max() > 1e-8
+    assert np.abs(damped.constant).max() < 2e-9
