@@ -25,8 +25,8 @@ from api.client import Client
 from api.files import NORMALISED, UPLOADS, Files
 from api.serve import app
 from api.stores.entities import Document
+from api.stores.migrations import SCHEMA_VERSION
 from api.stores.sql import open_store
-from api.stores.tables import SCHEMA_VERSION
 from rcsa_ident.errors import InputError
 from tests.api.in_process import service
 from tests.api.recordings import content, declared
@@ -283,7 +283,7 @@ def of_schema(members):
     path = Path(os.environ["SCRATCH"])
     path.write_bytes(members[0][1])
     with closing(sqlite3.connect(path)) as database, database:
-        database.execute("UPDATE meta SET schema_version = 99")
+        database.execute("UPDATE alembic_version SET version_num = '99'")
     return matching([(members[0][0], path.read_bytes()), *members[1:]])
 
 

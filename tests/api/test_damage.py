@@ -8,7 +8,6 @@ import os
 import sqlite3
 import zipfile
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -20,8 +19,7 @@ from api.backups.save import backup
 from api.files import NORMALISED, UPLOADS
 from api.security import new_id, now
 from api.serve import app
-from api.stores import tables
-from api.stores.campaigns import Campaign, Recording
+from api.stores.campaigns import Campaign
 from api.stores.entities import Damaged, Destroyed, Document, Machine, digest_of
 from api.stores.jobs import Outcome
 from api.stores.sql import open_store
@@ -217,28 +215,6 @@ def test_a_job_that_begins_from_damaged_text_says_so(store, machine, tmp_path):
     (id,) = (each.id for each in store.jobs.open())
     carried(store, tmp_path)
     assert "question of the job" in json.loads(store.jobs.find(id).problem)["detail"]
-
-
-@BOTH
-def test_a_store_from_before_digests_gets_them(request, store, machine):
-    """What is there counts as whole; of samples whose hash nobody knows it is enough that they are there."""
-    id = running(store, machine)
-    store.jobs.finish(id, "w", Outcome("done", now(), texts={"result": "found", "report": "told"}))
-    campaign = store.campaigns.add(Campaign(new_id(), "A", machine, "C", "{}", 1, now()))
-    row = Recording("A", campaign.id, "c.h5", "cut", 1, "0" * 64, "1" * 64, '{"verdict": {"usable": true}}', "", now(), "2" * 64)
-    store.recordings.put(row, False)
-    with store.writing() as connection:
-        for table, column in (("job_texts", "digest"), ("campaigns", "digest"), ("recordings", "samples")):
-            connection.execute(text(f"ALTER TABLE {table} DROP COLUMN {column}"))
-        connection.execute(text("UPDATE meta SET schema_version = 3"))
-    again = open_store(store.engine.url.render_as_string(hide_password=False))
-    assert (again.jobs.text(id, "result"), again.jobs.text(id, "report")) == ("found", "told")
-    assert again.campaigns.get("A", campaign.id) == campaign
-    assert again.recordings.get("A", campaign.id, "c.h5") == replace(row, samples="")
-    assert again.recordings.kept("A") == {(UPLOADS, "0" * 64): "0" * 64, (NORMALISED, "1" * 64): ""}
-    with again.reading() as connection:
-        assert connection.execute(text("SELECT schema_version FROM meta")).scalar() == tables.SCHEMA_VERSION
-    again.close()
 
 
 def folder_of_a_store(tmp_path) -> Path:
