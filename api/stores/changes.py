@@ -59,6 +59,8 @@ class Change:
         UTC, ISO 8601.
     text, summary, digest : str
         Of the version, as in `Document`; empty where there is none.
+    holds : bool
+        Whether this content is what is there now.
     """
 
     id: int
@@ -76,6 +78,7 @@ class Change:
     text: str
     summary: str
     digest: str
+    holds: bool
 
 
 class Changes(Protocol):

@@ -10,6 +10,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
@@ -227,6 +228,18 @@ def test_a_migration_that_fails_half_way_leaves_everything_as_it_was(url, tmp_pa
     monkeypatch.undo()
     with pytest.raises(InputError, match=f"schema version 99, allowed is at most {migrations.SCHEMA_VERSION}: a later release"):
         open_store(url)
+
+
+def test_a_store_that_is_refused_is_not_left_open(tmp_path):
+    url = f"sqlite:///{tmp_path / 'store.db'}"
+    open_store(url).close()
+    with changing(url) as connection:
+        connection.execute(text("UPDATE alembic_version SET version_num = '99'"))
+    # the error holds what was open when it was raised
+    with pytest.raises(InputError) as refused:
+        open_store(url)
+    assert [file.path for file in psutil.Process().open_files() if Path(file.path).parent == tmp_path] == []
+    assert refused.value.field == "store"
 
 
 @KINDS

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from sqlalchemy import text
 
 from api.client import Client
 from api.schemas.campaigns import EXAMPLE as CAMPAIGN
@@ -67,6 +68,40 @@ def test_a_version_is_restored_also_after_a_deletion(presetting):
     for version in (4, 9):
         refused(404, presetting.tooling_version, "T1", version)
         refused(404, presetting.restore_tooling, "T1", version)
+
+
+def test_what_is_there_is_not_restored(client):
+    """Not offered, and refused in words; what has come to harm is."""
+    first = client.write_tooling("T1", example())
+    second = client.write_tooling("T1", example(cutter=THREE))
+    client.restore_tooling("T1", 1)
+    assert [(c.version, c.holds) for c in client.changes()] == [(3, True), (2, False), (1, True)]
+    assert client.tooling_version("T1", 1).change.holds
+    for version in (1, 3):
+        for seen in (None, first.etag):
+            found = refused(409, client.restore_tooling, "T1", version, seen=seen)
+            assert found.detail == f"there is nothing to restore: version {version} is what is there now"
+    refused(412, client.restore_tooling, "T1", 1, seen=second.etag)
+    client.forget_tooling("T1")
+    assert [(c.version, c.holds) for c in client.changes()] == [(4, False), (3, False), (2, False), (1, False)]
+    assert client.restore_tooling("T1", 3).etag == first.etag
+
+
+def test_an_identification_that_is_there_is_not_restored(client, result):
+    machine = client.make_machine("HPM").id
+    client.identify(machine, result)
+    refused(409, client.restore_identification, machine, 1)
+    assert [(c.kind, c.holds) for c in client.changes()] == [("identification", True), ("machine", False)]
+
+
+def test_the_version_of_a_tooling_that_is_damaged_mends_it(store, client):
+    client.write_tooling("T1", example())
+    with store.writing() as connection:
+        connection.execute(text("UPDATE toolings SET text = 'nonsense'"))
+    assert [c.holds for c in client.changes()] == [False]
+    refused(500, client.tooling, "T1")
+    client.restore_tooling("T1", 1)
+    assert client.tooling("T1").tooling.cutter.teeth == 4
 
 
 def test_differences_are_told_before_anything_is_written(client):
