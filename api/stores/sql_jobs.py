@@ -91,11 +91,27 @@ class SqlJobs:
                 return None
             cancelled = found.state in OPEN
             if cancelled:
-                connection.execute(update(t).where(*here).values(state="cancelled", finished=when))
-                _forget_partial(connection, id)
-                _drop_texts(connection, id)
-                _append(connection, id, found.events, [Event(0, "end", "")])
+                _cancel(connection, found, when)
             return Job(**connection.execute(select(*_JOB).where(*here)).one()._asdict()), cancelled
+
+    def watch(self, id: str, when: str) -> None:
+        t = tables.jobs
+        with self.store.writing() as connection:
+            connection.execute(update(t).where(t.c.id == id, t.c.watched.is_not(None)).values(watched=when))
+
+    def abandon(self, before: str, when: str, problem: str) -> Sequence[str]:
+        t, ended = tables.jobs, []
+        alone = (t.c.state.in_(OPEN), t.c.watched < before)
+        with self.store.reading() as connection:
+            ids = connection.execute(select(t.c.id).where(*alone)).scalars().all()
+        for id in ids:
+            with self.store.writing() as connection:
+                # somebody may have come back meanwhile
+                found = connection.execute(select(t).where(t.c.id == id, *alone).with_for_update()).first()
+                if found is not None:
+                    _cancel(connection, found, when, problem)
+                    ended.append(id)
+        return ended
 
     def open(self) -> Sequence[Job]:
         t, turn = tables.jobs, _turns()
@@ -262,6 +278,14 @@ def _append(connection: Connection, job: str, last: int, events: Sequence[Event]
     connection.execute(insert(e), rows)
     connection.execute(update(t).where(t.c.id == job).values(events=last + len(rows)))
     _measure(connection, job)
+
+
+def _cancel(connection: Connection, job: Any, when: str, problem: str | None = None) -> None:
+    t = tables.jobs
+    connection.execute(update(t).where(t.c.id == job.id).values(state="cancelled", finished=when, problem=problem))
+    _forget_partial(connection, job.id)
+    _drop_texts(connection, job.id)
+    _append(connection, job.id, job.events, [Event(0, "end", "")])
 
 
 def _drop_texts(connection: Connection, job: str) -> None:

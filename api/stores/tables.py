@@ -194,6 +194,7 @@ jobs = Table(
     Column("events", Integer, nullable=False),
     Column("key", _Name, nullable=False, server_default=""),
     Column("who", String(200), nullable=False, server_default=""),
+    Column("watched", String(40)),
     _stored(),
     Index("ix_jobs_group", "group", "kind", "id"),
     Index("ix_jobs_stored", "group", "stored"),
