@@ -168,6 +168,7 @@ recordings = Table(
     Column("judged_with", String(64), nullable=False),
     Column("created", String(40), nullable=False),
     Column("samples", String(64), nullable=False, server_default=""),
+    Column("digest", String(64), nullable=False, server_default=""),
     _stored(),
     Index("ix_recordings_stored", "group", "stored"),
 )

@@ -114,6 +114,31 @@ def test_verdicts_meet_damage_and_forget_it(client, parts, campaign, tmp_path):
     assert client.recording(campaign, CUT).verdict == first
 
 
+@pytest.mark.parametrize("other", ['{"verdict": {"usable": false}}', "[]", "nonsense", ""])
+def test_a_damaged_verdict_is_told_and_heals(client, parts, campaign, tmp_path, other):
+    """The file can still be had; the campaign says of that cut what has happened, and an upload of another cut is judged."""
+    url = f"/v1/campaigns/{campaign}/recordings/{CUT}"
+    before, usable = client.recording(campaign, CUT), client.campaign(campaign).usable
+    with parts.store.writing() as connection:
+        connection.execute(text("UPDATE recordings SET found = :other WHERE name = :name"), {"other": other, "name": CUT})
+    words = f"the stored verdict on the recording {CUT} is damaged: its content is not what was stored; upload the same recording again"
+    for path in (url, f"{url}/spectrum", f"/v1/campaigns/{campaign}/recordings"):
+        answer = client.http.get(path)
+        assert (answer.status_code, answer.json()["detail"][: len(words)]) == (500, words), path
+    verdicts = {cut.cut.name: cut.verdict for cut in client.campaign(campaign).cuts}
+    assert not verdicts[CUT].usable
+    assert words in verdicts[CUT].reasons[0]
+    assert client.http.get(f"{url}/file").content == (tmp_path / CUT).read_bytes()
+    # the air cut again, which judges the cuts beside it
+    client.forget_recording(campaign, AIR)
+    client.upload(campaign, tmp_path / AIR)
+    # to somebody who sends in parts it is not there
+    assert client.http.head(url).status_code == 404
+    assert client.upload(campaign, tmp_path / CUT) == before
+    assert client.recording(campaign, CUT) == before
+    assert client.campaign(campaign).usable == usable
+
+
 def test_an_identification_says_which_recording_is_damaged(client, store, parts, campaign, tmp_path):
     flip(stored(parts, campaign, CUT, NORMALISED))
     id = client.identify_campaign(campaign).id

@@ -16,6 +16,7 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from sqlalchemy import Connection, Engine, MetaData, Table, create_engine, insert, inspect, select, text
 
+from api.reading.stored import found_of
 from api.stores import migrations, tables
 from api.stores.campaigns import Campaign, Recording
 from api.stores.entities import Document, Key, Machine, digest_of
@@ -192,6 +193,7 @@ def test_digests_and_sizes_of_what_had_none(url):
         assert store.campaigns.get("A", "c1").text == campaign["text"]
         assert store.jobs.text("j1", "answer") == "found"
         kept = store.recordings.get("A", "c1", "a.h5")
+        assert found_of(kept) == {"verdict": {"usable": True}}
         assert kept == Recording(**{name: row[name] for name in row if name != "usable"})
         used = store.usage("A")
         # a hundred a row, and the bytes of its texts; a job with its texts and events
