@@ -124,9 +124,11 @@ def restore_identification(
 ) -> IdentificationSummary:
     machine_of(components, caller.group, id)
     found = _version(components, caller, IDENTIFICATION, id, version)
-    document = Document(caller.group, id, found.text, found.summary, found.digest, now())
+    document = Document(caller.group, id, found.text, found.summary, found.digest, now(), found.summary_digest)
+    # a damaged one is not written again
+    told = summary_of(document)
     _restore(components.store.identifications, document, found, request, response, caller, why)
-    return summary_of(document)
+    return told
 
 
 def _version(components: Components, caller: Caller, kind: str, name: str, version: int) -> Change:

@@ -57,7 +57,7 @@ class Change:
     restores : int
     created : str
         UTC, ISO 8601.
-    text, summary, digest : str
+    text, summary, digest, summary_digest : str
         Of the version, as in `Document`; empty where there is none.
     holds : bool
         Whether this content is what is there now.
@@ -78,6 +78,7 @@ class Change:
     text: str
     summary: str
     digest: str
+    summary_digest: str
     holds: bool
 
 

@@ -49,6 +49,8 @@ class Job:
         Of the API key that asked for it: id and name.
     watched : str or None
         When somebody followed it last; None where it goes on without.
+    request_digest : str
+        Of the request, as it was stored.
     """
 
     id: str
@@ -71,6 +73,7 @@ class Job:
     key: str = ""
     who: str = ""
     watched: str | None = None
+    request_digest: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,7 +60,7 @@ class SqlChanges:
 def log_document(connection: Connection, kind: str, row: dict[str, Any], note: Note, new: bool) -> None:
     """Log a text that has been written; `row` has the columns of its document."""
     action = RESTORED if note.restores else MADE if new else CHANGED
-    content = {name: row[name] for name in ("text", "summary", "digest")}
+    content = {name: row[name] for name in ("text", "summary", "digest", "summary_digest")}
     _log(connection, kind, (row["group"], row["name"]), action, row["changed"], note, content)
 
 

@@ -12,7 +12,7 @@ from sqlalchemy.exc import IntegrityError
 from api.stores import tables
 from api.stores.changes import IDENTIFICATION, Note
 from api.stores.database import Database
-from api.stores.entities import digest_of, whole
+from api.stores.entities import Document, digest_of, whole
 from api.stores.idempotency import earlier, forget_old
 from api.stores.jobs import OPEN, PARTIAL, Event, Full, Job, Outcome, Worker
 from api.stores.sql_changes import log_document
@@ -46,7 +46,7 @@ class SqlJobs:
                     row = {"group": job.group, "key": repeat[0], "digest": repeat[1], "id": job.id, "created": job.created}
                     connection.execute(insert(r).values(row))
                 self.store.check_room(connection, job.group, tables.size_of(asdict(job)) + sum(map(len, texts.values())))
-                connection.execute(insert(t).values(asdict(job)))
+                connection.execute(insert(t).values(asdict(job) | {"request_digest": digest_of(job.request)}))
                 for name, text in texts.items():
                     connection.execute(insert(x).values(job=job.id, name=name, text=text, digest=digest_of(text)))
                 _measure(connection, job.id)
@@ -311,7 +311,7 @@ def _apply(connection: Connection, job: Any, outcome: Outcome) -> None:
     here = (i.c.group == job.group, i.c.name == job.machine)
     before = connection.execute(select(i.c.digest).where(*here)).scalar()
     connection.execute(delete(i).where(*here))
-    row = asdict(outcome.applied) | {"group": job.group, "name": job.machine, "changed": outcome.finished}
+    row = asdict(Document(job.group, job.machine, **asdict(outcome.applied), changed=outcome.finished))
     connection.execute(insert(i).values(row))
     if before != outcome.applied.digest:
         named = connection.execute(select(c.c.name).where(c.c.id == job.campaign)).scalar()

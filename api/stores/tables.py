@@ -104,6 +104,7 @@ def _documents(name: str) -> Table:
         Column("summary", Text, nullable=False),
         Column("digest", String(64), nullable=False),
         Column("changed", String(40), nullable=False),
+        Column("summary_digest", String(64), nullable=False, server_default=""),
         _stored(),
         Index(f"ix_{name}_stored", "group", "stored"),
     )
@@ -129,6 +130,7 @@ changes = Table(
     Column("text", Text, nullable=False),
     Column("summary", Text, nullable=False),
     Column("digest", String(64), nullable=False),
+    Column("summary_digest", String(64), nullable=False, server_default=""),
     UniqueConstraint("group", "kind", "name", "version"),
     _stored(),
     Index("ix_changes_group", "group", "id"),
@@ -196,6 +198,7 @@ jobs = Table(
     Column("key", _Name, nullable=False, server_default=""),
     Column("who", String(200), nullable=False, server_default=""),
     Column("watched", String(40)),
+    Column("request_digest", String(64), nullable=False, server_default=""),
     _stored(),
     Index("ix_jobs_group", "group", "kind", "id"),
     Index("ix_jobs_stored", "group", "stored"),

@@ -8,6 +8,7 @@ import os
 import sqlite3
 import zipfile
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,7 @@ from tests.api.identifying import carried, job, running
 from tests.api.in_process import BOTH, embedded, refused, service
 from tests.api.recordings import content, declared
 from tests.fixtures import by_hand
+from tests.fixtures.service import example
 
 CUT, AIR = "c0_cut.h5", "c0_air.h5"
 
@@ -137,6 +139,46 @@ def test_a_damaged_verdict_is_told_and_heals(client, parts, campaign, tmp_path, 
     assert client.upload(campaign, tmp_path / CUT) == before
     assert client.recording(campaign, CUT) == before
     assert client.campaign(campaign).usable == usable
+
+
+def test_damaged_summaries_are_told_and_heal(client, store, result):
+    machine = client.make_machine("M").id
+    client.identify(machine, result)
+    client.write_tooling("T1", example())
+    for table, other in (("identifications", '{"axes": []}'), ("toolings", "nonsense")):
+        with store.writing() as connection:
+            connection.execute(text(f"UPDATE {table} SET summary = :other"), {"other": other})
+    words = "is damaged: its content is not what was stored; write the same tooling or identification again"
+    for call in (partial(client.machine, machine), lambda: list(client.toolings()), partial(client.lobes, machine, "T1")):
+        assert words in refused(500, call).detail
+    # their texts are whole, and written again they mend it
+    text_of_tooling = client.tooling_file("T1")
+    client.identify(machine, result)
+    client.write_tooling("T1", text_of_tooling)
+    assert client.machine(machine).identification.axes
+    assert [each.name for each in client.toolings()] == ["T1"]
+    # no version was needed for that
+    assert [c.version for c in client.changes(kind="tooling")] == [1]
+
+
+def test_a_damaged_summary_of_a_version_is_not_restored(client, store, result):
+    machine = client.make_machine("M").id
+    for each in (result, result.replace('"seed": 1', '"seed": 2')):
+        client.identify(machine, each)
+    with store.writing() as connection:
+        connection.execute(text("UPDATE changes SET summary = '{\"axes\": []}' WHERE kind = 'identification' AND version = 1"))
+    before = client.machine(machine)
+    assert "is damaged" in refused(500, client.restore_identification, machine, 1).detail
+    assert client.machine(machine) == before
+
+
+def test_what_a_job_was_asked_is_what_it_does(client, store, campaign, tmp_path):
+    id = client.identify_campaign(campaign, seed=7).id
+    with store.writing() as connection:
+        connection.execute(text("UPDATE jobs SET request = replace(request, '7', '8')"))
+    carried(store, tmp_path)
+    told = client.http.get(f"/v1/identifications/{id}").json()
+    assert (told["state"], "request of the job" in told["problem"]["detail"]) == ("failed", True)
 
 
 def test_an_identification_says_which_recording_is_damaged(client, store, parts, campaign, tmp_path):

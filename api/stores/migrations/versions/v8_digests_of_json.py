@@ -1,4 +1,4 @@
-"""A digest beside what was found in every recording; what is there counts as whole."""
+"""A digest beside verdicts, summaries and what jobs were asked; what is there counts as whole."""
 
 from __future__ import annotations
 
@@ -9,14 +9,26 @@ from alembic import op
 
 revision, down_revision = "8", "7"
 
+#: Table, what names its rows, text, digest.
+_TEXTS = (
+    ("recordings", ("campaign", "name"), "found", "digest"),
+    ("identifications", ("group", "name"), "summary", "summary_digest"),
+    ("toolings", ("group", "name"), "summary", "summary_digest"),
+    ("changes", ("id",), "summary", "summary_digest"),
+    ("jobs", ("id",), "request", "request_digest"),
+)
+
 
 def upgrade() -> None:
-    with op.batch_alter_table("recordings") as batch:
-        batch.add_column(sa.Column("digest", sa.String(64), nullable=False, server_default=""))
     connection = op.get_bind()
-    table = sa.table("recordings", *map(sa.column, ("campaign", "name", "found", "digest")))
-    for campaign, name in connection.execute(sa.select(table.c.campaign, table.c.name)).all():
-        here = (table.c.campaign == campaign, table.c.name == name)
-        found = connection.execute(sa.select(table.c.found).where(*here)).scalar_one()
-        digest = hashlib.sha256(found.encode("utf-8")).hexdigest()[:32]
-        connection.execute(sa.update(table).where(*here).values(digest=digest))
+    for name, own, text, digest in _TEXTS:
+        with op.batch_alter_table(name) as batch:
+            batch.add_column(sa.Column(digest, sa.String(64), nullable=False, server_default=""))
+        table = sa.table(name, *map(sa.column, (*own, text, digest, "stored")))
+        for row in connection.execute(sa.select(*(table.c[key] for key in own))).all():
+            here = [table.c[key] == value for key, value in zip(own, row, strict=True)]
+            content = connection.execute(sa.select(table.c[text]).where(*here)).scalar_one()
+            found = hashlib.sha256(content.encode("utf-8")).hexdigest()[:32]
+            # of a job only what it was asked and what it comes to count
+            more = 0 if name == "jobs" else len(found)
+            connection.execute(sa.update(table).where(*here).values({digest: found, "stored": table.c.stored + more}))
