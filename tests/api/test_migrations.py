@@ -6,8 +6,10 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from pathlib import Path
+from threading import Barrier
 from typing import Any
 
 import psutil
@@ -231,6 +233,22 @@ def test_a_migration_that_fails_half_way_leaves_everything_as_it_was(url, tmp_pa
     monkeypatch.undo()
     with pytest.raises(InputError, match=f"schema version 99, allowed is at most {migrations.SCHEMA_VERSION}: a later release"):
         open_store(url)
+
+
+@KINDS
+def test_those_who_start_at_the_same_moment_migrate_once(url):
+    """As the service and its workers do."""
+    earlier(url, 2)
+    filled(url)
+    together = Barrier(4)
+
+    def opened(_):
+        together.wait()
+        with closing(open_store(url)) as store:
+            return len(store.changes.list("Ä 0 toolings group", None, 9))
+
+    with ThreadPoolExecutor(4) as threads:
+        assert list(threads.map(opened, range(4))) == [1, 1, 1, 1]
 
 
 def test_a_store_that_is_refused_is_not_left_open(tmp_path):
