@@ -14,10 +14,10 @@ from api.conventions import found_or_404
 from api.problems import Problem
 from api.reading.campaign_text import campaign_of_text
 from api.reading.reader_tasks import recording_and_air
-from api.reading.stored import samples_of
+from api.reading.stored import found_of, samples_of
 from api.schemas.toolings import ToolingKeys
 from api.stores.campaigns import Campaign, Recording
-from api.stores.entities import Document, Machine
+from api.stores.entities import Document, Machine, summary_of
 from api.work.forces import ReadPair
 from api.work.requests import MachineText, ToolingSource
 from rcsa_ident.errors import InputError
@@ -27,7 +27,7 @@ from rcsa_ident.signals.recording import Sensor
 def known_machine(components: Components, group: str, id: str) -> MachineText:
     """Return the identification of a machine that one can compute with."""
     document = identification_of(components, group, id)
-    if not json.loads(document.summary)["axes"]:
+    if not summary_of(document)["axes"]:
         raise InputError("machine", "an identification that has failed", "a machine with an identification of axis X, Y or both")
     return MachineText(document.digest, document.text)
 
@@ -80,7 +80,7 @@ def uploaded(components: Components, group: str, campaign: str, recording: str) 
     if cut is None:
         raise Problem(404, f"the campaign has no cut with a recording {recording}")
     kept = _kept(components, group, campaign, name)
-    found = json.loads(kept.found)
+    found = found_of(kept)
     air = None if cut.air is None else components.store.recordings.get(group, campaign, cut.air.name)
     tooling = ToolingSource(cut.tooling, json.loads(row.text)["toolings"][cut.tooling])
     sensors = channels_of(found["channels"], declared.sensors)

@@ -15,6 +15,7 @@ from api.access import AccessMonitor
 from api.components import Components, Rates
 from api.files import Files
 from api.head_requests import HeadRequests
+from api.jobs import leases
 from api.jobs.event_feed import EventFeeds
 from api.jobs.supervisor import Supervisor
 from api.metrics import JobCounts, Metrics
@@ -109,7 +110,7 @@ def create_app(
         if supervisor is not None:
             supervisor.start()
         lifetimes = Lifetimes(settings.keep_events_days, settings.keep_results_days, settings.keep_versions_days)
-        maintenance = asyncio.gather(uploads.maintain(), maintain(kept, lifetimes))
+        maintenance = asyncio.gather(uploads.maintain(), maintain(kept, lifetimes), leases.maintain(kept.jobs, settings.unwatched_seconds))
         yield
         maintenance.cancel()
         await made.stop()

@@ -6,7 +6,7 @@ import logging
 import os
 import sys
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
 from threading import Event
@@ -72,10 +72,9 @@ def create_key(
         if not settings.database:
             make(settings.data)
             check(settings.data)
-        store = open_store(settings.database_url)
         key, text = make_key(group, wanted, label, days)
-        store.keys.add(key)
-        store.close()
+        with closing(open_store(settings.database_url)) as store:
+            store.keys.add(key)
     except InputError as error:
         _fail(error)
     typer.echo(text)

@@ -105,6 +105,8 @@ class Settings:
         Event streams of jobs at once.
     watch_seconds : float [s]
         After which such a stream ends; clients go on from its last event.
+    unwatched_seconds : float [s]
+        After which a job that a view asked for is cancelled where nobody follows it.
     """
 
     data: Path = field(default_factory=lambda: Path("rcsa-ident-data"))
@@ -157,6 +159,7 @@ class Settings:
     dask: str = ""
     watchers: int = 200
     watch_seconds: float = 3600.0
+    unwatched_seconds: float = 120.0
 
     def __post_init__(self) -> None:
         for name, least, most in (
@@ -173,7 +176,7 @@ class Settings:
             ("job_workers", 0, 256), ("lobe_workers", 0, 256), ("job_nice", 0, 19),
             ("job_queue", 1, 10**6), ("job_attempts", 1, 1000), ("job_work_seconds", 1.0, 10**7),
             ("keep_events_days", 0.0, 36_500.0), ("keep_results_days", 0.0, 36_500.0), ("keep_versions_days", 0.0, 36_500.0),
-            ("watchers", 1, 10**5), ("watch_seconds", 0.1, 10**6),
+            ("watchers", 1, 10**5), ("watch_seconds", 0.1, 10**6), ("unwatched_seconds", 60.0, 10**6),
         ):  # fmt: skip
             if not least <= getattr(self, name) <= most:
                 raise InputError(PREFIX + name.upper(), getattr(self, name), f"a number from {least:g} to {most:g}")

@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 
 from api.backups.members import BLOCK, ENGINE, FORMAT, MANIFEST, MEMBER, STORE, Account, copy, disk
 from api.files import sync_folder
-from api.stores.tables import SCHEMA_VERSION
+from api.stores.database import version_in
 from rcsa_ident.errors import InputError
 
 _LARGEST_MANIFEST = 1 << 28
@@ -118,12 +118,12 @@ def _check(folder: Path) -> None:
                     ((state,), *_) = database.execute("PRAGMA quick_check").fetchall()
                     if state != "ok":
                         raise sqlite3.DatabaseError(state)
-                    if name == STORE:
-                        ((version,),) = database.execute("SELECT schema_version FROM meta").fetchall()
+                if name == STORE and not version_in(folder / name):
+                    raise ValueError
+            except InputError as error:
+                raise InputError("FILE.tar", error.found, error.allowed) from None
             except (sqlite3.Error, ValueError):
                 raise _no_backup(f"{name} that is no whole database") from None
-    if not isinstance(version, int) or version > SCHEMA_VERSION:
-        raise InputError("FILE.tar", f"schema version {version}", f"at most {SCHEMA_VERSION}: a later release has written it")
 
 
 def _place(folder: Path, data: Path) -> None:

@@ -166,7 +166,11 @@ def _write(file: BinaryIO, staging: Path, wanted: dict[str, str]) -> Account:
 
 
 def header(name: str, size: int) -> bytes:
-    """Return the header block of a member: GNU format, with a binary size where octal digits do not suffice."""
+    """Return the header block of a member: POSIX's, with GNU's binary size where octal digits do not suffice.
+
+    Of the formats of `tarfile` none serves alone: names of files have 111 to 117 characters, which its GNU and PAX formats put into a
+    member of their own, and a restore takes no other members; its POSIX format splits them, and knows no size of 8 GiB.
+    """
     info = tarfile.TarInfo(name)
     info.mode, info.size = 0o600, size if size < 8**11 else 0
     block = bytearray(info.tobuf(tarfile.USTAR_FORMAT))

@@ -6,6 +6,7 @@ import json
 import logging
 import sqlite3
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from typing import Any
 
 from dbos import DBOS, DBOSClient, DBOSConfig
@@ -48,9 +49,8 @@ class Durable:
     def start(self, executor: str, carry: Carry, kinds: Sequence[str]) -> None:
         if self.url.startswith("sqlite:///"):
             # stays with the file: readers and writers do not block each other
-            with sqlite3.connect(self.url.removeprefix("sqlite:///")) as connection:
+            with closing(sqlite3.connect(self.url.removeprefix("sqlite:///"))) as connection:
                 connection.execute("PRAGMA journal_mode=WAL")
-            connection.close()
         config: DBOSConfig = {
             "name": _NAME,
             "system_database_url": self.url,

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from api.jobs.job_context import JobContext
-from api.stores.entities import digest_of
+from api.stores.entities import digest_of, whole
 from api.stores.jobs import Applied, Job, Outcome
 from api.work import tasks
 from api.work.machine_cache import starts
@@ -58,7 +58,7 @@ def carry(load: Load, job: Job, context: JobContext, spread: Map = map) -> Outco
     InputError
         The campaign is gone or has changed, or none of its cuts is usable.
     """
-    request = json.loads(job.request)
+    request = json.loads(whole(job.request, job.request_digest, f"request of the job {job.id}", "ask for the job once more"))
     start = context.jobs.text(job.id, "start")
     campaign, read = load(job.group, str(job.campaign))
     plan = context.remember("plan", lambda: [_files(cut) for cut in campaign.cuts])

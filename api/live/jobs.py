@@ -113,9 +113,17 @@ def job_of(components: Components, group: str, id: str, kind: str) -> Job:
     return found_or_404(found if found is not None and found.kind == kind else None, "job")
 
 
+def _followed(components: Components, group: str, id: str, kind: str) -> Job:
+    """Return a job of a group and kind that somebody follows."""
+    job = job_of(components, group, id, kind)
+    if job.watched is not None and job.state in OPEN:
+        components.store.jobs.watch(id, now())
+    return job
+
+
 async def awaited(components: Components, group: str, id: str, kind: str, prefer: str | None) -> Job:
     """Return a job, where the client prefers so after it has ended."""
-    job = await run_in_threadpool(job_of, components, group, id, kind)
+    job = await run_in_threadpool(_followed, components, group, id, kind)
     wanted = re.search(r"(?:^|[,;\s])wait\s*=\s*\"?(\d{1,6})", prefer or "")
     end = time.monotonic() + min(float(wanted[1]) if wanted else 0.0, LONGEST_WAIT)
     while job.state in OPEN and time.monotonic() < end:
@@ -147,7 +155,7 @@ def finished(components: Components, group: str, id: str, kind: str, name: str) 
 
 async def events(components: Components, caller: Caller, id: str, kind: str, seen: str | None) -> StreamingResponse:
     """Return the stream of a job's events after a number; it ends when the caller's key does."""
-    job = await run_in_threadpool(job_of, components, caller.group, id, kind)
+    job = await run_in_threadpool(_followed, components, caller.group, id, kind)
     try:
         watching = components.feeds.stream(caller.group)
         watching.__enter__()
@@ -164,8 +172,15 @@ async def events(components: Components, caller: Caller, id: str, kind: str, see
     return StreamingResponse(stream(), media_type=EVENTS, headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"})
 
 
+def longest(components: Components, job: Job) -> float:
+    """Return for how long a stream of a job's events goes on [s]."""
+    settings = components.settings
+    # a lost network looks like a client that listens: of a job that somebody has to follow the client opens another stream in time
+    return settings.watch_seconds if job.watched is None else min(settings.watch_seconds, settings.unwatched_seconds / 2.0)
+
+
 async def _events(components: Components, caller: Caller, job: Job, after: int) -> AsyncIterator[str]:
-    end, beat = time.monotonic() + components.settings.watch_seconds, time.monotonic() + HEARTBEAT
+    end, beat = time.monotonic() + longest(components, job), time.monotonic() + HEARTBEAT
     # the current state first, without a number: it is not an event that could be missed
     told = await run_in_threadpool(answer, components, job)
     yield f"retry: 2000\n{_event(None, 'progress', told.model_dump_json())}"

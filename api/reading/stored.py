@@ -1,14 +1,18 @@
-"""The one door to the files of a recording: each is what was written, to the last bit, or it is not handed out."""
+"""The one door to a recording's files and to what was found in it: each is what was written, to the last bit, or is not handed out."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from api.files import NORMALISED, UPLOADS, Files, sha256_of
 from api.stores.campaigns import Recording
-from api.stores.entities import Damaged
+from api.stores.entities import Damaged, digest_of, whole
 from rcsa_ident.errors import InputError
+
+_MEND = "upload the same recording again"
 
 
 def upload_of(files: Files, recording: Recording) -> Path:
@@ -21,11 +25,23 @@ def samples_of(files: Files, recording: Recording) -> Path:
     return _whole(files, recording, NORMALISED, recording.normalised, recording.samples)
 
 
+def found_of(recording: Recording) -> dict[str, Any]:
+    """Return what was found in a recording, its verdict with it; raises `Damaged` where it has changed."""
+    what = f"verdict on the recording {recording.name}"
+    return dict(json.loads(whole(recording.found, recording.digest, what, f"{_MEND}, and it is judged again")))
+
+
+def is_judged(recording: Recording) -> bool:
+    """Whether what was found in a recording is what was stored."""
+    return digest_of(recording.found) == recording.digest
+
+
 def is_whole(files: Files, recording: Recording) -> bool:
     """Whether nothing of a recording is missing or has changed."""
     try:
         upload_of(files, recording)
         samples_of(files, recording)
+        found_of(recording)
     except Damaged:
         return False
     return True
@@ -35,7 +51,7 @@ def _whole(files: Files, recording: Recording, kind: str, key: str, sha256: str)
     path = files.path(recording.group, kind, key)
     if not files.is_whole(path, sha256):
         found = "is damaged: its content is not what was stored" if path.exists() else "is missing"
-        raise Damaged(f"the stored file of the recording {recording.name} {found}; upload the same recording again, and it is whole again")
+        raise Damaged(f"the stored file of the recording {recording.name} {found}; {_MEND}, and it is whole again")
     return path
 
 

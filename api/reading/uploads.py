@@ -17,7 +17,7 @@ from typing import Any
 from api.files import NORMALISED, UPLOADS, Files, Full, Partial, sha256_of
 from api.reading import reader_tasks
 from api.reading.campaign_text import Upload, files_of
-from api.reading.stored import is_whole, samples_of
+from api.reading.stored import found_of, is_judged, is_whole, samples_of
 from api.shares import Shares
 from api.stores.campaigns import Campaign, FileKey, Recording
 from api.stores.changes import Note
@@ -209,16 +209,16 @@ class Uploads:
         found = []
         for cut in json.loads(campaign.text)["cuts"]:
             row, air = rows.get(cut["cut"]), rows.get(cut.get("air", ""))
-            if row is not None and row.judged_with != ("" if air is None else air.normalised):
+            if row is not None and is_judged(row) and row.judged_with != ("" if air is None else air.normalised):
                 found.append((cut["id"], row, air))
         return found
 
     async def _among_fellows(self, campaign: Campaign) -> None:
         """Judge the cuts beside those of their tooling, each after its verdict for itself (`alone`)."""
         listed = await asyncio.to_thread(self.store.recordings.list, campaign.group, campaign.id, "", 1_000_000)
-        rows = {row.name: row for row in listed}
+        rows = {row.name: row for row in listed if is_judged(row)}
         there = [(cut["tooling"], rows[cut["cut"]]) for cut in json.loads(campaign.text)["cuts"] if cut["cut"] in rows]
-        found = [json.loads(row.found) for _, row in there]
+        found = [found_of(row) for _, row in there]
         alone = [each.get("alone", each["verdict"]) for each in found]
         verdicts = await self.reader.run(reader_tasks.among_fellows, [tooling for tooling, _ in there], alone)
         for (_, row), data, own, verdict in zip(there, found, alone, verdicts, strict=True):
@@ -230,7 +230,7 @@ class Uploads:
         """Judge cuts whose verdicts may say that a file was damaged."""
         rows = {row.name: row for row in await asyncio.to_thread(self.store.recordings.list, campaign.group, campaign.id, "", 1_000_000)}
         for cut in json.loads(campaign.text)["cuts"]:
-            if cut["id"] in cuts and cut["cut"] in rows:
+            if cut["id"] in cuts and cut["cut"] in rows and is_judged(rows[cut["cut"]]):
                 await self._judge(campaign, cut["id"], rows[cut["cut"]], rows.get(cut.get("air", "")))
 
     async def _judge(self, campaign: Campaign, cut: str, recording: Recording, air: Recording | None) -> None:
@@ -239,7 +239,7 @@ class Uploads:
             verdict = await self.reader.run(reader_tasks.judge, campaign.text, cut, own, still)
         except (InputError, Damaged) as error:
             verdict = refused_verdict(str(error))
-        text = json.dumps(json.loads(recording.found) | {"verdict": verdict, "alone": verdict}, allow_nan=False)
+        text = json.dumps(found_of(recording) | {"verdict": verdict, "alone": verdict}, allow_nan=False)
         after = replace(recording, found=text, judged_with="" if air is None else air.normalised)
         await asyncio.to_thread(self.store.recordings.judge, recording, after)
 

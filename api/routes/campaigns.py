@@ -17,12 +17,13 @@ from api.conventions import BODY, After, CampaignId, Limit, MachineId, Repeat, g
 from api.lookups import known_campaign, machine_of
 from api.problems import Problem
 from api.reading.campaign_text import LARGEST, campaign_of_text, declare, files_of, toml_text
-from api.reading.stored import upload_of
+from api.reading.stored import found_of, upload_of
+from api.reading.uploads import refused_verdict
 from api.schemas.campaigns import EXAMPLE, CampaignAnswer, CampaignSummary, CutAnswer, FileState, NewCampaign, VerdictAnswer
 from api.schemas.common import Page, body_of
 from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.campaigns import Campaign, Counts, Recording
-from api.stores.entities import Taken
+from api.stores.entities import Damaged, Taken
 from api.transfer.archives import zipped
 from api.work.toolings import parsed
 from rcsa_ident.errors import InputError
@@ -178,9 +179,16 @@ def _remarks(campaign: Campaign) -> list[str]:
         return [str(error)]
 
 
+def _verdict(row: Recording) -> dict[str, Any]:
+    try:
+        return dict(found_of(row)["verdict"])
+    except Damaged as error:
+        return refused_verdict(str(error))
+
+
 def _cut(cut: dict[str, Any], rows: dict[str, Recording]) -> CutAnswer:
     row, air = rows.get(cut["cut"]), cut.get("air")
-    verdict = None if row is None else VerdictAnswer.model_validate(json.loads(row.found)["verdict"])
+    verdict = None if row is None else VerdictAnswer.model_validate(_verdict(row))
     files = {
         "cut": FileState(name=cut["cut"], uploaded=row is not None),
         "air": None if air is None else FileState(name=air, uploaded=air in rows),

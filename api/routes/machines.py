@@ -34,6 +34,7 @@ from api.schemas.common import Page
 from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes, NewMachine
 from api.security import Guarded, WhoAsks, new_id, now
 from api.stores.entities import Document, Machine, Stale, Taken, digest_of
+from api.stores.entities import summary_of as stored_summary
 from api.work import tasks
 from api.work.machine_cache import is_result
 
@@ -162,7 +163,7 @@ def _digest(document: Document | None) -> str | None:
 
 def summary_of(document: Document) -> IdentificationSummary:
     """Return what lists tell of an identification."""
-    return IdentificationSummary(**json.loads(document.summary), changed=document.changed, etag=document.digest)
+    return IdentificationSummary(**stored_summary(document), changed=document.changed, etag=document.digest)
 
 
 def _answer(components: Components, machine: Machine) -> MachineAnswer:

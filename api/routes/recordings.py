@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import unicodedata
 from typing import Annotated, Any
 
@@ -16,7 +15,7 @@ from api.lookups import known_campaign
 from api.problems import Problem
 from api.reading import reader_tasks
 from api.reading.campaign_text import File, files_of
-from api.reading.stored import samples_of, upload_of
+from api.reading.stored import found_of, samples_of, upload_of
 from api.reading.uploads import Received
 from api.schemas.campaigns import RecordingAnswer, SignalAnswer, SpectrumAnswer
 from api.schemas.common import Page
@@ -139,7 +138,7 @@ async def spectrum(
 ) -> SpectrumAnswer:
     _, row = await run_in_threadpool(_kept, components, caller.group, id, name)
     path = await run_in_threadpool(samples_of, components.files, row)
-    speed = json.loads(row.found)["spindle_speed_rpm"]
+    speed = found_of(row)["spindle_speed_rpm"]
     return SpectrumAnswer.model_validate(await while_there(request, components.work.run(reader_tasks.spectrum, path, speed, points)))
 
 
@@ -190,6 +189,6 @@ def answer(campaign: Campaign, row: Recording) -> RecordingAnswer:
 
 
 def _answer(file: File, row: Recording) -> RecordingAnswer:
-    found: dict[str, Any] = json.loads(row.found)
+    found = found_of(row)
     common = {"name": row.name, "role": file.role, "cuts": list(file.cuts), "created": row.created}
     return RecordingAnswer.model_validate(common | {"size_bytes": row.size, "sha256": row.sha256} | found)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
+import re
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Request, Response
@@ -25,7 +26,11 @@ from api.work.requests import MachineText, ToolingSource, TooLong
 
 router = APIRouter(tags=["tool change"], route_class=Guarded)
 CSV, LOBES = "text/csv", "lobes"
-Later = Annotated[str | None, Header(alias="Prefer", max_length=200, description="`respond-async`: as a job in any case.")]
+_PREFERENCES = (
+    "`respond-async`: as a job in any case. `while-watched`: a job that is cancelled when for some time nobody has asked for it or opened "
+    "its events."
+)
+Later = Annotated[str | None, Header(alias="Prefer", max_length=200, description=_PREFERENCES)]
 
 
 @router.post(
@@ -55,7 +60,8 @@ async def lobes(body: LobeQuery, request: Request, parts: ThisService, caller: W
     question = body.request(parts.settings.work_seconds)
     machine, toolings = await _subject(parts, caller.group, body.machine, body.toolings)
     most = parts.settings.job_work_seconds
-    if "respond-async" not in (prefer or "").lower():
+    wanted = re.split(r"[\s,;]+", (prefer or "").lower())
+    if "respond-async" not in wanted:
         try:
             found = await while_there(request, _each(parts, tasks.lobes, machine, toolings, question))
             return LobeAnswer.model_validate({"machine": body.machine, "toolings": found})
@@ -64,7 +70,8 @@ async def lobes(body: LobeQuery, request: Request, parts: ThisService, caller: W
                 raise
     text = asked(machine, toolings, body.request(most))
     words = body.model_dump_json()
-    job = Job(new_id(), caller.group, LOBES, body.machine, None, words, "queued", now(), key=caller.id, who=caller.name)
+    watched = now() if "while-watched" in wanted else None
+    job = Job(new_id(), caller.group, LOBES, body.machine, None, words, "queued", now(), key=caller.id, who=caller.name, watched=watched)
     digest = hashlib.sha256(words.encode()).hexdigest()
     again = None if repeat is None else (repeat, digest)
     kept = await run_in_threadpool(jobs.submit, parts, job, {"question": text}, again)

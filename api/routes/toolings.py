@@ -14,7 +14,7 @@ from api.problems import Problem
 from api.schemas.common import Page, body_of
 from api.schemas.toolings import EXAMPLE, ToolingAnswer, ToolingKeys, ToolingSummary
 from api.security import Guarded, WhoAsks, now
-from api.stores.entities import Document, Stale, digest_of
+from api.stores.entities import Document, Stale, digest_of, summary_of
 from api.work.toolings import LARGEST, parsed, tooling_of
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.report.drawing import tooling_svg
@@ -64,7 +64,7 @@ async def write(
 def list_toolings(parts: ThisService, caller: WhoAsks, after: After = "", limit: Limit = 50) -> Page[ToolingSummary]:
     rows, following = page(parts.store.toolings.list(caller.group, after, limit + 1), limit, lambda row: row.name)
     return Page(
-        items=[ToolingSummary(name=row.name, changed=row.changed, etag=row.digest, **json.loads(row.summary)) for row in rows],
+        items=[ToolingSummary(name=row.name, changed=row.changed, etag=row.digest, **summary_of(row)) for row in rows],
         next=following,
     )
 

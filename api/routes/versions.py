@@ -78,16 +78,17 @@ def tooling_version(name: ToolingName, version: Version, components: ThisService
 @router.post(
     f"{_TOOLING}/restore",
     summary="Write a version of a tooling again, also one that was deleted",
-    description="If-Match or If-None-Match: * protect against overwriting concurrent changes. What it replaces stays as a version.",
+    description="If-Match or If-None-Match: * protect against overwriting concurrent changes. What it replaces stays as a version; "
+    "409 where the version is what is there now.",
     openapi_extra=guard("upload"),
-    responses={201: {"model": ToolingAnswer, "description": "It was deleted before."}, **problems(404, 412, 413, 422, 500)},
+    responses={201: {"model": ToolingAnswer, "description": "It was deleted before."}, **problems(404, 409, 412, 413, 422, 500)},
 )
 def restore_tooling(
     name: ToolingName, version: Version, request: Request, response: Response, components: ThisService, caller: WhoAsks, why: Why = ""
 ) -> ToolingAnswer:
-    text = _version(components, caller, TOOLING, name, version).text
-    document = Document(caller.group, name, text, json.dumps(summary(text)), digest_of(text), now())
-    _restore(components.store.toolings, document, version, request, response, caller, why)
+    found = _version(components, caller, TOOLING, name, version)
+    document = Document(caller.group, name, found.text, json.dumps(summary(found.text)), digest_of(found.text), now())
+    _restore(components.store.toolings, document, found, request, response, caller, why)
     return answer_of(document)
 
 
@@ -110,18 +111,24 @@ def identification_version(id: MachineId, version: Version, components: ThisServ
 @router.post(
     f"{_MACHINE}/restore",
     summary="Write a version of a machine's identification again",
-    description="If-Match or If-None-Match: * protect against overwriting concurrent changes. What it replaces stays as a version.",
+    description="If-Match or If-None-Match: * protect against overwriting concurrent changes. What it replaces stays as a version; "
+    "409 where the version is what is there now.",
     openapi_extra=guard("upload"),
-    responses={201: {"model": IdentificationSummary, "description": "The machine had none before."}, **problems(404, 412, 413, 422, 500)},
+    responses={
+        201: {"model": IdentificationSummary, "description": "The machine had none before."},
+        **problems(404, 409, 412, 413, 422, 500),
+    },
 )
 def restore_identification(
     id: MachineId, version: Version, request: Request, response: Response, components: ThisService, caller: WhoAsks, why: Why = ""
 ) -> IdentificationSummary:
     machine_of(components, caller.group, id)
     found = _version(components, caller, IDENTIFICATION, id, version)
-    document = Document(caller.group, id, found.text, found.summary, found.digest, now())
-    _restore(components.store.identifications, document, version, request, response, caller, why)
-    return summary_of(document)
+    document = Document(caller.group, id, found.text, found.summary, found.digest, now(), found.summary_digest)
+    # a damaged one is not written again
+    told = summary_of(document)
+    _restore(components.store.identifications, document, found, request, response, caller, why)
+    return told
 
 
 def _version(components: Components, caller: Caller, kind: str, name: str, version: int) -> Change:
@@ -130,10 +137,12 @@ def _version(components: Components, caller: Caller, kind: str, name: str, versi
     return found_or_404(found if found is not None and found.text else None, "version with a content")
 
 
-def _restore(kept: Documents, document: Document, version: int, request: Request, response: Response, caller: Caller, why: str) -> None:
+def _restore(kept: Documents, document: Document, version: Change, request: Request, response: Response, caller: Caller, why: str) -> None:
     seen = expected(request, lambda: getattr(kept.brief(document.group, document.name), "digest", None))
+    if version.holds and seen in (None, document.digest):
+        raise Problem(409, f"there is nothing to restore: version {version.version} is what is there now")
     try:
-        response.status_code = 201 if kept.put(document, seen, caller.note(why, version)) else 200
+        response.status_code = 201 if kept.put(document, seen, caller.note(why, version.version)) else 200
     except Stale:
         raise Problem(412, "what would be replaced is not what the query expects") from None
     response.headers.update(tagged(document.digest))
@@ -144,6 +153,6 @@ def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[Differe
 
 
 def _answer(change: Change) -> ChangeAnswer:
-    same = ("id", "kind", "name", "title", "version", "action", "created", "key", "who", "why")
+    same = ("id", "kind", "name", "title", "version", "action", "created", "key", "who", "why", "holds")
     columns = {name: getattr(change, name) for name in same}
     return ChangeAnswer.model_validate(columns | {"restores": change.restores or None, "etag": change.digest or None})

@@ -42,7 +42,7 @@ class QueuePlace(Answer):
 
 
 class JobProblem(Answer):
-    """Why a job failed."""
+    """Why a job failed, or why the service cancelled it."""
 
     detail: str
     errors: list[Fault]

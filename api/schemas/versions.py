@@ -29,6 +29,7 @@ class ChangeAnswer(Answer):
     who: str = Field(description="Name of the API key.")
     why: str
     etag: str | None = Field(description="Of the version's content; null where it has none.")
+    holds: bool = Field(description="Whether this content is what is there now, so that there is nothing to restore.")
 
 
 class Difference(Answer):

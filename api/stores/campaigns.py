@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 
@@ -53,6 +53,8 @@ class Recording:
     created : str
     samples : str
         SHA-256 of the samples' file, hexadecimal; empty where a release has stored them that did not keep it.
+    digest : str
+        Of `found`, as it was stored.
     """
 
     group: str
@@ -66,6 +68,7 @@ class Recording:
     judged_with: str
     created: str
     samples: str = ""
+    digest: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,8 +57,10 @@ class Change:
     restores : int
     created : str
         UTC, ISO 8601.
-    text, summary, digest : str
+    text, summary, digest, summary_digest : str
         Of the version, as in `Document`; empty where there is none.
+    holds : bool
+        Whether this content is what is there now.
     """
 
     id: int
@@ -76,6 +78,8 @@ class Change:
     text: str
     summary: str
     digest: str
+    summary_digest: str
+    holds: bool
 
 
 class Changes(Protocol):

@@ -1,4 +1,4 @@
-"""The database and its transactions: SQLite in WAL mode, or PostgreSQL by URL, through the same statements."""
+"""The database and its transactions, the same statements on SQLite and on PostgreSQL."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ import sqlite3
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from pathlib import Path
 
-from sqlalchemy import Connection, Engine, create_engine, event, func, select, text
+from sqlalchemy import URL, Connection, Engine, create_engine, func, select, text
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, IntegrityError, NoSuchModuleError, OperationalError, TimeoutError
 
 from api.stores import tables
+from api.stores.engines import engine_of
 from api.stores.entities import Destroyed, NoRoom, Unavailable
+from api.stores.migrations import migrate, version_of
 from rcsa_ident.errors import InputError
 
-_BUSY_MS = 5000
 #: Time [s] for which a count of a group's rows is added to instead of taken again: among very many rows it takes a while.
 COUNTED = 5.0
 #: Codes by which SQLite and PostgreSQL say that a file is no database, or that pages of it are damaged.
@@ -27,20 +28,20 @@ def open_engine(url: str) -> Engine:
     """Return the engine of a database whose tables have been made or migrated."""
     try:
         parsed = make_url(url)
-        engine = create_engine(parsed, pool_pre_ping=not url.startswith("sqlite"))
+        engine = engine_of(parsed)
     except (ArgumentError, NoSuchModuleError, ModuleNotFoundError) as error:
         # the URL may hold a password: the message names the error only
         allowed = "a URL as sqlite:///FILE or postgresql+psycopg://USER@HOST/NAME, with its driver installed"
         raise InputError("RCSA_IDENT_DATABASE", type(error).__name__, allowed) from None
-    if engine.dialect.name == "sqlite":
-        event.listen(engine, "connect", _sqlite)
-        event.listen(engine, "begin", _begin)
     try:
         with engine.begin() as connection:
             if engine.dialect.name == "postgresql":
                 # service and workers may find a new database at the same moment
                 connection.execute(text("SELECT pg_advisory_xact_lock(7243451)"))
-            tables.migrate(connection)
+            migrate(connection)
+    except InputError:
+        engine.dispose()
+        raise
     except (DBAPIError, sqlite3.DatabaseError) as error:
         engine.dispose()
         if _destroyed(error):
@@ -52,24 +53,31 @@ def open_engine(url: str) -> Engine:
     return engine
 
 
+def version_in(file: Path) -> str:
+    """Return the schema version of an embedded database, which is left as it is; empty where it holds no store.
+
+    Raises
+    ------
+    InputError
+        A later release has written it.
+    ValueError
+        It holds something else.
+    """
+    engine = create_engine(URL.create("sqlite", database=str(file)))
+    try:
+        with engine.connect() as connection:
+            return version_of(connection)
+    except DBAPIError as error:
+        raise ValueError(str(error.orig)) from None
+    finally:
+        engine.dispose()
+
+
 def _destroyed(error: Exception) -> bool:
     """Whether an error says that the database is damaged."""
     cause = getattr(error, "orig", None) or error
     codes = {getattr(cause, "sqlite_errorcode", None) or 0, getattr(cause, "sqlstate", None)}
     return not _DESTROYED.isdisjoint({code & 0xFF if isinstance(code, int) else code for code in codes})
-
-
-def _sqlite(connection: Any, _record: Any) -> None:
-    """Set WAL mode (readers do not wait for a writer) and full synchronisation (commits survive a loss of power)."""
-    # transactions begin where SQLAlchemy begins them, not at the first write
-    connection.isolation_level = None
-    for pragma in ("journal_mode=WAL", "synchronous=FULL", f"busy_timeout={_BUSY_MS}", "foreign_keys=ON"):
-        connection.execute(f"PRAGMA {pragma}")
-
-
-def _begin(connection: Connection) -> None:
-    wanted = "IMMEDIATE" if connection.get_execution_options().get("writes", True) else "DEFERRED"
-    connection.exec_driver_sql(f"BEGIN {wanted}")
 
 
 class Database:

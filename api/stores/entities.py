@@ -6,9 +6,10 @@ Whatever adds to what a group keeps raises `NoRoom` where that is more than it m
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+import json
+from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Protocol
+from typing import Any, Protocol
 
 from api.stores.campaigns import Campaigns, Recordings
 from api.stores.changes import UNSIGNED, Changes, Note
@@ -98,6 +99,8 @@ class Document:
     digest : str
         Of the text: its entity tag.
     changed : str
+    summary_digest : str
+        As it was stored; of a new document that of its summary.
     """
 
     group: str
@@ -106,6 +109,10 @@ class Document:
     summary: str
     digest: str
     changed: str
+    summary_digest: str = field(default="", compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "summary_digest", self.summary_digest or digest_of(self.summary))
 
 
 def digest_of(text: str) -> str:
@@ -129,6 +136,12 @@ def whole(text: str, digest: str, what: str, mend: str) -> str:
     if digest_of(text) != digest:
         raise Damaged(f"the stored {what} is damaged: its content is not what was stored; {mend}")
     return text
+
+
+def summary_of(document: Document) -> dict[str, Any]:
+    """Return the summary of a tooling or an identification; raises `Damaged` where it is not what was stored."""
+    what = f"summary of {document.name}"
+    return dict(json.loads(whole(document.summary, document.summary_digest, what, "write the same tooling or identification again")))
 
 
 class Keys(Protocol):

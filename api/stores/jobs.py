@@ -47,6 +47,10 @@ class Job:
         Number of its last event.
     key, who : str
         Of the API key that asked for it: id and name.
+    watched : str or None
+        When somebody followed it last; None where it goes on without.
+    request_digest : str
+        Of the request, as it was stored.
     """
 
     id: str
@@ -68,6 +72,8 @@ class Job:
     events: int = 0
     key: str = ""
     who: str = ""
+    watched: str | None = None
+    request_digest: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,6 +184,12 @@ class Jobs(Protocol):
 
     def cancel(self, group: str, id: str, when: str) -> tuple[Job, bool] | None:
         """Cancel an open job, whose inputs are dropped, and return the job and whether it was open."""
+
+    def watch(self, id: str, when: str) -> None:
+        """Note that somebody follows a job, where that matters."""
+
+    def abandon(self, before: str, when: str, problem: str) -> Sequence[str]:
+        """Cancel the open jobs that were watched before a time last, for this reason, and return their ids."""
 
     def open(self) -> Sequence[Job]:
         """Return all jobs that are queued or running, in the order of their turn: groups take turns, each with its oldest first."""

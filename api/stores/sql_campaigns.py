@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
+from dataclasses import replace as replaced
 from typing import Any
 
 from sqlalchemy import Connection, Select, delete, func, insert, select, update
@@ -121,6 +122,9 @@ class SqlRecordings:
                 if not replace:
                     raise Taken("name")
                 connection.execute(update(_R).where(*here).values(_row(recording)))
+            elif digest_of(there.found) != there.digest:
+                # what was found has come to harm, and has been found once more
+                connection.execute(update(_R).where(*here).values(_row(replaced(recording, created=there.created))))
             elif (there.normalised, there.samples) != (recording.normalised, recording.samples):
                 # read once more, perhaps by a later release, and equal to the last bit of the signals only
                 connection.execute(update(_R).where(*here).values(normalised=recording.normalised, samples=recording.samples))
@@ -183,7 +187,7 @@ def _keys(rows: Sequence[Any]) -> list[FileKey]:
 
 
 def _row(recording: Recording) -> dict[str, Any]:
-    row = asdict(recording)
+    row = asdict(recording) | {"digest": digest_of(recording.found)}
     return row | {"usable": int(json.loads(recording.found)["verdict"]["usable"]), "stored": tables.size_of(row)}
 
 

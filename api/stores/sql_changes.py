@@ -5,14 +5,24 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import Any
 
-from sqlalchemy import Connection, delete, func, insert, select, update
+from sqlalchemy import ColumnElement, Connection, and_, delete, exists, func, insert, or_, select, update
 
 from api.stores import tables
 from api.stores.changes import CHANGED, DELETED, IDENTIFICATION, MACHINE, MADE, RESTORED, TOOLING, Change, Note
 from api.stores.database import Database
 from api.stores.entities import whole
 
-_CHANGE = tables.columns_of(tables.changes, Change)
+
+def _holds() -> ColumnElement[bool]:
+    """Whether a version is what is there now; a text that has come to harm is another one, which the version mends."""
+    c, found = tables.changes, []
+    for kind, t in ((TOOLING, tables.toolings), (IDENTIFICATION, tables.identifications)):
+        same = (t.c.group == c.c.group, t.c.name == c.c.name, t.c.digest == c.c.digest, t.c.text == c.c.text)
+        found.append(and_(c.c.kind == kind, exists().where(*same)))
+    return or_(*found).label("holds")
+
+
+_CHANGE = [_holds() if name == "holds" else tables.changes.c[name] for name in Change.__dataclass_fields__]
 
 
 class SqlChanges:
@@ -50,7 +60,7 @@ class SqlChanges:
 def log_document(connection: Connection, kind: str, row: dict[str, Any], note: Note, new: bool) -> None:
     """Log a text that has been written; `row` has the columns of its document."""
     action = RESTORED if note.restores else MADE if new else CHANGED
-    content = {name: row[name] for name in ("text", "summary", "digest")}
+    content = {name: row[name] for name in ("text", "summary", "digest", "summary_digest")}
     _log(connection, kind, (row["group"], row["name"]), action, row["changed"], note, content)
 
 

@@ -12,7 +12,7 @@ from sqlalchemy.exc import IntegrityError
 from api.stores import tables
 from api.stores.changes import IDENTIFICATION, Note
 from api.stores.database import Database
-from api.stores.entities import digest_of, whole
+from api.stores.entities import Document, digest_of, whole
 from api.stores.idempotency import earlier, forget_old
 from api.stores.jobs import OPEN, PARTIAL, Event, Full, Job, Outcome, Worker
 from api.stores.sql_changes import log_document
@@ -46,7 +46,7 @@ class SqlJobs:
                     row = {"group": job.group, "key": repeat[0], "digest": repeat[1], "id": job.id, "created": job.created}
                     connection.execute(insert(r).values(row))
                 self.store.check_room(connection, job.group, tables.size_of(asdict(job)) + sum(map(len, texts.values())))
-                connection.execute(insert(t).values(asdict(job)))
+                connection.execute(insert(t).values(asdict(job) | {"request_digest": digest_of(job.request)}))
                 for name, text in texts.items():
                     connection.execute(insert(x).values(job=job.id, name=name, text=text, digest=digest_of(text)))
                 _measure(connection, job.id)
@@ -91,11 +91,27 @@ class SqlJobs:
                 return None
             cancelled = found.state in OPEN
             if cancelled:
-                connection.execute(update(t).where(*here).values(state="cancelled", finished=when))
-                _forget_partial(connection, id)
-                _drop_texts(connection, id)
-                _append(connection, id, found.events, [Event(0, "end", "")])
+                _cancel(connection, found, when)
             return Job(**connection.execute(select(*_JOB).where(*here)).one()._asdict()), cancelled
+
+    def watch(self, id: str, when: str) -> None:
+        t = tables.jobs
+        with self.store.writing() as connection:
+            connection.execute(update(t).where(t.c.id == id, t.c.watched.is_not(None)).values(watched=when))
+
+    def abandon(self, before: str, when: str, problem: str) -> Sequence[str]:
+        t, ended = tables.jobs, []
+        alone = (t.c.state.in_(OPEN), t.c.watched < before)
+        with self.store.reading() as connection:
+            ids = connection.execute(select(t.c.id).where(*alone)).scalars().all()
+        for id in ids:
+            with self.store.writing() as connection:
+                # somebody may have come back meanwhile
+                found = connection.execute(select(t).where(t.c.id == id, *alone).with_for_update()).first()
+                if found is not None:
+                    _cancel(connection, found, when, problem)
+                    ended.append(id)
+        return ended
 
     def open(self) -> Sequence[Job]:
         t, turn = tables.jobs, _turns()
@@ -264,6 +280,14 @@ def _append(connection: Connection, job: str, last: int, events: Sequence[Event]
     _measure(connection, job)
 
 
+def _cancel(connection: Connection, job: Any, when: str, problem: str | None = None) -> None:
+    t = tables.jobs
+    connection.execute(update(t).where(t.c.id == job.id).values(state="cancelled", finished=when, problem=problem))
+    _forget_partial(connection, job.id)
+    _drop_texts(connection, job.id)
+    _append(connection, job.id, job.events, [Event(0, "end", "")])
+
+
 def _drop_texts(connection: Connection, job: str) -> None:
     """Drop the inputs of a job that is over: they may be much larger than the request, and nobody reads them again."""
     connection.execute(delete(tables.job_texts).where(tables.job_texts.c.job == job))
@@ -287,7 +311,7 @@ def _apply(connection: Connection, job: Any, outcome: Outcome) -> None:
     here = (i.c.group == job.group, i.c.name == job.machine)
     before = connection.execute(select(i.c.digest).where(*here)).scalar()
     connection.execute(delete(i).where(*here))
-    row = asdict(outcome.applied) | {"group": job.group, "name": job.machine, "changed": outcome.finished}
+    row = asdict(Document(job.group, job.machine, **asdict(outcome.applied), changed=outcome.finished))
     connection.execute(insert(i).values(row))
     if before != outcome.applied.digest:
         named = connection.execute(select(c.c.name).where(c.c.id == job.campaign)).scalar()

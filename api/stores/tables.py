@@ -1,8 +1,8 @@
-"""Tables, and migrations of earlier versions."""
+"""Tables of the store."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from sqlalchemy import (
@@ -21,17 +21,9 @@ from sqlalchemy import (
     UniqueConstraint,
     cast,
     func,
-    insert,
-    inspect,
     literal,
     select,
-    text,
-    update,
 )
-from sqlalchemy.schema import CreateColumn
-
-from api.stores.entities import digest_of
-from rcsa_ident.errors import InputError
 
 #: What a row counts for beside its texts [bytes].
 ROW = 100
@@ -52,6 +44,8 @@ def _stored() -> Column[int]:
     )
 
 
+#: What releases before Alembic find where they kept the version, and refuse: it is above theirs.
+SINCE_ALEMBIC = 6
 meta = Table("meta", metadata, Column("schema_version", Integer, nullable=False))
 keys = Table(
     "keys",
@@ -110,6 +104,7 @@ def _documents(name: str) -> Table:
         Column("summary", Text, nullable=False),
         Column("digest", String(64), nullable=False),
         Column("changed", String(40), nullable=False),
+        Column("summary_digest", String(64), nullable=False, server_default=""),
         _stored(),
         Index(f"ix_{name}_stored", "group", "stored"),
     )
@@ -135,6 +130,7 @@ changes = Table(
     Column("text", Text, nullable=False),
     Column("summary", Text, nullable=False),
     Column("digest", String(64), nullable=False),
+    Column("summary_digest", String(64), nullable=False, server_default=""),
     UniqueConstraint("group", "kind", "name", "version"),
     _stored(),
     Index("ix_changes_group", "group", "id"),
@@ -174,6 +170,7 @@ recordings = Table(
     Column("judged_with", String(64), nullable=False),
     Column("created", String(40), nullable=False),
     Column("samples", String(64), nullable=False, server_default=""),
+    Column("digest", String(64), nullable=False, server_default=""),
     _stored(),
     Index("ix_recordings_stored", "group", "stored"),
 )
@@ -200,6 +197,8 @@ jobs = Table(
     Column("events", Integer, nullable=False),
     Column("key", _Name, nullable=False, server_default=""),
     Column("who", String(200), nullable=False, server_default=""),
+    Column("watched", String(40)),
+    Column("request_digest", String(64), nullable=False, server_default=""),
     _stored(),
     Index("ix_jobs_group", "group", "kind", "id"),
     Index("ix_jobs_stored", "group", "stored"),
@@ -235,54 +234,6 @@ job_workers = Table(
 )
 
 
-def _missing_tables(connection: Connection) -> None:
-    metadata.create_all(connection)
-
-
-def _kept_versions(connection: Connection) -> None:
-    """Versions with who, when and why; keys that expire; jobs that know who asked for them."""
-    metadata.create_all(connection)
-    _add_columns(connection, keys, jobs)
-    _first_versions(connection)
-
-
-def _add_columns(connection: Connection, *changed: Table) -> None:
-    """Add the columns that tables do not have yet."""
-    for table in changed:
-        there = {column["name"] for column in inspect(connection).get_columns(table.name)}
-        for column in (each for each in table.c if each.name not in there):
-            words = CreateColumn(column).compile(dialect=connection.dialect)
-            connection.execute(text(f"ALTER TABLE {table.name} ADD COLUMN {words}"))
-
-
-def _first_versions(connection: Connection) -> None:
-    """What is there is version 1, whoever wrote it."""
-    m, i, d = machines, identifications, toolings
-    nothing, unknown = (literal(""),) * 3, (literal(1), literal("made"), literal(0))
-    name_of = select(m.c.name).where(m.c.group == i.c.group, m.c.id == i.c.name).scalar_subquery()
-    for kind, table, name, title, when, content in (
-        ("machine", m, m.c.id, m.c.name, m.c.created, nothing),
-        ("identification", i, i.c.name, func.coalesce(name_of, i.c.name), i.c.changed, (i.c.text, i.c.summary, i.c.digest)),
-        ("tooling", d, d.c.name, d.c.name, d.c.changed, (d.c.text, d.c.summary, d.c.digest)),
-    ):
-        who = (literal(""), literal(""), literal("it was there before versions were kept"))
-        query = select(table.c.group, literal(kind), name, title, *unknown, when, *who, *content).order_by(name)
-        names = [column.name for column in changes.c if column.name not in ("id", "stored")]
-        connection.execute(insert(changes).from_select(names, query, include_defaults=False))
-
-
-def _digests(connection: Connection) -> None:
-    """A digest beside every text and every file; what is there counts as whole."""
-    _add_columns(connection, campaigns, recordings, job_texts)
-    for table in (campaigns, job_texts):
-        own = list(table.primary_key)
-        # one text after the other: together they may be larger than the memory
-        for row in connection.execute(select(*own)).all():
-            here = [column == value for column, value in zip(own, row, strict=True)]
-            content = connection.execute(select(table.c.text).where(*here)).scalar_one()
-            connection.execute(update(table).where(*here).values(digest=digest_of(content)))
-
-
 #: What the groups' quotas count, by the names that people read; what jobs say and come to counts with them.
 COUNTED = {
     "machines": (machines,),
@@ -295,18 +246,6 @@ COUNTED = {
     "keys": (keys,),
     "repeated_calls": (repeats, campaign_repeats, job_repeats),
 }
-
-
-def _sizes(connection: Connection) -> None:
-    """A size of every row, and an index that sums them for each group."""
-    counted = [table for each in COUNTED.values() for table in each]
-    _add_columns(connection, *counted, job_events, job_texts)
-    for table in (*counted, job_events, job_texts):
-        for index in table.indexes:
-            index.create(connection, checkfirst=True)
-        texts = [column for column in table.c if isinstance(column.type, String)]
-        connection.execute(update(table).values(stored=sum((func.coalesce(bytes_of(connection, c), 0) for c in texts), literal(ROW))))
-    connection.execute(update(jobs).values(stored=size_of_job(connection)))
 
 
 def bytes_of(connection: Connection, column: ColumnElement[str]) -> ColumnElement[int]:
@@ -326,22 +265,3 @@ def size_of_job(connection: Connection) -> ColumnElement[int]:
 def columns_of(table: Table, entity: Any) -> list[Column[Any]]:
     """Return the columns that an entity is made of."""
     return [table.c[name] for name in entity.__dataclass_fields__]
-
-
-#: Migrations from version k + 1 to k + 2, in order; a released one is never edited.
-MIGRATIONS: tuple[Callable[[Connection], None], ...] = (_missing_tables, _kept_versions, _digests, _sizes)
-SCHEMA_VERSION = 1 + len(MIGRATIONS)
-
-
-def migrate(connection: Connection) -> None:
-    """Migrate the store to the current version in one transaction; a later version is refused."""
-    if not inspect(connection).has_table("meta"):
-        metadata.create_all(connection)
-        connection.execute(insert(meta).values(schema_version=SCHEMA_VERSION))
-        return
-    version = connection.execute(select(meta.c.schema_version)).scalar_one()
-    if version > SCHEMA_VERSION:
-        raise InputError("store", f"schema version {version}", f"at most {SCHEMA_VERSION}: a later release has written it")
-    for step in MIGRATIONS[version - 1 :]:
-        step(connection)
-    connection.execute(update(meta).values(schema_version=SCHEMA_VERSION))

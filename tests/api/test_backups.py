@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -25,8 +26,8 @@ from api.client import Client
 from api.files import NORMALISED, UPLOADS, Files
 from api.serve import app
 from api.stores.entities import Document
+from api.stores.migrations import SCHEMA_VERSION
 from api.stores.sql import open_store
-from api.stores.tables import SCHEMA_VERSION
 from rcsa_ident.errors import InputError
 from tests.api.in_process import service
 from tests.api.recordings import content, declared
@@ -283,7 +284,7 @@ def of_schema(members):
     path = Path(os.environ["SCRATCH"])
     path.write_bytes(members[0][1])
     with closing(sqlite3.connect(path)) as database, database:
-        database.execute("UPDATE meta SET schema_version = 99")
+        database.execute("UPDATE alembic_version SET version_num = '99'")
     return matching([(members[0][0], path.read_bytes()), *members[1:]])
 
 
@@ -328,6 +329,51 @@ def test_sizes_beyond_octal_digits(size):
     name = f"files/{'0' * 32}/{NORMALISED}/{HASH}.h5"
     info = tarfile.TarInfo.frombuf(save.header(name, size), "ascii", "strict")
     assert (info.name, info.size, info.type) == (name, size, tarfile.REGTYPE)
+
+
+@pytest.mark.skipif(shutil.which("tar") is None, reason="there is no tar")
+def test_other_programs_read_a_member_beyond_octal_digits(tmp_path):
+    """Of a file with a hole, so that nothing of that size is written."""
+    name, size = f"files/{'0' * 32}/{NORMALISED}/{HASH}.h5", 8**11 + 5
+    with (tmp_path / "b.tar").open("wb") as file:
+        file.write(save.header(name, size))
+        file.truncate(512 + size + -size % 512 + 1024)
+    told = subprocess.run(["tar", "-tvf", tmp_path / "b.tar"], capture_output=True, text=True, check=True).stdout.split()
+    assert (told[2], told[-1]) == (str(size), name)
+    with tarfile.open(tmp_path / "b.tar") as tar:
+        assert [(each.name, each.size) for each in tar] == [(name, size)]
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path.relative_to(folder): path.read_bytes() for path in (folder / "files").rglob("*") if path.is_file()}
+
+
+def test_a_file_that_grows_meanwhile(data, tmp_path, monkeypatch):
+    """What it had when it was opened is in the backup, in pieces of bounded size."""
+    wanted, copied, pieces = contents(data), save.copy, []
+
+    class Counted:
+        def __init__(self, file):
+            self.file = file
+
+        def read(self, size):
+            pieces.append(size)
+            return self.file.read(size)
+
+    def growing(source, target, size, digest):
+        # the manifest's file has no name
+        if isinstance(source.name, str):
+            with open(source.name, "ab") as file:
+                file.write(b"later")
+        copied(Counted(source), target, size, digest)
+
+    monkeypatch.setattr(save, "copy", growing)
+    monkeypatch.setattr("api.backups.members.CHUNK", 4096)
+    assert backup(data, tmp_path / "b.tar").damaged == ()
+    assert contents(data) != wanted
+    assert max(pieces) == 4096
+    restore(tmp_path / "b.tar", tmp_path / "new")
+    assert contents(tmp_path / "new") == wanted
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

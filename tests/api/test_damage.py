@@ -8,7 +8,7 @@ import os
 import sqlite3
 import zipfile
 from contextlib import closing
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -20,8 +20,7 @@ from api.backups.save import backup
 from api.files import NORMALISED, UPLOADS
 from api.security import new_id, now
 from api.serve import app
-from api.stores import tables
-from api.stores.campaigns import Campaign, Recording
+from api.stores.campaigns import Campaign
 from api.stores.entities import Damaged, Destroyed, Document, Machine, digest_of
 from api.stores.jobs import Outcome
 from api.stores.sql import open_store
@@ -30,6 +29,7 @@ from tests.api.identifying import carried, job, running
 from tests.api.in_process import BOTH, embedded, refused, service
 from tests.api.recordings import content, declared
 from tests.fixtures import by_hand
+from tests.fixtures.service import example
 
 CUT, AIR = "c0_cut.h5", "c0_air.h5"
 
@@ -114,6 +114,71 @@ def test_verdicts_meet_damage_and_forget_it(client, parts, campaign, tmp_path):
     client.upload(campaign, tmp_path / AIR)
     client.upload(campaign, tmp_path / CUT)
     assert client.recording(campaign, CUT).verdict == first
+
+
+@pytest.mark.parametrize("other", ['{"verdict": {"usable": false}}', "[]", "nonsense", ""])
+def test_a_damaged_verdict_is_told_and_heals(client, parts, campaign, tmp_path, other):
+    """The file can still be had; the campaign says of that cut what has happened, and an upload of another cut is judged."""
+    url = f"/v1/campaigns/{campaign}/recordings/{CUT}"
+    before, usable = client.recording(campaign, CUT), client.campaign(campaign).usable
+    with parts.store.writing() as connection:
+        connection.execute(text("UPDATE recordings SET found = :other WHERE name = :name"), {"other": other, "name": CUT})
+    words = f"the stored verdict on the recording {CUT} is damaged: its content is not what was stored; upload the same recording again"
+    for path in (url, f"{url}/spectrum", f"/v1/campaigns/{campaign}/recordings"):
+        answer = client.http.get(path)
+        assert (answer.status_code, answer.json()["detail"][: len(words)]) == (500, words), path
+    verdicts = {cut.cut.name: cut.verdict for cut in client.campaign(campaign).cuts}
+    assert not verdicts[CUT].usable
+    assert words in verdicts[CUT].reasons[0]
+    assert client.http.get(f"{url}/file").content == (tmp_path / CUT).read_bytes()
+    # the air cut again, which judges the cuts beside it
+    client.forget_recording(campaign, AIR)
+    client.upload(campaign, tmp_path / AIR)
+    # to somebody who sends in parts it is not there
+    assert client.http.head(url).status_code == 404
+    assert client.upload(campaign, tmp_path / CUT) == before
+    assert client.recording(campaign, CUT) == before
+    assert client.campaign(campaign).usable == usable
+
+
+def test_damaged_summaries_are_told_and_heal(client, store, result):
+    machine = client.make_machine("M").id
+    client.identify(machine, result)
+    client.write_tooling("T1", example())
+    for table, other in (("identifications", '{"axes": []}'), ("toolings", "nonsense")):
+        with store.writing() as connection:
+            connection.execute(text(f"UPDATE {table} SET summary = :other"), {"other": other})
+    words = "is damaged: its content is not what was stored; write the same tooling or identification again"
+    for call in (partial(client.machine, machine), lambda: list(client.toolings()), partial(client.lobes, machine, "T1")):
+        assert words in refused(500, call).detail
+    # their texts are whole, and written again they mend it
+    text_of_tooling = client.tooling_file("T1")
+    client.identify(machine, result)
+    client.write_tooling("T1", text_of_tooling)
+    assert client.machine(machine).identification.axes
+    assert [each.name for each in client.toolings()] == ["T1"]
+    # no version was needed for that
+    assert [c.version for c in client.changes(kind="tooling")] == [1]
+
+
+def test_a_damaged_summary_of_a_version_is_not_restored(client, store, result):
+    machine = client.make_machine("M").id
+    for each in (result, result.replace('"seed": 1', '"seed": 2')):
+        client.identify(machine, each)
+    with store.writing() as connection:
+        connection.execute(text("UPDATE changes SET summary = '{\"axes\": []}' WHERE kind = 'identification' AND version = 1"))
+    before = client.machine(machine)
+    assert "is damaged" in refused(500, client.restore_identification, machine, 1).detail
+    assert client.machine(machine) == before
+
+
+def test_what_a_job_was_asked_is_what_it_does(client, store, campaign, tmp_path):
+    id = client.identify_campaign(campaign, seed=7).id
+    with store.writing() as connection:
+        connection.execute(text("UPDATE jobs SET request = replace(request, '7', '8')"))
+    carried(store, tmp_path)
+    told = client.http.get(f"/v1/identifications/{id}").json()
+    assert (told["state"], "request of the job" in told["problem"]["detail"]) == ("failed", True)
 
 
 def test_an_identification_says_which_recording_is_damaged(client, store, parts, campaign, tmp_path):
@@ -217,28 +282,6 @@ def test_a_job_that_begins_from_damaged_text_says_so(store, machine, tmp_path):
     (id,) = (each.id for each in store.jobs.open())
     carried(store, tmp_path)
     assert "question of the job" in json.loads(store.jobs.find(id).problem)["detail"]
-
-
-@BOTH
-def test_a_store_from_before_digests_gets_them(request, store, machine):
-    """What is there counts as whole; of samples whose hash nobody knows it is enough that they are there."""
-    id = running(store, machine)
-    store.jobs.finish(id, "w", Outcome("done", now(), texts={"result": "found", "report": "told"}))
-    campaign = store.campaigns.add(Campaign(new_id(), "A", machine, "C", "{}", 1, now()))
-    row = Recording("A", campaign.id, "c.h5", "cut", 1, "0" * 64, "1" * 64, '{"verdict": {"usable": true}}', "", now(), "2" * 64)
-    store.recordings.put(row, False)
-    with store.writing() as connection:
-        for table, column in (("job_texts", "digest"), ("campaigns", "digest"), ("recordings", "samples")):
-            connection.execute(text(f"ALTER TABLE {table} DROP COLUMN {column}"))
-        connection.execute(text("UPDATE meta SET schema_version = 3"))
-    again = open_store(store.engine.url.render_as_string(hide_password=False))
-    assert (again.jobs.text(id, "result"), again.jobs.text(id, "report")) == ("found", "told")
-    assert again.campaigns.get("A", campaign.id) == campaign
-    assert again.recordings.get("A", campaign.id, "c.h5") == replace(row, samples="")
-    assert again.recordings.kept("A") == {(UPLOADS, "0" * 64): "0" * 64, (NORMALISED, "1" * 64): ""}
-    with again.reading() as connection:
-        assert connection.execute(text("SELECT schema_version FROM meta")).scalar() == tables.SCHEMA_VERSION
-    again.close()
 
 
 def folder_of_a_store(tmp_path) -> Path:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 
 import pytest
 
@@ -20,6 +21,12 @@ def elsewhere(tmp_path) -> dict[str, str]:
     """Settings of processes that find themselves on another system."""
     shutil.copyfile(ROOT / "tests" / "fixtures" / "other_system.py", tmp_path / "sitecustomize.py")
     return {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
+
+
+def test_fixtures_are_imported_where_no_module_knows_users():
+    """As on Windows: tests that start no PostgreSQL server run there."""
+    code = "import sys; sys.modules['pwd'] = None; import tests.fixtures.postgres"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True, timeout=PATIENCE)
 
 
 @pytest.mark.slow(40)

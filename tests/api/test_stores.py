@@ -11,7 +11,6 @@ import pytest
 from sqlalchemy import text
 
 from api.security import make_key, new_id, now
-from api.stores import tables
 from api.stores.campaigns import Campaign, Counts, Recording
 from api.stores.entities import ABSENT, Document, Machine, Stale, Taken, Unavailable, digest_of
 from api.stores.sql import open_store
@@ -300,28 +299,6 @@ def test_an_idempotency_key_is_forgotten_after_a_day(tmp_path):
     store.close()
 
 
-def test_an_earlier_store_is_brought_up_and_a_later_one_refused(tmp_path, monkeypatch):
-    url = f"sqlite:///{tmp_path / 's.db'}"
-    store = open_store(url)
-    store.toolings.put(document())
-    store.close()
-
-    def step(connection):
-        connection.execute(text("ALTER TABLE toolings ADD COLUMN note TEXT NOT NULL DEFAULT 'none'"))
-
-    later_version = tables.SCHEMA_VERSION + 1
-    monkeypatch.setattr(tables, "MIGRATIONS", (*tables.MIGRATIONS, step))
-    monkeypatch.setattr(tables, "SCHEMA_VERSION", later_version)
-    for _ in range(2):
-        later = open_store(url)
-        with later.reading() as connection:
-            assert connection.execute(text("SELECT note FROM toolings")).scalar() == "none"
-        later.close()
-    monkeypatch.undo()
-    with pytest.raises(InputError, match=f"schema version {later_version}"):
-        open_store(url)
-
-
 @pytest.mark.parametrize("url", ["nonsense", "sqlite:////no/such/folder/s.db", "mysterious://a:secret@b/c"])
 def test_a_store_that_can_not_be_opened_says_so(url):
     with pytest.raises(InputError) as refused:
@@ -331,7 +308,7 @@ def test_a_store_that_can_not_be_opened_says_so(url):
 
 
 def test_a_store_that_is_locked_is_unavailable(tmp_path, monkeypatch):
-    monkeypatch.setattr("api.stores.database._BUSY_MS", 50)
+    monkeypatch.setattr("api.stores.engines._BUSY_MS", 50)
     url = f"sqlite:///{tmp_path / 's.db'}"
     one, other = open_store(url), open_store(url)
     with one.writing() as connection:

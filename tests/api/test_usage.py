@@ -14,7 +14,6 @@ from api.stores import database, tables
 from api.stores.campaigns import Campaign, Recording
 from api.stores.entities import Document, Machine, NoRoom, digest_of
 from api.stores.jobs import Applied, Event, Outcome
-from api.stores.sql import open_store
 from api.work.toolings import LARGEST
 from rcsa_ident.io.toml_text import toml_of
 from tests.api.identifying import job, running
@@ -82,21 +81,6 @@ def test_everything_is_counted_to_the_byte(store, machine):
     after = store.usage("A")
     assert after == counted_anew(store)
     assert (after["campaigns"], after["jobs"], after["identifications"]) == (0, 0, 0)
-
-
-@BOTH
-def test_a_store_from_before_sizes_gets_them(store, machine):
-    filled(store, machine)
-    found = store.usage("A")
-    with store.writing() as connection:
-        for table in (t for t in tables.metadata.sorted_tables if "stored" in t.c):
-            for index in (i for i in table.indexes if i.name.endswith("_stored")):
-                connection.execute(text(f"DROP INDEX {index.name}"))
-            connection.execute(text(f"ALTER TABLE {table.name} DROP COLUMN stored"))
-        connection.execute(text("UPDATE meta SET schema_version = 4"))
-    again = open_store(store.engine.url.render_as_string(hide_password=False))
-    assert again.usage("A") == found
-    again.close()
 
 
 def test_the_sum_is_taken_from_indexes(store):

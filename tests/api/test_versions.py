@@ -9,13 +9,11 @@ from sqlalchemy import text
 
 from api.client import Client
 from api.schemas.campaigns import EXAMPLE as CAMPAIGN
-from api.security import make_key, new_id, now
-from api.stores import tables
-from api.stores.entities import Document, Machine, digest_of
+from api.security import new_id, now
+from api.stores.entities import Machine, digest_of
 from api.stores.jobs import Applied, Outcome
-from api.stores.sql import open_store
 from tests.api.identifying import job as queued
-from tests.api.in_process import BOTH, database, refused
+from tests.api.in_process import BOTH, refused
 from tests.fixtures import by_hand
 from tests.fixtures.service import example
 
@@ -70,6 +68,40 @@ def test_a_version_is_restored_also_after_a_deletion(presetting):
     for version in (4, 9):
         refused(404, presetting.tooling_version, "T1", version)
         refused(404, presetting.restore_tooling, "T1", version)
+
+
+def test_what_is_there_is_not_restored(client):
+    """Not offered, and refused in words; what has come to harm is."""
+    first = client.write_tooling("T1", example())
+    second = client.write_tooling("T1", example(cutter=THREE))
+    client.restore_tooling("T1", 1)
+    assert [(c.version, c.holds) for c in client.changes()] == [(3, True), (2, False), (1, True)]
+    assert client.tooling_version("T1", 1).change.holds
+    for version in (1, 3):
+        for seen in (None, first.etag):
+            found = refused(409, client.restore_tooling, "T1", version, seen=seen)
+            assert found.detail == f"there is nothing to restore: version {version} is what is there now"
+    refused(412, client.restore_tooling, "T1", 1, seen=second.etag)
+    client.forget_tooling("T1")
+    assert [(c.version, c.holds) for c in client.changes()] == [(4, False), (3, False), (2, False), (1, False)]
+    assert client.restore_tooling("T1", 3).etag == first.etag
+
+
+def test_an_identification_that_is_there_is_not_restored(client, result):
+    machine = client.make_machine("HPM").id
+    client.identify(machine, result)
+    refused(409, client.restore_identification, machine, 1)
+    assert [(c.kind, c.holds) for c in client.changes()] == [("identification", True), ("machine", False)]
+
+
+def test_the_version_of_a_tooling_that_is_damaged_mends_it(store, client):
+    client.write_tooling("T1", example())
+    with store.writing() as connection:
+        connection.execute(text("UPDATE toolings SET text = 'nonsense'"))
+    assert [c.holds for c in client.changes()] == [False]
+    refused(500, client.tooling, "T1")
+    client.restore_tooling("T1", 1)
+    assert client.tooling("T1").tooling.cutter.teeth == 4
 
 
 def test_differences_are_told_before_anything_is_written(client):
@@ -138,48 +170,3 @@ def test_an_identification_that_a_job_writes_names_who_asked_for_it(store):
     assert store.jobs.finish(job.id, "w", Outcome("done", now(), applied=Applied("{}", "{}", digest_of("{}"))))
     newest = store.changes.list("A", None, 9)[0]
     assert (newest.kind, newest.name, newest.who, newest.key, newest.why) == ("identification", machine, "night shift", "k1", "identified")
-
-
-#: What version 2 of the store did not have.
-_BEFORE = (
-    "DROP TABLE changes", "ALTER TABLE keys DROP COLUMN expires", "ALTER TABLE keys DROP COLUMN used",
-    "ALTER TABLE jobs DROP COLUMN key", "ALTER TABLE jobs DROP COLUMN who", "UPDATE meta SET schema_version = 2",
-)  # fmt: skip
-
-
-@pytest.mark.parametrize("kind", ["sqlite", pytest.param("postgresql", marks=pytest.mark.slow)])
-def test_a_store_from_before_versions_gets_them(request, tmp_path, kind):
-    """What is there becomes version 1; keys and jobs stay as they are."""
-    url = database(request, kind, tmp_path)
-    store = open_store(url)
-    machine = store.machines.add(Machine(new_id(), "A", "HPM", "", now())).id
-    store.identifications.put(Document("A", machine, "found", "{}", digest_of("found"), now()))
-    for name in ("T1", "T2"):
-        store.toolings.put(Document("A", name, f"{name} text", "{}", digest_of(f"{name} text"), "2026-01-01"))
-    key, _ = make_key("A", ("read",), "presetting")
-    store.keys.add(key)
-    job = store.jobs.add(queued(machine), {}, 9)
-    with store.writing() as connection:
-        for statement in _BEFORE:
-            connection.execute(text(statement))
-    store.close()
-    for _ in range(2):
-        store = open_store(url)
-        found = store.changes.list("A", None, 9)
-        assert [(c.kind, c.title, c.version, c.action, c.who) for c in reversed(found)] == [
-            ("machine", "HPM", 1, "made", ""), ("identification", "HPM", 1, "made", ""),
-            ("tooling", "T1", 1, "made", ""), ("tooling", "T2", 1, "made", ""),
-        ]  # fmt: skip
-        assert store.changes.get("A", "tooling", "T1", 1).text == "T1 text"
-        assert store.changes.get("A", "identification", machine, 1).text == "found"
-        assert found[0].created == "2026-01-01"
-        assert store.keys.get(key.id) == key
-        assert store.jobs.get("A", job.id) == job
-        with store.reading() as connection:
-            assert connection.execute(text("SELECT schema_version FROM meta")).scalar() == tables.SCHEMA_VERSION
-        store.close()
-    store = open_store(url)
-    # the trail goes on
-    store.toolings.put(Document("A", "T1", "new", "{}", digest_of("new"), now()))
-    assert store.changes.list("A", None, 1)[0].version == 2
-    store.close()

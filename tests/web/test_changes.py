@@ -93,6 +93,9 @@ def test_a_dropped_campaign_leaves_the_library_as_it_is(opened, client: Client, 
     dialog.get_by_role("button", name="Restore it").click()
     expect(page.locator("tbody tr", has_text=f"restored the tooling {name} from its version 1")).to_be_visible()
     assert client.tooling(name).etag == before.etag
+    # what is there is offered no more
+    expect(page.locator("tbody tr", has_text=f"made the tooling {name}").locator("td").last).to_have_text("There now")
+    expect(page.get_by_role("button", name=f"Restore version 1 of {name}")).to_have_count(0)
 
 
 def test_a_version_is_restored_over_what_was_seen_and_over_nothing_else(opened, client: Client):

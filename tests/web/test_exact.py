@@ -45,6 +45,9 @@ def test_limits_come_over_the_preview_until_one_leaves(opened, client: Client, s
     until(lambda: page.wait_for_timeout(100) or sum(page.evaluate(POINTS)))
     job = job_of(page, opened)
     assert client.lobe_job(job).job.state == "running"
+    # a browser that is gone without a word ends it, too: the service cancels what nobody follows
+    preferences = [r.headers.get("prefer") for r in opened.watch.requests if r.method == "POST" and r.url.endswith("/v1/lobes")]
+    assert preferences[-1] == "respond-async, while-watched"
     if leave == "another view":
         page.goto(f"{served.url}/#/toolings")
     elif leave == "another page":

@@ -33,11 +33,11 @@ export const secondsIn = (job) => (job.state === "queued" ? job.waited_s : job.r
 
 /**
  * Lobes by a slower method, from a job. `told(job)` hears of its state, `part(partial)` of the limits that are known so far.
- * Whoever aborts the signal, leaves the view or closes the tab cancels it.
+ * Whoever aborts the signal, leaves the view or closes the tab cancels it; a browser that is gone without a word stops to follow it.
  */
 export async function followLobes(question, signal, { told, part }) {
   // never broken off: a job that the service has just accepted would go on for nobody
-  const job = await (await send("POST", "lobes", { json: question, headers: { Prefer: "respond-async" } })).json();
+  const job = await (await send("POST", "lobes", { json: question, headers: { Prefer: "respond-async, while-watched" } })).json();
   const path = `lobes/${job.id}`;
   const cancel = () => send("DELETE", path, { keepalive: true }).catch(() => {});
   if (signal.aborted) return void cancel();

@@ -43,8 +43,13 @@ const COLUMNS = (fault) => [
   { name: "When", cell: (change) => new Date(change.created).toLocaleString() },
   { name: "What happened", cell: inWords },
   { name: "Version", number: true, cell: (change) => String(change.version) },
-  { name: "Back", cell: (change) => (change.etag && change.kind !== "machine" ? restoreButton(change, fault) : null) },
+  { name: "Back", cell: (change) => wayBack(change, fault) },
 ];
+
+function wayBack(change, fault) {
+  if (!change.etag || change.kind === "machine") return null;
+  return change.holds ? h("span", { class: "soft" }, "There now") : restoreButton(change, fault);
+}
 
 function restoreButton(change, fault) {
   const label = `Restore version ${change.version} of ${change.title}`;
