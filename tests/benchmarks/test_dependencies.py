@@ -24,3 +24,9 @@ def test_the_table_is_made_from_what_is_installed():
     assert row.endswith("| 9.9, 2030-01 |")
     assert "BSD" in row
     assert {"numpy", "scipy", "llvmlite", "starlette"} <= set(needed(required()))
+
+
+def test_the_tests_that_show_a_probe_are_there():
+    shown = re.findall(r"`(tests/[a-z_/]+\.py)::(test_\w+)`", (ROOT / "docs" / "libraries.md").read_text(encoding="utf-8"))
+    assert len(shown) > 10
+    assert not [name for file, name in shown if f"def {name}(" not in (ROOT / file).read_text(encoding="utf-8")]
