@@ -43,7 +43,8 @@ BEFORE = [
 _HEAD = """# What the package rests on
 
 Written by `python -m benchmarks dependencies --out docs/dependencies.md`, from what is installed. "Brings" counts the packages that a
-requirement needs, itself left out; many share them. A newest release that was not looked up is a dash.
+requirement needs, itself left out; many share them. Newest
+releases are those of the table that `--releases` names; a dash where it has none, or one older than what is installed.
 
 | requirement | installed | licence | MB | brings | with them, MB | newest release |
 |---|---|---|---|---|---|---|
@@ -69,8 +70,8 @@ def table(releases: dict[str, str]) -> str:
     rows = [_row(name, releases.get(name, "0")) for name in names]
     now, before = needed(names), needed(name for name in BEFORE if _installed(name))
     ends = [
-        f"\nThe base install: {len(now)} packages, {_size(now.values()):.0f} MB; with the requirements of before there were "
-        f"{len(before)}, {_size(before.values()):.0f} MB.",
+        f"\nThe base install: {len(now)} packages, {_size(now.values()):.0f} MB; what was required before comes to {len(before)} packages, "
+        f"{_size(before.values()):.0f} MB, in the versions of now.",
         "What came: " + ", ".join(sorted(set(now) - set(before))) + ".",
     ]
     return _HEAD + "\n".join([*rows, *ends]) + "\n"

@@ -126,7 +126,7 @@ datetime.datetime = Jumping
 
 
 def test_the_service_stands_a_clock_that_jumps(folder, result):
-    """It starts, computes and ends: what waits, and how long, is measured by the monotonic clock."""
+    """It starts, answers, computes and ends; no job is a part of this."""
     (folder / "sitecustomize.py").write_text(textwrap.dedent(JUMPING), encoding="utf-8")
     served_with = {"PYTHONPATH": os.pathsep.join((str(folder), str(ROOT)))}
     with serving(folder / "data", **served_with) as served, Client(served.url) as client:
