@@ -29,6 +29,7 @@ STUDIES = (
     "recommendation",
     "reading",
     "hostile",
+    "dependencies",
 )
 
 
