@@ -42,6 +42,14 @@ def serve(
         _run(settings)
 
 
+@app.command("settings")
+def settings_table() -> None:
+    """Print all settings with defaults and ranges, as docs/service.md has them."""
+    from api.settings import table
+
+    typer.echo(table(), nl=False)
+
+
 @app.command("create-key")
 def create_key(
     context: typer.Context,
