@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import logging
 import re
 import secrets
 import time
 from contextlib import suppress
-from datetime import UTC, datetime
 from typing import Any
 
 from starlette.exceptions import HTTPException
@@ -18,6 +16,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
 from api.components import Components
+from api.log_lines import tell
 from api.problems import Problem, document
 from api.stores.entities import Destroyed, Unavailable
 from api.work.pool import Busy
@@ -45,6 +44,7 @@ class AccessMonitor:
         given = request.headers.get("x-request-id", "")
         id = given if _ID.fullmatch(given) else secrets.token_hex(8)
         request.state.request_id = id
+        tell(request_id=id)
         status, start = 0, time.perf_counter()
         # routes that stream uploads to the disk raise this limit
         request.state.body = body = _Body(request, receive, self.components.settings.max_body_bytes)
@@ -78,21 +78,20 @@ class AccessMonitor:
             problem = _problem(error)
             if not isinstance(error, Busy):
                 # who is refused because others are there already leaves one line, that of the request
-                log.error("unexpected" if problem.status == 500 else "unavailable", exc_info=error, extra={"fields": {"request_id": id}})
+                log.error("unexpected" if problem.status == 500 else "unavailable", exc_info=error)
             if status == 0:
                 await document(request, problem)(scope, receive, observed)
         finally:
-            self._record(scope, id, status, time.perf_counter() - start)
+            self._record(scope, status, time.perf_counter() - start)
 
-    def _record(self, scope: Scope, id: str, status: int, seconds: float) -> None:
+    def _record(self, scope: Scope, status: int, seconds: float) -> None:
         # the pattern, not the path: every id would make a counter of its own
         route = getattr(scope.get("route"), "path", "unknown")
         method = scope["method"] if scope["method"] in ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS") else "other"
         self.components.metrics.requests.labels(method, route, str(status)).inc()
         self.components.metrics.seconds.labels(method, route).observe(seconds)
-        caller = scope.get("state", {}).get("caller")
-        fields = {"request_id": id, "method": method, "route": route, "status": status, "seconds": round(seconds, 6)}
-        log.info("request", extra={"fields": fields | ({} if caller is None else {"key": caller.id, "group": caller.group})})
+        fields = {"method": method, "route": route, "status": status, "seconds": round(seconds, 6)}
+        log.info("request", extra={"fields": fields})
 
 
 class _Body:
@@ -181,19 +180,3 @@ def _problem(error: Exception) -> Problem:
     if isinstance(error, Busy):
         return Problem(503, "too many queries are waiting for an answer", headers=RETRY)
     return Problem(500, "an internal error occurred; it is logged under this request's id")
-
-
-class JsonLines(logging.Formatter):
-    """Log formatter: a record as one line of JSON."""
-
-    def format(self, record: logging.LogRecord) -> str:
-        line: dict[str, Any] = {
-            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
-            "level": record.levelname.lower(),
-            "logger": record.name,
-            "event": record.getMessage(),
-        }
-        line |= getattr(record, "fields", {})
-        if record.exc_info:
-            line["exception"] = self.formatException(record.exc_info)
-        return json.dumps(line, ensure_ascii=False, default=str)

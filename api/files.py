@@ -128,6 +128,8 @@ class Files:
     def __init__(self, folder: Path, group_bytes: int = 1 << 62, free_bytes: int = 0) -> None:
         self.folder, self.group_bytes, self.free_bytes = folder, group_bytes, free_bytes
         self.hashed: dict[tuple[Any, ...], float] = {}
+        #: Sizes of the files of a folder by name, of those alone that never change.
+        self.sizes: dict[Path, dict[str, int]] = {}
         #: Held from the rename of a file until its row is written, and while files without a row are removed.
         self.lock = threading.Lock()
 
@@ -180,12 +182,23 @@ class Files:
 
     def usage(self, group: str) -> dict[str, int]:
         """Return the size of all files of a group, including parts, by kind [bytes]."""
-        return {kind: sum(map(_size, os.scandir(self.of_group(group, kind)))) for kind in (UPLOADS, NORMALISED, PARTS)}
+        whole = {kind: self._size(self.of_group(group, kind)) for kind in (UPLOADS, NORMALISED)}
+        return whole | {PARTS: sum(_size(Path(entry.path)) for entry in os.scandir(self.of_group(group, PARTS)))}
+
+    def _size(self, folder: Path) -> int:
+        """Size of a folder of files that are named by their content: each is asked for its size once."""
+        # names are read anew each time: other services may share the folder
+        known, names = self.sizes.get(folder, {}), os.listdir(folder)
+        found = {name: known[name] if name in known else _size(folder / name) for name in names}
+        self.sizes[folder] = found
+        return sum(found.values())
 
     def keep(self, group: str, kind: str, key: str, source: Path) -> None:
         """Rename a synced part to its final name, replacing an equal file. The caller holds `lock`."""
         target = self.path(group, kind, key)
         os.replace(source, target)
+        # a whole file may take the place of a damaged one
+        self.sizes.get(target.parent, {}).pop(target.name, None)
         sync_folder(target.parent)
 
     def remove(self, group: str, keys: Iterable[tuple[str, str]]) -> None:
@@ -262,9 +275,9 @@ def no_room(error: BaseException) -> bool:
     return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
-def _size(entry: os.DirEntry[str]) -> int:
+def _size(path: Path) -> int:
     try:
-        return entry.stat().st_size
+        return path.stat().st_size
     except FileNotFoundError:
         # removed meanwhile
         return 0

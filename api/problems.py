@@ -131,7 +131,7 @@ def install(app: FastAPI) -> None:
 
     def damaged(request: Request, error: Exception) -> Response:
         assert isinstance(error, Damaged)
-        log.error("damaged", extra={"fields": {"request_id": getattr(request.state, "request_id", ""), "found": str(error)}})
+        log.error("damaged", extra={"fields": {"found": str(error)}})
         return document(request, Problem(500, str(error)))
 
     def full(request: Request, error: Exception) -> Response:

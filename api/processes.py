@@ -18,6 +18,8 @@ from typing import Any
 
 import psutil
 
+from api import log_lines
+
 #: A child that has lived this long [s] is not counted as one that fails at once.
 LIVED = 60.0
 MEBIBYTE = 1 << 20
@@ -114,6 +116,7 @@ class Child(SpawnProcess):
             follow_parent()
         # Ctrl-C reaches the whole group of processes: the service takes it and ends its children
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        log_lines.start()
         super().run()
 
     @property

@@ -22,6 +22,7 @@ from starlette.requests import HTTPConnection
 
 from api.components import Components, components_of
 from api.connections import network_of
+from api.log_lines import tell
 from api.problems import Problem
 from api.shares import GROUP
 from api.stores.changes import Note
@@ -197,6 +198,7 @@ class Guarded(APIRoute):
             caller = await admitted(request, components)
             request.state.caller = caller
             GROUP.set(caller.group)
+            tell(key=caller.id, group=caller.group)
             if not caller.may(scope):
                 raise Problem(403, f"the API key does not have the scope {scope}")
             seconds = components.rates.wait(caller.id)

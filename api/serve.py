@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import sys
 from collections.abc import Callable
 from contextlib import ExitStack, closing
 from functools import partial
@@ -40,6 +39,14 @@ def serve(
     context.obj = settings
     if context.invoked_subcommand is None:
         _run(settings)
+
+
+@app.command("settings")
+def settings_table() -> None:
+    """Print all settings with defaults and ranges, as docs/service.md has them."""
+    from api.settings import table
+
+    typer.echo(table(), nl=False)
 
 
 @app.command("create-key")
@@ -92,10 +99,11 @@ def worker(
     import signal
     import threading
 
+    from api import log_lines
     from api.jobs.supervisor import Supervisor
 
     settings = context.obj
-    _log()
+    log_lines.start()
     # a service whose jobs run elsewhere names none for itself
     crew = _crew(max(settings.job_workers, 1) if count is None else count, max(settings.lobe_workers, 1) if lobes is None else lobes)
     supervisor = Supervisor(crew, settings, settings.job_nice)
@@ -161,7 +169,6 @@ def job_worker(kind: str, settings: Any, ready: Callable[[], None], stop: Event)
     from api.reading.campaigns import load_campaign
     from api.stores.sql import open_store
 
-    _log()
     store = open_store(settings.database_url)
     load = partial(load_campaign, store, Files(settings.data / "files", settings.group_bytes, settings.free_bytes))
     spread = over_cluster(settings.dask) if settings.dask else map
@@ -169,15 +176,8 @@ def job_worker(kind: str, settings: Any, ready: Callable[[], None], stop: Event)
     JobWorker(store.jobs, Durable(settings.engine_url), {kind: carriers[kind]}, settings.job_attempts).run(ready, stop)
 
 
-def _log() -> None:
-    from api.access import JsonLines
-
-    handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(JsonLines())
-    logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
-
-
 def _run(settings: object) -> None:
+    from api import log_lines
     from api.data_folder import alone
     from api.jobs.supervisor import Supervisor
     from api.main import create_app
@@ -185,7 +185,7 @@ def _run(settings: object) -> None:
     from api.tls import Certificate
 
     assert isinstance(settings, Settings)
-    _log()
+    log_lines.start()
     with ExitStack() as held:
         try:
             held.enter_context(alone(settings.data))

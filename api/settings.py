@@ -1,14 +1,18 @@
-"""Settings of the service, read once from the environment."""
+"""Settings of the service, read once from the environment and from files of secrets: ranges and texts stand here alone."""
 
 from __future__ import annotations
 
 import difflib
 import ipaddress
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+import warnings
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Annotated, Any
+
+from pydantic import Field, ValidationError, model_validator
+from pydantic.fields import FieldInfo
+from pydantic_settings import BaseSettings, EnvSettingsSource, PydanticBaseSettingsSource, SecretsSettingsSource, SettingsConfigDict
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.scaleout import ADDRESS
@@ -17,169 +21,160 @@ PREFIX = "RCSA_IDENT_"
 MEGABYTE = 1_000_000
 #: Variables of the same beginning that tests and benchmarks read.
 _OTHERS = ("RCSA_IDENT_NO_SKIPS", "RCSA_IDENT_OBSERVER_RESULT")
+_SIZES = ((10**12, "TB"), (10**9, "GB"), (10**6, "MB"), (1000, "kB"), (1, "B"))
+_Bytes = Annotated[int, "bytes"]
+_MiB = Annotated[int, "MiB"]
+_Seconds = Annotated[float, "s"]
+_Days = Annotated[float, "days"]
 
 
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """Everything that differs between two installations.
+class Settings(BaseSettings):
+    """Everything that differs between two installations; raises `InputError` where one does not fit.
 
-    Parameters
-    ----------
-    data : Path
-        Folder of the embedded store; made where it is missing.
-    database : str
-        URL of a database in its place, as ``postgresql+psycopg://user@host/name``; empty for SQLite in the data folder.
-    database_file : Path or None
-        File with that URL, so that its password is in no environment.
-    host, port
-        Where the service listens.
-    keys : bool or None
-        Whether a key is asked for; None asks for one unless the service listens on loopback alone.
-    tls_certificate, tls_key : Path or None
-        PEM files of certificate and private key; with them the service speaks TLS alone.
-    proxies : str
-        Addresses or networks, separated by commas, that are believed where they say from whom and by which protocol a request came.
-    workers : int
-        Processes that compute.
-    queue : int
-        Queries that may wait for one.
-    connections, connections_per_address : int
-        Open at once; fewer than the files that the process may open (``ulimit -n``).
-    max_body_bytes : int
-    requests_per_minute, burst : int
-        Per key.
-    work_seconds : float [s]
-        Estimated work of one query; a longer one is refused.
-    query_seconds : float [s]
-        Of one query by the clock, once a process works on it; the process is ended then.
-    query_memory : int [MiB]
-        For one query.
-    kept_machines : int
-        Machines whose receptances each worker keeps.
-    streams, streams_per_group, stream_listeners : int
-        Force streams at once; of each, viewers beside its client.
-    stream_idle_seconds : float [s]
-        Without a sample, after which a stream ends.
-    stream_buffer_seconds : float [s]
-        Samples of a stream that may wait; older ones are dropped, and counted.
-    max_upload_bytes : int
-        Of one uploaded recording.
-    uploads : int
-        Uploads at once.
-    group_bytes : int
-        That all uploads of a group may take, what is read from them included.
-    group_database_bytes : int
-        That everything else of a group may take in the database.
-    free_bytes : int
-        That uploads leave free on the disk.
-    upload_seconds, upload_idle_seconds : float [s]
-        Of a whole upload, and without a byte of it.
-    upload_bytes_per_second : int
-        Below which an upload is given up, after the first `upload_idle_seconds`.
-    reader_memory : int [MiB]
-        For reading one upload.
-    reader_seconds, reader_wall_seconds : float [s]
-        Of a core and by the clock, for reading one upload.
-    reader_calls : int
-        After which the process that reads uploads is replaced.
-    job_workers, lobe_workers : int
-        Processes beside the service that carry out identifications, and lobes as jobs, which never wait for each other; 0 where they
-        run elsewhere.
-    job_nice : int
-        How far those processes step back behind streams and queries (0 to 19, as `nice`); 0 on a machine that does nothing else.
-    job_queue : int
-        Jobs of a group that may wait or run.
-    job_attempts : int
-        Times that a job is taken up again without coming further before it is given up.
-    job_work_seconds : float [s]
-        Estimated work of lobes as a job; longer ones are refused.
-    keep_events_days, keep_results_days : float [days]
-        After the end of a job, for which its events and its results are kept; 0 for ever.
-    keep_versions_days : float [days]
-        For which entries of the trail are kept with their versions, except the newest of each thing; 0 for ever.
-    examples : Path
-        Folder of a campaign that may be downloaded as an example, where it is there.
-    dask : str
-        Scheduler of a Dask cluster that searches of jobs spread over (``tcp://host:8786``); empty where they stay here.
-    watchers : int
-        Event streams of jobs at once.
-    watch_seconds : float [s]
-        After which such a stream ends; clients go on from its last event.
-    unwatched_seconds : float [s]
-        After which a job that a view asked for is cancelled where nobody follows it.
+    Only `from_environment` reads the environment; elsewhere what is not given keeps its default.
     """
 
-    data: Path = field(default_factory=lambda: Path("rcsa-ident-data"))
-    database: str = ""
-    database_file: Path | None = None
-    host: str = "127.0.0.1"
-    port: int = 8000
-    keys: bool | None = None
-    tls_certificate: Path | None = None
-    tls_key: Path | None = None
-    proxies: str = ""
-    workers: int = field(default_factory=lambda: max(1, min(os.cpu_count() or 1, 8)))
-    queue: int = 64
-    connections: int = 800
-    connections_per_address: int = 400
-    max_body_bytes: int = 16 * MEGABYTE
-    requests_per_minute: int = 6000
-    burst: int = 600
-    work_seconds: float = 20.0
-    query_seconds: float = 60.0
-    query_memory: int = 2048
-    kept_machines: int = 4
-    streams: int = 16
-    streams_per_group: int = 8
-    stream_listeners: int = 16
-    stream_idle_seconds: float = 30.0
-    stream_buffer_seconds: float = 30.0
-    max_upload_bytes: int = 2000 * MEGABYTE
-    uploads: int = 16
-    group_bytes: int = 200_000 * MEGABYTE
-    group_database_bytes: int = 2000 * MEGABYTE
-    free_bytes: int = 1000 * MEGABYTE
-    upload_seconds: float = 3600.0
-    upload_idle_seconds: float = 30.0
-    upload_bytes_per_second: int = 10_000
-    reader_memory: int = 2048
-    reader_seconds: float = 120.0
-    reader_wall_seconds: float = 900.0
-    reader_calls: int = 200
-    job_workers: int = 1
-    lobe_workers: int = 1
-    job_nice: int = 10
-    job_queue: int = 50
-    job_attempts: int = 10
-    job_work_seconds: float = 4.0 * 3600.0
-    keep_events_days: float = 0.0
-    keep_results_days: float = 0.0
-    keep_versions_days: float = 0.0
-    examples: Path = field(default_factory=lambda: Path("data/sample_runs"))
-    dask: str = ""
-    watchers: int = 200
-    watch_seconds: float = 3600.0
-    unwatched_seconds: float = 120.0
+    model_config = SettingsConfigDict(env_prefix=PREFIX, frozen=True, extra="forbid")
 
-    def __post_init__(self) -> None:
-        for name, least, most in (
-            ("port", 0, 65535), ("workers", 1, 256), ("queue", 0, 100_000),
-            ("connections", 1, 10**6), ("connections_per_address", 1, 10**6), ("max_body_bytes", 1000, 10**9),
-            ("requests_per_minute", 1, 10**9), ("burst", 1, 10**9), ("work_seconds", 0.1, 3600.0),
-            ("query_seconds", 0.1, 7200.0), ("query_memory", 256, 10**6), ("kept_machines", 1, 1000),
-            ("streams", 0, 1000), ("streams_per_group", 0, 1000), ("stream_listeners", 0, 1000), ("stream_idle_seconds", 1.0, 3600.0),
-            ("stream_buffer_seconds", 6.0, 120.0),
-            ("max_upload_bytes", 1000, 10**12), ("uploads", 1, 1000), ("group_bytes", 1000, 10**15), ("free_bytes", 0, 10**15),
-            ("group_database_bytes", 1000, 10**15),
-            ("upload_seconds", 1.0, 10**6), ("upload_idle_seconds", 0.1, 3600.0), ("upload_bytes_per_second", 0, 10**9),
-            ("reader_memory", 512, 10**6), ("reader_seconds", 0.1, 10**4), ("reader_wall_seconds", 0.1, 10**5), ("reader_calls", 1, 10**6),
-            ("job_workers", 0, 256), ("lobe_workers", 0, 256), ("job_nice", 0, 19),
-            ("job_queue", 1, 10**6), ("job_attempts", 1, 1000), ("job_work_seconds", 1.0, 10**7),
-            ("keep_events_days", 0.0, 36_500.0), ("keep_results_days", 0.0, 36_500.0), ("keep_versions_days", 0.0, 36_500.0),
-            ("watchers", 1, 10**5), ("watch_seconds", 0.1, 10**6), ("unwatched_seconds", 60.0, 10**6),
-        ):  # fmt: skip
-            if not least <= getattr(self, name) <= most:
-                raise InputError(PREFIX + name.upper(), getattr(self, name), f"a number from {least:g} to {most:g}")
+    data: Path = Field(Path("rcsa-ident-data"), description="folder of the embedded store; made where it is missing")
+    database: str = Field("", description="URL of a database in SQLite's place, as `postgresql+psycopg://user@host/name`")
+    database_file: Path | None = Field(None, description="a file with that URL, so that its password is in no environment")
+    secrets: Path | None = Field(
+        None,
+        description="a folder of files that are named as these variables and hold their values, as containers get their secrets "
+        "(`/run/secrets/RCSA_IDENT_DATABASE`); a variable of the environment counts first",
+    )
+    host: str = Field("127.0.0.1", description="where the service listens")
+    port: int = Field(8000, ge=0, le=65_535, description="its port")
+    keys: bool | None = Field(None, description="whether a key is asked for", json_schema_extra={"default": "on unless loopback"})
+    tls_certificate: Path | None = Field(None, description="a PEM file; with it the service speaks TLS alone, see [network.md](network.md)")
+    tls_key: Path | None = Field(None, description="a PEM file: the private key of the certificate")
+    proxies: str = Field(
+        "",
+        description="addresses or networks, separated by commas, that are believed where they say from whom and by which protocol a "
+        "request came, see [network.md](network.md)",
+    )
+    workers: int = Field(
+        default_factory=lambda: max(1, min(os.cpu_count() or 1, 8)),
+        ge=1,
+        le=256,
+        description="processes that answer queries; one more answers previews alone, while all of these work",
+        json_schema_extra={"default": "cores (at most 8)"},
+    )
+    queue: int = Field(64, ge=0, le=100_000, description="queries that may wait for one; beyond that 503")
+    connections: int = Field(
+        800,
+        ge=1,
+        le=10**6,
+        description="open at once, fewer than the files that a process may open (`ulimit -n`); others are closed",
+    )
+    connections_per_address: int = Field(
+        400, ge=1, le=10**6, description="open at once of one address; behind a proxy all come from its address"
+    )
+    max_body_bytes: _Bytes = Field(
+        16 * MEGABYTE,
+        ge=1000,
+        le=10**9,
+        description="of a body that is no upload; JSON that is not passed on to a process with limits has at most 1 MB; 413",
+    )
+    requests_per_minute: int = Field(6000, ge=1, le=10**9, description="for each key; 429 with the seconds to wait")
+    burst: int = Field(600, ge=1, le=10**9, description="requests of a key that may come at once")
+    work_seconds: _Seconds = Field(
+        20.0, ge=0.1, le=3600.0, description="estimated work of a query that is answered at once; lobes beyond it become a job, others 422"
+    )
+    query_seconds: _Seconds = Field(
+        60.0,
+        ge=0.1,
+        le=7200.0,
+        description="of one query by the clock, once a process works on it; then the process is ended: lobes become a job, others 422. "
+        "A query whose client leaves ends as well",
+    )
+    query_memory: _MiB = Field(2048, ge=256, le=10**6, description="for one query; ended as above")
+    kept_machines: int = Field(4, ge=1, le=1000, description="machines whose receptances each worker keeps")
+    streams: int = Field(16, ge=0, le=1000, description="force streams at once")
+    streams_per_group: int = Field(8, ge=0, le=1000, description="of one group")
+    stream_listeners: int = Field(16, ge=0, le=1000, description="viewers of each stream beside its client")
+    stream_idle_seconds: _Seconds = Field(30.0, ge=1.0, le=3600.0, description="without a sample, after which a stream ends")
+    stream_buffer_seconds: _Seconds = Field(
+        30.0, ge=6.0, le=120.0, description="samples of a stream that may wait; older ones are dropped, and counted"
+    )
+    max_upload_bytes: _Bytes = Field(2000 * MEGABYTE, ge=1000, le=10**12, description="of one uploaded recording; 413")
+    uploads: int = Field(16, ge=1, le=1000, description="uploads at once")
+    group_bytes: _Bytes = Field(
+        200_000 * MEGABYTE, ge=1000, le=10**15, description="that all uploads of a group may take, what is read from them included; 413"
+    )
+    group_database_bytes: _Bytes = Field(
+        2000 * MEGABYTE, ge=1000, le=10**15, description="that everything else of a group may take in the database; 413"
+    )
+    free_bytes: _Bytes = Field(1000 * MEGABYTE, ge=0, le=10**15, description="that uploads leave free on the disk")
+    upload_seconds: _Seconds = Field(3600.0, ge=1.0, le=10**6, description="of a whole upload; a slower one is given up: 408")
+    upload_idle_seconds: _Seconds = Field(30.0, ge=0.1, le=3600.0, description="without a byte of an upload: 408")
+    upload_bytes_per_second: int = Field(
+        10_000, ge=0, le=10**9, description="below which an upload is given up, after the first `UPLOAD_IDLE_SECONDS`: 408"
+    )
+    reader_memory: _MiB = Field(2048, ge=512, le=10**6, description="for reading one upload; 422")
+    reader_seconds: _Seconds = Field(120.0, ge=0.1, le=10**4, description="of a core, for reading one upload; 422")
+    reader_wall_seconds: _Seconds = Field(900.0, ge=0.1, le=10**5, description="by the clock, for reading one upload; 422")
+    reader_calls: int = Field(200, ge=1, le=10**6, description="after which the process that reads uploads is replaced")
+    job_workers: int = Field(
+        1,
+        ge=0,
+        le=256,
+        description="processes for identifications; 0 where `rcsa-ident-serve worker` runs them elsewhere. Each takes about 300 MB (of "
+        "which 110 MB are shared with the others) and at most one core",
+    )
+    lobe_workers: int = Field(1, ge=0, le=256, description="the same for lobes as jobs; the two kinds never wait for each other")
+    job_nice: int = Field(10, ge=0, le=19, description="how far processes for jobs stand behind queries and streams, as `nice`")
+    job_queue: int = Field(50, ge=1, le=10**6, description="jobs of a group that may wait or run")
+    job_attempts: int = Field(
+        10, ge=1, le=1000, description="times that a job is taken up again without coming further before it is given up"
+    )
+    job_work_seconds: _Seconds = Field(4.0 * 3600.0, ge=1.0, le=10**7, description="estimated work of lobes as a job; 422")
+    keep_events_days: _Days = Field(
+        0.0, ge=0.0, le=36_500.0, description="after the end of a job, for which its events are kept; 0 for ever"
+    )
+    keep_results_days: _Days = Field(
+        0.0, ge=0.0, le=36_500.0, description="after the end of a job, for which its results are kept; 0 for ever"
+    )
+    keep_versions_days: _Days = Field(
+        0.0,
+        ge=0.0,
+        le=36_500.0,
+        description="for which entries of the trail are kept with their versions, except the newest of each thing; 0 for ever",
+    )
+    examples: Path = Field(
+        Path("data/sample_runs"), description="folder of a campaign that may be downloaded as an example, where it is there"
+    )
+    dask: str = Field("", description="address of a Dask scheduler for the searches of jobs, as `tcp://host:8786`")
+    watchers: int = Field(200, ge=1, le=10**5, description="event streams of jobs at once")
+    watch_seconds: _Seconds = Field(
+        3600.0, ge=0.1, le=10**6, description="after which such a stream ends; clients go on from its last event"
+    )
+    unwatched_seconds: _Seconds = Field(
+        120.0, ge=60.0, le=10**6, description="after which lobes as a job that a view asked for are cancelled where nobody follows them"
+    )
+
+    def __init__(self, **given: Any) -> None:
+        try:
+            super().__init__(**given)
+        except ValidationError as error:
+            raise _plain(error) from None
+
+    @classmethod
+    def settings_customise_sources(  # type: ignore[override]  # of what it is given by name, it takes one
+        cls, settings_cls: type[BaseSettings], init_settings: PydanticBaseSettingsSource, **_others: PydanticBaseSettingsSource
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        """Read arguments alone."""
+        return (init_settings,)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_url(cls, given: dict[str, Any]) -> dict[str, Any]:
+        file = given.get("database_file")
+        return given if file is None else given | {"database": _url_in(Path(file), given.get("database", ""))}
+
+    @model_validator(mode="after")
+    def _fit_together(self) -> Settings:
         if self.query_seconds < self.work_seconds:
             raise InputError(f"{PREFIX}QUERY_SECONDS", self.query_seconds, f"at least {PREFIX}WORK_SECONDS, {self.work_seconds:g} s")
         if (self.tls_certificate is None) != (self.tls_key is None):
@@ -192,12 +187,11 @@ class Settings:
                 raise InputError(
                     f"{PREFIX}PROXIES", each.strip(), "addresses or networks separated by commas, as 10.0.0.7,10.1.0.0/16"
                 ) from None
-        if self.database_file is not None:
-            object.__setattr__(self, "database", _url_in(self.database_file, self.database))
         if self.dask and not ADDRESS.fullmatch(self.dask):
             raise InputError(f"{PREFIX}DASK", self.dask, "the address of a Dask scheduler, as tcp://host:8786")
         if self.keys is False and not self.loopback:
             raise InputError(f"{PREFIX}KEYS", "off", f"on, since the service listens on {self.host}, which other machines reach")
+        return self
 
     @property
     def loopback(self) -> bool:
@@ -225,24 +219,90 @@ class Settings:
 
 def from_environment(environment: Mapping[str, str]) -> Settings:
     """Return the settings of ``RCSA_IDENT_DATA``, ``RCSA_IDENT_PORT`` and so on; what is not there keeps its default."""
-    given: dict[str, Any] = {}
-    kinds = get_type_hints(Settings)
-    known = [name.upper() for name in kinds]
-    for name in environment:
-        given_name = name.removeprefix(PREFIX)
-        if name != given_name and given_name not in known and name not in _OTHERS:
-            near = difflib.get_close_matches(given_name, known, 1, 0.5)
+    named = {name: text.strip() for name, text in environment.items() if name.startswith(PREFIX) and text.strip()}
+    folder = named.get(f"{PREFIX}SECRETS")
+    hidden = {} if folder is None else _secrets(Path(folder))
+    _check_names([*(name for name in environment if name.startswith(PREFIX)), *hidden])
+    source = EnvSettingsSource(Settings)
+    source.env_vars = {name.lower(): text for name, text in {**hidden, **named}.items()}
+    try:
+        return Settings(**source())
+    except InputError as error:
+        if error.field in hidden and error.field not in named:
+            raise InputError(error.field, "something else in its file", error.allowed, str(folder)) from None
+        raise
+
+
+def _secrets(folder: Path) -> dict[str, str]:
+    """Return what the files of a folder hold, by the names of variables; no message repeats it."""
+    field, allowed = f"{PREFIX}SECRETS", "a folder of text files that are named as variables"
+    if not folder.is_dir():
+        raise InputError(field, f"{folder}, which is no folder", allowed)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            found = SecretsSettingsSource(Settings, folder)()
+        known = {PREFIX + name.upper(): text for name, text in found.items() if text}
+        return dict.fromkeys((each.name for each in folder.iterdir() if each.name.startswith(PREFIX)), "") | known
+    except (OSError, ValueError, Warning):
+        raise InputError(field, f"{folder} with a file that cannot be read", allowed) from None
+
+
+def _check_names(names: list[str]) -> None:
+    known = [PREFIX + name.upper() for name in Settings.model_fields]
+    for name in names:
+        if name not in known and name not in _OTHERS:
+            near = difflib.get_close_matches(name.removeprefix(PREFIX), [each.removeprefix(PREFIX) for each in known], 1, 0.5)
             hint = f"; did you mean {PREFIX}{near[0]}?" if near else ""
             raise InputError(name, "an unknown setting", f"one that docs/service.md lists{hint}")
-    for name, kind in kinds.items():
-        text = environment.get(PREFIX + name.upper(), "").strip()
-        if text:
-            try:
-                given[name] = _READERS[kind](text)
-            except ValueError:
-                allowed = "on or off" if name == "keys" else "a number"
-                raise InputError(PREFIX + name.upper(), text, allowed) from None
-    return Settings(**given)
+
+
+def _plain(error: ValidationError) -> InputError:
+    """The first of pydantic's errors in the project's words."""
+    first = error.errors()[0]
+    raised = first.get("ctx", {}).get("error")
+    if isinstance(raised, InputError):
+        return raised
+    name = str(first["loc"][0])
+    field = Settings.model_fields.get(name)
+    return InputError(PREFIX + name.upper(), first["input"], "one of the settings" if field is None else _allowed(field))
+
+
+def _allowed(field: FieldInfo) -> str:
+    least, most = _range(field)
+    if least is None or most is None:
+        return "on or off" if field.annotation == bool | None else "a text"
+    return f"a {'whole ' if field.annotation is int else ''}number from {least:g} to {most:g}"
+
+
+def _range(field: FieldInfo) -> tuple[Any, Any]:
+    found = [next((getattr(each, name) for each in field.metadata if hasattr(each, name)), None) for name in ("ge", "le")]
+    return found[0], found[1]
+
+
+def table() -> str:
+    """Return the table of all settings in Markdown, as docs/service.md has it."""
+    lines = ["| variable | default | allowed | what it sets |", "|---|---|---|---|"]
+    for name, field in Settings.model_fields.items():
+        unit = next((each for each in field.metadata if isinstance(each, str)), "")
+        extra = field.json_schema_extra
+        default = extra["default"] if isinstance(extra, dict) else _told(field.default, unit)
+        least, most = _range(field)
+        allowed = "" if least is None else f"{_told(least, unit)} to {_told(most, unit)}"
+        lines.append(f"| `{name.upper()}` | {default} | {allowed} | {field.description} |")
+    return "\n".join(lines) + "\n"
+
+
+def _told(value: Any, unit: str) -> str:
+    if value is None or value == "":
+        return "none"
+    if not isinstance(value, int | float):
+        return f"`{value}`" if isinstance(value, Path) else str(value)
+    if unit == "bytes":
+        size, unit = next(each for each in _SIZES if value >= each[0] or each[0] == 1)
+        value /= size
+    digits = f"{value:,.10g}" if value >= 10_000 else f"{value:g}"
+    return digits.replace(",", " ") + f" {unit}" * bool(unit)
 
 
 def _url_in(path: Path, database: str) -> str:
@@ -257,12 +317,3 @@ def _url_in(path: Path, database: str) -> str:
     if database not in ("", lines[0]):
         raise InputError(field, f"a file beside {PREFIX}DATABASE", "one of the two")
     return lines[0]
-
-
-def _switch(text: str) -> bool:
-    if text.lower() not in ("on", "off", "true", "false", "1", "0"):
-        raise ValueError(text)
-    return text.lower() in ("on", "true", "1")
-
-
-_READERS: dict[Any, Callable[[str], Any]] = {Path: Path, Path | None: Path, str: str, int: int, float: float, bool | None: _switch}

@@ -6,7 +6,7 @@ import threading
 from collections import Counter, deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextvars import ContextVar
+from contextvars import ContextVar, copy_context
 from typing import Any
 
 #: Group of the request that is being answered; empty for what the service does by itself.
@@ -107,13 +107,15 @@ class _Waiting:
     def __init__(self, group: str, call: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> None:
         self.group, self.call, self.arguments, self.named = group, call, arguments, named
         self.answer: Future[Any] = Future()
+        # the thread knows for whom it works, and so does what it logs
+        self.context = copy_context()
 
     def carry_out(self) -> None:
         """Answer, unless nobody waits any more."""
         if not self.answer.set_running_or_notify_cancel():
             return
         try:
-            found = self.call(*self.arguments, **self.named)
+            found = self.context.run(self.call, *self.arguments, **self.named)
         except BaseException as error:
             self.answer.set_exception(error)
         else:

@@ -6,6 +6,7 @@ import asyncio
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import Context
 
 from api.shares import Shares
 from api.stores.entities import Unavailable
@@ -60,7 +61,8 @@ class EventFeeds:
         bell = asyncio.Event()
         self.bells.setdefault(job, set()).add(bell)
         if self.looking is None or self.looking.done():
-            self.looking = asyncio.create_task(self._poll())
+            # for all who watch, not for the one who came first
+            self.looking = asyncio.create_task(self._poll(), context=Context())
         try:
             while self.numbers.get(job, 0) <= after:
                 try:

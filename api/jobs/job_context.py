@@ -8,6 +8,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextvars import copy_context
 from typing import Any
 
 from api.jobs.backend import VERSION, Remember
@@ -74,7 +75,7 @@ class JobContext:
         self.came_further = False
         self.count = 0
         self.last: dict[str, float] = {}
-        self.thread = threading.Thread(target=self._deliver_until_over, daemon=True)
+        self.thread = threading.Thread(target=copy_context().run, args=(self._deliver_until_over,), daemon=True)
 
     def __enter__(self) -> JobContext:
         self.thread.start()
@@ -115,7 +116,7 @@ class JobContext:
             text = self.engine(name, outcome)
         except Exception as error:
             # the job belongs to another worker, or the engine fails: no outcome of the job
-            log.error("the durable engine has refused a step", exc_info=error, extra={"fields": {"job": self.job, "step": name}})
+            log.error("the durable engine has refused a step", exc_info=error, extra={"fields": {"step": name}})
             self.leave(3)
             raise Stopped from error
         if computed and self.resumed:
@@ -124,9 +125,9 @@ class JobContext:
         found = _read(text)
         if found is None:
             if computed:
-                log.error("a step cannot be read back", extra={"fields": {"job": self.job, "step": name}})
+                log.error("a step cannot be read back", extra={"fields": {"step": name}})
                 raise Faulty(name)
-            log.warning("remembered by another version", extra={"fields": {"job": self.job, "step": name}})
+            log.warning("remembered by another version", extra={"fields": {"step": name}})
             raise Outdated(name)
         if "refused" in found:
             raise InputError(*found["refused"])
@@ -146,7 +147,7 @@ class JobContext:
         except Stopped:
             return _text()
         except Exception as error:
-            log.error("a step has failed", exc_info=error, extra={"fields": {"job": self.job, "step": name}})
+            log.error("a step has failed", exc_info=error, extra={"fields": {"step": name}})
             return _text()
 
     def map(self, function: Callable[[Any], Any], tasks: Sequence[Any], name: str, stage: str, spread: Map = map) -> list[Any]:
@@ -211,7 +212,7 @@ class JobContext:
                 job = self.jobs.find(self.job)
                 if job is not None and job.state == "running":
                     # another worker has taken the job over: report nothing more
-                    log.error("the job belongs to another worker now", extra={"fields": {"job": self.job}})
+                    log.error("the job belongs to another worker now")
                     self.leave(3)
                 self.stopped.set()
                 if not self.over.wait(GRACE):
@@ -231,7 +232,7 @@ class JobContext:
                 return self.jobs.tell(self.job, self.token, events, state, further)
             except Unavailable:
                 if time.monotonic() - start > PATIENCE:
-                    log.error("the database does not answer", extra={"fields": {"job": self.job}})
+                    log.error("the database does not answer")
                     self.leave(1)
                     return False
                 time.sleep(1.0)

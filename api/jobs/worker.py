@@ -19,6 +19,7 @@ import psutil
 
 from api.jobs.backend import JobBackend, Remember
 from api.jobs.job_context import Faulty, JobContext, Outdated, Stopped
+from api.log_lines import tell, telling
 from api.stores.entities import Damaged, Unavailable
 from api.stores.jobs import Job, Jobs, Outcome, Worker
 from rcsa_ident.errors import InputError
@@ -47,19 +48,21 @@ def carry(
     attempts : int
         Times that a job may be started without completing another step.
     """
-    try:
-        job = jobs.begin(id, token, _now())
-        if job is None:
-            return
-        start = time.monotonic()
-        outcome = _given_up(attempts) if job.attempts > attempts else _outcome(jobs, carriers[job.kind], job, token, remember, leave)
-        if outcome is not None:
-            seconds = job.seconds + time.monotonic() - start
-            names = ("state", "status", "problem", "texts", "applied")
-            jobs.finish(id, token, Outcome(finished=_now(), seconds=seconds, **{name: getattr(outcome, name) for name in names}))
-    except Unavailable as error:
-        log.error("the database does not answer", exc_info=error, extra={"fields": {"job": id}})
-        leave(1)
+    with telling(job=id):
+        try:
+            job = jobs.begin(id, token, _now())
+            if job is None:
+                return
+            tell(key=job.key, group=job.group)
+            start = time.monotonic()
+            outcome = _given_up(attempts) if job.attempts > attempts else _outcome(jobs, carriers[job.kind], job, token, remember, leave)
+            if outcome is not None:
+                seconds = job.seconds + time.monotonic() - start
+                names = ("state", "status", "problem", "texts", "applied")
+                jobs.finish(id, token, Outcome(finished=_now(), seconds=seconds, **{name: getattr(outcome, name) for name in names}))
+        except Unavailable as error:
+            log.error("the database does not answer", exc_info=error)
+            leave(1)
 
 
 def _outcome(jobs: Jobs, carrier: Carrier, job: Job, token: str, remember: Remember, leave: Callable[[int], Any]) -> Outcome | None:
@@ -77,12 +80,12 @@ def _outcome(jobs: Jobs, carrier: Carrier, job: Job, token: str, remember: Remem
     except Unavailable:
         raise
     except Damaged as error:
-        log.error("damaged", extra={"fields": {"job": job.id, "found": str(error)}})
+        log.error("damaged", extra={"fields": {"found": str(error)}})
         return failed(str(error))
     except Faulty:
         return failed("an internal error occurred; it is logged under this job's id")
     except Exception as error:
-        log.error("unexpected", exc_info=error, extra={"fields": {"job": job.id}})
+        log.error("unexpected", exc_info=error)
         return failed("an internal error occurred; it is logged under this job's id")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import re
 import time
 from collections.abc import AsyncIterator, Mapping, Sequence
@@ -22,6 +23,7 @@ from api.security import Caller, now, seconds_between, still_valid
 from api.stores.entities import Taken
 from api.stores.jobs import OPEN, Full, Job
 
+log = logging.getLogger("rcsa_ident.service")
 EVENTS = "text/event-stream"
 #: Retry-After [s], and interval of the heartbeat of an event stream without events [s].
 AGAIN, HEARTBEAT = "2", 15.0
@@ -98,13 +100,16 @@ def accepted(components: Components, job: Job) -> JSONResponse:
 def submit(components: Components, job: Job, texts: Mapping[str, str], repeat: tuple[str, str] | None) -> Job:
     """Store a job, which a worker then carries out."""
     try:
-        return components.store.jobs.add(job, texts, components.settings.job_queue, repeat)
+        kept = components.store.jobs.add(job, texts, components.settings.job_queue, repeat)
     except Taken as taken:
         raise in_use(taken, None, repeat and repeat[0]) from None
     except Full:
         raise Problem(503, f"{components.settings.job_queue} jobs are waiting already", headers={"Retry-After": "60"}) from None
     except KeyError:
         raise Problem(404, "there is no such machine") from None
+    # the worker that carries it out knows the job, not the request
+    log.info("job accepted", extra={"fields": {"job": kept.id, "kind": kept.kind}})
+    return kept
 
 
 def job_of(components: Components, group: str, id: str, kind: str) -> Job:

@@ -97,7 +97,7 @@ def _session_task(hub: Hub, session: Session, doing: Awaitable[None]) -> asyncio
         except Exception as error:
             end = end_of(error)
             if end.status == 500:
-                log.error("unexpected", exc_info=error, extra={"fields": {"session": session.about.id}})
+                log.error("unexpected", exc_info=error)
             hub.close(session, end)
 
     return asyncio.create_task(guarded())

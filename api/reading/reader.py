@@ -20,6 +20,7 @@ from typing import Any
 
 from api.confinement import Confinement, confine
 from api.files import Full, no_room
+from api.log_lines import ids, telling
 from api.processes import Child, follow_parent, limit, limit_memory, spawn_context
 from api.reading import reader_tasks
 from api.reading.room import Room
@@ -157,7 +158,7 @@ class _Reading:
         try:
             self._until_ready()
             self.calls += 1
-            self.pipe.send((call, self.room.take_in(arguments)))
+            self.pipe.send((call, self.room.take_in(arguments), ids()))
             kind, answer = self._receive(self.limits.wall_seconds)
             self.room.give_out()
         except TimeoutError:
@@ -213,12 +214,13 @@ def _serve(pipe: Connection, limits: Limits, prepare: Callable[[], None], room: 
     pipe.send_bytes(json.dumps([held.files, held.network]).encode())
     while True:
         try:
-            call, arguments = pipe.recv()
+            call, arguments, known = pipe.recv()
         except EOFError:
             return
         # CPU time counts from the start of the process
         limit("RLIMIT_CPU", int(time.process_time() + limits.seconds) + 1, -1)
-        pipe.send_bytes(_answer(call, arguments))
+        with telling(**known):
+            pipe.send_bytes(_answer(call, arguments))
 
 
 def _answer(call: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:

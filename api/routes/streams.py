@@ -20,6 +20,7 @@ from api.conventions import guard
 from api.conventions import problems as documented
 from api.live.stream_connection import LINGER, UNEXPECTED, end_of, serve_owner, serve_viewer
 from api.live.stream_opening import open_logger, open_replay
+from api.log_lines import tell
 from api.problems import Problem
 from api.schemas.common import body_of
 from api.schemas.forces import Hello, ReplayHello, StreamHello, StreamsAnswer, StreamSummary, WatchHello
@@ -68,6 +69,7 @@ def _summary(session: Session) -> StreamSummary:
 async def stream(websocket: WebSocket) -> None:
     components: Components = websocket.app.state.components
     id = new_id()
+    tell(request_id=id)
     try:
         caller = await _admit(websocket, components)
     except Problem as problem:
@@ -83,7 +85,7 @@ async def stream(websocket: WebSocket) -> None:
     except Exception as error:
         end = end_of(error)
         if end.status == 500:
-            log.error("unexpected", exc_info=error, extra={"fields": {"request_id": id}})
+            log.error("unexpected", exc_info=error)
     finally:
         with contextlib.suppress(Exception):
             await _farewell(websocket, end, id)
@@ -115,11 +117,12 @@ async def _serve(websocket: WebSocket, components: Components, caller: Caller | 
     if caller is None:
         caller = await admitted(websocket, components, hello.key)
     GROUP.set(caller.group)
+    tell(key=caller.id, group=caller.group)
     _check_rate(components, caller.id)
     scope = "read" if isinstance(hello, WatchHello) and not caller.may("run") else "run"
     if not caller.may(scope):
         raise Problem(403, f"the API key does not have the scope {scope}")
-    log.info("stream", extra={"fields": {"request_id": id, "kind": kind.__name__, "key": caller.id, "group": caller.group}})
+    log.info("stream", extra={"fields": {"kind": kind.__name__}})
     hub = components.streams
     if isinstance(hello, WatchHello):
         session = hub.get(caller.group, hello.watch)
@@ -133,6 +136,7 @@ async def _serve(websocket: WebSocket, components: Components, caller: Caller | 
         opening = await open_logger(components, caller.group, hello)
     about = opening.about(id, caller.group, components.settings.stream_buffer_seconds)
     session = hub.open(about)
+    tell(**session.ids)
     try:
         return await serve_owner(websocket, components, caller, session, opening, hello)
     except WebSocketDisconnect:

@@ -154,7 +154,7 @@ class Hub:
         if session is None:
             return
         if message.kind == FAILED:
-            fields = {"session": session.about.id, "found": message.content.decode("utf-8", "replace")}
+            fields = session.ids | {"found": message.content.decode("utf-8", "replace")}
             log.error("a stream has failed", extra={"fields": fields})
             self.close(session, End(1011, 500, _UNEXPECTED))
         elif message.kind == REFUSED:

@@ -9,6 +9,7 @@ import socket
 from collections.abc import Callable
 from typing import Protocol
 
+from api.log_lines import telling
 from api.processes import BackOff, Child
 from api.streams.engine import HEADER, READY, Engine, Message
 
@@ -119,6 +120,7 @@ def serve(connection: socket.socket) -> None:
             content = source.read(length)
             if len(content) < length:
                 return
-            answer = engine.answer(Message(kind, session, first, arrived, drift, known, content))
+            with telling(stream=str(session)):
+                answer = engine.answer(Message(kind, session, first, arrived, drift, known, content))
             if answer is not None:
                 connection.sendall(answer.packed())

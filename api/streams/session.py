@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from api.log_lines import ids
 from api.streams.counts import Counts
 from api.streams.listener import Listener
 from rcsa_ident.arrays import FloatArray
@@ -109,6 +110,8 @@ class Session:
 
     def __init__(self, about: About, number: int) -> None:
         self.about, self.number = about, number
+        #: What its lines in the log carry: those of the request that opened it, too.
+        self.ids = ids() | {"session": about.id, "stream": str(number)}
         self.stage, self.end = Stage.SETTLING, End()
         self.counts, self.waiting = Counts(), deque[tuple[int, FloatArray, float]]()
         self.flying: deque[int] = deque()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from queue import SimpleQueue
 from typing import Any, Protocol, TypeVar
@@ -40,8 +40,27 @@ class Work(Protocol):
         """End the processes."""
 
 
+class _Lane:
+    """Processes that share a queue, and the threads that wait for them.
+
+    Parameters
+    ----------
+    members : sequence of Worker
+    name : str
+    """
+
+    def __init__(self, members: Sequence[Worker], name: str) -> None:
+        # a thread for each process: a call waits for both at once
+        self.threads, self.most, self.calls = FairThreads(len(members), name), len(members), 0
+        self.free: SimpleQueue[Worker] = SimpleQueue()
+        for member in members:
+            self.free.put(member)
+
+
 class Pool:
     """Pool of spawned worker processes; the next call is of the group that has fewest at work.
+
+    One process more answers previews alone, while all others work: what takes milliseconds waits behind nothing that takes seconds.
 
     A process is replaced when its query exceeds a limit or is withdrawn: nothing else ends a computation that has begun.
 
@@ -68,9 +87,8 @@ class Pool:
     ) -> None:
         self.workers, self.machines, self.limits = workers, machines, limits
         self.places = Shares(workers + queue, several)
-        self.threads: FairThreads | None = None
         self.members: list[Worker] = []
-        self.free: SimpleQueue[Worker] = SimpleQueue()
+        self.lanes: tuple[_Lane, _Lane] | None = None
         self.lock = threading.Lock()
 
     @property
@@ -82,12 +100,11 @@ class Pool:
         return any(member.ready for member in self.members)
 
     def start(self) -> None:
-        # a thread for each process: a call waits for both at once
-        self.threads = FairThreads(self.workers, "work")
-        self.members = [self._worker() for _ in range(self.workers)]
-        for member in self.members:
-            self.free.put(member)
-            self.threads.submit(self._answer, _Call())
+        self.members = [self._worker() for _ in range(self.workers + 1)]
+        self.lanes = _Lane(self.members[:-1], "work"), _Lane(self.members[-1:], "previews")
+        for lane in self.lanes:
+            for _ in range(lane.most):
+                lane.threads.submit(self._answer, lane, _Call())
 
     def _worker(self) -> Worker:
         return Worker(self.limits, partial(_begin, self.machines), warm_observer)
@@ -103,11 +120,14 @@ class Pool:
             The call has exceeded the limit of time, or of memory.
         """
         group = GROUP.get()
-        if self.threads is None or not self.places.take(group):
+        if self.lanes is None or not self.places.take(group):
             raise Busy
+        usual, previews = self.lanes
+        lane = previews if usual.calls >= usual.most and any(getattr(each, "preview", False) for each in arguments) else usual
         asked = _Call(guarded, (call, *arguments))
+        lane.calls += 1
         try:
-            answer: T = await asyncio.wrap_future(self.threads.submit(self._answer, asked))
+            answer: T = await asyncio.wrap_future(lane.threads.submit(self._answer, lane, asked))
             return answer
         except Killed:
             raise Busy from None
@@ -115,11 +135,12 @@ class Pool:
             asked.withdraw()
             raise
         finally:
+            lane.calls -= 1
             self.places.give(group)
 
-    def _answer(self, asked: _Call) -> Any:
+    def _answer(self, lane: _Lane, asked: _Call) -> Any:
         """In a thread: have a free process answer, and replace it where it is of no further use."""
-        member = self.free.get()
+        member = lane.free.get()
         try:
             member = self._fit(member)
             member.begin()
@@ -128,12 +149,12 @@ class Pool:
             try:
                 member = self._fit(member)
             finally:
-                self.free.put(member)
+                lane.free.put(member)
 
     def _fit(self, member: Worker) -> Worker:
         """Return a member that takes calls, or another in its place; the same where the pool ends."""
         with self.lock:
-            if self.threads is None or (member.fit and member.process.is_alive()):
+            if self.lanes is None or (member.fit and member.process.is_alive()):
                 return member
             member.end()
             self.members[self.members.index(member)] = other = self._worker()
@@ -141,16 +162,15 @@ class Pool:
 
     def stop(self) -> None:
         with self.lock:
-            threads, self.threads = self.threads, None
+            lanes, self.lanes = self.lanes, None
         for member in self.members:
             # a running call ends with its process
             member.process.kill()
-        if threads is not None:
-            threads.shutdown(wait=True, cancel_futures=True)
+        for lane in lanes or ():
+            lane.threads.shutdown(wait=True, cancel_futures=True)
         for member in self.members:
             member.end()
         self.members.clear()
-        self.free = SimpleQueue()
 
 
 class _Call:

@@ -14,6 +14,7 @@ from rcsa_ident.machining_setup import CutSpec, Tooling
 from rcsa_ident.stability.lobes import DRAWS
 from rcsa_ident.stability.methods import method_named
 from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict
+from rcsa_ident.stability.zero_order import ZeroOrder
 from rcsa_ident.workflows.tool_change import ToolChange
 
 
@@ -109,6 +110,11 @@ class LobeRequest:
     work_seconds: float
     recommend: bool = True
     tested: tuple[tuple[float, float, str], ...] = ()
+
+    @property
+    def preview(self) -> bool:
+        """Whether it is answered at once."""
+        return self.method == ZeroOrder.name and not self.recommend
 
     def change(self, machine: TipSource, tooling: Tooling) -> ToolChange:
         """Return the question for a machine and a tooling."""

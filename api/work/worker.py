@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
+from api.log_lines import ids, telling
 from api.processes import Child, limit_memory, spawn_context
 from api.work.requests import TooLong
 from rcsa_ident.errors import InputError
@@ -86,7 +87,7 @@ class Worker:
         """
         kind, answer = "killed", None
         try:
-            self.pipe.send((call, arguments))
+            self.pipe.send((call, arguments, ids()))
             self.asked += 1
             # what the process still prepares is not the call's time
             if self.pipe.poll(_START) and self.pipe.recv():
@@ -126,12 +127,13 @@ def _serve(pipe: Connection, memory: int, prepare: Callable[[], None], spare: Ca
         spare()
     while True:
         try:
-            call, arguments = pipe.recv()
+            call, arguments, known = pipe.recv()
         except EOFError:
             return
         # it has begun
         pipe.send(True)
-        pipe.send(_answer(call, arguments))
+        with telling(**known):
+            pipe.send(_answer(call, arguments))
 
 
 def _answer(call: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[str, Any]:

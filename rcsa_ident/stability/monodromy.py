@@ -224,14 +224,19 @@ class MonodromyOperator:
         base = float(np.angle(value)) / period
         highest = 2.0 * float(np.max(np.abs(pole)))
         k = np.arange(-int((highest + base) * period / (2.0 * np.pi)), int((highest - base) * period / (2.0 * np.pi)) + 1)
-        omega = base + 2.0 * np.pi * k / period
-        lines = np.zeros((omega.size, force.shape[1]), dtype=complex)
+        apart = 2.0 * np.pi / period
+        omega = base + apart * k
         growth = np.log(abs(value)) / period
-        for _, h, steps, first, _ in places[places[:, 3] >= 0.0]:
-            for step in range(int(steps)):
-                p = int(first) + step * nodes + np.arange(nodes + 1)
-                weight = h / period * self.table[1] * np.exp(-growth * time[p])
-                lines += np.exp(-1j * omega[:, None] * time[p]) @ (weight[:, None] * force[p])
+        steps = [(first + nodes * np.arange(count), h) for _, h, count, first, _ in places[places[:, 3] >= 0.0]]
+        p = np.concatenate([at[:, None] + np.arange(nodes + 1) for at, _ in steps]).astype(np.intp).ravel()
+        weight = np.concatenate([np.tile(h / period * self.table[1], at.size) for at, h in steps])
+        at = time[p]
+        turned = (weight * np.exp((-growth - 1j * omega[0]) * at))[:, None] * force[p]
+        # the lines are equally far apart: of so many beside each other the exponentials serve all the others, too
+        beside = int(np.sqrt(omega.size)) + 1
+        near = np.exp(-1j * apart * np.arange(beside)[:, None] * at)
+        far = range(0, omega.size, beside)
+        lines = np.concatenate([near @ (np.exp(-1j * apart * m * at)[:, None] * turned) for m in far])[: omega.size]
         decay = 1.0 / (1j * omega[:, None] - pole), 1.0 / (1j * omega[:, None] - pole.conj())
         pairs = (decay[0], inputs, outputs), (decay[1], inputs.conj(), outputs.conj())
         motion = lines @ constant.T + sum((d * (lines @ i.T)) @ o.T for d, i, o in pairs)

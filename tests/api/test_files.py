@@ -9,6 +9,7 @@ import time
 
 import pytest
 
+import api.files
 from api.files import NORMALISED, PARTS, STALE_FILE, STALE_PART, UPLOADS, Files, Full, Part, Partial, TooLarge
 
 
@@ -169,6 +170,24 @@ def test_a_group_may_keep_so_much(tmp_path):
     files.check_space("B", 100)
     part.drop()
     files.check_space("A", 40)
+
+
+def test_room_is_counted_without_asking_every_file_again(files, monkeypatch):
+    asked = []
+    size = api.files._size
+    monkeypatch.setattr("api.files._size", lambda path: (asked.append(path.name), size(path))[1])
+    first, second = kept(files, "A", b"12345"), kept(files, "A", b"123", NORMALISED)
+    assert files.usage("A") == {UPLOADS: 5, NORMALISED: 3, PARTS: 0}
+    third = kept(files, "A", b"1234567")
+    assert files.usage("A")[UPLOADS] == 12
+    assert sorted(asked) == sorted([first, f"{second}.h5", third])
+    # a whole one in the place of a damaged one, one that is gone, and a service that starts anew
+    files.path("A", UPLOADS, third).write_bytes(b"1")
+    assert Files(files.folder).usage("A")[UPLOADS] == 6
+    kept(files, "A", b"1234567")
+    with files.lock:
+        files.remove("A", [(UPLOADS, first)])
+    assert files.usage("A") == Files(files.folder).usage("A") == {UPLOADS: 7, NORMALISED: 3, PARTS: 0}
 
 
 def test_the_disk_keeps_what_it_has_to(tmp_path, monkeypatch):

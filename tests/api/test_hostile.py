@@ -7,6 +7,7 @@ import json
 
 import pytest
 
+from api.log_lines import JsonLines
 from api.problems import MEDIA_TYPE
 from api.stores.entities import Unavailable
 from api.work.pool import Busy
@@ -172,6 +173,7 @@ ERRORS = [(RuntimeError("secret detail"), 500), (Busy(), 503), (Unavailable(), 5
 
 @pytest.mark.parametrize(("error", "status"), ERRORS)
 def test_nothing_unexpected_leaves_the_service(store, tmp_path, error, status, caplog):
+    caplog.handler.setFormatter(JsonLines())
     with service(store, tmp_path) as http:
         id = http.post("/v1/machines", json={"name": "m"}).json()["id"]
         http.app.state.components.work.__class__ = Failing
@@ -182,22 +184,17 @@ def test_nothing_unexpected_leaves_the_service(store, tmp_path, error, status, c
     assert ("retry-after" in answer.headers) == (status == 503)
     if status == 500:
         # the log has it, under the same id
-        records = [r for r in caplog.records if r.message == "unexpected"]
-        assert records[0].exc_info
-        assert records[0].fields["request_id"] == told["request_id"]
+        (line,) = [line for line in map(json.loads, caplog.text.splitlines()) if line["event"] == "unexpected"]
+        assert "secret detail" in line["exception"] or error.args == ()
+        assert line["request_id"] == told["request_id"]
 
 
 def test_one_line_of_log_for_each_request(http, caplog):
     caplog.set_level("INFO", "rcsa_ident.service")
+    caplog.handler.setFormatter(JsonLines())
     http.get("/v1/machines", headers={"X-Request-ID": "r1"})
-    (record,) = [r for r in caplog.records if r.message == "request"]
-    told = record.fields
-    assert (told["request_id"], told["method"], told["status"], told["group"]) == ("r1", "GET", 200, "local")
-    from api.access import JsonLines
-
-    line = json.loads(JsonLines().format(record))
-    assert line["event"] == "request"
-    assert line["status"] == 200
+    (line,) = [line for line in map(json.loads, caplog.text.splitlines()) if line["event"] == "request"]
+    assert (line["request_id"], line["method"], line["status"], line["group"]) == ("r1", "GET", 200, "local")
 
 
 def test_counters(http):

@@ -152,6 +152,33 @@ def test_a_pool_ends_at_once_whatever_it_computes():
     asyncio.run(ended_meanwhile())
 
 
+class Preview:
+    preview = True
+
+
+def of_a_preview(_preview):
+    return os.getpid()
+
+
+@pytest.mark.slow
+def test_a_preview_waits_behind_no_question_that_takes_long(pool):
+    """Else this test never ends."""
+
+    async def asked():
+        usual = await pool.run(of_a_preview, Preview())
+        long = asyncio.ensure_future(pool.run(forever))
+        while pool.lanes[0].calls == 0:
+            await asyncio.sleep(0.0)
+        aside = await pool.run(of_a_preview, Preview())
+        long.cancel()
+        await asyncio.gather(long, return_exceptions=True)
+        return usual, aside
+
+    usual, aside = asyncio.run(asked())
+    # while a process of the usual ones is free it answers previews, too: its machines are read already
+    assert usual != aside == pool.members[1].process.pid
+
+
 def test_a_pool_that_has_not_begun_refuses():
     with pytest.raises(Busy):
         asyncio.run(Pool(1, 1, 1).run(pow, 2, 2))

@@ -74,6 +74,41 @@ def test_the_database_may_be_told_by_a_file(tmp_path):
         assert "secret" not in str(error.value)
 
 
+def test_settings_from_files_of_secrets(tmp_path):
+    (tmp_path / "RCSA_IDENT_DATABASE").write_text("postgresql+psycopg://shop:secret@db/shop\n")
+    (tmp_path / "RCSA_IDENT_PORT").write_text("9000")
+    (tmp_path / "password_of_another_service").write_text("x")
+    given = {"RCSA_IDENT_SECRETS": str(tmp_path)}
+    found = from_environment(given)
+    assert (found.database_url, found.port) == ("postgresql+psycopg://shop:secret@db/shop", 9000)
+    assert from_environment(given | {"RCSA_IDENT_PORT": "9001"}).port == 9001
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("PORT", b"secret", "RCSA_IDENT_PORT: found something else in its file, allowed is a whole number from 0 to 65535"),
+        ("DATABAS", b"secret", "RCSA_IDENT_DATABAS: found an unknown setting, .* did you mean RCSA_IDENT_DATABASE"),
+        ("DATABASE", b"secret\xff", "RCSA_IDENT_SECRETS: found .* with a file that cannot be read"),
+        ("DATABASE", None, "RCSA_IDENT_SECRETS: found .* with a file that cannot be read"),
+    ],
+)
+def test_secrets_that_do_not_fit_are_named_and_not_repeated(tmp_path, name, content, words):
+    file = tmp_path / f"RCSA_IDENT_{name}"
+    file.mkdir() if content is None else file.write_bytes(content)
+    with pytest.raises(InputError, match=words) as error:
+        from_environment({"RCSA_IDENT_SECRETS": str(tmp_path)})
+    assert "secret" not in str(error.value).replace(str(tmp_path), "")
+    with pytest.raises(InputError, match=r"RCSA_IDENT_SECRETS: found .* which is no folder"):
+        from_environment({"RCSA_IDENT_SECRETS": str(tmp_path / "elsewhere")})
+
+
+def test_only_one_place_reads_the_environment(monkeypatch):
+    monkeypatch.setenv("RCSA_IDENT_PORT", "9")
+    assert Settings().port == 8000
+    assert from_environment(os.environ).port == 9
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [

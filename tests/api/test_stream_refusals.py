@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import struct
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -192,7 +191,7 @@ def keyed(tmp_path):
         ):
             key, keys[name] = make_key(group, scopes, name)
             parts.store.keys.add(key)
-        object.__setattr__(parts, "settings", replace(parts.settings, keys=True))
+        object.__setattr__(parts, "settings", parts.settings.model_copy(update={"keys": True}))
         yield http, id, keys
 
 

@@ -281,6 +281,20 @@ def test_amplitudes_are_those_of_the_motion():
     np.testing.assert_allclose(found.motion / found.motion.max(), expected / expected.max(), rtol=0, atol=2e-6)
 
 
+def test_waves_of_a_slow_revolution_do_not_cost_its_square(monkeypatch):
+    """Unequal teeth repeat less often: a longer period holds as many more lines as points: they share their exponentials."""
+    cutter = Cutter(4, 0.012, np.radians(30.0), np.radians([80.0, 100.0, 80.0, 100.0]))
+    cut, speed = MonodromyOperator(tip(TWO), MillingProcess(cutter, COEFFICIENTS, HALF), 6), 1000.0 * RPM
+    # the kernels are compiled before
+    cut.multiplier(speed, 1e-3, 2e-4)
+    asked, exp = [], np.exp
+    monkeypatch.setattr(np, "exp", lambda x, *more: (asked.append(np.size(x)), exp(x, *more))[1])
+    found = cut.multiplier(speed, 1e-3, 2e-4, waves=True)
+    points = cut._laid_out(speed, 1e-3, 2e-4).time.size
+    assert found.omega.size > 100
+    assert sum(asked) < 0.5 * found.omega.size * points
+
+
 def test_common_period():
     swing = mill(3, 0.5, speed_variation=SpeedVariation(0.1, 0.5))
     assert common_period(mill(3, 0.5), 2.0) == 2.0

@@ -137,7 +137,8 @@ export async function follow(path, on, signal) {
       for (;;) {
         const { value, done } = await reader.read();
         if (done) break;
-        const blocks = (rest + value.replaceAll("\r\n", "\n")).split("\n\n");
+        // a line ends by CR, LF or both; a CR at the end of a part may be half of both
+        const blocks = (rest + value).replace(/\r\n|\r(?!$)/g, "\n").split("\n\n");
         rest = blocks.pop();
         for (const block of blocks) {
           const event = parsed(block);
