@@ -55,7 +55,13 @@ READERS: dict[str, Reader] = {
 SOUND = (".wav", ".rf64", ".bwf", ".w64", ".aif", ".aiff", ".caf", ".flac", ".ogg", ".opus", ".mp3")
 
 
-def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: float | None = None, cut_off: str = "refuse") -> Recording:
+def read_recording(
+    path: str | Path,
+    sensors: tuple[Sensor, ...],
+    default_rate: float | None = None,
+    cut_off: str = "refuse",
+    time: str | None = None,
+) -> Recording:
     """Return the sensors' channels of a recording in SI; other channels of the file are left alone.
 
     Parameters
@@ -68,6 +74,8 @@ def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: 
         Rate of a file that carries none.
     cut_off : str
         What a sound file that ends too early is: ``refuse``, an error, or ``note``, a note on the recording.
+    time : str or None
+        Name of the vector of times in a MATLAB file, where several stand in it.
 
     Raises
     ------
@@ -76,12 +84,17 @@ def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: 
     """
     if not sensors:
         raise InputError("sensors", "none", "at least one sensor", str(path))
-    rate, signals = read_signals(path, [sensor.name for sensor in sensors], default_rate, cut_off=cut_off)
+    rate, signals = read_signals(path, [sensor.name for sensor in sensors], default_rate, cut_off=cut_off, time=time)
     return in_si(rate, signals, sensors)
 
 
 def read_signals(
-    path: str | Path, names: Sequence[str], default_rate: float | None = None, suffix: str | None = None, cut_off: str = "refuse"
+    path: str | Path,
+    names: Sequence[str],
+    default_rate: float | None = None,
+    suffix: str | None = None,
+    cut_off: str = "refuse",
+    time: str | None = None,
 ) -> tuple[float, Sequence[Channel]]:
     """Return the sampling rate [Hz] and the named channels as they stand in a file, shape (n,) each; long ones may stay in it.
 
@@ -94,7 +107,7 @@ def read_signals(
         For a file that carries no rate.
     suffix : str or None
         Taken in place of the path's own.
-    cut_off : str
+    cut_off, time : str
         As with `read_recording`.
 
     Raises
@@ -109,10 +122,15 @@ def read_signals(
     reader = READERS.get(suffix.lower())
     if reader is None:
         raise InputError("recording", f"suffix '{suffix}'", "one of " + ", ".join(READERS), str(path))
+    options = {"cut_off": cut_off} if suffix.lower() in SOUND else {}
+    if time is not None:
+        if suffix.lower() != ".mat":
+            raise InputError("time", time, "nothing: only of MATLAB files the vector of times is chosen", str(path))
+        options = {"time": time}
     # what overflows or is no number is a lost sample, see below
     with np.errstate(all="ignore"):
         try:
-            return reader(path, names, default_rate, **({"cut_off": cut_off} if suffix.lower() in SOUND else {}))
+            return reader(path, names, default_rate, **options)
         except InputError as error:
             raise (error if error.where else error.at(str(path))) from None
 
