@@ -18,6 +18,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+import rcsa_ident
+
 _NO_NEW_PRIVILEGES = 38
 _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446
 _VERSION_FLAG, _PATH_BENEATH = 1, 1
@@ -82,8 +84,10 @@ def confine(readable: Iterable[Path], writable: Iterable[Path] = ()) -> Confinem
 
 def _python() -> list[Path]:
     """Where modules and their libraries are; what is imported late is still found."""
+    # of a checkout that the service is started in, the packages alone: its data may stand beside them
+    own = [Path(__file__).parent, Path(rcsa_ident.__file__).parent]
     places = [*sys.path, sys.prefix, sys.base_prefix, *sysconfig.get_paths().values(), "/usr/lib", "/lib", "/lib64", "/usr/share/zoneinfo"]
-    return [Path(place) for place in dict.fromkeys(places) if place and Path(place) != Path.cwd() and Path(place).exists()]
+    return [*own, *(Path(place) for place in dict.fromkeys(places) if place and Path(place) != Path.cwd() and Path(place).exists())]
 
 
 def _close_files(libc: ctypes.CDLL, readable: Iterable[Path], writable: Iterable[Path]) -> bool:

@@ -7,6 +7,7 @@ so that library, command line and service say the same.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -14,6 +15,8 @@ from enum import StrEnum
 from rcsa_ident.errors import InputError, finite
 from rcsa_ident.remarks import Remark
 from rcsa_ident.units import from_rpm
+
+_UNIT = re.compile("_(rpm|mm|um|mpa|n_per_mm|deg|hz|kw|nm)$")
 
 
 class PlausibilityCode(StrEnum):
@@ -73,7 +76,9 @@ class Range:
         low, high = self.usual
         if low <= self._given(value) <= high:
             return None
-        return Remark(PlausibilityCode.UNUSUAL, f"{field} is {self.told(value)}, but usual are {self._usual()}{self._slip(value)}")
+        return Remark(
+            PlausibilityCode.UNUSUAL, f"{_in_words(field)} is {self.told(value)}, but usual are {self._usual()}{self._slip(value)}"
+        )
 
     def told(self, value: float) -> str:
         """Return a value [SI] in the unit of files."""
@@ -92,6 +97,11 @@ class Range:
             if self.usual[0] <= meant <= self.usual[1]:
                 return ": " + question.format(f"{meant:.6g} {self.unit}".rstrip())
         return ""
+
+
+def _in_words(field: str) -> str:
+    """A key as people say it, its unit stands behind the value; one with a path names a place in a file and stays."""
+    return field if "." in field else _UNIT.sub("", field).replace("_", " ")
 
 
 def remarks_of(values: Iterable[tuple[str, Range, float]]) -> list[Remark]:
@@ -132,7 +142,7 @@ def proportion(
 
 
 def _length(usual: tuple[float, float], possible: tuple[float, float]) -> Range:
-    slips = (("was it given in metres ({})?", 1e3), ("was it given in inches ({})?", 25.4), ("was it given in um ({})?", 1e-3))
+    slips = (("was it given in metres ({})?", 1e3), ("was it given in inches ({})?", 25.4), ("was it given in µm ({})?", 1e-3))
     return Range("mm", 1e-3, usual, possible, slips)
 
 
@@ -148,8 +158,8 @@ DENSITY = Range("kg/m^3", 1.0, (1200.0, 20_000.0), (100.0, 30_000.0), (("was it 
 LOSS_FACTOR = Range("", 1.0, (0.0, 0.1), (0.0, 1.0), (("was it given in percent ({})?", 1e-2),))
 _SOFTER = (
     ("was it given in N/m per mm ({})?", 1e3),
-    ("was it given in N/um per m ({})?", 1e6),
-    ("was it given in N/um per mm ({})?", 1e9),
+    ("was it given in N/µm per m ({})?", 1e6),
+    ("was it given in N/µm per mm ({})?", 1e9),
 )
 CONTACT = {
     "translational_stiffness": Range("N/m per m", 1.0, (2e8, 2e13), (1e6, 1e17), _SOFTER),
@@ -175,7 +185,7 @@ TANGENTIAL = Range(
 RADIAL_RATIO = Range("", 1.0, (-0.1, 1.5), (-1.0, 5.0), (("was it given in percent ({})?", 1e-2),))
 AXIAL_RATIO = Range("", 1.0, (-1.0, 1.5), (-1.0, 5.0), (("was it given in percent ({})?", 1e-2),))
 EDGE = Range("N/mm", 1e3, (0.0, 200.0), (0.0, 1000.0), (("was it given in N/m ({})?", 1e-3),))
-FEED_PER_TOOTH = Range("mm", 1e-3, (0.001, 2.0), (1e-5, 10.0), (("was it given in metres ({})?", 1e3), ("was it given in um ({})?", 1e-3)))
+FEED_PER_TOOTH = Range("mm", 1e-3, (0.001, 2.0), (1e-5, 10.0), (("was it given in metres ({})?", 1e3), ("was it given in µm ({})?", 1e-3)))
 IMMERSION = Range("%", 1e-2, (1.5, 100.0), (0.0, 100.0), (("was {} meant?", 1e2),))
 SPINDLE_SPEED = Range("rev/min", from_rpm(1.0), (150.0, 80_000.0), (1.0, 500_000.0))
 AXIAL_DEPTH = _length((0.01, 60.0), (1e-4, 500.0))

@@ -90,7 +90,7 @@ def test_a_campaign_remarks_on_its_toolings_its_workpiece_and_its_cuts(tmp_path)
     assert [remark.split(" is ")[0] for remark in found] == [
         "T1: holder.segments[0].inner_diameter_mm",
         "foam: tangential coefficient",
-        "T1-0 and 2 more: axial_depth_mm",
+        "T1-0 and 2 more: axial depth",
     ]
 
 

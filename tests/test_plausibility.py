@@ -36,15 +36,15 @@ def test_what_is_usual_is_possible_and_both_ends_belong_to_it(name):
     [
         (DIAMETER, 12e-6, "was it given in metres (12 mm)?"),
         (DIAMETER, 0.4e-3, "was it given in inches (10.16 mm)?"),
-        (STICKOUT, 60.0, "was it given in um (60 mm)?"),
+        (STICKOUT, 60.0, "was it given in µm (60 mm)?"),
         (TANGENTIAL, 2.1e6, "was it given in GPa (2100 MPa)?"),
         (TANGENTIAL, 2.1e15, "was it given in Pa (2100 MPa)?"),
         (TANGENTIAL, 2100.0, "was it given in MPa where Pa is asked for (2100 MPa)?"),
-        (plausibility.CONTACT["translational_stiffness"], 2e4, "was it given in N/um per m (2e+10 N/m per m)?"),
+        (plausibility.CONTACT["translational_stiffness"], 2e4, "was it given in N/µm per m (2e+10 N/m per m)?"),
         (plausibility.CONTACT["translational_stiffness"], 2e7, "was it given in N/m per mm (2e+10 N/m per m)?"),
         (plausibility.RADIAL_RATIO, 26.0, "was it given in percent (0.26)?"),
         (plausibility.EDGE, 12e6, "was it given in N/m (12 N/mm)?"),
-        (plausibility.FEED_PER_TOOTH, 0.1, "was it given in um (0.1 mm)?"),
+        (plausibility.FEED_PER_TOOTH, 0.1, "was it given in µm (0.1 mm)?"),
         (IMMERSION, 0.005, "was 50 % meant?"),
     ],
 )
@@ -86,8 +86,8 @@ def test_a_process_remarks_on_coefficients_feed_and_immersion():
     odd = MillingProcess(Cutter(4, 0.012), CuttingCoefficients(2e7, 1.8), Engagement.from_immersion(0.005, "up"), feed_per_tooth=5e-3)
     assert [remark.split(" is ")[0] for remark in odd.remarks] == [
         "tangential coefficient",
-        "radial_ratio",
-        "feed_per_tooth",
+        "radial ratio",
+        "feed per tooth",
         "radial immersion",
     ]
     with pytest.raises(InputError, match="feed_per_tooth: found 100 mm"):

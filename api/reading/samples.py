@@ -19,13 +19,15 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.channels import RATE, Channel
+from rcsa_ident.io.channels import RATE, Channel, Signals, notes_of
 from rcsa_ident.io.hdf5 import LARGEST_CHUNK
 from rcsa_ident.io.recordings import in_si, read_signals, recorded
 from rcsa_ident.machining_setup import Cut
+from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import BLOCK, Quantity, Recording, Sensor
+from rcsa_ident.signals.verdict import RecordCode
 
-_SENSORS = "sensors"
+_SENSORS, _NOTES = "sensors", "notes"
 
 
 def write_normalised(path: Path, rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) -> None:
@@ -33,6 +35,7 @@ def write_normalised(path: Path, rate: float, signals: Sequence[Channel], sensor
     with h5py.File(path, "w") as file:
         file.attrs[RATE] = float(rate)
         file.attrs[_SENSORS] = json.dumps([asdict(sensor) for sensor in sensors])
+        file.attrs[_NOTES] = json.dumps([(note.code, str(note)) for note in notes_of(signals)])
         for i, signal in enumerate(signals):
             kind = np.float32 if all(_single(block) for _, block in _blocks_of(signal)) else np.float64
             chunk = int(min(max(rate, 1.0), LARGEST_CHUNK // 8, signal.size))
@@ -72,7 +75,7 @@ def read_normalised(path: str | Path, in_file: bool = False) -> Recording:
     """
     sensors = _sensors(Path(path))
     rate, signals = read_signals(path, [f"{i}" for i in range(len(sensors))], suffix=".h5")
-    return (recorded if in_file else in_si)(rate, signals, sensors)
+    return (recorded if in_file else in_si)(rate, Signals(signals, _notes(Path(path))), sensors)
 
 
 def read_cut_normalised(cut: Cut) -> tuple[Recording, Recording | None]:
@@ -101,6 +104,12 @@ def _sensors(path: Path) -> tuple[Sensor, ...]:
             return tuple(_sensor(each) for each in json.loads(file.attrs[_SENSORS]))
     except (OSError, KeyError, ValueError):
         raise InputError("recording", "samples that are missing or damaged", "an uploaded recording") from None
+
+
+def _notes(path: Path) -> tuple[Remark, ...]:
+    """What the reader said of the upload; samples of an earlier release carry none."""
+    with h5py.File(path, "r", locking=False) as file:
+        return tuple(Remark(RecordCode(code), words) for code, words in json.loads(file.attrs.get(_NOTES, "[]")))
 
 
 def _sensor(data: dict[str, Any]) -> Sensor:

@@ -16,6 +16,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE
 from rcsa_ident.io.time_base import uniform
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import LONGEST
 
 RATE = "sampling_rate_hz"
@@ -54,6 +55,25 @@ class StoredChannel:
 
 #: A channel's samples: an array, or what reads parts of one.
 Channel = FloatArray | StoredChannel
+
+
+class Signals(list[Channel]):
+    """Channels of a recording with what the user should know of them.
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+    notes : tuple of Remark
+    """
+
+    def __init__(self, channels: Sequence[Channel], notes: tuple[Remark, ...] = ()) -> None:
+        super().__init__(channels)
+        self.notes = notes
+
+
+def notes_of(channels: Sequence[Channel]) -> tuple[Remark, ...]:
+    """Return what the user should know of a recording's channels."""
+    return channels.notes if isinstance(channels, Signals) else ()
 
 
 class Scratch:

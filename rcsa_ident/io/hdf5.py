@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.io.channels import LARGEST_DATA, LARGEST_RATIO, LARGEST_STORED, RATE, Channel, StoredChannel
+from rcsa_ident.io.channels import LARGEST_DATA, LARGEST_RATIO, LARGEST_STORED, RATE, Channel, StoredChannel, the_only
 from rcsa_ident.io.files import MEGABYTE, existing_file, replacing
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.signals.recording import LONGEST
@@ -28,6 +29,8 @@ LARGEST_FILE = 2048 * MEGABYTE
 LARGEST_CHUNK = 8 * MEGABYTE
 MOST_CHUNKS = 100_000
 MOST_OBJECTS = 10_000
+#: Levels of structs.
+_DEEPEST = 16
 FILTERS = {
     h5py.h5z.FILTER_DEFLATE: "deflate",
     h5py.h5z.FILTER_SHUFFLE: "shuffle",
@@ -103,14 +106,50 @@ def _part(path: Path, name: str, first: int, end: int) -> FloatArray:
         raise InputError("recording", _cause(error), "a complete HDF5 file", str(path)) from None
 
 
-def read_vectors(path: Path, names: Sequence[str], wished: Sequence[str], kinds: Sequence[str]) -> dict[str, FloatArray]:
-    """Return vectors as MATLAB keeps them, one row or one column, shape (n,) each: the named ones, and those of `wished` that are there.
+class _MatlabTables:
+    """Tables of numbers of an open file of version 7.3: those on the root, and those in structs, which are groups."""
+
+    def __init__(self, file: h5py.File, size: int, kinds: Sequence[str], where: str) -> None:
+        self.file, self.size, self.kinds, self.where = file, size, kinds, where
+        self.present: list[str] = []
+        self._walk(file, "", 0)
+
+    def _walk(self, group: h5py.Group, prefix: str, depth: int) -> None:
+        for name in _hard_links(group, self.where):
+            self.present.append(prefix + name)
+            if depth > _DEEPEST or len(self.present) > MOST_OBJECTS:
+                raise InputError("recording", "structs in structs without end", f"{_DEEPEST} levels, {MOST_OBJECTS} variables", self.where)
+            # what cells refer to stands in groups of their own
+            if not name.startswith("#") and group.get(name, getclass=True) is h5py.Group:
+                self._walk(group[name], f"{prefix}{name}.", depth + 1)
+
+    def names(self, beside: str) -> list[str]:
+        return self.present
+
+    def _dataset(self, name: str) -> h5py.Dataset:
+        the_only(name, self.present, self.where)
+        dataset = _dataset(self.file, name.replace(".", "/"), [name.replace(".", "/")], self.where, vectors=True)
+        _check_kind(dataset, self.kinds, f"channel {name}", self.where)
+        return dataset
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        shape: tuple[int, ...] = self._dataset(name).shape[::-1]
+        return shape if len(shape) == 2 else (1, *shape)
+
+    def table(self, name: str) -> FloatArray:
+        dataset = self._dataset(name)
+        _check_size([dataset], [name], self.size, self.where, LARGEST_DATA)
+        values: FloatArray = np.atleast_2d(dataset[()].T)
+        return values
+
+
+@contextmanager
+def matlab_tables(path: Path, kinds: Sequence[str]) -> Iterator[_MatlabTables]:
+    """Open a file of version 7.3, whose rows are MATLAB's columns.
 
     Parameters
     ----------
     path : path
-    names, wished : sequences of str
-        Vectors that have to be there, and those that are read if they are.
     kinds : sequence of str
         Allowed values of the attribute ``MATLAB_class``; without it the type of the samples decides.
     """
@@ -118,15 +157,7 @@ def read_vectors(path: Path, names: Sequence[str], wished: Sequence[str], kinds:
     size = existing_file(path, "recording", LARGEST_FILE).stat().st_size
     try:
         with h5py.File(path, "r", locking=False) as file:
-            present = _hard_links(file, where)
-            found = [*names, *(name for name in wished if name in present)]
-            datasets = [_dataset(file, name, present, where, vectors=True) for name in found]
-            for name, dataset in zip(found, datasets, strict=True):
-                _check_kind(dataset, kinds, f"channel {name}", where)
-            _check_size(datasets[: len(names)], names, size, where, LARGEST_DATA)
-            for name, dataset in zip(found[len(names) :], datasets[len(names) :], strict=True):
-                _check_size([dataset], [name], size, where, LARGEST_DATA)
-            return {name: dataset[()].ravel() for name, dataset in zip(found, datasets, strict=True)}
+            yield _MatlabTables(file, size, kinds, where)
     except InputError:
         raise
     except _BROKEN as error:
@@ -151,7 +182,7 @@ def _cause(error: Exception) -> str:
     return f"one that cannot be read ({' '.join(inner.split())[:90]})"
 
 
-def _hard_links(file: h5py.File, where: str) -> list[str]:
+def _hard_links(file: h5py.Group, where: str) -> list[str]:
     """Names on the root; a link that is not to an object of this very file is refused, read or not."""
     links = file.id.links
     if len(file.id) > MOST_OBJECTS:
@@ -180,7 +211,7 @@ def _dataset(file: h5py.File, name: str, present: list[str], where: str, vectors
     if plist.get_external_count() > 0:
         raise InputError(field, "samples in an external file", "samples in the file itself", where)
     shape = dataset.shape
-    if shape is None or len(shape) not in ((1, 2) if vectors else (1,)) or math.prod(shape) != max(shape) or 0 in shape:
+    if shape is None or len(shape) not in ((1, 2) if vectors else (1,)) or 0 in shape:
         raise InputError(field, f"shape {shape}", f"a {'vector' if vectors else '1-D dataset'} with at least one sample", where)
     if dataset.dtype.kind not in "biuf":
         raise InputError(field, f"values of type {dataset.dtype}", "real numbers", where)

@@ -11,19 +11,19 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.channels import LARGEST_DATA, Channel, StoredChannel
+from rcsa_ident.io.channels import LARGEST_DATA, Channel, StoredChannel, notes_of
 from rcsa_ident.io.files import MEGABYTE
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 
-Reader = Callable[[Path, Sequence[str], float | None], tuple[float, Sequence[Channel]]]
+Reader = Callable[..., tuple[float, Sequence[Channel]]]
 
 
 def _of(module: str) -> Reader:
     """A format's reader, imported with its library when the first file of that format is read."""
 
-    def read(path: Path, names: Sequence[str], rate: float | None) -> tuple[float, Sequence[Channel]]:
-        found: tuple[float, Sequence[Channel]] = import_module(f"rcsa_ident.io.{module}").read_channels(path, names, rate)
+    def read(path: Path, names: Sequence[str], rate: float | None, **options: str) -> tuple[float, Sequence[Channel]]:
+        found: tuple[float, Sequence[Channel]] = import_module(f"rcsa_ident.io.{module}").read_channels(path, names, rate, **options)
         return found
 
     return read
@@ -38,12 +38,30 @@ READERS: dict[str, Reader] = {
     ".uff": _of("uff_records"),
     ".unv": _of("uff_records"),
     ".wav": _of("wav"),
+    ".rf64": _of("wav"),
+    ".bwf": _of("wav"),
+    ".w64": _of("sound"),
+    ".aif": _of("sound"),
+    ".aiff": _of("sound"),
+    ".caf": _of("sound"),
+    ".flac": _of("sound"),
+    ".ogg": _of("sound"),
+    ".opus": _of("sound"),
+    ".mp3": _of("sound"),
     ".mat": _of("matlab"),
     ".parquet": _of("parquet"),
 }
+#: Formats that devices write while they measure: what is left of one that broke off can be read.
+SOUND = (".wav", ".rf64", ".bwf", ".w64", ".aif", ".aiff", ".caf", ".flac", ".ogg", ".opus", ".mp3")
 
 
-def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: float | None = None) -> Recording:
+def read_recording(
+    path: str | Path,
+    sensors: tuple[Sensor, ...],
+    default_rate: float | None = None,
+    cut_off: str = "refuse",
+    time: str | None = None,
+) -> Recording:
     """Return the sensors' channels of a recording in SI; other channels of the file are left alone.
 
     Parameters
@@ -54,6 +72,10 @@ def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: 
         Signals are divided by the sensor's sensitivity; a trigger stays as it is.
     default_rate : float or None [Hz]
         Rate of a file that carries none.
+    cut_off : str
+        What a sound file that ends too early is: ``refuse``, an error, or ``note``, a note on the recording.
+    time : str or None
+        Name of the vector of times in a MATLAB file, where several stand in it.
 
     Raises
     ------
@@ -62,12 +84,17 @@ def read_recording(path: str | Path, sensors: tuple[Sensor, ...], default_rate: 
     """
     if not sensors:
         raise InputError("sensors", "none", "at least one sensor", str(path))
-    rate, signals = read_signals(path, [sensor.name for sensor in sensors], default_rate)
+    rate, signals = read_signals(path, [sensor.name for sensor in sensors], default_rate, cut_off=cut_off, time=time)
     return in_si(rate, signals, sensors)
 
 
 def read_signals(
-    path: str | Path, names: Sequence[str], default_rate: float | None = None, suffix: str | None = None
+    path: str | Path,
+    names: Sequence[str],
+    default_rate: float | None = None,
+    suffix: str | None = None,
+    cut_off: str = "refuse",
+    time: str | None = None,
 ) -> tuple[float, Sequence[Channel]]:
     """Return the sampling rate [Hz] and the named channels as they stand in a file, shape (n,) each; long ones may stay in it.
 
@@ -80,6 +107,8 @@ def read_signals(
         For a file that carries no rate.
     suffix : str or None
         Taken in place of the path's own.
+    cut_off, time : str
+        As with `read_recording`.
 
     Raises
     ------
@@ -88,13 +117,20 @@ def read_signals(
     """
     path = Path(path)
     suffix = path.suffix if suffix is None else suffix
+    if cut_off not in ("refuse", "note"):
+        raise InputError("cut_off", cut_off, "refuse or note")
     reader = READERS.get(suffix.lower())
     if reader is None:
         raise InputError("recording", f"suffix '{suffix}'", "one of " + ", ".join(READERS), str(path))
+    options = {"cut_off": cut_off} if suffix.lower() in SOUND else {}
+    if time is not None:
+        if suffix.lower() != ".mat":
+            raise InputError("time", time, "nothing: only of MATLAB files the vector of times is chosen", str(path))
+        options = {"time": time}
     # what overflows or is no number is a lost sample, see below
     with np.errstate(all="ignore"):
         try:
-            return reader(path, names, default_rate)
+            return reader(path, names, default_rate, **options)
         except InputError as error:
             raise (error if error.where else error.at(str(path))) from None
 
@@ -120,7 +156,7 @@ class StoredSamples:
 def recorded(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) -> Recording:
     """Return signals in SI as `in_si`, but leave those of a long recording where they are."""
     if any(isinstance(signal, StoredChannel) for signal in signals):
-        return Recording(rate, cast(FloatArray, StoredSamples(rate, signals, sensors)), sensors)
+        return Recording(rate, cast(FloatArray, StoredSamples(rate, signals, sensors)), sensors, notes_of(signals))
     return in_si(rate, signals, sensors)
 
 
@@ -147,7 +183,7 @@ def in_si(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) 
     # an overflow in the acquisition is a lost sample like any other
     samples[np.isinf(samples)] = np.nan
     samples.setflags(write=False)
-    return Recording(rate, samples, sensors)
+    return Recording(rate, samples, sensors, notes_of(signals))
 
 
 def read_cut(sensors: tuple[Sensor, ...], default_rate: float | None, cut: Cut) -> tuple[Recording, Recording | None]:

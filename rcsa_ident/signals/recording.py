@@ -11,6 +11,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Drawn
 
 #: Samples of a block, in which recordings are gone through.
@@ -96,6 +97,8 @@ class Recording(Drawn):
     samples : array, shape (n, c) [m, m/s^2, N; a trigger as it is]
         A sample that was lost is NaN. Those of a long recording may stand in its file; then slices of them are arrays.
     sensors : tuple of Sensor, length c
+    notes : tuple of Remark
+        What its reader says of the file: lossy, cut off.
 
     Examples
     --------
@@ -108,6 +111,7 @@ class Recording(Drawn):
     rate: float
     samples: FloatArray
     sensors: tuple[Sensor, ...]
+    notes: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
         positive("sampling_rate_hz", self.rate, "Hz")

@@ -31,7 +31,7 @@ DRIFT_PHASE = 0.5
 
 
 class RecordCode(StrEnum):
-    """What may be said of a record; the last three speak of one that may be used."""
+    """What may be said of a record; the last five speak of one that may be used."""
 
     UNREADABLE = "unreadable"
     NOT_FINITE = "not-finite"
@@ -49,6 +49,8 @@ class RecordCode(StrEnum):
     IMPLAUSIBLE = "implausible"
     LONG = "long"
     NO_AIR_CUT = "no-air-cut"
+    LOSSY = "lossy"
+    CUT_OFF = "cut-off"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -79,7 +81,7 @@ def examined(recording: Recording) -> Verdict:
     """Return what the samples themselves say, in one pass over them: why they are left out (lost, frozen, saturated, silent), and what
     speaks for a wrong unit or sensitivity: motion that no spindle makes, or that no sensor resolves."""
     columns = [i for i, sensor in enumerate(recording.sensors) if sensor.quantity in PLAUSIBLE]
-    reasons, notes = [], []
+    reasons, notes = [], [*recording.notes]
     for i, found in zip(columns, scan(recording, columns), strict=True):
         sensor = recording.sensors[i]
         if found.lost:

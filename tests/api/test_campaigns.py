@@ -75,7 +75,7 @@ def test_a_campaign_says_what_is_unusual_about_it(client, machine):
     made = client.make_campaign(machine, data)
     (remark,) = made.remarks
     assert remark.startswith("c0 and 1 more: ")
-    assert "feed_per_tooth_mm is 2.5 mm" in remark
+    assert "feed per tooth is 2.5 mm, but usual are 0.001 to 2 mm" in remark
     assert client.campaign(made.id).remarks == made.remarks
 
 

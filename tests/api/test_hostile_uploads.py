@@ -13,6 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import soundfile
 from fastapi.testclient import TestClient
 
 from api.main import create_app
@@ -36,7 +37,7 @@ class Campaign:
         self.http, self.folder, self.reader = http, folder, reader
         machine = http.post("/v1/machines", json={"name": "m"}).json()["id"]
         self.paths = {}
-        for suffix in (".h5", ".csv", ".tdms", ".uff", ".wav", ".mat", ".parquet"):
+        for suffix in (".h5", ".csv", ".tdms", ".uff", ".wav", ".flac", ".mat", ".parquet"):
             for kind, sensors in (("x", SENSORS), ("all", declared()["sensors"])):
                 data = declared(suffix=suffix, sensors=sensors)
                 id = http.post(f"/v1/machines/{machine}/campaigns", json=data).json()["id"]
@@ -289,3 +290,13 @@ def test_declared_sizes_of_every_format_are_looked_at_first(campaign):
     form = struct.pack("<HHIIHH", 1, 1, 51200, 102400, 2, 16)
     raw = b"RIFF\xff\xff\xff\xffWAVEfmt " + struct.pack("<I", 16) + form + b"data\xf0\xff\xff\xff" + bytes(100)
     assert campaign.put(raw, ".wav").status_code == 422
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("suffix", [".flac", ".wav"])
+def test_sound_is_decoded_in_the_reader(campaign, tmp_path, suffix):
+    """The library is found and loaded in there, wherever the service is started; only then its channels can be told."""
+    soundfile.write(tmp_path / f"cut{suffix}", np.zeros((600, 2)), 48000)
+    answer = campaign.put((tmp_path / f"cut{suffix}").read_bytes(), suffix)
+    assert answer.status_code == 422
+    assert "one channel of the file: ch1, ch2" in answer.text

@@ -353,7 +353,7 @@ def test_unusual_values_are_warned_of_in_every_answer(shop):
         ({"ktc_mpa": 2.1, "krc": 0.3}, "cut.ktc_mpa", "GPa (2100 MPa)"),
         ({"ktc_mpa": 900, "krc": 26.0}, "cut.krc", "percent (0.26)"),
         ({"kte_n_per_mm": 12e3}, "cut.kte_n_per_mm", "N/m (12 N/mm)"),
-        ({"feed_per_tooth_mm": 100.0}, "cut.feed_per_tooth_mm", "um (0.1 mm)"),
+        ({"feed_per_tooth_mm": 100.0}, "cut.feed_per_tooth_mm", "µm (0.1 mm)"),
     ],
 )
 def test_a_cut_that_is_impossible_is_refused_with_the_likely_slip(shop, cut, field, words):

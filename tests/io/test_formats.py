@@ -230,6 +230,6 @@ def test_a_missing_package_is_named_with_its_extra(tmp_path, monkeypatch, module
 
 
 def test_no_package_of_an_extra_is_loaded_before_its_format_is_met():
-    code = "import sys, rcsa_ident.io.recordings; print([m for m in ('nptdms', 'pyarrow', 'scipy.io') if m in sys.modules])"
+    code = "import sys, rcsa_ident.io.recordings; print([m for m in ('nptdms', 'pyarrow', 'scipy.io', 'soundfile') if m in sys.modules])"
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"

@@ -66,6 +66,151 @@ def test_where_the_rate_comes_from(tmp_path, newer):
     np.testing.assert_array_equal(found.samples[:, 0], [1.5, -2.0, np.nan, 3.0, 4.0])
 
 
+def save_nested(path: Path, newer: bool, **variables: object) -> None:
+    """Structs as dictionaries, in 7.3 as groups."""
+    if not newer:
+        scipy.io.savemat(path, variables, do_compression=True)
+        return
+
+    def fill(group: h5py.Group, members: dict[str, object]) -> None:
+        for name, value in members.items():
+            if isinstance(value, dict):
+                fill(group.create_group(name), value)
+            else:
+                group[name] = np.atleast_2d(np.asarray(value)).T
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        fill(file, variables)
+    with path.open("rb+") as raw:
+        raw.write(b"MATLAB 7.3")
+
+
+def signals(path: Path, *names: str, rate: float | None = None, time: str | None = None) -> tuple[float, list[list[float]]]:
+    found = read_recording(path, tuple(Sensor(name, Quantity.TRIGGER) for name in names), rate, time=time)
+    return found.rate, found.samples.T.tolist()
+
+
+STEPS = np.arange(5.0)
+TABLE = np.arange(10.0).reshape(2, 5)
+
+
+@both
+def test_rows_of_matrices_and_fields_of_structs(tmp_path, newer):
+    path = tmp_path / "cut.mat"
+    rig = {"time": STEPS / 100.0, "q": TABLE, "deep": {"x": STEPS + 7.0}}
+    save_nested(path, newer, rig=rig, q=TABLE.T, Fs=20.0)
+    assert signals(path, "rig.q(2)", "rig.q(1)") == (100.0, [TABLE[1].tolist(), TABLE[0].tolist()])
+    assert signals(path, "q(2)") == (20.0, [TABLE[1].tolist()])
+    # a struct without times of its own belongs to those around it
+    assert signals(path, "rig.deep.x") == (100.0, [(STEPS + 7.0).tolist()])
+
+
+@both
+def test_cells_and_arrays_of_structs(tmp_path, newer):
+    path = tmp_path / "cut.mat"
+    if newer:
+        save_nested(path, True, c=STEPS, Fs=20.0)
+        with pytest.raises(InputError, match=r"channel c\{2\}: found no such channel"):
+            signals(path, "c{2}")
+        return
+    many = np.array([(STEPS,), (STEPS + 1.0,)], dtype=[("x", object)])
+    scipy.io.savemat(path, {"c": np.array([STEPS, "text", STEPS + 2.0], dtype=object), "s": many, "Fs": 20.0}, do_compression=True)
+    assert signals(path, "c{3}", "s(2).x") == (20.0, [(STEPS + 2.0).tolist(), (STEPS + 1.0).tolist()])
+    with pytest.raises(InputError, match=r"channel c\{2\}: found values of class char"):
+        signals(path, "c{2}")
+
+
+GRIDS = {"time_cont": STEPS / 100.0, "time_disc": STEPS + 1.0, "x": STEPS, "odd": np.ones((5, 5)), "cube": np.ones((2, 3, 5))}
+
+
+@both
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (["rig.x"], "several vectors of times: rig.time_cont, rig.time_disc, allowed is one that tells the campaign's sampling_rate_hz"),
+        (["rig.odd(1)"], "rig.odd of shape (5, 5), allowed is a matrix whose longer side is time"),
+        (["rig.q(3)"], "number 3, allowed is rig.q(1) to rig.q(2)"),
+        (["rig.q"], "shape (2, 5), allowed is a vector with at least one sample, or one of its signals: rig.q(1) to rig.q(2)"),
+        (["rig.y"], "no such channel"),
+        (["rig.x", "slow.x"], "several times or rates (rig.x: rig.time_cont, slow.x: slow.time)"),
+    ],
+)
+def test_what_is_not_clear_is_refused_with_the_choice(tmp_path, newer, names, words):
+    path = tmp_path / "cut.mat"
+    save_nested(path, newer, rig={k: v for k, v in {**GRIDS, "q": TABLE}.items() if k != "cube"}, slow={"time": STEPS, "x": STEPS})
+    with pytest.raises(InputError) as caught:
+        signals(path, *names, rate=None if len(names) == 1 else 100.0)
+    assert words in str(caught.value)
+
+
+@both
+def test_the_campaigns_rate_or_a_name_chooses_the_times(tmp_path, newer):
+    path = tmp_path / "cut.mat"
+    save_nested(path, newer, rig={k: v for k, v in GRIDS.items() if k != "cube"})
+    assert signals(path, "rig.x", rate=100.0)[0] == 100.0
+    assert signals(path, "rig.x", time="rig.time_disc")[0] == 1.0
+    with pytest.raises(InputError, match=r"channel rig\.clock: found no such channel"):
+        signals(path, "rig.x", time="rig.clock")
+    (tmp_path / "cut.csv").write_text("x\n1\n")
+    with pytest.raises(InputError, match="time: found t, allowed is nothing"):
+        signals(tmp_path / "cut.csv", "x", rate=1.0, time="t")
+
+
+@pytest.mark.slow
+def test_damaged_structs_cost_a_sentence(tmp_path):
+    path = tmp_path / "cut.mat"
+    scipy.io.savemat(path, {"rig": {**GRIDS, "c": np.array([STEPS, "a"], dtype=object)}, "Fs": 1.0})
+    raw, rng, sentences, read = path.read_bytes(), np.random.default_rng(4), [], 0
+    for _ in range(2000):
+        damaged = bytearray(raw)
+        for place in rng.integers(128, len(raw), rng.integers(1, 4)):
+            damaged[place] = rng.choice([0, 1, 0x7F, 0xFF, rng.integers(0, 256)])
+        path.write_bytes(damaged)
+        try:
+            read += len(signals(path, "rig.x", "rig.c{1}", rate=100.0)[1]) == 2
+        except InputError as error:
+            sentences.append(str(error))
+    assert read > 0
+    assert len(sentences) > 300
+    assert not [each for each in sentences if "\n" in each]
+
+
+def test_a_struct_that_is_a_bomb_is_not_unpacked(tmp_path):
+    scipy.io.savemat(tmp_path / "cut.mat", {"x": {"a": np.zeros(5_000_000)}}, do_compression=True)
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match="bytes declared in a file of"):
+            signals(tmp_path / "cut.mat", "x.a", rate=1.0)
+        assert tracemalloc.get_traced_memory()[1] < 5e6
+    finally:
+        tracemalloc.stop()
+
+
+def test_structs_in_structs_end(tmp_path):
+    deep: object = STEPS
+    for _ in range(30):
+        deep = {"a": deep}
+    scipy.io.savemat(tmp_path / "cut.mat", {"x": deep})
+    with pytest.raises(InputError, match="structs in structs without end"):
+        signals(tmp_path / "cut.mat", "x.a", rate=1.0)
+
+
+SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
+
+
+def test_the_robot_of_the_shared_files():
+    """Motor angles of the KR300: 250 Hz by the times of its struct, an opaque variable beside."""
+    path = SHARED / "robot_kr300" / "traj_A.mat"
+    if not path.exists():
+        pytest.skip("the shared files are not beside this checkout")
+    rate, (angle, torque) = signals(path, "rec.act_pos_mot_deg(1)", "rec.act_torque_abs_nm(6)", rate=250.0)
+    whole = scipy.io.loadmat(path, variable_names=["rec"], simplify_cells=True)["rec"]
+    assert rate == pytest.approx(250.0, rel=1e-6)
+    np.testing.assert_array_equal(angle, whole["act_pos_mot_deg"][0])
+    np.testing.assert_array_equal(torque, whole["act_torque_abs_nm"][5])
+    assert signals(path, "tau_g_all(2)", rate=100.0, time="time_data.time_cont")[0] == pytest.approx(250.0, rel=1e-6)
+
+
 BROKEN = [
     ({"x": VALUES}, "sampling_rate_hz: found nothing, allowed is a vector 'time' [s], a number"),
     ({"x": VALUES, "Fs": -1.0}, "variable Fs: found -1.0"),

@@ -9,7 +9,7 @@ import { unzipped } from "../zip.js";
 import { keepFiles } from "./campaign_form.js";
 import { differing } from "./changes.js";
 
-const RECORDING = /\.(h5|hdf5|tdms|uff|unv|wav|mat|parquet|csv)$/i;
+const RECORDING = /\.(h5|hdf5|tdms|uff|unv|wav|rf64|bwf|w64|aiff?|caf|flac|ogg|opus|mp3|mat|parquet|csv)$/i;
 const TOML = { "Content-Type": "application/toml" };
 const last = (path) => path.split(/[\\/]/).at(-1);
 
@@ -89,7 +89,7 @@ export async function intake(place, files) {
       ? ["These are toolings. Drop them on the toolings' page."]
       : [
           "Nothing among these files is a campaign.toml, a tooling or a recording.",
-          "Recordings are HDF5, TDMS, UFF 58, WAV, MATLAB, Parquet or CSV files.",
+          "Recordings are HDF5, TDMS, UFF 58, WAV and other sound, MATLAB, Parquet or CSV files.",
         ];
     fill(place, note("doubt", ...only));
     return;
