@@ -30,7 +30,7 @@ from rcsa_ident.plausibility import (
     SPINDLE_SPEED,
     STICKOUT,
 )
-from rcsa_ident.signals.recording import Quantity, Sensor
+from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Sensor
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, clamped
 from rcsa_ident.units import from_rpm, to_rpm
 
@@ -253,7 +253,7 @@ def sensor_of(name: str, data: Any, where: str) -> Sensor:
         The file, for the messages.
     """
     kind = Table(data, where, f"sensors.{name}", sorted({*_SENSOR, *_TRIGGER}))
-    quantity = Quantity(kind.text("quantity", choices=tuple(Quantity)))
+    quantity = Quantity(kind.text("quantity", choices=CAMPAIGN_QUANTITIES))
     trigger = quantity is Quantity.TRIGGER
     table = Table(data, where, f"sensors.{name}", _TRIGGER if trigger else _SENSOR)
     default = [1.0] if trigger else []

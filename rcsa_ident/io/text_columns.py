@@ -90,7 +90,7 @@ def read_table(path: str | Path, field: str, largest: int = LARGEST_TEXT) -> Tex
     largest : int
         Bytes that are allowed.
     """
-    return table_of(_text(read_bytes(path, field, largest), field, str(path)), field, str(path))
+    return table_of(decoded(read_bytes(path, field, largest), field, str(path)), field, str(path))
 
 
 def table_of(text: str, field: str, where: str) -> TextTable:
@@ -169,7 +169,7 @@ def _parts(path: Path, field: str, largest: int) -> Iterator[TextTable]:
             while block := file.read(_PART):
                 # UTF-16 has no byte that is a line's end
                 whole = block.startswith(_UTF16) and not parts.header
-                yield parts.next(_text(block + (file.read() if whole else file.readline()), field, where))
+                yield parts.next(decoded(block + (file.read() if whole else file.readline()), field, where))
     except OSError as error:
         raise InputError(field, error.strerror or "an error on reading", "a file that can be read", where) from None
 
@@ -222,7 +222,7 @@ def _time_column(table: TextTable, names: Sequence[str]) -> list[str]:
     return time
 
 
-def _text(raw: bytes, field: str, where: str) -> str:
+def decoded(raw: bytes, field: str, where: str) -> str:
     if raw.startswith(_UTF16):
         encodings = ["utf-16"]
     elif b"\0" in raw:

@@ -145,3 +145,158 @@ def _level(value, length, sign, extremes, samples, runs):
         samples[1] += length
     elif sign * value < sign * extremes[1]:
         extremes[1], samples[1] = value, length
+
+
+@numba.njit(cache=True)
+def angle_sums(samples, angle, starts, window, highest):
+    """Return sum_t window[t] samples[s + t] e^{-i m angle[s + t]} of blocks that begin at `starts`, for m = 0..highest.
+
+    Shapes: samples (n, c), angle (n,), starts (b,), window (l,) -> (b, highest + 1, c).
+    """
+    blocks, length, channels = starts.size, window.size, samples.shape[1]
+    sums = np.empty((blocks, highest + 1, channels), dtype=np.complex128)
+    cosine, sine = np.ones(highest + 1), np.zeros(highest + 1)
+    real, imaginary = np.empty((channels, highest + 1)), np.empty((channels, highest + 1))
+    for b in range(blocks):
+        real[:], imaginary[:] = 0.0, 0.0
+        for t in range(length):
+            place = starts[b] + t
+            first, second = math.cos(angle[place]), math.sin(angle[place])
+            for m in range(1, min(4, highest) + 1):
+                cosine[m] = cosine[m - 1] * first - sine[m - 1] * second
+                sine[m] = cosine[m - 1] * second + sine[m - 1] * first
+            for m in range(5, highest + 1):
+                cosine[m] = cosine[m - 4] * cosine[4] - sine[m - 4] * sine[4]
+                sine[m] = cosine[m - 4] * sine[4] + sine[m - 4] * cosine[4]
+            for c in range(channels):
+                x = window[t] * samples[place, c]
+                for m in range(highest + 1):
+                    real[c, m] += x * cosine[m]
+                for m in range(highest + 1):
+                    imaginary[c, m] -= x * sine[m]
+        for c in range(channels):
+            for m in range(highest + 1):
+                sums[b, m, c] = real[c, m] + 1j * imaginary[c, m]
+    return sums
+
+
+@numba.njit(cache=True)
+def angle_signal(amplitude, angle, length):
+    """Return Re sum_m amplitude[w, m] e^{i m angle[t]} over windows of `length` samples that follow each other.
+
+    Shapes: amplitude (w, m + 1, c), angle (n,) -> (w length, c).
+    """
+    windows, orders, channels = amplitude.shape
+    values = np.zeros((windows * length, channels))
+    size = min(_CHUNK, length)
+    cosine, sine, power, quadrature = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    out = np.empty((channels, size))
+    for w in range(windows):
+        for start in range(w * length, (w + 1) * length, size):
+            count = min(size, (w + 1) * length - start)
+            for t in range(count):
+                cosine[t], sine[t] = math.cos(angle[start + t]), math.sin(angle[start + t])
+                power[t], quadrature[t] = 1.0, 0.0
+            out[:] = 0.0
+            for m in range(orders):
+                for c in range(channels):
+                    a, b = amplitude[w, m, c].real, amplitude[w, m, c].imag
+                    for t in range(count):
+                        out[c, t] += a * power[t] - b * quadrature[t]
+                for t in range(count):
+                    turned = power[t] * cosine[t] - quadrature[t] * sine[t]
+                    quadrature[t] = power[t] * sine[t] + quadrature[t] * cosine[t]
+                    power[t] = turned
+            for c in range(channels):
+                for t in range(count):
+                    values[start + t, c] = out[c, t]
+    return values
+
+
+@numba.njit(cache=True)
+def comb_scores(gain, place, most, folded):
+    """Return what lines at the multiples of each trial frequency gain together, as far up as they gain, shapes (w, b), (f,) -> (w, f).
+
+    `gain` is what a line in a bin is worth, of bins from 0 to half the sampling rate; `place` the trial frequencies in bins. At most
+    `most` multiples count; those above half the rate only where they are looked for folded back, and each bin once.
+    """
+    windows, bins = gain.shape
+    scores = np.zeros((windows, place.size))
+    used = np.empty(most)
+    for f in range(place.size):
+        for w in range(windows):
+            total, count = 0.0, 0
+            for m in range(1, most + 1):
+                at = m * place[f]
+                if at > bins - 2:
+                    if not folded:
+                        break
+                    at = at % (2.0 * (bins - 1))
+                    if at > bins - 1:
+                        at = 2.0 * (bins - 1) - at
+                if at < 2.0 or at > bins - 3:
+                    continue
+                if folded:
+                    known = False
+                    for k in range(count):
+                        known = known or abs(used[k] - at) < 8.0
+                    if known:
+                        continue
+                    used[count] = at
+                    count += 1
+                low = int(at)
+                share = at - low
+                total += (1.0 - share) * gain[w, low] + share * gain[w, low + 1]
+                scores[w, f] = max(scores[w, f], total)
+    return scores
+
+
+@numba.njit(cache=True)
+def sideband_scores(gain, place, centre, most, worth):
+    """Return what lines to both sides of a bin gain together, as far as they gain, shapes (b,), (f,) -> (f,).
+
+    Their spacing is 1, 2, ... times each trial frequency, of which the best one counts; `worth`, shape (t,), is what each is multiplied by.
+    """
+    scores = np.zeros(place.size)
+    for f in range(place.size):
+        for times in range(1, worth.size + 1):
+            both = 0.0
+            for sign in (-1.0, 1.0):
+                total, best = 0.0, 0.0
+                for k in range(1, most + 1):
+                    at = centre + sign * k * times * place[f]
+                    if at < 2.0 or at > gain.size - 3:
+                        break
+                    low = int(at)
+                    share = at - low
+                    total += (1.0 - share) * gain[low] + share * gain[low + 1]
+                    best = max(best, total)
+                both += best
+            scores[f] = max(scores[f], worth[times - 1] * both)
+    return scores
+
+
+@numba.njit(cache=True)
+def best_path(scores, reach, price):
+    """Return the path over the windows with the largest sum of scores less `price` times the squares of its steps, and all ends' sums.
+
+    Shapes: scores (w, f) -> (w,), (f,). A step is at most `reach` places.
+    """
+    windows, places = scores.shape
+    total = scores[0].copy()
+    back = np.zeros((windows, places), dtype=np.int32)
+    for w in range(1, windows):
+        new = np.empty(places)
+        for f in range(places):
+            best, came = -np.inf, f
+            for g in range(max(f - reach, 0), min(f + reach, places - 1) + 1):
+                value = total[g] - price * (g - f) ** 2
+                if value > best:
+                    best, came = value, g
+            new[f], back[w, f] = best + scores[w, f], came
+        total = new
+    path = np.empty(windows, dtype=np.int64)
+    path[-1] = np.argmax(total)
+    for w in range(windows - 1, 0, -1):
+        path[w - 1] = back[w, path[w]]
+    return path, total

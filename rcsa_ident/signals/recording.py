@@ -27,6 +27,11 @@ class Quantity(StrEnum):
     ACCELERATION = "acceleration"
     TRIGGER = "trigger"
     FORCE = "force"
+    SOUND = "sound"
+
+
+#: What a campaign's sensors measure; sound gives no length.
+CAMPAIGN_QUANTITIES = tuple(quantity for quantity in Quantity if quantity is not Quantity.SOUND)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +44,7 @@ class Sensor:
         The channel's name in the recordings.
     quantity : Quantity
     axis : Dof or None
-        Machine axis, X or Y, for a force also Z, positive as the axis; None for a trigger.
+        Machine axis, X or Y, for a force also Z, positive as the axis; None for a trigger and for a microphone.
     sensitivity : float [V/m, V/(m/s^2), V/N]
         Signal per quantity; 1 where the file is in SI.
     delay : float [s]
@@ -72,7 +77,7 @@ class Sensor:
     def __post_init__(self) -> None:
         # a dynamometer also feels along the spindle
         known = (Dof.X, Dof.Y, Dof.Z) if self.quantity is Quantity.FORCE else (Dof.X, Dof.Y)
-        if self.quantity is not Quantity.TRIGGER and self.axis not in known:
+        if self.quantity not in (Quantity.TRIGGER, Quantity.SOUND) and self.axis not in known:
             raise InputError(f"sensors.{self.name}.axis", self.axis, "X, Y or Z" if len(known) == 3 else "X or Y")
         if not np.isfinite(self.sensitivity) or self.sensitivity == 0.0:
             raise InputError(f"sensors.{self.name}.sensitivity", self.sensitivity, "a finite number other than 0")

@@ -66,3 +66,84 @@ def test_runs_go_on_across_blocks(kernel):
     np.testing.assert_array_equal(lengths, [0, 3, 0, 3, 0, 0, 0, 0])
     # the last run of three is as long as the one before and followed by less
     np.testing.assert_array_equal(front[1:4], [[0.0, 3.0, 1.0], [4.0, 3.0, 2.5], [0.0, 0.0, 0.0]])
+
+
+def turning(n):
+    """An angle that speeds up."""
+    t = np.arange(n)
+    return 0.05 * t + 2e-5 * t**2
+
+
+@pytest.mark.parametrize("highest", [0, 3, 9])
+@pytest.mark.parametrize("kernel", compiled_and_plain("angle_sums"))
+def test_angle_sums(kernel, highest):
+    rng = np.random.default_rng(4)
+    samples, angle, window, starts = rng.normal(size=(90, 2)), turning(90), rng.uniform(size=31), np.array([0, 17, 59])
+    found = kernel(samples, angle, starts, window, highest)
+    for block, s in zip(found, starts, strict=True):
+        phase = np.exp(-1j * np.outer(np.arange(highest + 1), angle[s : s + 31]))
+        np.testing.assert_allclose(block, phase @ (window[:, None] * samples[s : s + 31]), atol=1e-11)
+
+
+@pytest.mark.parametrize("kernel", compiled_and_plain("angle_signal"))
+def test_angle_signal(kernel):
+    rng = np.random.default_rng(5)
+    amplitude, angle = rng.normal(size=(2, 6, 2)) + 1j * rng.normal(size=(2, 6, 2)), turning(300)
+    found = kernel(amplitude, angle, 150)
+    for w in range(2):
+        phase = np.exp(1j * np.outer(angle[150 * w : 150 * (w + 1)], np.arange(6)))
+        np.testing.assert_allclose(found[150 * w : 150 * (w + 1)], (phase @ amplitude[w]).real, atol=1e-11)
+
+
+def teeth_of_a_comb(gain, place, most, folded):
+    """What a comb gains, order by order."""
+    bins, total, best, used = gain.size, 0.0, 0.0, []
+    for m in range(1, most + 1):
+        at = m * place
+        if at > bins - 2 and not folded:
+            break
+        if folded:
+            at = abs((at + bins - 1) % (2 * (bins - 1)) - (bins - 1))
+        if not 2.0 <= at <= bins - 3 or (folded and any(abs(each - at) < 8.0 for each in used)):
+            continue
+        used.append(at)
+        total += np.interp(at, np.arange(bins), gain)
+        best = max(best, total)
+    return best
+
+
+@pytest.mark.parametrize("folded", [False, True])
+@pytest.mark.parametrize("kernel", compiled_and_plain("comb_scores"))
+def test_comb_scores(kernel, folded):
+    gain, place = np.random.default_rng(6).normal(size=(3, 120)), np.array([7.3, 19.9, 33.3, 70.2])
+    expected = [[teeth_of_a_comb(row, each, 12, folded) for each in place] for row in gain]
+    np.testing.assert_allclose(kernel(gain, place, 12, folded), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("kernel", compiled_and_plain("sideband_scores"))
+def test_sideband_scores(kernel):
+    gain, place = np.random.default_rng(7).normal(size=200), np.array([6.7, 23.1])
+    for each, found in zip(place, kernel(gain, place, 90.0, 5, np.array([1.0, 0.5, 0.9])), strict=True):
+        both = []
+        for times in (1, 2, 3):
+            sides = []
+            for sign in (-1, 1):
+                at = 90.0 + sign * np.arange(1, 6) * times * each
+                values = np.interp(at[(at >= 2.0) & (at <= 197.0)], np.arange(200), gain)
+                sides.append(np.cumsum(values).max(initial=0.0))
+            both.append({1: 1.0, 2: 0.5, 3: 0.9}[times] * sum(sides))
+        assert found == pytest.approx(max(both))
+
+
+@pytest.mark.parametrize("kernel", compiled_and_plain("best_path"))
+def test_best_path_is_the_best_of_all(kernel):
+    scores = np.random.default_rng(8).normal(size=(4, 5))
+    path, total = kernel(scores, 2, 0.3)
+
+    def value(trial):
+        return scores[range(4), trial].sum() - 0.3 * np.sum(np.diff(trial) ** 2)
+
+    every = [np.array(trial) for trial in np.ndindex(5, 5, 5, 5) if np.abs(np.diff(trial)).max() <= 2]
+    best = max(every, key=value)
+    np.testing.assert_array_equal(path, best)
+    assert total.max() == pytest.approx(value(best))

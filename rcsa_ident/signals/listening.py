@@ -1,0 +1,354 @@
+"""What one recording says by itself, of any sensor and without a drawing: the speed, how steady it is, whether it cut, and chatter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.errors import InputError, positive
+from rcsa_ident.shown import Shown
+from rcsa_ident.signals.loud_part import decimated, loud_part
+from rcsa_ident.signals.off_orders import OffOrders, off_orders
+from rcsa_ident.signals.order_lines import OrderLines, order_lines
+from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.signals.rotation import Rotation
+from rcsa_ident.signals.speed_search import APART, TURNS, find_rotation, window_length
+from rcsa_ident.units import from_hz, to_hz, to_rpm
+
+#: Spindle frequencies that are looked for where nothing is told [Hz]: 300 to 48 000 rev/min.
+LOWEST, HIGHEST = 5.0, 800.0
+#: Share of a told speed within which the true one is looked for.
+AROUND = 0.03
+#: Change of the speed over the part, as a share, above which it is a ramp, and how many times the wander about the ramp it has to be.
+_RAMP, _RAMP_OVER_WANDER = 0.01, 3.0
+#: Wander above which a speed is not steady.
+_UNSTEADY = 0.02
+#: Explained share below which nothing cuts, if the teeth do not stand out either.
+_IDLE_SHARE = 0.15
+#: Lines off the orders are chatter above this share of the record, and of what the orders explain.
+_CHATTER_SHARE, _CHATTER_OVER_ORDERS = 0.15, 0.25
+#: Most teeth that are looked for, and the share of the orders' power, or of that of chatter's sidebands, that their multiples hold.
+_MOST_TEETH, _TOOTH_SHARE, _SIDEBAND_SHARE = 12, 0.8, 0.6
+#: How many times stronger than others lines are that stand out.
+_STAND_OUT = 10.0
+#: Rate above which a recorder has a filter against folding [Hz]; highest frequency that a line may have been folded from [Hz].
+_FILTERED, _HIGHEST_ALIAS = 10e3, 5e3
+#: Highest order that is looked for folded back; share of the lines' power and number of orders from which on it is no chance.
+_FOLDED_ORDERS, _FOLDED_SHARE, _FOLDED_LINES = 30, 5e-4, 3
+#: Suggested speeds: most tooth passages in a period of the chatter, and how far from the present speed where no range is told.
+_MOST_WAVES, _SLOWEST, _FASTEST = 8, 0.5, 3.0
+
+
+class Heard(StrEnum):
+    """What a recording holds."""
+
+    STABLE = "stable"
+    CHATTER = "chatter"
+    IDLE = "idle"
+    NO_CUT = "no cut"
+    UNSTEADY = "unsteady"
+
+
+class Event(NamedTuple):
+    """Something that happens in a recording.
+
+    Parameters
+    ----------
+    kind : str
+        ``entry``, ``exit``, ``overload`` or ``drop-out``.
+    time : float or None [s]
+        None where it is not told.
+    """
+
+    kind: str
+    time: float | None
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Listening(Shown):
+    """What a recording says.
+
+    Parameters
+    ----------
+    verdict : Heard
+    reasons : tuple of str
+        Sentences: why, and what was taken as given.
+    duration : float [s]
+    part : (float, float) [s]
+        What was judged: the longest stretch that is loud.
+    band : float [Hz]
+        Frequency up to which it was judged.
+    spindle_speed, spindle_speed_std : float or None [rad/s]
+        Mean of the part; None where none was found.
+    other_speeds : tuple of float [rad/s]
+        Speeds that explain the record as well.
+    wander : float or None
+        Standard deviation of the speed in windows of a quarter of a second, about a ramp where there is one, as a share.
+    ramp : (float, float) or None [rad/s]
+        First and last speed where it changes on purpose.
+    teeth : int or None
+        As told, or as the lines show.
+    explained_share : float or None
+        Share of the variance that lines at multiples of the followed speed explain.
+    folded : bool
+        Orders above half the sampling rate stand folded back in the record.
+    chatter : tuple of float [Hz]
+        The structure's frequency, as the sampling shows it.
+    aliases : tuple of float [Hz]
+        All frequencies that the sampling cannot tell apart from it; one where it can.
+    lines : tuple of float [Hz]
+        Other lines beside the orders.
+    suggested_speeds : tuple of float [rad/s]
+        Speeds that put a whole number of tooth passages on the chatter's period.
+    events : tuple of Event
+    """
+
+    verdict: Heard
+    reasons: tuple[str, ...]
+    duration: float
+    part: tuple[float, float]
+    band: float
+    spindle_speed: float | None = None
+    spindle_speed_std: float | None = None
+    other_speeds: tuple[float, ...] = ()
+    wander: float | None = None
+    ramp: tuple[float, float] | None = None
+    teeth: int | None = None
+    explained_share: float | None = None
+    folded: bool = False
+    chatter: tuple[float, ...] = ()
+    aliases: tuple[float, ...] = ()
+    lines: tuple[float, ...] = ()
+    suggested_speeds: tuple[float, ...] = ()
+    events: tuple[Event, ...] = ()
+
+    def __str__(self) -> str:
+        if self.spindle_speed is None:
+            return str(self.verdict)
+        return f"{self.verdict} at {to_rpm(self.spindle_speed):.1f} rev/min"
+
+
+def listen(
+    samples: FloatArray,
+    rate: float,
+    quantity: Quantity = Quantity.ACCELERATION,
+    teeth: int | None = None,
+    spindle_speed: float | None = None,
+    between: tuple[float, float] | None = None,
+) -> Listening:
+    """Return what a recording says: speed, teeth, verdict, chatter and speeds to try.
+
+    Parameters
+    ----------
+    samples : array, shape (n, c)
+        Channels of one quantity, without lost samples.
+    rate : float [Hz]
+    quantity : Quantity
+        What the channels measure. Which of the chatter's lines is the structure's is told by the motion, also of accelerations; sound
+        is taken as it is heard. A displacement is mostly run-out and roundness, which are there in the air, too.
+    teeth : int or None
+        As told; else they are found from the lines.
+    spindle_speed : float or None [rad/s]
+        As programmed; the true one is looked for near it.
+    between : (float, float) or None [rad/s]
+        Speeds that the machine may turn at: where it is looked for, and suggested.
+
+    Raises
+    ------
+    InputError
+        The record is too short, or nothing moves in it.
+
+    Examples
+    --------
+    >>> time, rng = np.arange(8192) / 4096.0, np.random.default_rng(1)
+    >>> signal = np.sum([np.cos(2 * np.pi * 100.0 * m * time) for m in (1, 2, 4, 8)], axis=0) + 0.1 * rng.standard_normal(8192)
+    >>> print(listen(signal[:, None], 4096.0))
+    stable at 6000.0 rev/min
+    """
+    positive("sampling_rate_hz", rate, "Hz")
+    if teeth is not None and not 1 <= teeth <= 100:
+        raise InputError("teeth", teeth, "1 to 100")
+    low, high = _search(spindle_speed, between)
+    duration = samples.shape[0] / rate
+    least = max(TURNS / high, 64.0 / rate)
+    if duration < least:
+        raise InputError("recording", f"{duration:.3g} s", f"at least {least:.2g} s")
+    if not np.ptp(samples, axis=0).max() > 0.0:
+        raise InputError("recording", "a constant value in every channel", "a signal that moves")
+    samples, rate, band = decimated(samples, rate)
+    loud = loud_part(samples, rate)
+    start, stop = loud.start / rate, loud.stop / rate
+    events = (Event("entry", start),) * (loud.start > 0) + (Event("exit", stop),) * (loud.stop < samples.shape[0])
+    nothing = Listening(Heard.UNSTEADY, (), duration, (start, stop), band, events=events)
+    low = max(low, TURNS / (stop - start))
+    if high < 1.01 * low:
+        words = f"the longest loud stretch lasts {stop - start:.2g} s, which is too short to tell the speed"
+        return replace(nothing, reasons=(words,))
+    part = samples[loud]
+    found = find_rotation(part, rate, low, high)
+    if found is None:
+        words = "there are no lines at the multiples of one frequency: the spindle does not turn, or is not heard"
+        return replace(nothing, verdict=Heard.NO_CUT, reasons=(words,))
+    fold = rate < _FILTERED and quantity is not Quantity.SOUND
+    lines, folded = _lines(part, rate, band, found.rotation, fold)
+    answer = replace(nothing, other_speeds=tuple(from_hz(each) for each in found.others), folded=folded, explained_share=lines.explained)
+    return _judged(answer, part, rate, lines, found.rotation, quantity, teeth, between or _around(found.rotation), fold)
+
+
+def _search(spindle_speed: float | None, between: tuple[float, float] | None) -> tuple[float, float]:
+    """Frequencies between which the spindle's is looked for [Hz]."""
+    if spindle_speed is not None:
+        told = to_hz(positive("spindle_speed", spindle_speed, "rad/s"))
+        return (1.0 - AROUND) * told, (1.0 + AROUND) * told
+    if between is None:
+        return LOWEST, HIGHEST
+    if not 0.0 < between[0] < between[1]:
+        raise InputError("speeds", between, "two speeds above 0, the lower one first")
+    return (1.0 - APART) * to_hz(between[0]), (1.0 + APART) * to_hz(between[1])
+
+
+def _around(rotation: Rotation) -> tuple[float, float]:
+    """Speeds that are suggested where no range is told [rad/s]."""
+    return _SLOWEST * rotation.spindle_speed, _FASTEST * rotation.spindle_speed
+
+
+def _lines(part: FloatArray, rate: float, band: float, rotation: Rotation, fold: bool) -> tuple[OrderLines, bool]:
+    """The lines of the orders, and whether such stand folded back among them."""
+    frequency = to_hz(rotation.spindle_speed)
+    length = window_length(rate, frequency, part.shape[0])
+    below = max(int(min(0.49 * rate, band) / frequency), 1)
+    if fold and below < _FOLDED_ORDERS:
+        both = order_lines(part, rotation.angle, length, _FOLDED_ORDERS)
+        above = both.power[int(0.5 * rate / frequency) + 1 :]
+        if above.sum() > _FOLDED_SHARE * both.power.sum() and np.count_nonzero(above) >= _FOLDED_LINES:
+            return both, True
+    return order_lines(part, rotation.angle, length, below), False
+
+
+def _judged(
+    answer: Listening,
+    part: FloatArray,
+    rate: float,
+    lines: OrderLines,
+    rotation: Rotation,
+    quantity: Quantity,
+    told: int | None,
+    between: tuple[float, float],
+    fold: bool,
+) -> Listening:
+    """The answer with what is said of a part whose rotation is known."""
+    frequency, order = to_hz(rotation.spindle_speed), np.arange(1, lines.power.size)
+    apparent = np.abs((order * frequency + 0.5 * rate) % rate - 0.5 * rate)
+    beside = off_orders(
+        lines.rest, _typical(part, rate), rate, np.concatenate([[frequency], apparent]), answer.band, quantity is Quantity.ACCELERATION
+    )
+    power, gap = lines.power[1:], quantity is Quantity.DISPLACEMENT
+    teeth = told if gap else told or _teeth(power)
+    ramp, wander = _ramp(*rotation.speeds())
+    answer = replace(
+        answer, spindle_speed=rotation.spindle_speed, spindle_speed_std=rotation.speed_std, wander=wander, ramp=ramp, teeth=teeth
+    )
+    explained = max(lines.explained, 0.0)
+    if beside.share > max(_CHATTER_SHARE, _CHATTER_OVER_ORDERS * explained):
+        return _chattering(answer, beside, rate, told or _teeth(beside.beside, _SIDEBAND_SHARE) or teeth, between, fold)
+    if explained < _IDLE_SHARE and not gap and (teeth is None or _on_multiples(power, teeth) < _TOOTH_SHARE):
+        words = f"the spindle's orders explain {explained:.0%} of the record and the teeth do not stand out among them: nothing is cut"
+        return replace(answer, verdict=Heard.IDLE, reasons=(words,), teeth=told, lines=tuple(beside.frequency))
+    if wander > _UNSTEADY:
+        words = f"the speed changes by {wander:.1%} and not along a ramp"
+        return replace(answer, verdict=Heard.UNSTEADY, reasons=(words,), lines=tuple(beside.frequency))
+    words = f"lines at multiples of the spindle's frequency explain {explained:.0%} of the record"
+    if beside.frequency.size:
+        words += f", lines beside them {beside.share:.1%}"
+    reasons = [words]
+    if gap:
+        reasons.append("a gap sensor sees run-out and roundness in the air, too: whether it cuts is not told")
+    if teeth is not None and teeth % 2 == 0:
+        reasons.append(f"chatter that repeats every second tooth would stand on the run-out's orders with {teeth} teeth: it is not judged")
+    return replace(answer, verdict=Heard.STABLE, reasons=tuple(reasons), lines=tuple(beside.frequency))
+
+
+def _typical(part: FloatArray, rate: float) -> float:
+    """Mean square about the mean of a second of the part, all channels together, median of its seconds."""
+    length = min(round(rate), part.shape[0])
+    seconds = part[: part.shape[0] // length * length].reshape(-1, length, part.shape[1])
+    return float(np.median(np.sum(seconds.var(axis=1), axis=1)))
+
+
+def _chattering(
+    answer: Listening, beside: OffOrders, rate: float, teeth: int | None, between: tuple[float, float], fold: bool
+) -> Listening:
+    """The answer for a record with strong lines off the orders: which frequency is the structure's, and what speeds fit it."""
+    assert answer.spindle_speed is not None
+    strongest, frequency = float(beside.frequency[0]), to_hz(answer.spindle_speed)
+    multiples = np.arange(_HIGHEST_ALIAS // rate + 1.0) * rate
+    aliases = sorted({round(float(each), 3) for sign in (-1, 1) for each in np.abs(multiples + sign * strongest) if each < _HIGHEST_ALIAS})
+    aliases = aliases if fold else [strongest]
+    words = [
+        f"lines at no multiple of the spindle's frequency, {frequency:.2f} Hz, hold {beside.share:.0%} of the record; the structure's "
+        f"is {strongest:.1f} Hz"
+    ]
+    suggested: list[float] = []
+    if len(aliases) > 1:
+        shown = ", ".join(f"{each:.0f}" for each in aliases)
+        words.append(f"a recorder of {rate:.0f} Hz without a filter cannot tell {shown} Hz apart: no speed is suggested")
+    elif teeth is None:
+        words.append("how many teeth the cutter has is neither told nor heard: no speed is suggested")
+    else:
+        speeds = [(waves, 2.0 * np.pi * strongest / (teeth * waves)) for waves in range(1, _MOST_WAVES + 1)]
+        inside = [(waves, speed) for waves, speed in speeds if between[0] <= speed <= between[1]]
+        suggested = [speed for _, speed in inside]
+        if inside:
+            shown = ", ".join(f"{to_rpm(speed):.0f} rev/min ({waves})" for waves, speed in inside)
+            words.append(f"a whole number of chatter's waves between two teeth: {shown}")
+    return replace(
+        answer,
+        verdict=Heard.CHATTER,
+        teeth=teeth,
+        reasons=tuple(words),
+        chatter=(strongest,),
+        aliases=tuple(aliases),
+        lines=tuple(beside.frequency[1:]),
+        suggested_speeds=tuple(suggested),
+    )
+
+
+def _ramp(speeds: FloatArray, weight: FloatArray) -> tuple[tuple[float, float] | None, float]:
+    """First and last speed of a ramp, and the wander about it, or about the mean, as a share."""
+    mean = float(np.average(speeds, weights=weight))
+    place = np.arange(speeds.size) - np.average(np.arange(speeds.size), weights=weight)
+    slope = float(np.sum(weight * place * speeds) / max(np.sum(weight * place**2), 1e-300))
+
+    def wander(about: FloatArray) -> float:
+        return float(np.sqrt(np.average((speeds - about) ** 2, weights=weight))) / mean
+
+    change, about = slope * speeds.size, wander(mean + slope * place)
+    if speeds.size > 3 and abs(change) > max(_RAMP, _RAMP_OVER_WANDER * about) * mean:
+        return (float(mean + slope * (place[0] - 0.5)), float(mean + slope * (place[-1] + 0.5))), about
+    return None, wander(np.full(speeds.size, mean))
+
+
+def _on_multiples(power: FloatArray, teeth: int) -> float:
+    """Share of the power of the lines 1, 2, ... that stands on the multiples of a number."""
+    return float(power[teeth - 1 :: teeth].sum() / (power.sum() + 1e-300))
+
+
+def _teeth(power: FloatArray, least: float | None = None) -> int | None:
+    """Largest number whose multiples hold most of the power of the lines 1, 2, ...; None where none above 1 does.
+
+    A line that a resonance lifts may hold most of it alone: where the other multiples of a part of the number stand out as well, the
+    part is the number.
+    """
+    least = _TOOTH_SHARE if least is None else least
+    counts = [teeth for teeth in range(2, min(_MOST_TEETH, power.size) + 1) if _on_multiples(power, teeth) > least]
+    teeth, order = max(counts, default=1), np.arange(1, power.size + 1)
+    for part in (part for part in range(teeth - 1, 1, -1) if teeth % part == 0):
+        shared, others = power[(order % part == 0) & (order % teeth != 0)], power[order % part != 0]
+        if shared.size and shared.mean() > _STAND_OUT * others.mean():
+            teeth = part
+            break
+    return teeth if teeth > 1 else None

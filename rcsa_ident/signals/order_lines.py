@@ -1,0 +1,91 @@
+"""Lines at the multiples of a spindle's followed angle, window by window: what they explain, and which of them keep their phase."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.signals._kernels import angle_signal, angle_sums
+
+#: Share of a window's samples below which a combination of orders is not told from the others: two that fold onto one line.
+_TOLD_APART = 1e-6
+#: Standard deviations by which the mean product of neighbours stands above nothing where a line keeps its phase.
+_SURE = 3.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OrderLines:
+    """Lines at the multiples of the spindle's angle, fitted in windows that follow each other.
+
+    Parameters
+    ----------
+    power : array, shape (m + 1,)
+        Mean square of the line of each order, all channels together; 0 where windows do not share its phase.
+    explained : float
+        Share of the variance about the windows' means that the fits explain, both per degree of freedom.
+    energy : float
+        Mean square about the means, all channels together.
+    rest : array, shape (n, c)
+        What the fits leave; the samples behind the last window are left out.
+    """
+
+    power: FloatArray
+    explained: float
+    energy: float
+    rest: FloatArray
+
+
+def order_lines(samples: FloatArray, angle: FloatArray, length: int, highest: int) -> OrderLines:
+    """Return the lines at multiples of an angle, by least squares in each window.
+
+    Orders above half the sampling rate are fitted where they stand folded back: the angle at the samples is all that is asked.
+
+    Parameters
+    ----------
+    samples : array, shape (n, c)
+    angle : array, shape (n,) [rad]
+    length : int
+        Samples of a window; at most n.
+    highest : int
+        Highest order.
+    """
+    n, channels = samples.shape
+    starts = np.arange(0, n - length + 1, length)
+    windows, flat = starts.size, np.ones(length)
+    centred = samples[: windows * length].reshape(windows, length, channels)
+    centred = (centred - centred.mean(axis=1, keepdims=True)).reshape(windows * length, channels)
+    # unknowns of a window are complex exponentials of the orders -m to m, whose products are exponentials of twice as many orders
+    products = _both_sides(angle_sums(np.ones((n, 1)), angle, starts, flat, 2 * highest))[:, :, 0]
+    order = np.arange(2 * highest + 1)
+    matrix = products[:, order[:, None] - order[None, :] + 2 * highest]
+    sums = _both_sides(angle_sums(centred, angle, starts, flat, highest))
+    if highest * (angle[-1] - angle[0]) < np.pi * n:
+        solution, used = np.linalg.solve(matrix, sums), order.size * windows
+    else:
+        value, vector = np.linalg.eigh(matrix)
+        inverse = np.where(value > _TOLD_APART * length, 1.0 / np.maximum(value, 1e-300), 0.0)[:, :, None]
+        solution, used = vector @ (inverse * (np.conj(np.swapaxes(vector, 1, 2)) @ sums)), int(np.sum(inverse > 0.0))
+    energy, explained = float(np.sum(centred**2)), float(np.real(np.sum(np.conj(solution) * sums)))
+    free = max(windows * length - used, 1)
+    left = max(energy - explained, 0.0) / free
+    share = 1.0 - left / (energy / (windows * (length - 1)) + 1e-300)
+    amplitude = solution[:, highest:]
+    weights = np.where(np.arange(highest + 1) == 0, 1.0, 2.0)[None, :, None]
+    rest = centred - angle_signal(np.ascontiguousarray(weights * amplitude), angle, length)
+    return OrderLines(_steady_power(amplitude), share, energy / (windows * length), rest)
+
+
+def _both_sides(sums: ComplexArray) -> ComplexArray:
+    """Sums of the orders -m to m from those of 0 to m, shape (w, m + 1, c)."""
+    return np.concatenate([np.conj(sums[:, :0:-1]), sums], axis=1)
+
+
+def _steady_power(amplitude: ComplexArray) -> FloatArray:
+    """Mean square of the lines that windows share: the product of neighbours has no share of noise, which does not know what it was."""
+    pairs = np.sum(np.real(amplitude[1:] * np.conj(amplitude[:-1])) if amplitude.shape[0] > 1 else np.abs(amplitude) ** 2, axis=2)
+    mean = pairs.mean(axis=0)
+    power = 2.0 * np.where(mean > _SURE * pairs.std(axis=0) / np.sqrt(pairs.shape[0]), mean, 0.0)
+    power[0] = 0.0
+    return power

@@ -1,0 +1,218 @@
+"""How the spindle turns within a record: its speed window by window, and its angle sample by sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.ndimage import gaussian_filter1d
+
+from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.signals._kernels import angle_sums, best_path, comb_scores
+from rcsa_ident.signals.line_gain import WINDOW, line_gain
+from rcsa_ident.signals.steady_part import hann
+
+#: Orders that are looked at.
+ORDERS = 40
+#: Trial speeds stand this far apart, as a share.
+_STEP = 2e-4
+#: Largest change of speed from one window to the next, as so many standard deviations.
+_LARGEST_CHANGE = 7.5
+#: Revolutions of the blocks in which the angle is followed, and their least length [s].
+_BLOCK_TURNS, _SHORTEST_BLOCK = 4.0, 0.012
+#: Times over which the lines' amplitudes are taken as one [s], one after the other: neighbours are brought into line before what lies
+#: farther apart, and at last all of the record, since what turns all orders in proportion is the spindle.
+_AMPLITUDE_TIMES = (0.25, 1.0, 4.0, np.inf)
+#: Spectral densities of the angular acceleration that are tried [rad^2/s^3].
+_DENSITIES = 10.0 ** np.arange(-4.0, 5.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rotation:
+    """The spindle's angle over a record.
+
+    Parameters
+    ----------
+    rate : float [Hz]
+    angle : array, shape (n,) [rad]
+        At each sample, from the first one.
+    time : array, shape (b,) [s]
+        Middles of the blocks that told it.
+    information : array, shape (b,) [1/rad^2]
+        What each told of it.
+    """
+
+    rate: float
+    angle: FloatArray
+    time: FloatArray
+    information: FloatArray
+
+    @property
+    def spindle_speed(self) -> float:
+        """Mean speed [rad/s], where the blocks told it."""
+        speeds, weight = self.speeds()
+        return float(np.average(speeds, weights=weight))
+
+    @property
+    def speed_std(self) -> float:
+        """Standard deviation of the mean speed [rad/s]."""
+        middle = np.average(self.time, weights=self.information)
+        return float(1.0 / np.sqrt(np.sum(self.information * (self.time - middle) ** 2)))
+
+    def speeds(self, window: float = 0.25) -> tuple[FloatArray, FloatArray]:
+        """Return the mean speed in windows of about this length [s] that follow each other [rad/s], and their weights, a sum of 1."""
+        count = max(int((self.angle.size - 1) / (window * self.rate)), 1)
+        ends = np.linspace(0, self.angle.size - 1, count + 1).astype(int)
+        weight = np.histogram(self.time * self.rate, ends, weights=self.information)[0]
+        return np.diff(self.angle[ends]) / np.diff(ends) * self.rate, weight / weight.sum()
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How a speed is followed window by window.
+
+    Parameters
+    ----------
+    window : float [s]
+        Length of the windows, which hold a few revolutions at least.
+    change : float [-]
+        Standard deviation of the change of speed from one to the next, as a share.
+    """
+
+    window: float = WINDOW
+    change: float = 2e-3
+
+    @property
+    def slowest(self) -> float:
+        """Frequency of a spindle that turns often enough in a window [Hz]."""
+        return _BLOCK_TURNS / self.window
+
+    def length(self, rate: float, lowest: float, samples: int) -> int:
+        """Return the samples of a window, where the spindle turns at `lowest` [Hz] at least; at most what there are."""
+        return min(round(max(self.window, _BLOCK_TURNS / lowest) * rate), samples)
+
+
+#: Of a speed that wanders, and of one that changes on purpose.
+WANDER, RAMP = Pace(), Pace(0.25, 8e-3)
+
+
+def speed_path(samples: FloatArray, rate: float, lowest: float, highest: float, pace: Pace = WANDER) -> tuple[FloatArray, FloatArray]:
+    """Return the likeliest path of the spindle's frequency through windows that overlap by half.
+
+    In each window a trial frequency is worth what lines at its multiples are worth; from one window to the next it changes little.
+
+    Parameters
+    ----------
+    samples : array, shape (n, c)
+    rate : float [Hz]
+    lowest, highest : float [Hz]
+        Where it is looked for.
+    pace : Pace
+
+    Returns
+    -------
+    middles : array, shape (w,)
+        Samples from the first one to the windows' middles.
+    frequency : array, shape (w,) [Hz]
+    """
+    length = pace.length(rate, lowest, samples.shape[0])
+    gain, middles = line_gain(samples, rate, length)
+    trial = np.exp(np.arange(np.log(lowest), np.log(highest) + _STEP, _STEP))
+    scores = comb_scores(gain, trial * 4.0 * length / rate, ORDERS, False)
+    path, _ = best_path(scores, max(round(_LARGEST_CHANGE * pace.change / _STEP), 1), 0.5 * (_STEP / pace.change) ** 2)
+    return middles, trial[path]
+
+
+def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: FloatArray) -> Rotation:
+    """Return the spindle's angle at each sample: the phase that the strong orders have in common.
+
+    In each block of a few revolutions the lines' phases tell the angle; how fast it may change is what makes them most likely.
+    Orders above half the rate do not take part.
+
+    Parameters
+    ----------
+    samples : array, shape (n, c)
+    rate : float [Hz]
+    middles : array, shape (w,)
+        Samples from the first one to the middles of the windows in which the speed is known.
+    frequency : array, shape (w,) [Hz]
+        The spindle's in each, to within a few hundredths of a turn over the window.
+    """
+    at, mean = np.arange(samples.shape[0]), float(frequency.mean())
+    speed = np.full(at.size, mean)
+    if middles.size > 1:
+        speed = PchipInterpolator(middles, frequency)(np.clip(at, middles[0], middles[-1]))
+    angle = 2.0 * np.pi / rate * np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))])
+    highest = max(min(int(0.45 * rate / float(frequency.max())), ORDERS), 1)
+    length = min(round(max(_BLOCK_TURNS / mean, _SHORTEST_BLOCK) * rate), at.size)
+    hop = max(length // 2, 1)
+    starts = np.arange(0, at.size - length + 1, hop)
+    window = hann(length)
+    lines = angle_sums(samples - samples.mean(axis=0), angle, starts, 2.0 / window.sum() * window, highest)[:, 1:]
+    phase, information = _common_phase(lines, np.arange(1, highest + 1)[None, :, None], hop / rate)
+    time = (starts + 0.5 * (length - 1)) / rate
+    if starts.size < 4:
+        # no more is told than was known
+        return Rotation(rate, angle, np.array([0.0, (at.size - 1) / rate]), np.ones(2))
+    spline = CubicSpline(time, phase, bc_type="natural")
+    inside = np.clip(at / rate, time[0], time[-1])
+    # beyond the blocks' middles the speed goes on as it is there
+    angle = angle + spline(inside) + spline(inside, 1) * (at / rate - inside)
+    return Rotation(rate, angle - angle[0], time, information)
+
+
+def _common_phase(lines: ComplexArray, order: np.ndarray, step: float) -> tuple[FloatArray, FloatArray]:
+    """Angle [rad] that the lines of each block, shape (b, m, c), have in common beyond the expected one, and its information [1/rad^2]."""
+    phase = np.zeros(lines.shape[0])
+    for reach in _AMPLITUDE_TIMES:
+        density = None
+        for _ in range(8):
+            turned = lines * np.exp(-1j * phase[:, None, None] * order)
+            mean, noise, information = _told(turned, order, reach / step)
+            change = np.sum(np.imag(np.conj(mean) * turned) * order / noise, axis=(1, 2)) / information
+            new, density = _smoothed(phase + np.clip(change, -0.3, 0.3), information, step, density)
+            moved, phase = float(np.max(np.abs(new - phase))), new
+            if moved < 1e-3:
+                break
+    # what each block itself tells, not the record's mean in it
+    turned = lines * np.exp(-1j * phase[:, None, None] * order)
+    return phase, _told(turned, order, _AMPLITUDE_TIMES[0] / step)[2]
+
+
+def _told(lines: ComplexArray, order: np.ndarray, reach: float) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Mean lines around each block, variance of their real parts, and information of each block's angle [1/rad^2]."""
+    mean = _local_mean(lines, reach)
+    noise = 0.5 * np.mean(np.abs(lines - mean) ** 2, axis=0) + 1e-300
+    return mean, noise, np.sum(np.abs(mean) ** 2 * order**2 / noise, axis=(1, 2)) + 1e-300
+
+
+def _local_mean(lines: ComplexArray, reach: float) -> ComplexArray:
+    """Mean of the blocks around each, shape (b, m, c); of all of them where the reach is longer than the record."""
+    if reach > 0.5 * lines.shape[0]:
+        return np.broadcast_to(lines.mean(axis=0), lines.shape)
+    return gaussian_filter1d(lines.real, reach, axis=0) + 1j * gaussian_filter1d(lines.imag, reach, axis=0)
+
+
+def _smoothed(phase: FloatArray, information: FloatArray, step: float, density: float | None) -> tuple[FloatArray, float]:
+    """Phases whose speed walks at random, and the density of its steps: as told, or under which they are likeliest."""
+    n = phase.size
+    # squares of second differences: D'D has five diagonals
+    diagonal, first, second = np.zeros(n), np.zeros(n), np.zeros(n)
+    diagonal[:-2] += 1.0
+    diagonal[1:-1] += 4.0
+    diagonal[2:] += 1.0
+    first[1 : n - 1] -= 2.0
+    first[2:] -= 2.0
+    second[2:] = 1.0
+    best, likeliest, chosen = phase, -np.inf, 0.0
+    for each in _DENSITIES if density is None else (density,):
+        scale = 1.0 / (each * step**3)
+        factor = cholesky_banded(np.array([scale * second, scale * first, scale * diagonal + information]))
+        smooth = cho_solve_banded((factor, False), information * phase)
+        cost = np.sum(information * (phase - smooth) ** 2) + scale * np.sum(np.diff(smooth, 2) ** 2)
+        likelihood = -0.5 * (cost + 2.0 * np.sum(np.log(factor[2])) - (n - 2) * np.log(scale))
+        if likelihood > likeliest:
+            best, likeliest, chosen = smooth, likelihood, float(each)
+    return best, chosen

@@ -1,0 +1,223 @@
+"""The spindle's speed, found in a record that does not tell it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.signals._kernels import comb_scores, sideband_scores
+from rcsa_ident.signals.line_gain import WINDOW, line_gain
+from rcsa_ident.signals.order_lines import OrderLines, order_lines
+from rcsa_ident.signals.rotation import ORDERS, RAMP, Rotation, follow, speed_path
+from rcsa_ident.signals.steady_part import hann
+
+#: Length of the windows in which the speed is looked for [s]: fine enough for lines that lie close.
+_LONG = 4.0
+#: Trial speeds stand this far apart, as a share, and candidates at least this far.
+_STEP, APART = 1e-4, 0.015
+#: Strong lines beside which others are looked for at the spacing of the spindle or of its teeth, and how many to each side: chatter has
+#: them. Those at the spacing of two and more teeth are worth less, since they also stand at that of a slower spindle with more teeth.
+_CENTRES, _SIDES = 3, 16
+_WORTH = np.array([1.0] + [0.8] * 7)
+#: Share of the best score that a candidate has to have, and most candidates.
+_AS_GOOD, _MOST = 0.75, 6
+#: Score above which lines at the multiples of one speed are no chance.
+_A_SPEED = 7.0
+#: Share of the lines' power that orders off a multiple may have, if the spindle turns at that multiple.
+_ELSEWHERE = 5e-4
+#: Explained share from which on weak lines between others are no chance.
+_CLEAN = 0.5
+#: Half width of a line in long windows [Hz], that of what it is compared with, how many times as strong it is, and the share that lines
+#: between the multiples may have.
+_OWN, _AROUND, _CLEAR, _BETWEEN = 0.5, 6.0, 20.0, 5e-3
+#: A candidate belongs to the lines if it explains this share of what the best one explains.
+_EXPLAINS = 0.8
+#: Explained share above which short windows tell a path, and how much more it has to explain than a constant speed.
+_TELLS, _CLEARLY = 0.1, 1.02
+#: Explained share from which on a path that leads far is a ramp, and how much more it has to explain than any one speed.
+_RAMP_EXPLAINS, _RAMP_CLEARLY = 0.3, 1.2
+#: Revolutions in a window of the fit.
+TURNS = 8.0
+#: Samples in which candidates are compared, from the middle of a longer record.
+_COMPARED = 1 << 17
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundSpeed:
+    """A speed and how it was found.
+
+    Parameters
+    ----------
+    rotation : Rotation
+    others : tuple of float [Hz]
+        Frequencies that explain the record as well.
+    """
+
+    rotation: Rotation
+    others: tuple[float, ...] = ()
+
+
+def window_length(rate: float, frequency: float, samples: int) -> int:
+    """Return the samples of a window of the fit: half a second, or a few revolutions of a slow spindle; at most what there are."""
+    return min(round(max(WINDOW, TURNS / frequency) * rate), samples)
+
+
+def find_rotation(samples: FloatArray, rate: float, lowest: float, highest: float) -> FoundSpeed | None:
+    """Return how the spindle turns, found between two frequencies; None where nothing is heard of it.
+
+    Long windows tell the candidates: frequencies at whose multiples, and at whose spacing beside the strongest lines, there are
+    lines. Those that explain as much as the best one belong together; of these the spindle's is the highest of which all lines
+    are multiples.
+
+    Parameters
+    ----------
+    samples : array, shape (n, c)
+        Of a cut, or of a spindle that idles.
+    rate : float [Hz]
+    lowest, highest : float [Hz]
+    """
+    spare = max(samples.shape[0] - _COMPARED, 0) // 2
+    middle = samples[spare : samples.shape[0] - spare]
+    fits = [(each, *_fitted(middle, rate, each)) for each in _candidates(middle, rate, lowest, highest)]
+    ramp = _ramp(samples, rate, lowest, highest)
+    most = max((_explained(lines) for _, _, lines in fits), default=0.0)
+    if ramp is not None and _explained(ramp[1]) > max(_RAMP_EXPLAINS, _RAMP_CLEARLY * most):
+        return FoundSpeed(ramp[0])
+    if not fits:
+        return None
+    members = [fit for fit in fits if _explained(fit[2]) >= _EXPLAINS * most] if most > _TELLS else fits[:1]
+    slowest, _, lines = min(members, key=lambda fit: fit[0])
+    times = _largest_multiple(lines.power, slowest, highest)
+    while times > 1 and _between(middle, rate, slowest, times) > _BETWEEN:
+        times = next((part for part in range(times - 1, 1, -1) if times % part == 0), 1)
+    frequency = times * slowest
+    parts = _parts(middle, rate, frequency, lowest) if most > _CLEAN else 1
+    if parts > 1 and _shares(_fitted(middle, rate, frequency / parts)[1].power, parts) > _BETWEEN:
+        frequency /= parts
+    # a member that the spindle's multiples do not hold explains as much by other lines
+    others = tuple(each for each, _, _ in members if each > frequency and abs(each / frequency - round(each / frequency)) > APART)
+    return FoundSpeed(_fitted(samples, rate, frequency)[0], others)
+
+
+def _parts(samples: FloatArray, rate: float, frequency: float, lowest: float) -> int:
+    """Least number by which a frequency is divided so that nearly all lines stand on multiples that stand between its own: what looks like
+    the spindle may be the tooth passages. Lines of other origin may stand there by chance, but do not keep the spindle's phase."""
+    shares = {parts: _between(samples, rate, frequency / parts, parts) for parts in range(2, _MOST + 3) if frequency / parts >= lowest}
+    most = max(shares.values(), default=0.0)
+    return min(parts for parts in shares if shares[parts] > 0.9 * most) if most > _BETWEEN else 1
+
+
+def _between(samples: FloatArray, rate: float, frequency: float, times: int) -> float:
+    """Share of the lines at multiples of a frequency that are no multiples of so many times it, as long windows show them: beside
+    chatter, short ones do not tell weak lines."""
+    length = min(round(_LONG * rate), samples.shape[0])
+    power, order = _power(samples, length), np.arange(1, int(0.45 * rate / frequency) + 1)
+    hertz = 4.0 * length / rate
+    own, around = max(round(_OWN * hertz), 2), round(_AROUND * hertz)
+    line = np.zeros(order.size)
+    for k, at in enumerate(np.round(order * frequency * hertz).astype(int)):
+        top = float(power[max(at - own, 0) : at + own + 1].max())
+        beside = np.concatenate([power[max(at - around, 0) : max(at - 2 * own, 0)], power[at + 2 * own + 1 : at + around + 1]])
+        line[k] = top if top > _CLEAR * np.median(beside) else 0.0
+    return _shares(np.concatenate([[0.0], line]), times)
+
+
+def _ramp(samples: FloatArray, rate: float, lowest: float, highest: float) -> tuple[Rotation, OrderLines] | None:
+    """How a spindle turns whose speed changes on purpose, and its lines; None where no path leads far enough."""
+    # a window holds a few revolutions, and is short beside the ramp
+    lowest, highest = max(lowest, RAMP.slowest), min(highest, 0.2 * rate)
+    if highest < (1.0 + 2.0 * APART) * lowest:
+        return None
+    middles, path = speed_path(samples, rate, lowest, highest, RAMP)
+    if np.ptp(np.log(path)) < 2.0 * APART:
+        return None
+    gain = line_gain(samples, rate, RAMP.length(rate, lowest, samples.shape[0]))[0]
+    place = path * 2.0 * (gain.shape[1] - 1) / rate
+
+    def score(parts: int) -> float:
+        return sum(float(comb_scores(row[None], at[None] / parts, ORDERS, False)[0, 0]) for row, at in zip(gain, place, strict=True))
+
+    # what looks like the spindle may be the tooth passages
+    scores = {parts: score(parts) for parts in range(1, _MOST + 1) if path.min() / parts >= lowest}
+    parts = max(parts for parts in scores if scores[parts] >= _AS_GOOD * max(scores.values()))
+    slowest = float(path.max()) / parts
+    fit = _lines(samples, rate, follow(samples, rate, middles, path / parts), slowest)
+    times = _largest_multiple(fit[1].power, slowest, highest)
+    return fit if times == 1 else _lines(samples, rate, follow(samples, rate, middles, times * path / parts), times * slowest)
+
+
+def _lines(samples: FloatArray, rate: float, rotation: Rotation, frequency: float) -> tuple[Rotation, OrderLines]:
+    """A rotation and the lines of its orders below half the rate."""
+    highest = min(max(int(0.48 * rate / frequency), 1), 2 * ORDERS)
+    return rotation, order_lines(samples, rotation.angle, window_length(rate, frequency, samples.shape[0]), highest)
+
+
+def _candidates(samples: FloatArray, rate: float, lowest: float, highest: float) -> list[float]:
+    """Frequencies [Hz] that lines speak for, the best first; none where that may be chance."""
+    length = min(round(_LONG * rate), samples.shape[0])
+    gain = line_gain(samples, rate, length)[0].mean(axis=0)
+    trial = np.exp(np.arange(np.log(lowest), np.log(min(highest, 0.4 * rate)) + _STEP, _STEP))
+    place = trial * 4.0 * length / rate
+    score = comb_scores(gain[None], place, ORDERS, False)[0]
+    score = score + np.max([sideband_scores(gain, place, float(centre), _SIDES, _WORTH) for centre in _strongest(samples, length)], axis=0)
+    found: list[int] = []
+    for at in np.argsort(-score):
+        if score[at] < max(_AS_GOOD * score.max(), _A_SPEED) or len(found) == _MOST:
+            break
+        if all(abs(np.log(trial[at] / trial[each])) > APART for each in found):
+            found.append(int(at))
+    return [float(trial[at]) for at in found]
+
+
+def _power(samples: FloatArray, length: int) -> FloatArray:
+    """Power in the bins of `line_gain`, all windows and channels together."""
+    starts = range(0, samples.shape[0] - length + 1, max(length // 2, 1))
+    window = hann(length)[:, None]
+    parts = (samples[s : s + length] - samples[s : s + length].mean(axis=0) for s in starts)
+    power: FloatArray = np.sum([np.sum(np.abs(np.fft.rfft(part * window, 4 * length, axis=0)) ** 2, axis=1) for part in parts], axis=0)
+    return power
+
+
+def _strongest(samples: FloatArray, length: int) -> list[int]:
+    """Bins of the strongest lines, those of `line_gain`."""
+    power, found = _power(samples, length), []
+    for _ in range(_CENTRES):
+        found.append(int(np.argmax(power)))
+        power[max(found[-1] - 40, 0) : found[-1] + 41] = 0.0
+    return found
+
+
+def _fitted(samples: FloatArray, rate: float, frequency: float) -> tuple[Rotation, OrderLines]:
+    """How a spindle turns that turns at about this frequency, and its lines.
+
+    The path through short windows knows how it wanders; where they say too little, the speed is the one that long windows tell.
+    """
+    path = speed_path(samples, rate, (1.0 - APART) * frequency, (1.0 + APART) * frequency)
+    constant = np.array([0.5 * (samples.shape[0] - 1)]), np.array([frequency])
+    by_path, steady = [_lines(samples, rate, follow(samples, rate, *each), frequency) for each in (path, constant)]
+    told = _explained(by_path[1]) > max(_CLEARLY * _explained(steady[1]), _TELLS)
+    return by_path if told else steady
+
+
+def _explained(lines: OrderLines) -> float:
+    """Share of the variance that lines explain which keep their phase."""
+    return float(lines.power.sum()) / (lines.energy + 1e-300)
+
+
+def _shares(power: FloatArray, times: int) -> float:
+    """Share of the power of the lines 0, 1, 2, ... that stands on no multiple of a number."""
+    return float(power[np.arange(power.size) % times != 0].sum() / (power.sum() + 1e-300))
+
+
+def _largest_multiple(power: FloatArray, frequency: float, highest: float) -> int:
+    """Largest number of which all orders with a line are multiples, as far as the frequency stays below a highest one."""
+    times = 1
+    while True:
+        for more in (2, 3, 5, 7):
+            if times * more * frequency < 1.01 * highest and _shares(power, times * more) < _ELSEWHERE:
+                times *= more
+                break
+        else:
+            return times

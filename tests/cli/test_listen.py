@@ -1,0 +1,70 @@
+"""listen on the command line: one answer for people and one for machines."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scipy.io import wavfile
+from typer.testing import CliRunner
+
+from rcsa_ident.cli import app
+
+KEYS = {
+    "spindle_speed_rpm", "spindle_speed_std_rpm", "speed_wander_percent", "ramp", "teeth", "explained_share", "verdict", "reasons",
+    "chatter_frequencies_hz", "chatter_aliases_hz", "chatter_lines_hz", "suggested_speeds_rpm", "events",
+}  # fmt: skip
+
+
+@pytest.fixture
+def sound(tmp_path):
+    """Two seconds of a cut with four teeth at 6000 rev/min."""
+    time, rng = np.arange(44100) / 22050.0, np.random.default_rng(1)
+    orders = {1: 0.1, 4: 0.5, 8: 0.3, 12: 0.1}
+    signal = sum(a * np.cos(2.0 * np.pi * 100.0 * m * time) for m, a in orders.items()) + 0.05 * rng.standard_normal(time.size)
+    path = tmp_path / "sound.wav"
+    wavfile.write(path, 22050, (16000.0 * signal).astype(np.int16))
+    return path
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["listen", *map(str, arguments)])
+
+
+def test_the_answer_for_machines(sound):
+    found = run(sound, "--json")
+    assert found.exit_code == 0
+    answer = json.loads(found.stdout)
+    assert answer.keys() >= KEYS
+    assert answer["verdict"] == "stable"
+    assert answer["spindle_speed_rpm"] == pytest.approx(6000.0, abs=0.5)
+    assert answer["teeth"] == 4
+    assert answer["quantity"] == "sound"
+    both = json.loads(run(sound, sound, "--json").stdout)
+    assert [each["verdict"] for each in both["recordings"]] == ["stable", "stable"]
+
+
+def test_the_answer_for_people_and_the_figure(sound, tmp_path):
+    found = run(sound, "--plot", tmp_path / "figure.svg")
+    assert found.exit_code == 0
+    assert "stable at 6000.0 rev/min" in found.stdout
+    text = (tmp_path / "figure.svg").read_text(encoding="utf-8")
+    for words in ("time [s]", "frequency [Hz]", "order of the spindle", "tooth passing"):
+        assert words in text
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--speeds-from", 5000), "--speeds-to"),
+        (("--channel", "ch7"), "ch7"),
+        (("--quantity", "force"), "a channel that measures force"),
+        (("--plot", "nowhere/figure.png"), "no folder"),
+        (("--speeds-from", 9000, "--speeds-to", 8000), "the lower one first"),
+    ],
+)
+def test_what_is_wrong_is_said(sound, options, words):
+    found = run(sound, *options)
+    assert found.exit_code == 2
+    assert words in found.stderr
