@@ -42,6 +42,9 @@ _OPTIONS = {
     "radial_edge": ("kre_n_per_mm", ""),
     "runout": ("runout_um", "in um"),
     "feed_per_tooth": ("feed_per_tooth_mm", ""),
+    "quantity": ("quantity", ""),
+    "channel": ("channel", ""),
+    "sampling_rate_hz": ("rate_hz", ""),
 }
 
 Command = TypeVar("Command", bound=Callable[..., Any])

@@ -86,7 +86,7 @@ class OpenRecording:
             order = (Quantity.ACCELERATION, Quantity.SOUND, Quantity.FORCE, Quantity.DISPLACEMENT)
             quantity = next((each for each in order if any(channel.quantity is each for channel in chosen)), None)
         if quantity is None:
-            allowed = "--quantity acceleration, sound, displacement or force: no unit in the file says what is measured"
+            allowed = "acceleration, sound, displacement or force, told: no unit in the file says what is measured"
             raise InputError("quantity", listed([each.name for each in chosen]), allowed)
         # a unit that says something else is another channel, one that says nothing is taken at the user's word
         kept = tuple(each for each in chosen if each.quantity in (quantity, None))
@@ -121,7 +121,7 @@ def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: fl
     if suffix in _SOUND:
         return _sound(path, names)
     if not names:
-        raise InputError("--channel", "none", f"names of channels: a file '{suffix}' is not listed without settings", str(path))
+        raise InputError("channel", "none", f"names of channels: those of a file '{suffix}' are not listed here", str(path))
     rate, signals = read_signals(path, names, default_rate)
     return OpenRecording(rate, tuple(OpenChannel(name, "", None, signal[:]) for name, signal in zip(names, signals, strict=True)))
 
@@ -166,7 +166,7 @@ def _text(path: Path, default_rate: float | None) -> OpenRecording:
     elif default_rate is not None or rate is not None:
         rate = default_rate or rate
     else:
-        raise InputError("sampling_rate_hz", "nothing", "a column 'time' with its unit, or --rate-hz", where)
+        raise InputError("sampling_rate_hz", "nothing", "a column 'time' with its unit, or the rate [Hz], told", where)
     assert rate is not None
     channels = []
     for i, (name, unit) in enumerate(zip(names, units, strict=True)):

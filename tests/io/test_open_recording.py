@@ -70,7 +70,7 @@ def test_a_table_without_names_has_its_time_in_front(tmp_path):
     opened = open_recording(written(tmp_path, table([TIME, X, Y], " "), "record.txt"))
     assert opened.rate == pytest.approx(2000.0)
     assert any("column 1" in remark for remark in opened.remarks)
-    with pytest.raises(InputError, match="--quantity"):
+    with pytest.raises(InputError, match="told: no unit"):
         opened.of()
     quantity, channels = opened.of(Quantity.FORCE, ["column 2"])
     assert quantity is Quantity.FORCE
