@@ -30,6 +30,7 @@ STUDIES = (
     "reading",
     "hostile",
     "dependencies",
+    "recordings",
 )
 
 

@@ -37,8 +37,8 @@ _MOST_TEETH, _TOOTH_SHARE, _SIDEBAND_SHARE = 12, 0.8, 0.6
 _STAND_OUT = 10.0
 #: Rate above which a recorder has a filter against folding [Hz]; highest frequency that a line may have been folded from [Hz].
 _FILTERED, _HIGHEST_ALIAS = 10e3, 5e3
-#: Highest order that is looked for folded back; share of the lines' power and number of orders from which on it is no chance.
-_FOLDED_ORDERS, _FOLDED_SHARE, _FOLDED_LINES = 30, 5e-4, 3
+#: Highest order that is looked for folded back, and the explained share from which on such orders are no chance.
+_FOLDED_ORDERS, _FOLDED_GAIN = 30, 2e-3
 #: Suggested speeds: most tooth passages in a period of the chatter, and how far from the present speed where no range is told.
 _MOST_WAVES, _SLOWEST, _FASTEST = 8, 0.5, 3.0
 
@@ -221,12 +221,13 @@ def _lines(part: FloatArray, rate: float, band: float, rotation: Rotation, fold:
     frequency = to_hz(rotation.spindle_speed)
     length = window_length(rate, frequency, part.shape[0])
     below = max(int(min(0.49 * rate, band) / frequency), 1)
+    plain = order_lines(part, rotation.angle, length, below)
     if fold and below < _FOLDED_ORDERS:
         both = order_lines(part, rotation.angle, length, _FOLDED_ORDERS)
-        above = both.power[int(0.5 * rate / frequency) + 1 :]
-        if above.sum() > _FOLDED_SHARE * both.power.sum() and np.count_nonzero(above) >= _FOLDED_LINES:
+        # both per degree of freedom: more orders explain no more of noise
+        if both.explained > plain.explained + _FOLDED_GAIN:
             return both, True
-    return order_lines(part, rotation.angle, length, below), False
+    return plain, False
 
 
 def _judged(

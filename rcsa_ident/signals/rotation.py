@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.linalg import cho_solve_banded, cholesky_banded
-from scipy.ndimage import gaussian_filter1d
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.signals._kernels import angle_sums, best_path, comb_scores
@@ -16,8 +15,6 @@ from rcsa_ident.signals.steady_part import hann
 
 #: Orders that are looked at.
 ORDERS = 40
-#: Trial speeds stand this far apart, as a share.
-_STEP = 2e-4
 #: Largest change of speed from one window to the next, as so many standard deviations.
 _LARGEST_CHANGE = 7.5
 #: Revolutions of the blocks in which the angle is followed, and their least length [s].
@@ -79,10 +76,13 @@ class Pace:
         Length of the windows, which hold a few revolutions at least.
     change : float [-]
         Standard deviation of the change of speed from one to the next, as a share.
+    step : float [-]
+        Between trial speeds, as a share.
     """
 
     window: float = WINDOW
     change: float = 2e-3
+    step: float = 2e-4
 
     @property
     def slowest(self) -> float:
@@ -95,7 +95,7 @@ class Pace:
 
 
 #: Of a speed that wanders, and of one that changes on purpose.
-WANDER, RAMP = Pace(), Pace(0.25, 8e-3)
+WANDER, RAMP = Pace(), Pace(0.25, 8e-3, 1e-3)
 
 
 def speed_path(samples: FloatArray, rate: float, lowest: float, highest: float, pace: Pace = WANDER) -> tuple[FloatArray, FloatArray]:
@@ -119,9 +119,9 @@ def speed_path(samples: FloatArray, rate: float, lowest: float, highest: float, 
     """
     length = pace.length(rate, lowest, samples.shape[0])
     gain, middles = line_gain(samples, rate, length)
-    trial = np.exp(np.arange(np.log(lowest), np.log(highest) + _STEP, _STEP))
+    trial = np.exp(np.arange(np.log(lowest), np.log(highest) + pace.step, pace.step))
     scores = comb_scores(gain, trial * 4.0 * length / rate, ORDERS, False)
-    path, _ = best_path(scores, max(round(_LARGEST_CHANGE * pace.change / _STEP), 1), 0.5 * (_STEP / pace.change) ** 2)
+    path, _ = best_path(scores, max(round(_LARGEST_CHANGE * pace.change / pace.step), 1), 0.5 * (pace.step / pace.change) ** 2)
     return middles, trial[path]
 
 
@@ -189,10 +189,14 @@ def _told(lines: ComplexArray, order: np.ndarray, reach: float) -> tuple[Complex
 
 
 def _local_mean(lines: ComplexArray, reach: float) -> ComplexArray:
-    """Mean of the blocks around each, shape (b, m, c); of all of them where the reach is longer than the record."""
-    if reach > 0.5 * lines.shape[0]:
+    """Mean of the blocks to both sides of each, shape (b, m, c); of all of them where the reach is longer than the record."""
+    blocks = lines.shape[0]
+    if reach > 0.5 * blocks:
         return np.broadcast_to(lines.mean(axis=0), lines.shape)
-    return gaussian_filter1d(lines.real, reach, axis=0) + 1j * gaussian_filter1d(lines.imag, reach, axis=0)
+    running = np.concatenate([np.zeros((1, *lines.shape[1:]), dtype=complex), np.cumsum(lines, axis=0)])
+    first = np.maximum(np.arange(blocks) - max(round(reach), 1), 0)
+    last = np.minimum(np.arange(blocks) + max(round(reach), 1) + 1, blocks)
+    return (running[last] - running[first]) / (last - first)[:, None, None]
 
 
 def _smoothed(phase: FloatArray, information: FloatArray, step: float, density: float | None) -> tuple[FloatArray, float]:

@@ -81,10 +81,11 @@ def find_rotation(samples: FloatArray, rate: float, lowest: float, highest: floa
     spare = max(samples.shape[0] - _COMPARED, 0) // 2
     middle = samples[spare : samples.shape[0] - spare]
     fits = [(each, *_fitted(middle, rate, each)) for each in _candidates(middle, rate, lowest, highest)]
-    ramp = _ramp(samples, rate, lowest, highest)
+    ramp = _ramp(middle, rate, lowest, highest)
     most = max((_explained(lines) for _, _, lines in fits), default=0.0)
     if ramp is not None and _explained(ramp[1]) > max(_RAMP_EXPLAINS, _RAMP_CLEARLY * most):
-        return FoundSpeed(ramp[0])
+        whole = ramp if spare == 0 else _ramp(samples, rate, lowest, highest)
+        return FoundSpeed((whole or ramp)[0])
     if not fits:
         return None
     members = [fit for fit in fits if _explained(fit[2]) >= _EXPLAINS * most] if most > _TELLS else fits[:1]
