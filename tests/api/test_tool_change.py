@@ -310,7 +310,7 @@ def test_a_posterior_that_is_too_large_to_keep_is_weighed(shop, monkeypatch):
 @pytest.mark.parametrize(
     ("part", "value", "field", "words"),
     [
-        ("contact", {"translational_stiffness": 2e4}, "contact.translational_stiffness", "N/um per m (2e+10"),
+        ("contact", {"translational_stiffness": 2e4}, "contact.translational_stiffness", "N/µm per m (2e+10"),
         ("tool", {"stickout_mm": 0.06}, "tool.stickout_mm", "metres (60 mm)"),
         ("cutter", {"diameter_mm": 0.012}, "cutter.diameter_mm", "metres (12 mm)"),
         ("cutter", {"diameter_mm": 200.0}, "cutter.diameter_mm", "times that diameter"),
