@@ -44,6 +44,7 @@ _WHY = {
     416: "The file ends before the part that Range asks for.",
     422: "The input is not usable; the fields at fault are named.",
     429: "There are too many requests with this API key.",
+    460: "The bytes of the part do not have the announced checksum; none of them is kept.",
     500: "What is stored is damaged; the sentence says how it becomes whole again.",
     503: "Too many queries are waiting for an answer, or the database does not answer.",
 }

@@ -42,6 +42,7 @@ from api.routes import (
     streams,
     tool_change,
     toolings,
+    tus,
     usage,
     versions,
 )
@@ -132,7 +133,7 @@ def create_app(
     app.include_router(health.router)
     app.include_router(static_files.router)
     about = (keys, usage, machines, toolings, versions, libraries, holders, materials, examples, example_campaign)
-    for each in (*about, campaigns, recordings, resumable_upload, multi_upload, tool_change, identifications, forces, streams):
+    for each in (*about, campaigns, recordings, resumable_upload, tus, multi_upload, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(HeadRequests, router=app.router)
     app.add_middleware(AccessMonitor, components=components)

@@ -34,7 +34,7 @@ _FIELDS = {
     "bore": "bore_mm",
     "holder length": "length_mm",
 }
-_TITLES = {413: "Content too large", 422: "Input not usable"}
+_TITLES = {413: "Content too large", 422: "Input not usable", 460: "Checksum mismatch"}
 
 
 class Problem(Exception):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace as replaced
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from fastapi import APIRouter, Header, Request, Response
 from fastapi.concurrency import run_in_threadpool
@@ -21,7 +23,7 @@ from api.reading.uploads import partial_name
 from api.routes.recordings import BINARY, RecordingName, Replace, answer, named, take
 from api.schemas.campaigns import RecordingAnswer
 from api.security import Guarded, WhoAsks
-from api.stores.campaigns import Campaign
+from api.stores.campaigns import Campaign, Recording
 from api.stores.entities import Taken
 from api.transfer.body_stream import (
     LOOK,
@@ -60,12 +62,7 @@ Length = Annotated[
 )
 async def head(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks) -> Response:
     campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
-    path, state = await run_in_threadpool(components.files.partial, caller.group, partial_name(campaign.id, name))
-    if state is not None and state.complete:
-        # to a client, an upload without a missing byte is one that is kept
-        with storage_problems(), suppress(Taken):
-            await components.uploads.finish(path, replaced(state, group=caller.group, campaign=campaign.id, name=name))
-    state = await run_in_threadpool(_state, components, campaign, name)
+    state = await state_of(components, campaign, name)
     if state is None:
         raise Problem(404, "no part of this recording has been uploaded")
     return Response(
@@ -99,6 +96,57 @@ async def patch(
 ) -> Any:
     campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
     whole, content = announced_digest(request, "Repr-Digest"), announced_digest(request, "Content-Digest")
+    checksum = None if content is None else Checksum("sha256", content, partial(check_digest, header="Content-Digest"))
+    done = await receive(request, components, campaign, name, Upload(offset, length, replace, whole), checksum)
+    if isinstance(done, int):
+        return Response(status_code=204, headers={"Upload-Offset": str(done)})
+    response.status_code, kept = done
+    response.headers.update(tagged(kept.sha256))
+    return answer(campaign, kept)
+
+
+class Checksum(NamedTuple):
+    """What a part is to hash to.
+
+    Parameters
+    ----------
+    algorithm : str
+        As `hashlib` calls it.
+    digest : str
+        In hexadecimal digits.
+    check : callable of (announced, found)
+        Raises where they differ.
+    """
+
+    algorithm: str
+    digest: str
+    check: Callable[[str, str], None]
+
+
+class Upload(NamedTuple):
+    """What a part says of its upload.
+
+    Parameters
+    ----------
+    offset : int [bytes]
+    length : int or None [bytes]
+        Of the whole; None where it is known.
+    replace : bool
+        Whether the whole takes the place of other content.
+    whole : str or None
+        SHA-256 of the whole.
+    """
+
+    offset: int
+    length: int | None = None
+    replace: bool = False
+    whole: str | None = None
+
+
+async def receive(
+    request: Request, components: Components, campaign: Campaign, name: str, upload: Upload, checksum: Checksum | None = None
+) -> int | tuple[int, Recording]:
+    """Append the body of a request to an upload; return the offset behind it, or status and recording where nothing is missing."""
     refuse_encoded(request)
     key = (campaign.id, name)
     if key in components.uploads.writing:
@@ -106,17 +154,18 @@ async def patch(
         raise Problem(503, "another request is writing this recording", headers={"Retry-After": "2"})
     components.uploads.writing.add(key)
     try:
-        with components.uploads.admitted(caller.group):
-            state = await _go_on(components, campaign, name, offset, length)
-            state = replaced(state, group=caller.group, campaign=campaign.id, name=name, replacing=replace)
-            path = components.files.partial(caller.group, partial_name(campaign.id, name))[0]
-            part = await _append(request, components, caller.group, path, state, content)
+        with components.uploads.admitted(campaign.group):
+            state = await _go_on(components, campaign, name, upload.offset, upload.length)
+            replacing = upload.replace or state.replacing
+            state = replaced(state, group=campaign.group, campaign=campaign.id, name=name, replacing=replacing)
+            path = components.files.partial(campaign.group, partial_name(campaign.id, name))[0]
+            part = await _append(request, components, campaign.group, path, state, checksum)
             try:
                 if part.size < state.length:
-                    return Response(status_code=204, headers={"Upload-Offset": str(part.size)})
+                    return part.size
                 received = await complete(part)
-                check_digest(whole, received.sha256)
-                response.status_code, kept = await take(components, campaign, name, received, replace)
+                check_digest(upload.whole, received.sha256)
+                stored = await take(components, campaign, name, received, replacing)
             except (InputError, Problem) as error:
                 # kept unless they are at fault: the disk may have room again, or the client may replace the other content
                 if isinstance(error, InputError) or error.status in (404, 422):
@@ -125,10 +174,18 @@ async def patch(
             finally:
                 part.close()
             await run_in_threadpool(components.files.forget, path)
+            return stored
     finally:
         components.uploads.writing.discard(key)
-    response.headers.update(tagged(kept.sha256))
-    return answer(campaign, kept)
+
+
+async def state_of(components: Components, campaign: Campaign, name: str) -> Partial | None:
+    """State of an upload; one that lacks no byte is stored first: to a client such an upload is one that is kept."""
+    path, state = await run_in_threadpool(components.files.partial, campaign.group, partial_name(campaign.id, name))
+    if state is not None and state.complete:
+        with storage_problems(), suppress(Taken):
+            await components.uploads.finish(path, replaced(state, group=campaign.group, campaign=campaign.id, name=name))
+    return await run_in_threadpool(_state, components, campaign, name)
 
 
 def _state(components: Components, campaign: Campaign, name: str) -> Partial | None:
@@ -157,9 +214,9 @@ async def _go_on(components: Components, campaign: Campaign, name: str, offset: 
     return state
 
 
-async def _append(request: Request, components: Components, group: str, path: Path, state: Partial, content: str | None) -> Part:
+async def _append(request: Request, components: Components, group: str, path: Path, state: Partial, checksum: Checksum | None) -> Part:
     """Append a part and record the state, also where the part breaks off."""
-    part, digest = await run_in_threadpool(Part, path, state.offset), hashlib.sha256()
+    part, digest = await run_in_threadpool(Part, path, state.offset), hashlib.new(checksum.algorithm if checksum else "sha256")
     noted = 0
     try:
         async for block in blocks(request, components):
@@ -170,13 +227,14 @@ async def _append(request: Request, components: Components, group: str, path: Pa
             with storage_problems():
                 await write(components, group, part, block, part.size - state.offset + len(block))
             digest.update(block)
-            if content is None and (part.size - state.offset) // LOOK > noted:
+            if checksum is None and (part.size - state.offset) // LOOK > noted:
                 noted += 1
                 await run_in_threadpool(_note, components, part, part.size, state)
-        check_digest(content, digest.hexdigest(), "Content-Digest")
+        if checksum is not None:
+            checksum.check(checksum.digest, digest.hexdigest())
     except (Problem, InputError, HTTPException) as error:
         # a part with a digest counts only when it is complete
-        kept = state.offset if content is not None or isinstance(error, InputError) else part.size
+        kept = state.offset if checksum is not None or isinstance(error, InputError) else part.size
         await run_in_threadpool(_note, components, part, kept, state)
         part.close()
         raise

@@ -96,6 +96,8 @@ def fuzzing() -> tuple[ModuleType, list[Callable[..., Any]]]:
         import schemathesis
         from schemathesis.checks import not_a_server_error
         from schemathesis.specs.openapi import checks
+    # bytes like any others
+    schemathesis.serializer.alias("application/offset+octet-stream", "application/octet-stream")
     return schemathesis, [
         not_a_server_error,
         checks.status_code_conformance,

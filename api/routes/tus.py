@@ -1,0 +1,235 @@
+"""Resumable uploads as tus 1.0 speaks of them: another face of `resumable_upload`, for clients that are there already."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+from collections.abc import Callable, Coroutine
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Header, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import PlainTextResponse
+from starlette.responses import Response as Answer
+
+from api.components import Components, ThisService
+from api.conventions import CampaignId, guard, problems
+from api.files import Partial
+from api.problems import Problem, of_input, of_validation
+from api.reading.uploads import partial_name
+from api.routes.recordings import RecordingName, named
+from api.routes.resumable_upload import Checksum, Upload, receive, state_of
+from api.security import Guarded, WhoAsks
+from api.stores.campaigns import Campaign
+from api.transfer.body_stream import check_room, storage_problems
+from rcsa_ident.errors import InputError
+
+VERSION = "1.0.0"
+EXTENSIONS = "creation,termination,checksum"
+ALGORITHMS = ("sha1", "sha256", "md5")
+PART = "application/offset+octet-stream"
+_SAID = {"Tus-Resumable": VERSION}
+_BODY = {"required": True, "content": {PART: {"schema": {"type": "string", "format": "binary"}}}}
+_TUS: dict[str, Any] = {"Tus-Resumable": {"description": "Version of the protocol.", "schema": {"type": "string"}}}
+_OFFSET: dict[str, Any] = {"Upload-Offset": {"description": "Number of bytes received.", "schema": {"type": "string"}}}
+_PARAMETERS = [
+    {"name": "Tus-Resumable", "in": "header", "required": True, "schema": {"const": VERSION}, "description": "Version of the protocol."}
+]
+Length = Annotated[int, Header(alias="Upload-Length", ge=0, lt=10**15, description="Length of the whole file.")]
+Offset = Annotated[int, Header(alias="Upload-Offset", ge=0, lt=10**15, description="Offset of this part.")]
+Metadata = Annotated[
+    str,
+    Header(
+        alias="Upload-Metadata",
+        max_length=4000,
+        description="`filename` and its name in the campaign in Base64; `replace` takes the place of a recording with other content.",
+    ),
+]
+Announced = Annotated[
+    str | None,
+    Header(alias="Upload-Checksum", max_length=200, description="Algorithm (sha1, sha256 or md5) and hash of this part in Base64."),
+]
+
+
+class SpeaksTus(Guarded):
+    """Routes that answer only to the version of the protocol that they speak, and name it in every answer."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Answer]]:
+        """Return the handler of a request."""
+        inner = super().get_route_handler()
+
+        async def handler(request: Request) -> Answer:
+            try:
+                if request.method != "OPTIONS" and request.headers.get("tus-resumable") != VERSION:
+                    raise Problem(412, f"Tus-Resumable: found another version, allowed is {VERSION}", headers={"Tus-Version": VERSION})
+                answer = await inner(request)
+            except (InputError, RequestValidationError, Problem) as error:
+                problem = _problem(error)
+                problem.headers.update(_SAID)
+                raise problem from None
+            answer.headers.update(_SAID)
+            return answer
+
+        return handler
+
+
+def _problem(error: InputError | RequestValidationError | Problem) -> Problem:
+    if isinstance(error, Problem):
+        return error
+    return of_input(error) if isinstance(error, InputError) else of_validation(error.errors())
+
+
+router = APIRouter(prefix="/campaigns/{id}/uploads", tags=["recordings"], route_class=SpeaksTus)
+
+
+@router.options(
+    "",
+    status_code=204,
+    summary="What uploads by tus may do",
+    openapi_extra=guard("upload"),
+    responses={204: {"description": "Version, extensions and largest size, in headers.", "headers": _TUS}, **problems(404, 422)},
+)
+async def options(id: CampaignId, components: ThisService) -> Response:
+    told = {
+        "Tus-Version": VERSION,
+        "Tus-Extension": EXTENSIONS,
+        "Tus-Max-Size": str(components.settings.max_upload_bytes),
+        "Tus-Checksum-Algorithm": ",".join(ALGORITHMS),
+    }
+    return Response(status_code=204, headers=told)
+
+
+@router.post(
+    "",
+    status_code=201,
+    response_class=PlainTextResponse,
+    summary="Begin an upload by tus",
+    description="The file name of the metadata is one that the campaign names. The upload lives for a day without a new byte.",
+    openapi_extra=guard("upload", parameters=_PARAMETERS),
+    responses={
+        201: {
+            "description": "Location is where the parts go; the body is empty.",
+            "headers": _TUS | _OFFSET,
+            "content": {"text/plain": {"schema": {"type": "string"}}},
+        },
+        **problems(404, 412, 413, 422),
+    },
+)
+async def create(
+    id: CampaignId, request: Request, components: ThisService, caller: WhoAsks, length: Length, metadata: Metadata
+) -> Response:
+    told = _metadata(metadata)
+    if "filename" not in told:
+        raise InputError("Upload-Metadata", metadata[:80], "a filename: its name in the campaign, in Base64")
+    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, told["filename"])
+    await check_room(components, caller.group, length)
+    if (campaign.id, name) in components.uploads.writing:
+        raise Problem(503, "another request is writing this recording", headers={"Retry-After": "2"})
+    state = Partial(0, length, caller.group, campaign.id, name, told.get("replace", "") not in ("", "false", "0"))
+    await run_in_threadpool(_begin, components, campaign, state)
+    path = request.url_for("send_part", id=id, name=name).path
+    return PlainTextResponse("", 201, {"Location": path, "Upload-Offset": "0"})
+
+
+@router.head(
+    "/{name}",
+    status_code=204,
+    summary="State of an upload by tus",
+    description="An offset as large as the length says that the recording is stored.",
+    openapi_extra=guard("upload", parameters=_PARAMETERS),
+    responses={204: {"description": "The state of the upload.", "headers": _TUS | _OFFSET}, **problems(404, 412, 422)},
+)
+async def state(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks) -> Response:
+    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
+    found = await state_of(components, campaign, name)
+    if found is None:
+        raise Problem(404, "no such upload has begun")
+    told = {"Upload-Offset": str(found.offset), "Upload-Length": str(found.length), "Cache-Control": "no-store"}
+    return Response(status_code=204, headers=told)
+
+
+@router.patch(
+    "/{name}",
+    status_code=204,
+    summary="Upload a part by tus",
+    description="The last part is acknowledged when the recording is read, judged and stored.",
+    openapi_extra=guard("upload", requestBody=_BODY, parameters=_PARAMETERS, **{"x-content-types": (PART,)}),
+    responses={
+        204: {"description": "The part is stored.", "headers": _TUS | _OFFSET},
+        **problems(400, 404, 408, 409, 412, 413, 415, 422, 460),
+    },
+)
+async def send_part(
+    id: CampaignId,
+    name: RecordingName,
+    request: Request,
+    components: ThisService,
+    caller: WhoAsks,
+    offset: Offset,
+    announced: Announced = None,
+) -> Response:
+    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
+    checksum = None if announced is None else _checksum(announced)
+    length = await run_in_threadpool(_length, components, campaign, name)
+    done = await receive(request, components, campaign, name, Upload(offset), checksum)
+    return Response(status_code=204, headers={"Upload-Offset": str(done if isinstance(done, int) else length)})
+
+
+@router.delete(
+    "/{name}",
+    status_code=204,
+    summary="Give up an upload by tus",
+    description="A recording that is stored already stays: it is deleted as a recording.",
+    openapi_extra=guard("upload", parameters=_PARAMETERS),
+    responses={204: {"description": "Its bytes are gone.", "headers": _TUS}, **problems(404, 412, 422)},
+)
+async def give_up(id: CampaignId, name: RecordingName, components: ThisService, caller: WhoAsks) -> Response:
+    campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, name)
+    path, found = await run_in_threadpool(components.files.partial, campaign.group, partial_name(campaign.id, name))
+    if found is None:
+        raise Problem(404, "no such upload has begun")
+    await run_in_threadpool(components.files.forget, path)
+    return Response(status_code=204)
+
+
+def _begin(components: Components, campaign: Campaign, state: Partial) -> None:
+    path, _ = components.files.partial(campaign.group, partial_name(campaign.id, state.name))
+    with storage_problems():
+        components.files.forget(path)
+        path.touch()
+        components.files.note(path, state)
+
+
+def _length(components: Components, campaign: Campaign, name: str) -> int:
+    _, found = components.files.partial(campaign.group, partial_name(campaign.id, name))
+    if found is None:
+        raise Problem(404, "no such upload has begun")
+    return found.length
+
+
+def _metadata(text: str) -> dict[str, str]:
+    """Pairs of a key and a value in Base64, divided by commas; a key may stand without a value."""
+    found = {}
+    for pair in text.split(","):
+        key, _, value = pair.strip().partition(" ")
+        try:
+            found[key] = base64.b64decode(value, validate=True).decode("utf-8")
+        except (binascii.Error, UnicodeDecodeError):
+            raise InputError("Upload-Metadata", pair[:80], "pairs of a key and UTF-8 text in Base64, divided by commas") from None
+    return found
+
+
+def _checksum(text: str) -> Checksum:
+    algorithm, _, value = text.partition(" ")
+    if algorithm not in ALGORITHMS:
+        raise Problem(400, f"Upload-Checksum: found {algorithm[:40]}, allowed are {', '.join(ALGORITHMS)}")
+    try:
+        return Checksum(algorithm, base64.b64decode(value, validate=True).hex(), _same)
+    except binascii.Error:
+        raise Problem(400, f"Upload-Checksum: found {value[:80]}, allowed is a hash in Base64") from None
+
+
+def _same(announced: str, found: str) -> None:
+    if announced != found:
+        raise Problem(460, f"the part has the checksum {found}, announced was {announced}: none of its bytes is kept")
