@@ -38,6 +38,7 @@ from api.routes import (
     multi_upload,
     recordings,
     resumable_upload,
+    schemas,
     static_files,
     streams,
     tool_change,
@@ -132,7 +133,7 @@ def create_app(
     problems.install(app)
     app.include_router(health.router)
     app.include_router(static_files.router)
-    about = (keys, usage, machines, toolings, versions, libraries, holders, materials, examples, example_campaign)
+    about = (keys, usage, machines, toolings, versions, libraries, holders, materials, schemas, examples, example_campaign)
     for each in (*about, campaigns, recordings, resumable_upload, tus, multi_upload, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(HeadRequests, router=app.router)

@@ -140,6 +140,11 @@ class Client(Uploads, Jobs):
         query = {"bore_mm": bore_mm} if length_mm is None else {"bore_mm": bore_mm, "length_mm": length_mm}
         return read(CatalogueAnswer, self.send("GET", f"/holders/{taper}/{chuck}", params=query))
 
+    def schema(self, name: str) -> Json:
+        """Return the JSON Schema of a TOML file: tooling, campaign, machine or modes."""
+        found: Json = self.send("GET", f"/schemas/{name}").json()
+        return found
+
     def materials(self) -> list[MaterialAnswer]:
         """Return the library of materials."""
         return read(Materials, self.send("GET", "/materials")).items

@@ -94,12 +94,9 @@ def _layout_to_json(layout: CoupledLayout) -> dict[str, Any]:
 
 def _unknowns(table: Table) -> CoupledUnknowns:
     own = table.table("layout")
-    softening = own.value("softening", "true or false", False)
-    if not isinstance(softening, bool):
-        own.refuse("softening", describe(softening), "true or false")
     layout = CoupledLayout(
         own.number("modes", least=1, most=_MOST_MODES, whole=True),
-        softening=softening,
+        softening=own.flag("softening", False),
         skew=own.number("discs", least=0, most=_MOST_DISCS, whole=True),
         turning=own.number("turning", least=-1, most=1, whole=True),
     )

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.io.setups import beam_segments, feed_angle_of, material_library
 from rcsa_ident.io.toml_text import read_toml
-from rcsa_ident.io.validated_table import Table, as_number, describe
+from rcsa_ident.io.validated_table import Table
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Workpiece
 from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH
@@ -68,7 +70,24 @@ def read_machine(path: str | Path) -> MachineFile:
         Names the file, the key, what was found and what is allowed.
     """
     path = Path(path)
-    top = Table(read_toml(path, "machine"), str(path), known=_TOP)
+    return machine_of(read_toml(path, "machine"), str(path), path.stem, path.parent)
+
+
+def machine_of(data: Mapping[str, Any], where: str, name: str, folder: Path) -> MachineFile:
+    """Return what a machine's table of keys says, as `read_machine` finds it in a file.
+
+    Parameters
+    ----------
+    data : mapping
+        The table's keys.
+    where : str
+        The file, for the messages.
+    name : str
+        Counts where the table has none.
+    folder : Path
+        That paths of toolings are relative to.
+    """
+    top = Table(data, where, known=_TOP)
     head = top.table("machine", ("name", "gyroscopic"), {})
     sensors = top.table("sensors", _SENSORS, {})
     cuts = top.table("cuts", _CUTS)
@@ -79,7 +98,7 @@ def read_machine(path: str | Path) -> MachineFile:
             bearings=tuple(_bearing(table) for table in top.tables("bearings", _BEARING)),
             housing=_housing(top.table("housing", _HOUSING)),
             joint=_joint(top.table("joint", _JOINT)),
-            gyroscopic=_flag(head, "gyroscopic", True),
+            gyroscopic=head.flag("gyroscopic", True),
             fixture_position=sensors.number("fixture_position_mm", "mm", 0.0, least=-1000.0, most=5000.0) * 1e-3,
         )
         fastest = max(plan.spindle_speeds)
@@ -88,21 +107,21 @@ def read_machine(path: str | Path) -> MachineFile:
                 allowed = f"below {1.0 / to_rpm(fastest):.3g} at {to_rpm(fastest):g} rev/min, so that some stiffness is left"
                 top.refuse(f"bearings[{i}].softening_per_rpm", f"{bearing.softening * from_rpm(1.0):g}", allowed)
         return MachineFile(
-            name=head.text("name", path.stem),
+            name=head.text("name", name),
             spindle=spindle,
             sensors=_sensors(sensors),
             workpiece=workpiece_of(top.table("workpiece", WORKPIECE_KEYS)),
             plan=plan,
-            toolings=_paths(cuts, "toolings", path.parent, required=True),
-            truth_toolings=_paths(cuts, "truth_toolings", path.parent, required=False),
+            toolings=_paths(cuts, "toolings", folder, required=True),
+            truth_toolings=_paths(cuts, "truth_toolings", folder, required=False),
         )
 
 
 def _bearing(table: Table) -> Bearing:
     return Bearing(
         table.number("position_mm", "mm", least=0.0, most=5000.0) * 1e-3,
-        _pair(table, "stiffness", "N/m"),
-        _pair(table, "damping", "N s/m"),
+        _pair(table, "stiffness", "N/m", above=0.0),
+        _pair(table, "damping", "N s/m", least=0.0),
         table.number("softening_per_rpm", "1/(rev/min)", 0.0, least=-1e-3, most=1e-3) / from_rpm(1.0),
         _angle(table),
     )
@@ -113,17 +132,22 @@ def _housing(table: Table) -> Housing:
         position=table.number("position_mm", "mm", least=-5000.0, most=5000.0) * 1e-3,
         mass=table.number("mass", "kg", above=0.0),
         inertia=table.number("inertia", "kg m^2", above=0.0),
-        stiffness=_pair(table, "stiffness", "N/m"),
-        damping=_pair(table, "damping", "N s/m"),
-        tilting_stiffness=_pair(table, "tilting_stiffness", "N m/rad"),
-        tilting_damping=_pair(table, "tilting_damping", "N m s/rad"),
+        stiffness=_pair(table, "stiffness", "N/m", above=0.0),
+        damping=_pair(table, "damping", "N s/m", least=0.0),
+        tilting_stiffness=_pair(table, "tilting_stiffness", "N m/rad", above=0.0),
+        tilting_damping=_pair(table, "tilting_damping", "N m s/rad", least=0.0),
         angle=_angle(table),
     )
 
 
 def _joint(table: Table) -> FlangeJoint:
-    units = ("N/m", "N s/m", "N m/rad", "N m s/rad")
-    return FlangeJoint(*(table.number(key, unit, least=0.0) for key, unit in zip(_JOINT, units, strict=True)))
+    stiff, damped, stiff_turning, damped_turning = _JOINT
+    return FlangeJoint(
+        table.number(stiff, "N/m", above=0.0),
+        table.number(damped, "N s/m", least=0.0),
+        table.number(stiff_turning, "N m/rad", above=0.0),
+        table.number(damped_turning, "N m s/rad", least=0.0),
+    )
 
 
 def _sensors(table: Table) -> SensorSuite:
@@ -137,7 +161,7 @@ def _sensors(table: Table) -> SensorSuite:
         roundness_orders=table.number("roundness_orders", "", usual.roundness_orders, least=0, most=64, whole=True),
         cutter_runout=table.number("cutter_runout_um", "um", usual.cutter_runout * 1e6, least=0.0) * 1e-6,
         speed_error=table.number("speed_error_percent", "%", usual.speed_error * 1e2, least=0.0, most=4.0) * 1e-2,
-        trigger=_flag(table, "trigger"),
+        trigger=table.flag("trigger", False),
         tooth_angle=float(np.radians(table.number("tooth_angle_deg", "deg", 0.0, least=-360.0, most=360.0))),
         gap_sensitivity=table.number("flange_sensitivity", "V/m", 1.0),
         acceleration_sensitivity=table.number("fixture_sensitivity", "V/(m/s^2)", 1.0),
@@ -168,8 +192,8 @@ def _speeds(table: Table) -> list[float]:
     """A list of speeds, or from, to and count."""
     value = table.value("spindle_speeds_rpm", "a list of speeds, or { from, to, count } [rev/min]")
     if not isinstance(value, dict):
-        speeds = table.numbers("spindle_speeds_rpm", None, "rev/min")
-        if not speeds or min(speeds) <= 0.0 or max(speeds) > 500000.0:
+        speeds = table.numbers("spindle_speeds_rpm", None, "rev/min", above=0.0)
+        if not speeds or max(speeds) > 500000.0:
             table.refuse("spindle_speeds_rpm", f"{speeds}", "one or more speeds above 0 and at most 500000 [rev/min]")
         return speeds
     limits = table.table("spindle_speeds_rpm", ("from", "to", "count"))
@@ -177,8 +201,8 @@ def _speeds(table: Table) -> list[float]:
     return np.linspace(first, last, limits.number("count", "", least=1, most=10000, whole=True)).tolist()
 
 
-def _pair(table: Table, key: str, unit: str) -> PerAxis:
-    x, y = table.numbers(key, 2, unit)
+def _pair(table: Table, key: str, unit: str, *, above: float | None = None, least: float | None = None) -> PerAxis:
+    x, y = table.numbers(key, 2, unit, above=above, least=least)
     return x, y
 
 
@@ -187,16 +211,6 @@ def _angle(table: Table) -> float:
     return float(np.radians(table.number("angle_deg", "deg", 0.0, least=-180.0, most=180.0)))
 
 
-def _flag(table: Table, key: str, usual: bool = False) -> bool:
-    value = table.value(key, "true or false", usual)
-    if not isinstance(value, bool):
-        table.refuse(key, describe(value), "true or false")
-    return value
-
-
 def _paths(table: Table, key: str, folder: Path, required: bool) -> tuple[Path, ...]:
     allowed = "a list of paths of tooling files, relative to the machine file"
-    found = table.value(key, allowed) if required else table.value(key, allowed, [])
-    if not isinstance(found, list) or (required and not found) or not all(isinstance(p, str) and p for p in found):
-        table.refuse(key, describe(found) if as_number(found) is None else found, allowed)
-    return tuple(folder / p for p in found)
+    return tuple(folder / path for path in table.texts(key, allowed, required))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +25,12 @@ def read_modes(path: str | Path) -> dict[Dof, ModalModel]:
     InputError
         Names the file, the key, what was found and what is allowed.
     """
-    top = Table(read_toml(path, "modes"), str(path), known=("x", "y"))
+    return modes_of(read_toml(path, "modes"), str(path))
+
+
+def modes_of(data: Mapping[str, Any], where: str) -> dict[Dof, ModalModel]:
+    """Return the modes of a table of keys as `read_modes` finds them in a file; `where` is the file, for the messages."""
+    top = Table(data, where, known=("x", "y"))
     models = {axis: _model(top, axis) for axis in (Dof.X, Dof.Y) if axis in top}
     if not models:
         top.refuse("x", "nothing", "tables [[x]], [[y]] or both")
@@ -40,9 +47,7 @@ def _model(top: Table, axis: Dof) -> ModalModel:
 
 def _mass(table: Table, omega: float) -> float:
     """The modal mass as given, or k / omega_n^2."""
-    given = [key for key in _MODE[2:] if key in table]
-    if len(given) != 1:
-        table.refuse(_MODE[2], "both" if given else "nothing", "one of modal_mass_kg [kg] and stiffness_n_per_m [N/m]")
-    if given == ["modal_mass_kg"]:
+    given = table.one_of(_MODE[2:], "one of modal_mass_kg [kg] and stiffness_n_per_m [N/m]")
+    if given == "modal_mass_kg":
         return table.number("modal_mass_kg", "kg", above=0.0)
     return table.number("stiffness_n_per_m", "N/m", above=0.0) / omega**2

@@ -15,7 +15,7 @@ from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.toml_text import read_toml
-from rcsa_ident.io.validated_table import Table, as_number, describe
+from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Campaign, Cut, Tooling
 from rcsa_ident.plausibility import (
@@ -146,7 +146,7 @@ def _segment(table: Table, materials: Mapping[str, Material]) -> BeamSegment:
     outer = table.quantity("outer_diameter_mm", SEGMENT_DIAMETER)
     end = table.quantity("end_diameter_mm", SEGMENT_DIAMETER, None)
     inner = table.number("inner_diameter_mm", "mm", 0.0, least=0.0)
-    material = materials[table.text("material", choices=tuple(materials))]
+    material = materials[table.text("material", choices=tuple(materials), names_of="materials")]
     smallest, largest = min(outer, end or outer), max(outer, end or outer)
     if inner >= smallest:
         table.refuse("inner_diameter_mm", f"{inner:g}", f"below the outer diameter, {smallest:g} [mm]")
@@ -286,19 +286,13 @@ def _cut(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Table,
         feed_angle_of(table),
     )
     name = table.text("id")
-    tooling = table.text("tooling", choices=tuple(toolings))
+    tooling = table.text("tooling", choices=tuple(toolings), names_of="toolings")
     return Cut(name, tooling, conditions, locate(table, "cut"), locate(table, "air") if "air" in table else None)
 
 
 def feed_angle_of(table: Table) -> float:
-    allowed = f"one of {', '.join(FEED_DIRECTIONS)}, or an angle from +X from -360 to 360 [deg]"
-    value = table.value("feed_direction", allowed)
-    if isinstance(value, str) and value in FEED_DIRECTIONS:
-        return FEED_DIRECTIONS[value]
-    degrees = as_number(value)
-    if degrees is None or abs(degrees) > 360.0:
-        table.refuse("feed_direction", describe(value), allowed)
-    return float(np.radians(degrees))
+    value = table.number_or("feed_direction", FEED_DIRECTIONS, "an angle from +X", "deg", -360.0, 360.0)
+    return FEED_DIRECTIONS[value] if isinstance(value, str) else float(np.radians(value))
 
 
 def feed_direction_of(angle: float) -> str | float:

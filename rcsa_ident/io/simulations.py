@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -80,7 +80,9 @@ def write_simulation(
         for folder in (runs / "recordings", runs / "toolings", known / "tip", known / "cross", known / "forces"):
             folder.mkdir()
         for path, tooling in zip(setup.toolings, toolings, strict=True):
-            shutil.copyfile(path, runs / "toolings" / f"{tooling.name}.toml")
+            # where the schema for editors lies is another way from there
+            text = path.read_text("utf-8-sig")
+            write_text(runs / "toolings" / f"{tooling.name}.toml", re.sub(r"\A#:schema .*\n", "", text))
         write_text(runs / "campaign.toml", campaign_text(setup, toolings))
         rows = ["record,spindle_speed_rpm,tooth_angle_deg"]
         for done, cut in enumerate(cuts, start=1):

@@ -6,12 +6,54 @@ import difflib
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.plausibility import Range
 
 _REQUIRED: Any = object()
+
+
+@dataclass(slots=True)
+class Asked:
+    """What a reader asked of one table, for who describes the file.
+
+    Parameters
+    ----------
+    data : mapping
+        The table.
+    path : str
+        As `Table` has it.
+    known : collection of str or None
+    keys : dict
+        JSON Schema of what may stand under a key; tables by the path of theirs, under ``table``.
+    required : set of str
+    one_of : list of tuple of str
+        Keys of which exactly one is there.
+    """
+
+    data: Mapping[str, Any]
+    path: str
+    known: Collection[str] | None
+    keys: dict[str, dict[str, Any]] = field(default_factory=dict)
+    required: set[str] = field(default_factory=set)
+    one_of: list[tuple[str, ...]] = field(default_factory=list)
+
+
+_listening: ContextVar[dict[int, Asked] | None] = ContextVar("listening", default=None)
+
+
+@contextmanager
+def listening() -> Iterator[dict[int, Asked]]:
+    """Gather what readers ask of tables meanwhile, by the identity of each table's data; what is asked last counts."""
+    gathered: dict[int, Asked] = {}
+    token = _listening.set(gathered)
+    try:
+        yield gathered
+    finally:
+        _listening.reset(token)
 
 
 class Table:
@@ -33,6 +75,10 @@ class Table:
         if not isinstance(data, Mapping):
             raise InputError(path or "content", describe(data), "a table of keys", where)
         self.data: Mapping[str, Any] = data
+        self._asked: Asked | None = None
+        if (gathered := _listening.get()) is not None:
+            self._asked = gathered.setdefault(id(data), Asked(data, path, known))
+            self._asked.known = known
         if known is not None:
             for key in data:
                 if key not in known:
@@ -64,7 +110,7 @@ class Table:
         """
         raise InputError(self.name(key), found, allowed, self.where)
 
-    def value(self, key: str, allowed: str, default: Any = _REQUIRED) -> Any:
+    def value(self, key: str, allowed: str, default: Any = _REQUIRED, schema: Mapping[str, Any] | None = None) -> Any:
         """Return what stands under `key`; without a default the key must be there.
 
         Parameters
@@ -73,7 +119,13 @@ class Table:
         allowed : str
             What could stand there, in words.
         default : object, optional
+        schema : mapping, optional
+            The same in JSON Schema.
         """
+        if self._asked is not None:
+            usual = {"default": default} if isinstance(default, str | int | float) else {}
+            self._asked.keys[key] = {**(schema or {"description": allowed}), **usual}
+            (self._asked.required.add if default is _REQUIRED else self._asked.required.discard)(key)
         if key in self.data:
             return self.data[key]
         if default is _REQUIRED:
@@ -107,7 +159,8 @@ class Table:
         limits = [*(text for text in limits if text), *([f"at most {most:g}"] if most is not None else [])]
         allowed = "a whole number" if whole else "a finite number"
         allowed = " ".join([allowed, " and ".join(limits), f"[{unit}]" if unit else ""]).replace("  ", " ").strip()
-        value = self.value(key, allowed, default)
+        edges = {"exclusiveMinimum": above, "minimum": least, "maximum": most}
+        value = self.value(key, allowed, default, _number_schema(unit, edges, whole))
         if key not in self.data:
             return value
         number = as_number(value)
@@ -131,12 +184,59 @@ class Table:
         default : object, optional
         """
         value = self.number(key, kind.unit, default)
+        if self._asked is not None:
+            words = f"Usual are {kind.usual[0]:g} to {kind.usual[1]:g}"
+            self._asked.keys[key] |= {
+                "minimum": kind.possible[0],
+                "maximum": kind.possible[1],
+                "description": f"{words} {kind.unit}".rstrip(),
+            }
         if key in self.data:
             with self.naming({}):
                 kind.checked(key, value * kind.size)
         return value
 
-    def numbers(self, key: str, count: int | None, unit: str = "") -> list[float]:
+    def number_or(self, key: str, names: Collection[str], what: str, unit: str, least: float, most: float) -> str | float:
+        """Return one of `names`, or a number from `least` to `most`.
+
+        Parameters
+        ----------
+        key : str
+        names : collection of str
+        what : str
+            The number in words, for the message.
+        unit : str
+        least, most : float
+        """
+        allowed = f"one of {', '.join(names)}, or {what} from {least:g} to {most:g} [{unit}]"
+        edges = {"minimum": least, "maximum": most}
+        value = self.value(key, allowed, schema={"anyOf": [{"enum": list(names)}, _number_schema(unit, edges)], "description": allowed})
+        if isinstance(value, str) and value in names:
+            return value
+        number = as_number(value)
+        if number is None or not least <= number <= most:
+            self.refuse(key, describe(value), allowed)
+        return number
+
+    def flag(self, key: str, default: bool) -> bool:
+        """Return true or false."""
+        value = self.value(key, "true or false", default, {"type": "boolean"})
+        if not isinstance(value, bool):
+            self.refuse(key, describe(value), "true or false")
+        return value
+
+    def one_of(self, keys: tuple[str, ...], allowed: str) -> str:
+        """Return which one of `keys` is there; several or none are refused."""
+        if self._asked is not None:
+            self._asked.one_of.append(keys)
+        given = [key for key in keys if key in self.data]
+        if len(given) != 1:
+            self.refuse(keys[0], "both" if given else "nothing", allowed)
+        return given[0]
+
+    def numbers(
+        self, key: str, count: int | None, unit: str = "", *, above: float | None = None, least: float | None = None
+    ) -> list[float]:
         """Return a list of `count` finite numbers (any number of them if None).
 
         Parameters
@@ -145,17 +245,25 @@ class Table:
         count : int or None
         unit : str
             For the message.
+        above, least : float, optional
+            Limits of each: `above` is not allowed itself, `least` is.
         """
-        allowed = f"a list of {'finite' if count is None else f'{count} finite'} numbers" + (f" [{unit}]" if unit else "")
-        value = self.value(key, allowed)
+        limit = f" above {above:g}" if above is not None else f" of at least {least:g}" if least is not None else ""
+        allowed = f"a list of {'finite' if count is None else f'{count} finite'} numbers{limit}" + (f" [{unit}]" if unit else "")
+        sizes = {} if count is None else {"minItems": count, "maxItems": count}
+        items = _number_schema(unit, {"exclusiveMinimum": above, "minimum": least})
+        value = self.value(key, allowed, schema={"type": "array", "items": items, **sizes})
         if not _is_list(value) or (count is not None and len(value) != count):
             self.refuse(key, describe(value), allowed)
-        numbers = [as_number(v) for v in value]
-        if None in numbers:
-            self.refuse(key, f"{describe(value[numbers.index(None)])} in the list", allowed)
-        return [n for n in numbers if n is not None]
+        numbers: list[float] = []
+        for item in value:
+            number = as_number(item)
+            if number is None or (above is not None and number <= above) or (least is not None and number < least):
+                self.refuse(key, f"{describe(item)} in the list", allowed)
+            numbers.append(number)
+        return numbers
 
-    def text(self, key: str, default: Any = _REQUIRED, choices: Collection[str] = (), allowed: str = "a text") -> Any:
+    def text(self, key: str, default: Any = _REQUIRED, choices: Collection[str] = (), allowed: str = "a text", names_of: str = "") -> Any:
         """Return a non-empty text, one of `choices` if there are any; a default is returned unchecked.
 
         Parameters
@@ -165,9 +273,16 @@ class Table:
         choices : collection of str
         allowed : str
             What could stand there, in words, where there are no choices.
+        names_of : str
+            Table of the file whose keys are choices, where there is one.
         """
         allowed = f"one of {', '.join(choices)}" if choices else allowed
-        value = self.value(key, allowed, default)
+        schema: dict[str, Any] = {"type": "string", "pattern": r"\S"}
+        if names_of:
+            schema["description"] = f"A name that the file knows, as those of [{names_of}]"
+        elif choices:
+            schema = {"type": "string", "enum": [str(choice) for choice in choices]}
+        value = self.value(key, allowed, default, schema)
         if key not in self.data:
             return value
         if not isinstance(value, str) or not value.strip():
@@ -176,6 +291,14 @@ class Table:
             near = difflib.get_close_matches(value, choices, 1, 0.5)
             self.refuse(key, describe(value), allowed + (f"; did you mean {near[0]}?" if near else ""))
         return value
+
+    def texts(self, key: str, allowed: str, required: bool = True) -> list[str]:
+        """Return a list of non-empty texts; where it is not required it may be missing or empty."""
+        schema = {"type": "array", "items": {"type": "string", "minLength": 1}} | ({"minItems": 1} if required else {})
+        found = self.value(key, allowed, _REQUIRED if required else [], schema)
+        if not _is_list(found) or (required and not found) or not all(isinstance(text, str) and text for text in found):
+            self.refuse(key, describe(found), allowed)
+        return list(found)
 
     def table(self, key: str, known: Collection[str] | None = None, default: Any = _REQUIRED) -> Table:
         """Return the table under `key`.
@@ -187,12 +310,12 @@ class Table:
             Keys that the table may have; by default any.
         default : mapping, optional
         """
-        return Table(self.value(key, f"a table [{self.name(key)}]", default), self.where, self.name(key), known)
+        return Table(self.value(key, f"a table [{self.name(key)}]", default, {"table": self.name(key)}), self.where, self.name(key), known)
 
     def tables(self, key: str, known: Collection[str] | None = None) -> list[Table]:
         """Return the tables of the list under `key`; there is at least one."""
         allowed = "a list of one or more tables"
-        value = self.value(key, allowed)
+        value = self.value(key, allowed, schema={"type": "array", "minItems": 1, "items": {"table": f"{self.name(key)}[]"}})
         if not _is_list(value) or not value:
             self.refuse(key, describe(value), allowed)
         return [Table(item, self.where, f"{self.name(key)}[{i}]", known) for i, item in enumerate(value)]
@@ -219,6 +342,11 @@ class Table:
             if error.where:
                 raise
             raise InputError(names.get(error.field, self.name(error.field)), error.found, error.allowed, self.where) from None
+
+
+def _number_schema(unit: str, edges: Mapping[str, float | None] | None = None, whole: bool = False) -> dict[str, Any]:
+    schema = {"type": "integer" if whole else "number"} | ({"description": f"In {unit}"} if unit else {})
+    return schema | {word: edge for word, edge in (edges or {}).items() if edge is not None}
 
 
 def as_number(value: Any) -> float | None:

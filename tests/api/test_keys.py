@@ -40,6 +40,7 @@ CALLS = [
     ("POST", "/toolings/drawing", example(), "read"),
     ("POST", "/toolings/import", {"data": []}, "upload"),
     ("GET", "/materials", None, "read"),
+    ("GET", "/schemas/n", None, "read"),
     ("GET", "/holders", None, "read"),
     ("GET", "/holders/taper/chuck", None, "read"),
     ("GET", "/usage", None, "read"),
