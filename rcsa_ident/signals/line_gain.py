@@ -37,9 +37,9 @@ def line_gain(samples: FloatArray, rate: float, length: int) -> tuple[FloatArray
     """
     starts = np.arange(0, samples.shape[0] - length + 1, max(length // 2, 1))
     padded = 4 * length
-    window, width = hann(length)[:, None], max(round(_SPACING * padded / rate), 16)
     gain = np.zeros((starts.size, padded // 2 + 1))
     bins = np.arange(gain.shape[1])
+    window, width = hann(length)[:, None], min(max(round(_SPACING * padded / rate), 16), bins.size)
     for w, start in enumerate(starts):
         part = samples[start : start + length]
         power = np.abs(np.fft.rfft((part - part.mean(axis=0)) * window, padded, axis=0)) ** 2

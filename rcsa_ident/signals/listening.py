@@ -16,7 +16,7 @@ from rcsa_ident.signals.off_orders import OffOrders, off_orders
 from rcsa_ident.signals.order_lines import OrderLines, order_lines
 from rcsa_ident.signals.recording import Quantity
 from rcsa_ident.signals.rotation import Rotation
-from rcsa_ident.signals.speed_search import APART, TURNS, find_rotation, window_length
+from rcsa_ident.signals.speed_search import APART, HIGHEST_SHARE, TURNS, find_rotation, window_length
 from rcsa_ident.units import from_hz, to_hz, to_rpm
 
 #: Spindle frequencies that are looked for where nothing is told [Hz]: 300 to 48 000 rev/min.
@@ -184,9 +184,9 @@ def listen(
     start, stop = loud.start / rate, loud.stop / rate
     events = (Event("entry", start),) * (loud.start > 0) + (Event("exit", stop),) * (loud.stop < samples.shape[0])
     nothing = Listening(Heard.UNSTEADY, (), duration, (start, stop), band, events=events)
-    low = max(low, TURNS / (stop - start))
+    low, high = max(low, TURNS / (stop - start)), min(high, HIGHEST_SHARE * rate)
     if high < 1.01 * low:
-        words = f"the longest loud stretch lasts {stop - start:.2g} s, which is too short to tell the speed"
+        words = f"the longest even stretch, {stop - start:.2g} s at {rate:.4g} Hz, is too short, or its rate too low, to tell the speed"
         return replace(nothing, reasons=(words,))
     part = samples[loud]
     found = find_rotation(part, rate, low, high)
@@ -244,9 +244,7 @@ def _judged(
     """The answer with what is said of a part whose rotation is known."""
     frequency, order = to_hz(rotation.spindle_speed), np.arange(1, lines.power.size)
     apparent = np.abs((order * frequency + 0.5 * rate) % rate - 0.5 * rate)
-    beside = off_orders(
-        lines.rest, _typical(part, rate), rate, np.concatenate([[frequency], apparent]), answer.band, quantity is Quantity.ACCELERATION
-    )
+    beside = off_orders(lines.rest, _typical(part, rate), rate, apparent, answer.band, quantity is Quantity.ACCELERATION)
     power, gap = lines.power[1:], quantity is Quantity.DISPLACEMENT
     teeth = told if gap else told or _teeth(power)
     ramp, wander = _ramp(*rotation.speeds())

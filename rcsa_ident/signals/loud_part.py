@@ -41,7 +41,7 @@ def loud_part(samples: FloatArray, rate: float) -> slice:
 
 
 def _longest(wanted: np.ndarray) -> tuple[int, int]:
-    """First and last window of the longest stretch of wanted ones, short pauses included."""
+    """First and last window of the longest stretch of wanted ones, short pauses included; all of them where none is wanted."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], wanted, [False]]).astype(int))).reshape(-1, 2)
     joined: list[tuple[int, int]] = []
     for first, last in edges.tolist():
@@ -49,7 +49,7 @@ def _longest(wanted: np.ndarray) -> tuple[int, int]:
             joined[-1] = joined[-1][0], last
         else:
             joined.append((first, last))
-    return max(joined, key=lambda each: each[1] - each[0])
+    return max(joined, key=lambda each: each[1] - each[0], default=(0, wanted.size))
 
 
 def decimated(samples: FloatArray, rate: float) -> tuple[FloatArray, float, float]:

@@ -15,6 +15,8 @@ from rcsa_ident.signals.steady_part import hann
 
 #: Length of the windows in which the speed is looked for [s]: fine enough for lines that lie close.
 _LONG = 4.0
+#: Share of the sampling rate above which a spindle's frequency is not told.
+HIGHEST_SHARE = 0.4
 #: Trial speeds stand this far apart, as a share, and candidates at least this far.
 _STEP, APART = 1e-4, 0.015
 #: Strong lines beside which others are looked for at the spacing of the spindle or of its teeth, and how many to each side: chatter has
@@ -84,8 +86,9 @@ def find_rotation(samples: FloatArray, rate: float, lowest: float, highest: floa
     ramp = _ramp(middle, rate, lowest, highest)
     most = max((_explained(lines) for _, _, lines in fits), default=0.0)
     if ramp is not None and _explained(ramp[1]) > max(_RAMP_EXPLAINS, _RAMP_CLEARLY * most):
-        whole = ramp if spare == 0 else _ramp(samples, rate, lowest, highest)
-        return FoundSpeed((whole or ramp)[0])
+        ramp = ramp if spare == 0 else _ramp(samples, rate, lowest, highest)
+        if ramp is not None:
+            return FoundSpeed(ramp[0])
     if not fits:
         return None
     members = [fit for fit in fits if _explained(fit[2]) >= _EXPLAINS * most] if most > _TELLS else fits[:1]
@@ -159,7 +162,7 @@ def _candidates(samples: FloatArray, rate: float, lowest: float, highest: float)
     """Frequencies [Hz] that lines speak for, the best first; none where that may be chance."""
     length = min(round(_LONG * rate), samples.shape[0])
     gain = line_gain(samples, rate, length)[0].mean(axis=0)
-    trial = np.exp(np.arange(np.log(lowest), np.log(min(highest, 0.4 * rate)) + _STEP, _STEP))
+    trial = np.exp(np.arange(np.log(lowest), np.log(min(highest, HIGHEST_SHARE * rate)) + _STEP, _STEP))
     place = trial * 4.0 * length / rate
     score = comb_scores(gain[None], place, ORDERS, False)[0]
     score = score + np.max([sideband_scores(gain, place, float(centre), _SIDES, _WORTH) for centre in _strongest(samples, length)], axis=0)

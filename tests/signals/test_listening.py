@@ -168,6 +168,28 @@ def test_a_high_rate_is_looked_at_below_five_kilohertz():
     assert to_rpm(answer.spindle_speed) == pytest.approx(true, rel=2e-5)
 
 
+def test_whatever_is_recorded_is_answered():
+    """Short, slow, silent, spiky or clipped: an answer, or a sentence, and never anything else."""
+    rng, seen = np.random.default_rng(7), set()
+    for case in range(60):
+        rate = float(np.exp(rng.uniform(np.log(50.0), np.log(60e3))))
+        n, channels = int(rng.integers(64, 6000)), int(rng.integers(1, 4))
+        time = np.arange(n)[:, None] / rate
+        samples = [
+            rng.standard_normal((n, channels)),
+            np.cos(2.0 * np.pi * rng.uniform(1.0, 0.6 * rate) * time) + np.zeros((n, channels)),
+            np.clip(3.0 * np.cos(2.0 * np.pi * rng.uniform(5.0, 100.0) * time), -1.0, 1.0) + np.zeros((n, channels)),
+            np.where(rng.uniform(size=(n, channels)) < 1e-3, 1e6, 1e-6 * rng.standard_normal((n, channels))),
+            1e-12 * np.cumsum(rng.standard_normal((n, channels)), axis=0) + 1e3,
+        ][case % 5]
+        told = {"spindle_speed": from_rpm(rng.uniform(10.0, 90e3))} if rng.uniform() < 0.3 else {}
+        try:
+            seen.add(listen(samples, rate, rng.choice(list(Quantity)), **told).verdict)
+        except InputError as error:
+            seen.add(error.field)
+    assert {Heard.NO_CUT, Heard.UNSTEADY, "recording"} <= seen
+
+
 @pytest.mark.parametrize(
     ("samples", "rate", "options", "field"),
     [
