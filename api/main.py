@@ -25,6 +25,7 @@ from api.reading.uploads import Uploads
 from api.retention import Lifetimes, maintain
 from api.routes import (
     campaigns,
+    dropped_files,
     example_campaign,
     examples,
     forces,
@@ -133,7 +134,7 @@ def create_app(
     problems.install(app)
     app.include_router(health.router)
     app.include_router(static_files.router)
-    about = (keys, usage, machines, toolings, versions, libraries, holders, materials, schemas, examples, example_campaign)
+    about = (keys, usage, machines, toolings, versions, libraries, dropped_files, holders, materials, schemas, examples, example_campaign)
     for each in (*about, campaigns, recordings, resumable_upload, tus, multi_upload, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(HeadRequests, router=app.router)

@@ -15,6 +15,7 @@ from api.client.asking import Json, match, read
 from api.client.jobs import Jobs
 from api.client.uploads import Uploads
 from api.schemas.common import Page
+from api.schemas.dropped_files import DroppedAnswer, TestedCutsAnswer
 from api.schemas.forces import ForceAnswer, StreamsAnswer, StreamSummary
 from api.schemas.holders import CatalogueAnswer, Holders
 from api.schemas.keys import KeyAnswer, MadeKey
@@ -139,6 +140,17 @@ class Client(Uploads, Jobs):
         """Return a holder of the catalogue, by default of a typical length."""
         query = {"bore_mm": bore_mm} if length_mm is None else {"bore_mm": bore_mm, "length_mm": length_mm}
         return read(CatalogueAnswer, self.send("GET", f"/holders/{taper}/{chuck}", params=query))
+
+    def preview(self, files: Mapping[str, str]) -> DroppedAnswer:
+        """Return what TOML files hold, texts by name: campaign, toolings and what is missing; nothing is stored."""
+        body = {"files": [{"name": name, "text": text} for name, text in files.items()]}
+        return read(DroppedAnswer, self.send("POST", "/campaigns/preview", json=body))
+
+    def tested_cuts(self, text: str) -> TestedCutsAnswer:
+        """Return the cuts of CUTS.csv; nothing is stored."""
+        return read(
+            TestedCutsAnswer, self.send("POST", "/tested-cuts/preview", content=text.encode(), headers={"Content-Type": "text/csv"})
+        )
 
     def schema(self, name: str) -> Json:
         """Return the JSON Schema of a TOML file: tooling, campaign, machine or modes."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.text_columns import read_table
+from rcsa_ident.io.text_columns import TextTable, read_table, table_of
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.stability.tested_cuts import TestedCuts, Verdict
 from rcsa_ident.units import from_rpm
@@ -23,7 +23,15 @@ def read_tested_cuts(path: str | Path) -> TestedCuts:
     InputError
         Names the file and the line.
     """
-    table = read_table(path, "tested cuts")
+    return _cuts_of(read_table(path, "tested cuts"))
+
+
+def tested_cuts_of(text: str, where: str) -> TestedCuts:
+    """Return the cuts of a text as `read_tested_cuts` finds them in a file; `where` is named in the messages."""
+    return _cuts_of(table_of(text, "tested cuts", where))
+
+
+def _cuts_of(table: TextTable) -> TestedCuts:
     for name in COLUMNS:
         if table.header.count(name) != 1:
             found = f"only {listed(table.header)}" if name not in table.header else "two columns of that name"

@@ -41,6 +41,8 @@ CALLS = [
     ("POST", "/toolings/import", {"data": []}, "upload"),
     ("GET", "/materials", None, "read"),
     ("GET", "/schemas/n", None, "read"),
+    ("POST", "/campaigns/preview", {"files": []}, "read"),
+    ("POST", "/tested-cuts/preview", None, "read"),
     ("GET", "/holders", None, "read"),
     ("GET", "/holders/taper/chuck", None, "read"),
     ("GET", "/usage", None, "read"),

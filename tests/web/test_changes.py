@@ -7,6 +7,7 @@ import re
 from contextlib import closing
 from pathlib import Path
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from api.client import Client
@@ -96,6 +97,24 @@ def test_a_dropped_campaign_leaves_the_library_as_it_is(opened, client: Client, 
     # what is there is offered no more
     expect(page.locator("tbody tr", has_text=f"made the tooling {name}").locator("td").last).to_have_text("There now")
     expect(page.get_by_role("button", name=f"Restore version 1 of {name}")).to_have_count(0)
+
+
+@pytest.mark.parametrize("toolings", ['toolings = { S8-own = "toolings/drawn.toml" }', 'toolings.S8-own = "toolings/drawn.toml"'])
+def test_a_dropped_campaign_is_read_as_toml_and_not_by_its_look(opened, client: Client, served: Served, tmp_path, toolings: str):
+    """The tooling's key is not its file's name, and what differs is the campaign's own."""
+    client.write_tooling("S8-own", by_hand.TOOLING)
+    head, _, rest = _CAMPAIGN.replace("NAME", "S8-own").partition("[toolings]")
+    _, brackets, cuts = rest.partition("[[cuts]]")
+    (tmp_path / "campaign.toml").write_text(f"{toolings}\n{head}{brackets}{cuts}")
+    (tmp_path / "drawn.toml").write_text(THREE)
+    page = opened()
+    drop(page, "section.drop", [tmp_path / "campaign.toml", tmp_path / "drawn.toml"])
+    expect(page.locator('[data-tooling="S8-own"] tbody tr')).to_have_count(1)
+    page.get_by_role("button", name="Take it in", exact=True).click()
+    expect(page.locator("h1")).to_have_text("Dropped")
+    assert json.loads(_kept(served, page.url.rsplit("/", 1)[1]))["toolings"] == {"S8-own": f"{THREE}\n"}
+    assert client.tooling("S8-own").tooling.cutter.teeth == 4
+    assert "drawn" not in [each.name for each in client.toolings()]
 
 
 def test_a_version_is_restored_over_what_was_seen_and_over_nothing_else(opened, client: Client):

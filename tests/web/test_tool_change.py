@@ -59,7 +59,7 @@ def test_tested_cuts_stand_beside_the_limit(opened, client: Client, shop: str, t
     page = opened(f"#/change?machine={shop}&tooling=T1&tooling=T1-long")
     expect(page.locator(".chart.lobes .main-svg").first).to_be_visible(timeout=30_000)
     file = tmp_path / "Schnitte.csv"
-    lines = ("spindle_speed_rpm;note;axial_depth_mm;verdict", "8000;a;0,05;stable", "", "9000;b;30;Chatter", "9000;c;0,05;chatter")
+    lines = ("spindle_speed_rpm;note;axial_depth_mm;verdict", '"8000";"a";"0,05";"stable"', "", "9000;b;30;Chatter", "9000;c;0,05;chatter")
     file.write_text("\ufeff" + "\n".join(lines), "utf-8")
     chosen(page, file)
     told = page.locator(".tested-cuts .reads li")
@@ -82,13 +82,14 @@ def test_wrong_tested_cuts_are_refused_in_words(opened, shop: str, tmp_path: Pat
     expect(page.locator(".chart.lobes .main-svg").first).to_be_visible(timeout=30_000)
     head = "spindle_speed_rpm,axial_depth_mm,verdict\n"
     for text, words in (
-        ("", "columns spindle_speed_rpm, axial_depth_mm, verdict"),
-        (head, "cuts: found nothing"),
-        (head + "8000,1,loud\n", "line 2, verdict: found loud, allowed is stable, chatter, marginal"),
-        (head + "\n8000,-1,stable\n", "line 3, axial_depth_mm: found -1, allowed is a number above 0 and at most 500"),
-        (head + "133,1,stable\n50,1,stable\n", "line 3, spindle_speed_rpm: found 50, allowed is a number from 100 to 200000"),
-        (head + "8000,1,stable\n" * 1001, "cuts: found 1001, allowed is 1 to 1000"),
-        (head + "8000\n", "line 2, verdict: found nothing"),
+        ("", "found 0 lines, allowed is a line of column names"),
+        ("a,b\n1,2\n", "columns spindle_speed_rpm, axial_depth_mm, verdict"),
+        (head, "found 1 lines, allowed is a line of column names"),
+        (head + "8000,1,loud\n", "line 2, column verdict: found loud, allowed is one of stable, chatter, marginal"),
+        (head + "\n8000,-1,stable\n", "line 3, column axial_depth_mm: found -1, allowed is a finite number above 0 [mm]"),
+        (head + "133,1,stable\n50,1,stable\n", "cuts[1].spindle_speed_rpm: found 50, allowed is greater than or equal to 100"),
+        (head + "8000,1,stable\n" * 1001, "cuts: found 1001 of them, allowed is at most 1000"),
+        (head + "8000\n", "line 2, tested cuts: found 1 cells, allowed is 3 cells as in the header"),
     ):
         file = tmp_path / "CUTS.csv"
         file.write_text(text, "utf-8")

@@ -1,12 +1,8 @@
-// Cuts that were tried: CUTS.csv as the commands read it, marks in the chart, and how many are classified correctly.
-import { Problem } from "./api.js";
+// Cuts that were tried: CUTS.csv as the service reads it, marks in the chart, and how many are classified correctly.
+import { Problem, send } from "./api.js";
 import { h } from "./dom.js";
 
-const COLUMNS = ["spindle_speed_rpm", "axial_depth_mm", "verdict"];
 const VERDICTS = ["stable", "chatter", "marginal"];
-/** What the service takes: cuts, and the range of each number. */
-const MOST = 1000;
-const RANGES = { spindle_speed_rpm: [100, 200_000], axial_depth_mm: [0, 500] };
 /** What marks a verdict: symbol in the chart, sign in the text, colour. */
 export const MARKS = {
   stable: ["circle-open", "○", "good"],
@@ -14,37 +10,12 @@ export const MARKS = {
   marginal: ["triangle-up-open", "△", "doubt"],
 };
 
-/** The cuts of a text table: comma, semicolon or tab, a decimal comma with the latter two. */
-export function testedCuts(name, text) {
-  const wrong = (field, found, allowed) => {
-    throw new Problem(0, { detail: `${name}: ${field}: found ${found || "nothing"}, allowed is ${allowed}` });
-  };
-  const lines = text
-    .replace(/^\ufeff/, "")
-    .split(/\r?\n/)
-    .map((line, i) => [i + 1, line.trim()])
-    .filter(([, line]) => line && !line.startsWith("#"));
-  const first = lines.shift()?.[1] ?? "";
-  const divider = ["\t", ";", ","].find((each) => first.includes(each)) ?? ",";
-  const header = first.split(divider).map((cell) => cell.trim());
-  const places = COLUMNS.map((column) => {
-    if (!header.includes(column)) wrong(`column ${column}`, `only ${header.join(", ")}`, `columns ${COLUMNS.join(", ")}`);
-    return header.indexOf(column);
+/** The cuts of CUTS.csv, as the service reads them. */
+export async function testedCuts(name, file) {
+  const answer = await send("POST", "tested-cuts/preview", { body: file, headers: { "Content-Type": "text/csv" } }).catch((error) => {
+    throw error instanceof Problem ? new Problem(error.status, { detail: `${name}: ${error.message}`, errors: error.errors }) : error;
   });
-  if (!lines.length || lines.length > MOST) wrong("cuts", lines.length ? String(lines.length) : "", `1 to ${MOST} of them`);
-  return lines.map(([number, line]) => {
-    const [speed, depth, seen] = places.map((place) => line.split(divider)[place]?.trim() ?? "");
-    const within = (field, written) => {
-      const value = Number(divider === "," ? written : written.replace(",", "."));
-      const [least, most] = RANGES[field];
-      const fits = written && value >= least && value > 0 && value <= most;
-      return fits
-        ? value
-        : wrong(`line ${number}, ${field}`, written, `a number ${least ? `from ${least} to` : "above 0 and at most"} ${most}`);
-    };
-    if (!VERDICTS.includes(seen.toLowerCase())) wrong(`line ${number}, verdict`, seen, VERDICTS.join(", "));
-    return { spindle_speed_rpm: within(COLUMNS[0], speed), axial_depth_mm: within(COLUMNS[1], depth), verdict: seen.toLowerCase() };
-  });
+  return (await answer.json()).cuts;
 }
 
 /** Cuts as an address holds them: speed, depth and the verdict's first letter. */

@@ -1,5 +1,5 @@
 // What was dropped: a campaign and its toolings and recordings are recognised by what is in them, and taken in after one look.
-import { all, once, part, post, Problem, send } from "../api.js";
+import { once, part, post, Problem, send } from "../api.js";
 import { card, fill, h, note, waiting } from "../dom.js";
 import { busy, field, select, showProblem } from "../forms.js";
 import { go, to } from "../router.js";
@@ -11,46 +11,36 @@ import { differing } from "./changes.js";
 
 const RECORDING = /\.(h5|hdf5|tdms|uff|unv|wav|rf64|bwf|w64|aiff?|caf|flac|ogg|opus|mp3|mat|parquet|csv)$/i;
 const TOML = { "Content-Type": "application/toml" };
-const last = (path) => path.split(/[\\/]/).at(-1);
 
-/** Sort files into campaign, toolings, recordings and others, by their content where the name does not say enough. */
-export async function sorted(files) {
-  const found = { campaign: null, toolings: [], recordings: [], others: [] };
+/** Sort files into TOML with its text, recordings and others, by their names. */
+async function sorted(files) {
+  const found = { texts: new Map(), recordings: [], others: [] };
   for (const file of files) {
-    if (/\.toml$/i.test(file.name) && file.size < 4e6) {
-      const text = await file.text();
-      if (/^\s*\[(campaign|\[cuts\])\]/m.test(text)) found.campaign = { file, text };
-      else if (/^\s*\[cutter\]/m.test(text)) found.toolings.push({ file, text });
-      else found.others.push(file);
-    } else if (RECORDING.test(file.name)) found.recordings.push(file);
+    if (/\.toml$/i.test(file.name) && file.size < 1e6) found.texts.set(file.name, await file.text());
+    else if (RECORDING.test(file.name)) found.recordings.push(file);
     else if (!file.name.startsWith(".")) found.others.push(file);
   }
   return found;
 }
 
-const TOOLINGS = /^\s*\[toolings\][^\n]*\n([\s\S]*?)(?=^\s*\[|$(?![\s\S]))/m;
-
-/** The key and the file that a line of [toolings] names, by a look that leaves the reading to the service. */
-function namedIn(line) {
-  const [, bare, one, two, path] = /^\s*(?:([A-Za-z0-9_-]+)|"([^"]+)"|'([^']+)')\s*=\s*["']([^"']+\.toml)["']/.exec(line) ?? [];
-  return path ? [last(path), bare ?? one ?? two] : null;
+/** What the TOML files mean is what the service reads in them. */
+async function read({ texts, recordings, others }) {
+  const told = await post("campaigns/preview", { files: [...texts].map(([name, text]) => ({ name, text })) });
+  const toolings = told.toolings.map((t) => ({ ...t, text: texts.get(t.file) }));
+  return { told, toolings, text: texts.get(told.campaign), recordings, others: [...others, ...told.others] };
 }
-
-/** Which key of [toolings] names which file. */
-export const keysOfToolings = (text) => new Map((TOOLINGS.exec(text)?.[1] ?? "").split("\n").map(namedIn).filter(Boolean));
 
 /** The campaign with the texts of toolings in the place of their files: it takes them from itself, not from the library. */
-export function withToolings(text, texts) {
-  // JSON's escapes are TOML's, but for DEL
-  const quoted = (words) => JSON.stringify(words).replaceAll("\x7f", "\\u007f");
-  const inlined = (line) => {
-    const key = namedIn(line)?.[1];
-    return texts.has(key) ? `${quoted(key)} = ${quoted(`${texts.get(key)}\n`)}` : line;
+function withToolings({ keys, toolings, from_library }, own) {
+  const names = [...toolings.filter((t) => t.listed).map((t) => t.key), ...from_library];
+  const given = Object.entries(keys.toolings ?? Object.fromEntries(names.map((name) => [name, name])));
+  const inlined = ([key, what]) => {
+    const called = typeof what === "string" && !what.endsWith(".toml") ? what : key;
+    return [key, own.has(called) ? `${own.get(called)}\n` : what];
   };
-  return text.replace(TOOLINGS, (block) => block.split("\n").map(inlined).join("\n"));
+  return { ...keys, toolings: Object.fromEntries(given.map(inlined)) };
 }
 
-const nameIn = (text) => /^\s*\[campaign\][^[]*?^\s*name\s*=\s*["']([^"']*)["']/ms.exec(text)?.[1] ?? "";
 const asName = (text) =>
   text
     .replace(/[^A-Za-z0-9 ._+()-]/g, " ")
@@ -63,12 +53,12 @@ export async function intake(place, files) {
   fill(place, waiting("looking at the files …"));
   let found = null;
   try {
-    found = await sorted((await Promise.all(files.map((file) => (/\.zip$/i.test(file.name) ? unzipped(file) : [file])))).flat());
+    found = await read(await sorted((await Promise.all(files.map((file) => (/\.zip$/i.test(file.name) ? unzipped(file) : [file])))).flat()));
   } catch (error) {
-    fill(place, note("bad", error.message));
+    fill(place, note("bad", error.message, ...(error.errors ?? []).map((e) => `${e.field}: found ${e.found}, allowed ${e.allowed}`)));
     return;
   }
-  if (!found.campaign) {
+  if (!found.told.campaign) {
     if (found.recordings.length) {
       keepFiles(found.recordings);
       fill(
@@ -94,27 +84,7 @@ export async function intake(place, files) {
     fill(place, note("doubt", ...only));
     return;
   }
-  const keys = keysOfToolings(found.campaign.text);
-  const library = new Set((await all("toolings")).map((t) => t.name));
-  const toolings = await Promise.all(
-    found.toolings.map(async ({ file, text }) => {
-      const key = keys.get(file.name) ?? file.name.replace(/\.toml$/i, "");
-      return { key, text, listed: keys.has(file.name), there: library.has(key) ? await compared(key, text) : null };
-    }),
-  ).catch((error) => {
-    fill(place, note("bad", error.message, ...(error.errors ?? []).map((e) => `${e.field}: found ${e.found}, allowed ${e.allowed}`)));
-    if (!(error instanceof Problem)) throw error;
-  });
-  if (!toolings) return;
-  offer(place, found, toolings, [...keys.values()]);
-}
-
-/** Where a dropped tooling differs from the library's. */
-async function compared(key, text) {
-  const answer = await send("POST", `toolings/${part(key)}/differences`, { body: text, headers: TOML }).catch((error) => {
-    throw named(error, `tooling ${key}`);
-  });
-  return answer.json();
+  offer(place, found);
 }
 
 /** What to do with a dropped tooling that differs from the library's: never over it, unless somebody says so. */
@@ -130,8 +100,9 @@ function choiceOf(tooling) {
   return { ...tooling, choice };
 }
 
-function offer(place, found, toolings, wanted) {
-  const title = nameIn(found.campaign.text);
+function offer(place, found) {
+  const { told, toolings } = found;
+  const title = told.name;
   const here = machine();
   const which = select([...knownMachines().map((m) => [m.id, m.name]), ["", "A new machine"]], here?.id ?? "");
   const called = h("input", { autocomplete: "off", maxlength: 64 });
@@ -139,9 +110,9 @@ function offer(place, found, toolings, wanted) {
   const naming = field("Its name", called, { name: "name" });
   naming.hidden = which.value !== "";
   which.addEventListener("change", () => (naming.hidden = which.value !== ""));
-  const apart = toolings.filter((t) => t.there?.differences.length).map(choiceOf);
-  const missing = wanted.filter((key) => !toolings.some((t) => t.key === key));
-  const button = h("button", { class: "primary" }, "Take it in");
+  const apart = toolings.filter((t) => t.differences.length).map(choiceOf);
+  const absent = told.recordings.filter((name) => !found.recordings.some((file) => file.name.normalize("NFC") === name));
+  const button = h("button", { class: "primary", disabled: told.missing.length > 0 }, "Take it in");
   const said = h("div", { role: "status" });
   const form = h(
     "form",
@@ -149,9 +120,9 @@ function offer(place, found, toolings, wanted) {
     h(
       "dl",
       { class: "facts" },
-      fact("Campaign", title || found.campaign.file.name),
+      fact("Campaign", title || told.campaign),
       fact("Toolings", toolings.map((t) => t.key).join(", ") || "of the library"),
-      fact("Recordings", String(found.recordings.length)),
+      fact("Recordings", `${found.recordings.length}${absent.length ? `; the campaign names ${absent.length} more` : ""}`),
       found.others.length ? fact("Left aside", `${found.others.length} other files`) : null,
     ),
     h(
@@ -165,11 +136,12 @@ function offer(place, found, toolings, wanted) {
         "section",
         { class: "view", "data-tooling": t.key },
         note("doubt", `${t.key} is in the library already, and differs:`),
-        differing(t.there.differences, "In the library", "Dropped"),
+        differing(t.differences, "In the library", "Dropped"),
         field(`What to do with ${t.key}`, t.choice),
       ),
     ),
-    missing.length ? note("", `Not among the files, so taken from the library: ${missing.join(", ")}.`) : null,
+    told.from_library.length ? note("", `Not among the files, so taken from the library: ${told.from_library.join(", ")}.`) : null,
+    told.missing.length ? note("bad", `Neither among the files nor in the library: ${told.missing.join(", ")}. Drop their files, too.`) : null,
     h("div", { class: "row-of-buttons" }, button, h("button", { type: "button", onclick: () => fill(place) }, "Leave it")),
     said,
   );
@@ -181,19 +153,17 @@ function offer(place, found, toolings, wanted) {
         fill(said, waiting("writing toolings and campaign …"));
         const machineId = which.value || (await made(called.value.trim()));
         const chosen = (what) => apart.filter((t) => t.choice.value === what);
-        const why = new URLSearchParams({ why: `with the campaign ${title || found.campaign.file.name}`.slice(0, 200) });
-        for (const tooling of [...toolings.filter((t) => t.there === null), ...chosen("replace")]) {
+        const why = new URLSearchParams({ why: `with the campaign ${title || told.campaign}`.slice(0, 200) });
+        for (const tooling of [...toolings.filter((t) => t.etag === null), ...chosen("replace")]) {
           // over what was shown, and over nothing else
-          const seen = tooling.there ? { "If-Match": `"${tooling.there.etag}"` } : { "If-None-Match": "*" };
+          const seen = tooling.etag ? { "If-Match": `"${tooling.etag}"` } : { "If-None-Match": "*" };
           await send("PUT", `toolings/${part(tooling.key)}?${why}`, { body: tooling.text, headers: { ...TOML, ...seen } }).catch((error) => {
             throw named(error, `tooling ${tooling.key}`);
           });
         }
         const own = new Map(chosen("campaign").map((t) => [t.key, t.text]));
-        const answer = await send("POST", `machines/${machineId}/campaigns`, {
-          body: withToolings(found.campaign.text, own),
-          headers: { ...TOML, ...key },
-        }).catch((error) => {
+        const body = own.size ? { json: withToolings(told, own), headers: key } : { body: found.text, headers: { ...TOML, ...key } };
+        const answer = await send("POST", `machines/${machineId}/campaigns`, body).catch((error) => {
           throw named(error, "campaign.toml");
         });
         const campaign = await answer.json();

@@ -117,7 +117,7 @@ function testedParts(lobes, tested, ontested) {
       input.value = "";
       if (!file) return;
       try {
-        ontested({ name: file.name, cuts: testedCuts(file.name, await file.text()) });
+        ontested({ name: file.name, cuts: await testedCuts(file.name, file) });
       } catch (error) {
         failed(fault, error);
       }

@@ -1,0 +1,90 @@
+"""What files mean before anything is stored."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request
+from fastapi.concurrency import run_in_threadpool
+from pydantic import ValidationError
+
+from api.components import ThisService
+from api.conventions import BODY, guard, problems, utf8
+from api.problems import Problem
+from api.reading.dropped import look_at
+from api.schemas.dropped_files import DroppedAnswer, DroppedFiles, DroppedToolingAnswer, TestedCutsAnswer
+from api.schemas.queries import MOST_TESTED, TestedCut
+from api.schemas.versions import Difference
+from api.security import Guarded, WhoAsks
+from api.stores.entities import digest_of
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.tested_cuts import COLUMNS, tested_cuts_of
+from rcsa_ident.units import to_rpm
+
+router = APIRouter(tags=["campaigns"], route_class=Guarded)
+CSV = "text/csv"
+_LARGEST_CSV = 1_000_000
+_CUTS = {"required": True, "content": {CSV: {"schema": {"type": "string"}}}}
+
+
+@router.post(
+    "/campaigns/preview",
+    summary="What dropped TOML files hold: campaign, toolings, and what is missing; nothing is stored",
+    openapi_extra=guard("read"),
+    responses=problems(*BODY),
+)
+async def preview(asked: DroppedFiles, components: ThisService, caller: WhoAsks) -> DroppedAnswer:
+    def library(name: str) -> str | None:
+        return getattr(components.store.toolings.get(caller.group, name), "text", None)
+
+    def looked() -> DroppedAnswer:
+        found = look_at([(file.name, file.text) for file in asked.files], library)
+        toolings = [
+            DroppedToolingAnswer(
+                file=each.file,
+                key=each.key,
+                listed=each.listed,
+                etag=None if each.there is None else digest_of(each.there),
+                differences=[Difference(field=field, old=old, new=new) for field, old, new in each.differences],
+            )
+            for each in found.toolings
+        ]
+        same = ("campaign", "name", "keys", "from_library", "missing", "recordings", "others")
+        return DroppedAnswer(toolings=toolings, **{name: getattr(found, name) for name in same})
+
+    return await run_in_threadpool(looked)
+
+
+@router.post(
+    "/tested-cuts/preview",
+    summary="The cuts of CUTS.csv, as the commands read it; nothing is stored",
+    openapi_extra=guard("read", requestBody=_CUTS, **{"x-content-types": (CSV,)}),
+    responses=problems(*BODY),
+)
+async def tested_cuts(request: Request) -> TestedCutsAnswer:
+    raw = await request.body()
+    if len(raw) > _LARGEST_CSV:
+        raise Problem(413, f"tested cuts have at most {_LARGEST_CSV // 1000} kB")
+
+    def read() -> TestedCutsAnswer:
+        try:
+            found = tested_cuts_of(utf8(raw), "")
+        except InputError as error:
+            # a body has no file's name, but lines
+            field = ", ".join(filter(None, (error.where.strip(), error.field)))
+            raise InputError(field, error.found, error.allowed) from None
+        if len(found.verdict) > MOST_TESTED:
+            raise InputError("cuts", f"{len(found.verdict)} of them", f"at most {MOST_TESTED}")
+        # what is written in rev/min and mm comes back so
+        columns = ([float(f"{value:.12g}") for value in values] for values in (to_rpm(found.spindle_speed), 1e3 * found.axial_depth))
+        return TestedCutsAnswer(cuts=[_cut(*row) for row in enumerate(zip(*columns, found.verdict, strict=True))])
+
+    return await run_in_threadpool(read)
+
+
+def _cut(index: int, row: tuple[float, float, str]) -> TestedCut:
+    """A cut within what a query takes."""
+    try:
+        return TestedCut.model_validate(dict(zip(COLUMNS, row, strict=True)), strict=False)
+    except ValidationError as error:
+        (fault, *_) = error.errors()
+        field = fault["loc"][0]
+        raise InputError(f"cuts[{index}].{field}", f"{fault['input']:g}", fault["msg"].removeprefix("Input should be ")) from None
