@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
-from pydantic import ValidationError
 
 from api.components import ThisService
 from api.conventions import BODY, guard, problems, utf8
 from api.problems import Problem
 from api.reading.dropped import look_at
-from api.schemas.dropped_files import DroppedAnswer, DroppedFiles, DroppedToolingAnswer, TestedCutsAnswer
-from api.schemas.queries import MOST_TESTED, TestedCut
+from api.schemas.dropped_files import DroppedAnswer, DroppedFiles, DroppedToolingAnswer, TestedCutsAnswer, tested_cut
+from api.schemas.queries import MOST_TESTED
 from api.schemas.versions import Difference
 from api.security import Guarded, WhoAsks
 from api.stores.entities import digest_of
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.tested_cuts import COLUMNS, tested_cuts_of
+from rcsa_ident.io.tested_cuts import tested_cuts_of
 from rcsa_ident.units import to_rpm
 
 router = APIRouter(tags=["campaigns"], route_class=Guarded)
@@ -75,16 +74,6 @@ async def tested_cuts(request: Request) -> TestedCutsAnswer:
             raise InputError("cuts", f"{len(found.verdict)} of them", f"at most {MOST_TESTED}")
         # what is written in rev/min and mm comes back so
         columns = ([float(f"{value:.12g}") for value in values] for values in (to_rpm(found.spindle_speed), 1e3 * found.axial_depth))
-        return TestedCutsAnswer(cuts=[_cut(*row) for row in enumerate(zip(*columns, found.verdict, strict=True))])
+        return TestedCutsAnswer(cuts=[tested_cut(*row) for row in enumerate(zip(*columns, found.verdict, strict=True))])
 
     return await run_in_threadpool(read)
-
-
-def _cut(index: int, row: tuple[float, float, str]) -> TestedCut:
-    """A cut within what a query takes."""
-    try:
-        return TestedCut.model_validate(dict(zip(COLUMNS, row, strict=True)), strict=False)
-    except ValidationError as error:
-        (fault, *_) = error.errors()
-        field = fault["loc"][0]
-        raise InputError(f"cuts[{index}].{field}", f"{fault['input']:g}", fault["msg"].removeprefix("Input should be ")) from None

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from api.schemas.common import Answer, Body
 from api.schemas.queries import TestedCut
 from api.schemas.versions import Difference
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.tested_cuts import COLUMNS
 
 
 class DroppedFile(Body):
@@ -51,3 +53,13 @@ class TestedCutsAnswer(Answer):
     """Cuts that were tried."""
 
     cuts: list[TestedCut]
+
+
+def tested_cut(index: int, row: tuple[float, float, str]) -> TestedCut:
+    """Return a cut of a table (speed [rev/min], depth [mm], verdict) within what a query takes; an error names the cut from 0."""
+    try:
+        return TestedCut.model_validate(dict(zip(COLUMNS, row, strict=True)), strict=False)
+    except ValidationError as error:
+        (fault, *_) = error.errors()
+        field = fault["loc"][0]
+        raise InputError(f"cuts[{index}].{field}", f"{fault['input']:g}", fault["msg"].removeprefix("Input should be ")) from None
