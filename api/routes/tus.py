@@ -7,7 +7,7 @@ import binascii
 from collections.abc import Callable, Coroutine
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Request, Response
+from fastapi import APIRouter, Depends, Header, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import PlainTextResponse
@@ -53,7 +53,7 @@ Announced = Annotated[
 
 
 class SpeaksTus(Guarded):
-    """Routes that answer only to the version of the protocol that they speak, and name it in every answer."""
+    """Routes that name the version of the protocol in every answer."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Answer]]:
         """Return the handler of a request."""
@@ -61,8 +61,6 @@ class SpeaksTus(Guarded):
 
         async def handler(request: Request) -> Answer:
             try:
-                if request.method != "OPTIONS" and request.headers.get("tus-resumable") != VERSION:
-                    raise Problem(412, f"Tus-Resumable: found another version, allowed is {VERSION}", headers={"Tus-Version": VERSION})
                 answer = await inner(request)
             except (InputError, RequestValidationError, Problem) as error:
                 problem = _problem(error)
@@ -80,7 +78,13 @@ def _problem(error: InputError | RequestValidationError | Problem) -> Problem:
     return of_input(error) if isinstance(error, InputError) else of_validation(error.errors())
 
 
-router = APIRouter(prefix="/campaigns/{id}/uploads", tags=["recordings"], route_class=SpeaksTus)
+async def speaks(request: Request) -> None:
+    """Refuse another version of the protocol; asking what is spoken needs none."""
+    if request.method != "OPTIONS" and request.headers.get("tus-resumable") != VERSION:
+        raise Problem(412, f"Tus-Resumable: found another version, allowed is {VERSION}", headers={"Tus-Version": VERSION})
+
+
+router = APIRouter(prefix="/campaigns/{id}/uploads", tags=["recordings"], route_class=SpeaksTus, dependencies=[Depends(speaks)])
 
 
 @router.options(

@@ -67,6 +67,8 @@ CALLS = [
     ("GET", "/campaigns/c/recordings/n/spectrum", None, "read"),
     ("GET", "/campaigns/c/recordings/n/signal", None, "read"),
     ("DELETE", "/campaigns/c/recordings/n", None, "upload"),
+    *((method, "/campaigns/c/uploads", None, "upload") for method in ("OPTIONS", "POST")),
+    *((method, "/campaigns/c/uploads/n", None, "upload") for method in ("HEAD", "PATCH", "DELETE")),
     ("POST", "/tooltip", {"machine": "m", "tooling": "t"}, "run"),
     ("POST", "/lobes", {"machine": "m", "toolings": ["t"]}, "run"),
     ("GET", "/lobes/j", None, "read"),

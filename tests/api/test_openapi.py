@@ -87,6 +87,9 @@ NOTHING_TO_SAY = (
     "/health", "/ready", "/metrics", "/v1/keys", "/v1/usage", "/v1/forces/streams", "/v1/examples", "/v1/materials", "/v1/holders",
 )  # fmt: skip
 
+#: Calls that take a table, which chance does not write: all that it sends is refused.
+TABLES = ("/v1/tested-cuts/preview",)
+
 
 @pytest.fixture
 def fuzzing() -> tuple[ModuleType, list[Callable[..., Any]]]:
@@ -181,4 +184,4 @@ def test_the_api_keeps_to_its_description(tmp_path, result, fuzzing):
                     # nothing about it can be wrong
                     assert mode is schemathesis.GenerationMode.NEGATIVE
             assert fuzzed.statuses, operation.label
-            assert len(fuzzed.statuses) > 1 or operation.path in NOTHING_TO_SAY, (operation.label, fuzzed.statuses)
+            assert len(fuzzed.statuses) > 1 or operation.path in (*NOTHING_TO_SAY, *TABLES), (operation.label, fuzzed.statuses)
