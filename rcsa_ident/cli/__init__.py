@@ -29,6 +29,7 @@ from rcsa_ident.cli import (  # noqa: E402
     machine,
     plan,
     schema,
+    tap,
     tools,
 )
 
@@ -60,7 +61,15 @@ app = typer.Typer(
 _COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
     "Identification": (demo.demo, identify.check, identify.identify, plan.plan, export.export),
     "Tool change": (lobes.tooltip, lobes.lobes, advice.advise, cases.cases, forces.forces, tools.import_tools, tools.holders, tools.draw),
-    "Further measurements": (listen.listen, calibrate.calibrate, calibrate.materials, compare.compare, decouple.decouple, contact.contact),
+    "Further measurements": (
+        listen.listen,
+        tap.tap,
+        calibrate.calibrate,
+        calibrate.materials,
+        compare.compare,
+        decouple.decouple,
+        contact.contact,
+    ),
     "Virtual machine and set-up": (machine.simulate, schema.schema, machine.warm),
 }
 for _title, _commands in _COMMANDS.items():

@@ -41,6 +41,8 @@ FORCES = {"n": 1.0, "kn": 1e3, "lbf": 4.4482216152605, "lb": 4.4482216152605}
 UNITS_ALLOWED = "motion over force, as m/N, um/N, mm/N, in/lbf, m/s/N, m/s^2/N, g/N"
 _KINDS = {DISPLACEMENT: 0, VELOCITY: 1, ACCELERATION: 2}
 _LARGEST = 128 * MEGABYTE
+#: Last frequency [Hz] below which more lines than hertz are samples over time.
+_LOWEST_END = 60.0
 #: Lines of names and remarks in front of the numbers of a text file.
 _MOST_HEADER = 200
 
@@ -288,6 +290,9 @@ def _from_columns(path: str | Path, scale: tuple[float, int] | None) -> list[Tap
     table = np.array(rows)
     if not np.all(np.isfinite(table)):
         raise InputError("FRF", "numbers that are not finite", "finite numbers", where)
+    if table[-1, 0] < _LOWEST_END and len(rows) > table[-1, 0] - table[0, 0]:
+        found = f"{len(rows)} lines up to {table[-1, 0]:g}"
+        raise InputError("FRF", f"{found}: samples over time?", "frequencies [Hz] of a machine; hits of a hammer are read by tap", where)
     frequency, values_ = _receptance(table[:, 0], table[:, 1] + 1j * table[:, 2], scale or _unit_in(names), where)
     return [TapTest(frequency, values_, "", "", 1, "", where)]
 

@@ -9,6 +9,7 @@ import pytest
 
 from rcsa_ident.io.open_recording import open_recording
 from rcsa_ident.signals.listening import Heard, Listening
+from rcsa_ident.signals.tap import tap
 from rcsa_ident.units import from_rpm, to_rpm
 from rcsa_ident.workflows.listen import listen_to
 
@@ -84,3 +85,13 @@ def test_the_sound_of_that_speed_is_stable():
     assert answer.verdict is Heard.STABLE
     assert to_rpm(answer.spindle_speed) == pytest.approx(4488.8, rel=3e-4)
     assert to_rpm(heard("Stable.wav", spindle_speed=from_rpm(4494.0)).spindle_speed) == pytest.approx(4488.8, rel=3e-4)
+
+
+def test_a_real_hit_gives_its_analysers_receptance():
+    opened = open_recording(SHARED / "hammer" / "raw_tap_tip_tip.txt")
+    force, response = (each.samples for each in opened.channels)
+    found = tap(opened.rate, [(force, response)])
+    near = (found.omega > 2.0 * np.pi * 300.0) & (found.omega < 2.0 * np.pi * 3000.0)
+    peak = int(np.argmax(np.abs(found.receptance[near])))
+    assert np.abs(found.receptance[near])[peak] == pytest.approx(6.76e-7, rel=0.01)
+    assert found.omega[near][peak] / (2.0 * np.pi) == pytest.approx(1056.0, abs=1.0)
