@@ -7,8 +7,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
 
 from fastapi import Request
-from python_multipart.exceptions import FormParserError
-from python_multipart.multipart import MultipartParser, parse_options_header
+from multipart import MultipartError, MultipartSegment, PushMultipartParser, parse_options_header
 
 from api.components import Components
 from api.files import Part
@@ -44,61 +43,25 @@ async def events(request: Request, components: Components) -> AsyncIterator[Head
     Problem
         400 where the body is not a complete form, 408 and 413 as from `blocks`.
     """
-    options = parse_options_header(request.headers.get("content-type", ""))[1]
-    found: list[Head | bytes | None] = []
-    heads: dict[bytes, bytes] = {}
-    name, value, count, whole = bytearray(), bytearray(), 0, False
-
-    def begin() -> None:
-        nonlocal count
-        count += 1
-        if count > MOST_PARTS:
-            raise Problem(413, f"the body is too large: at most {MOST_PARTS} parts")
-        heads.clear()
-
-    def header() -> None:
-        heads[bytes(name).lower()] = bytes(value)
-        name.clear()
-        value.clear()
-
-    def end() -> None:
-        nonlocal whole
-        whole = True
-
+    boundary, parts = parse_options_header(request.headers.get("content-type", ""))[1].get("boundary", ""), 0
     try:
-        parser = MultipartParser(
-            options.get(b"boundary", b""),
-            {
-                "on_part_begin": begin,
-                "on_header_field": lambda data, start, end: name.extend(data[start:end]),
-                "on_header_value": lambda data, start, end: value.extend(data[start:end]),
-                "on_header_end": header,
-                "on_headers_finished": lambda: found.append(_head(heads)),
-                "on_part_data": lambda data, start, end: found.append(bytes(data[start:end])),
-                "on_part_end": lambda: found.append(None),
-                "on_end": end,
-            },
-        )
-        if not options.get(b"boundary"):
-            raise FormParserError
-        async for block in blocks(request, components):
-            parser.write(bytes(block))
-            for each in found:
-                yield each
-            found.clear()
-        parser.finalize()
-        if not whole:
-            # the parser accepts a truncated last part
-            raise FormParserError
-    except FormParserError:
+        # any byte is a character of Latin-1: a name that is not UTF-8 speaks against its part alone
+        with PushMultipartParser(boundary, header_charset="latin-1") as parser:
+            async for block in blocks(request, components):
+                for event in parser.parse(block):
+                    if not isinstance(event, MultipartSegment):
+                        yield event
+                        continue
+                    parts += 1
+                    if parts > MOST_PARTS:
+                        raise Problem(413, f"the body is too large: at most {MOST_PARTS} parts")
+                    yield Head(_utf8(event.name or ""), None if event.filename is None else recording_name(_utf8(event.filename)))
+    except MultipartError:
         raise Problem(400, "the body cannot be read: it is not complete multipart/form-data") from None
 
 
-def _head(heads: dict[bytes, bytes]) -> Head:
-    options = parse_options_header(heads.get(b"content-disposition", b""))[1]
-    name = options.get(b"filename")
-    found = None if name is None else recording_name(name.decode("utf-8", "replace"))
-    return Head(options.get(b"name", b"").decode("utf-8", "replace"), found)
+def _utf8(text: str) -> str:
+    return text.encode("latin-1").decode("utf-8", "replace")
 
 
 @asynccontextmanager
