@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, non_negative, positive
@@ -146,9 +145,11 @@ def decimator(factor: int, attenuation: float = 90.0) -> FloatArray:
 
     Flat to 0.4 of the new rate, down by `attenuation` dB from 0.6 of it on: what folds lands above 0.4.
     """
-    count, beta = scipy.signal.kaiserord(attenuation, 0.2 / factor * 2.0)
+    from scipy.signal import firwin, kaiserord  # slow to import, and files are read without it
+
+    count, beta = kaiserord(attenuation, 0.2 / factor * 2.0)
     half = int(np.ceil(count / 2 / factor)) * factor
-    return scipy.signal.firwin(2 * half + 1, 1.0 / factor, window=("kaiser", beta))
+    return firwin(2 * half + 1, 1.0 / factor, window=("kaiser", beta))
 
 
 def padding(factor: int) -> int:
@@ -175,18 +176,20 @@ def sample(values: FloatArray, factor: int, fine_step: float, delay: float, band
     -------
     array, shape (n,)
     """
+    from scipy.signal import lfilter, upfirdn
+
     if bandwidth is not None:
         # exact for linear interpolation between the fine samples
         x = 2.0 * np.pi * bandwidth * fine_step
         decay = np.exp(-x)
         ramp = 1.0 - (1.0 - decay) / x
         start = values[0] * (1.0 - ramp)
-        values, _ = scipy.signal.lfilter([ramp, 1.0 - decay - ramp], [1.0, -decay], values, zi=[start])
+        values, _ = lfilter([ramp, 1.0 - decay - ramp], [1.0, -decay], values, zi=[start])
     taps = decimator(factor)
     pad = taps.size // 2 // factor
     if delay > 0.0:
         taps = _delayed(taps, delay / fine_step)
-    filtered = scipy.signal.upfirdn(taps, values, down=factor)
+    filtered = upfirdn(taps, values, down=factor)
     count = (values.size - 1) // factor + 1 - 2 * pad
     return filtered[2 * pad : 2 * pad + count]
 

@@ -41,7 +41,7 @@ def test_the_examples_give_no_warning():
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("contact.translational_stiffness", 3e4, "N/um per m (3e+10 N/m per m)?"),
+        ("contact.translational_stiffness", 3e4, "N/µm per m (3e+10 N/m per m)?"),
         ("tool.stickout_mm", 0.0659, "given in metres (65.9 mm)?"),
         ("tool.segments[1].inner_diameter_mm", 11.9, "a bore of at most 0.6 times the outer diameter"),
         ("cutter.diameter_mm", 0.012, "given in metres (12 mm)?"),

@@ -61,7 +61,7 @@ CASES = [
     ("[shaft]", "[shafts]", "shafts", "did you mean shaft"),
     ("position_mm = 48.0", "position_mm = 4800.0", "position_mm", "440"),
     ("stiffness = [3.6e8, 3.3e8]", "stiffness = 3.6e8", "bearings[0].stiffness", "2 finite numbers"),
-    ("stiffness = [3.6e8, 3.3e8]", "stiffness = [3.6e8, -1.0]", "bearings.stiffness", "greater than 0"),
+    ("stiffness = [3.6e8, 3.3e8]", "stiffness = [3.6e8, -1.0]", "bearings[0].stiffness", "numbers above 0"),
     ("damping = [8.5e3, 7.6e3]", "damping = [8.5e3, nan]", "bearings[0].damping", "finite"),
     ("mass = 160.0", "mass = 0.0", "housing.mass", "above 0"),
     ("mass = 160.0", "mass = 160.0\nangle_deg = 200.0", "housing.angle_deg", "at most 180"),
