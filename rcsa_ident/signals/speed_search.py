@@ -102,7 +102,8 @@ def find_rotation(samples: FloatArray, rate: float, lowest: float, highest: floa
         frequency /= parts
     # a member that the spindle's multiples do not hold explains as much by other lines
     others = tuple(each for each, _, _ in members if each > frequency and abs(each / frequency - round(each / frequency)) > APART)
-    return FoundSpeed(_fitted(samples, rate, frequency)[0], others)
+    known = {each: rotation for each, rotation, _ in fits} if spare == 0 else {}
+    return FoundSpeed(known.get(frequency) or _fitted(samples, rate, frequency)[0], others)
 
 
 def _parts(samples: FloatArray, rate: float, frequency: float, lowest: float) -> int:
