@@ -27,9 +27,7 @@ _SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-
 _NAME_AND_UNIT = re.compile(r"^(?P<name>.*?)\s*[(\[](?P<unit>[^()\[\]]*(?:\([^()]*\)[^()\[\]]*)?)[)\]]\s*$")
 _DERIVATIVES = {0: Quantity.DISPLACEMENT, 2: Quantity.ACCELERATION}
 #: A sampling rate in the lines above a table.
-_RATE_WORDS = re.compile(
-    r"(?:sampl\w*[ _]?(?:rate|freq\w*)|abtastrate)[^\d]*?(?:\[?(?P<unit>k?hz)\]?)?[^\d-]*(?P<value>\d+(?:[.,]\d+)?)", re.IGNORECASE
-)
+_RATE_WORDS = re.compile(r"(?:sampl\w*[ _]?(?:rate|freq\w*)|abtastrate)\D*(?P<value>\d+(?:[.,]\d+)?)", re.IGNORECASE)
 #: Lines of remarks in front of the names, at most.
 _MOST_HEADER = 200
 #: Formats of sound.
@@ -256,8 +254,7 @@ def _of_unit(unit: str) -> tuple[float, Quantity | None]:
 def _numbers(lines: Sequence[str], start: int, delimiter: str, comma: bool, width: int, where: str) -> FloatArray:
     """All lines of numbers, shape (n, width); a header that comes again is left out, an empty cell is NaN."""
     rows = [line for line in lines[start:] if line and not line.isspace()]
-    head = [line for line in lines[:start] if line]
-    repeated = set(head)
+    repeated = set(lines[:start])
     rows = [row for row in rows if row not in repeated]
     if comma:
         rows = [row.replace(",", ".") for row in rows]

@@ -17,7 +17,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.files import MEGABYTE, read_bytes, write_text
 from rcsa_ident.io.validated_table import Table, as_number, describe
 from rcsa_ident.io.workpieces import workpiece_of
-from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity
 from rcsa_ident.units import from_hz, to_hz
 
 SCHEMA_VERSION = 1
@@ -144,7 +144,7 @@ def check_result(data: Any, where: str) -> None:
         top.text(key)
     _check_campaign(top.table("campaign"))
     for sensor in top.named_tables("sensors").values():
-        if sensor.text("quantity", choices=tuple(Quantity)) != Quantity.TRIGGER:
+        if sensor.text("quantity", choices=CAMPAIGN_QUANTITIES) != Quantity.TRIGGER:
             sensor.text("axis", choices=tuple(AXES))
             sensor.number("sensitivity")
     workpiece_of(top.table("workpiece"))

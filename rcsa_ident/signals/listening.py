@@ -336,13 +336,12 @@ def _on_multiples(power: FloatArray, teeth: int) -> float:
     return float(power[teeth - 1 :: teeth].sum() / (power.sum() + 1e-300))
 
 
-def _teeth(power: FloatArray, least: float | None = None) -> int | None:
+def _teeth(power: FloatArray, least: float = _TOOTH_SHARE) -> int | None:
     """Largest number whose multiples hold most of the power of the lines 1, 2, ...; None where none above 1 does.
 
     A line that a resonance lifts may hold most of it alone: where the other multiples of a part of the number stand out as well, the
     part is the number.
     """
-    least = _TOOTH_SHARE if least is None else least
     counts = [teeth for teeth in range(2, min(_MOST_TEETH, power.size) + 1) if _on_multiples(power, teeth) > least]
     teeth, order = max(counts, default=1), np.arange(1, power.size + 1)
     for part in (part for part in range(teeth - 1, 1, -1) if teeth % part == 0):

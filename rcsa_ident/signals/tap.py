@@ -79,7 +79,8 @@ class TapFrf:
         None of a single hit, where it says nothing.
     hits : tuple of Hit
     window_decay : float [1/s]
-        Of the exponential window of the responses, 0 without one: what it adds to the decay of every mode.
+        Of the exponential window of force and responses, 0 without one: the receptance is that at i omega + window_decay, every mode
+        decays so much faster.
     """
 
     omega: FloatArray
@@ -168,10 +169,12 @@ def tap(
         variance = 0.5 * noise / total
     else:
         variance = np.abs(found) ** 2 * np.maximum(1.0 - told, 0.0) / np.maximum(2.0 * told * good.sum(), 1e-12)
-    scale = (1j * omega) ** derivative
+    # at s = i omega + decay, where the window has moved everything to
+    s = 1j * omega + decay
+    scale = s**derivative
     receptance = found / scale
     if sensor_mass:
-        receptance = receptance / (1.0 + omega**2 * sensor_mass * receptance)
+        receptance = receptance / (1.0 - s**2 * sensor_mass * receptance)
     return TapFrf(omega, receptance, variance / np.abs(scale) ** 2, told, tuple(hits), decay)
 
 
@@ -191,9 +194,8 @@ def _hits(record: int, force: FloatArray, response: FloatArray, rate: float) -> 
     for first, end in zip(firsts.tolist(), ends.tolist(), strict=True):
         start, stop = max(first - before, 0), int(end) if end == force.size else int(end) - before
         top = first + int(np.argmax(size[first : first + round(_BOUNCE * rate)]))
-        hit = Hit(record, top / rate, float(size[top]))
         reason = _fault(size, response, start, top, stop, rate)
-        found.append((Hit(record, hit.time, hit.force, reason), None if reason else (force[start:stop], response[start:stop])))
+        found.append((Hit(record, top / rate, float(size[top]), reason), None if reason else (force[start:stop], response[start:stop])))
     return found
 
 
@@ -220,7 +222,7 @@ def _offset(response: FloatArray, rate: float) -> float:
 
 
 def _noise(response: FloatArray, rate: float) -> float:
-    """Mean square of a response in front of the hit, or at its end where that is quieter than nothing at all."""
+    """Mean square of a response in front of the hit or at its end, the larger one: what is in front may be a trigger's zeros."""
     return float(max(np.var(response[: max(round(0.5 * _BEFORE * rate), 2)]), np.var(response[-max(response.size // 20, 2) :])))
 
 
