@@ -290,7 +290,7 @@ def _from_columns(path: str | Path, scale: tuple[float, int] | None) -> list[Tap
     table = np.array(rows)
     if not np.all(np.isfinite(table)):
         raise InputError("FRF", "numbers that are not finite", "finite numbers", where)
-    if table[-1, 0] < _LOWEST_END and len(rows) > table[-1, 0] - table[0, 0]:
+    if table[-1, 0] < _LOWEST_END and len(rows) > table[-1, 0] - table[0, 0] > 0:
         found = f"{len(rows)} lines up to {table[-1, 0]:g}"
         raise InputError("FRF", f"{found}: samples over time?", "frequencies [Hz] of a machine; hits of a hammer are read by tap", where)
     frequency, values_ = _receptance(table[:, 0], table[:, 1] + 1j * table[:, 2], scale or _unit_in(names), where)

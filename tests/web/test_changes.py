@@ -149,7 +149,7 @@ def test_edits_that_are_not_saved_are_asked_for(opened, client: Client, served: 
     toolings.click()
     page.get_by_role("button", name="Stay here").click()
     expect(page.locator("h1")).to_have_text("S9-edits")
-    assert page.url.endswith("#/toolings/edit/S9-edits")
+    expect(page).to_have_url(re.compile("#/toolings/edit/S9-edits$"))
     expect(teeth).to_have_value("3")
     page.get_by_role("button", name="Save", exact=True).click()
     expect(page.locator("tbody tr", has_text="changed the tooling S9-edits")).to_be_visible()
