@@ -23,6 +23,7 @@ from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.units import from_hz
+from rcsa_ident.virtual.disturbances import Disturbances
 from rcsa_ident.workflows.simulate import true_receptances
 
 EVALUATION = tuple(range(1, 11))
@@ -39,8 +40,19 @@ TURNED_SAMPLE: dict[str, tuple[float, tuple[float, ...], bool, float]] = {
     "gyroscopic": (0.0, (0.0,) * 3, True, 1.0),
     "turned": (14.0, (-17.0, -4.0, 11.0), True, 1.0),
 }
-#: What tells the campaigns of one machine apart: trigger or none, and the factor on the noise of gap and accelerometer.
-CONDITIONS = {"trigger": (True, 1.0), "no-trigger": (False, 1.0), "noise-x3": (False, 3.0)}
+#: What a workshop adds; fixed on 2026-11-23, before the speed was followed inside the record.
+WORKSHOP = Disturbances(speed_wander=1e-3, wander_time=0.3, clock_error=1e-3, hum=2e-7, knocks=3.0, knock=1e-7)
+#: Before and behind the steady part of each cut, whose length stays as it is [s].
+ENTRY = 0.05
+#: What tells the campaigns of one machine apart: trigger or none, the factor on the noise of gap and accelerometer, what disturbs.
+CONDITIONS = {
+    "trigger": (True, 1.0, None),
+    "no-trigger": (False, 1.0, None),
+    "noise-x3": (False, 3.0, None),
+    "workshop": (False, 1.0, WORKSHOP),
+    "workshop-trigger": (True, 1.0, WORKSHOP),
+    "workshop-loud": (False, 1.0, replace(WORKSHOP, machine_noise=3.4)),
+}
 #: Toolings that cut, and those that never do: one in a holder that cut, one in another.
 CUT, HELD_OUT = ("first", "second"), ("similar", "different")
 #: The stability limit at every speed is at least so many times the depth of the cuts.
@@ -177,10 +189,14 @@ def named(names: Sequence[str]) -> list[str]:
 
 def under(machine: MachineFile, condition: str) -> MachineFile:
     """Return the machine with the sensors of one of the `CONDITIONS`."""
-    trigger, noise = CONDITIONS[condition]
-    sensors = machine.sensors
+    trigger, noise, disturbances = CONDITIONS[condition]
+    sensors, plan = machine.sensors, machine.plan
     gap, acceleration = noise * sensors.gap_noise, noise * sensors.acceleration_noise
-    return replace(machine, sensors=replace(sensors, trigger=trigger, gap_noise=gap, acceleration_noise=acceleration))
+    machine = replace(machine, sensors=replace(sensors, trigger=trigger, gap_noise=gap, acceleration_noise=acceleration))
+    if disturbances is None:
+        return machine
+    plan = replace(plan, duration=plan.duration + 2.0 * ENTRY, entry=ENTRY, leave=ENTRY)
+    return replace(machine, disturbances=disturbances, plan=plan)
 
 
 def least_limit(machine: MachineFile) -> float:

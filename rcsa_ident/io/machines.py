@@ -17,10 +17,11 @@ from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Workpiece
 from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH
 from rcsa_ident.units import from_rpm, to_rpm
+from rcsa_ident.virtual.disturbances import Disturbances
 from rcsa_ident.virtual.machine import Bearing, CutPlan, FlangeJoint, Housing, PerAxis, VirtualSpindle
-from rcsa_ident.virtual.sensors import SensorSuite
+from rcsa_ident.virtual.sensors import UNDISTURBED, SensorSuite
 
-_TOP = ("machine", "shaft", "materials", "bearings", "housing", "joint", "sensors", "workpiece", "cuts")
+_TOP = ("machine", "shaft", "materials", "bearings", "housing", "joint", "sensors", "disturbances", "workpiece", "cuts")
 _BEARING = ("position_mm", "stiffness", "damping", "softening_per_rpm", "angle_deg")
 _HOUSING = ("position_mm", "mass", "inertia", "stiffness", "damping", "tilting_stiffness", "tilting_damping", "angle_deg")
 _JOINT = ("translational_stiffness", "translational_damping", "rotational_stiffness", "rotational_damping")
@@ -31,7 +32,10 @@ _SENSORS = (
 )  # fmt: skip
 _CUTS = (
     "toolings", "truth_toolings", "spindle_speeds_rpm", "axial_depth_mm", "feed_per_tooth_mm", "entry_angle_deg", "exit_angle_deg",
-    "feed_direction", "duration_s", "settling_s",
+    "feed_direction", "duration_s", "settling_s", "entry_s", "exit_s",
+)  # fmt: skip
+_DISTURBANCES = (
+    "speed_wander_percent", "wander_time_s", "clock_error_percent", "hum_um", "mains_hz", "machine_noise", "knocks_per_s", "knock_um",
 )  # fmt: skip
 
 
@@ -50,6 +54,7 @@ class MachineFile:
         Tooling files of the cuts.
     truth_toolings : tuple of Path
         Toolings that never cut, whose receptances are wanted.
+    disturbances : Disturbances
     """
 
     name: str
@@ -59,6 +64,7 @@ class MachineFile:
     plan: CutPlan
     toolings: tuple[Path, ...]
     truth_toolings: tuple[Path, ...] = ()
+    disturbances: Disturbances = UNDISTURBED
 
 
 def read_machine(path: str | Path) -> MachineFile:
@@ -114,6 +120,7 @@ def machine_of(data: Mapping[str, Any], where: str, name: str, folder: Path) -> 
             plan=plan,
             toolings=_paths(cuts, "toolings", folder, required=True),
             truth_toolings=_paths(cuts, "truth_toolings", folder, required=False),
+            disturbances=_disturbances(top.table("disturbances", _DISTURBANCES, {})),
         )
 
 
@@ -172,6 +179,20 @@ def _sensors(table: Table) -> SensorSuite:
     )
 
 
+def _disturbances(table: Table) -> Disturbances:
+    usual = UNDISTURBED
+    return Disturbances(
+        speed_wander=table.number("speed_wander_percent", "%", usual.speed_wander * 1e2, least=0.0, most=2.0) * 1e-2,
+        wander_time=table.number("wander_time_s", "s", usual.wander_time, above=0.0, most=60.0),
+        clock_error=table.number("clock_error_percent", "%", usual.clock_error * 1e2, least=-2.0, most=2.0) * 1e-2,
+        hum=table.number("hum_um", "um", usual.hum * 1e6, least=0.0) * 1e-6,
+        mains=table.number("mains_hz", "Hz", usual.mains, above=0.0, most=1000.0),
+        machine_noise=table.number("machine_noise", "m/s^2", usual.machine_noise, least=0.0),
+        knocks=table.number("knocks_per_s", "1/s", usual.knocks, least=0.0, most=1000.0),
+        knock=table.number("knock_um", "um", usual.knock * 1e6, least=0.0) * 1e-6,
+    )
+
+
 def _plan(table: Table) -> CutPlan:
     entry = table.number("entry_angle_deg", "deg", least=0.0, most=180.0)
     exit_ = table.number("exit_angle_deg", "deg", least=0.0, most=180.0)
@@ -185,6 +206,8 @@ def _plan(table: Table) -> CutPlan:
         feed_angle=feed_angle_of(table),
         duration=table.number("duration_s", "s", 0.3, above=0.0, most=60.0),
         settling=table.number("settling_s", "s", 0.15, least=0.0, most=60.0),
+        entry=table.number("entry_s", "s", 0.0, least=0.0, most=60.0),
+        leave=table.number("exit_s", "s", 0.0, least=0.0, most=60.0),
     )
 
 

@@ -58,7 +58,9 @@ def align(cut: ComplexArray, air: ComplexArray, teeth: int, highest: int = 16) -
     return angle % (2.0 * np.pi), float(min(std, unknown[1]))
 
 
-def trigger_edge(recording: Recording, speed: float, window: slice = slice(None)) -> tuple[float, float] | None:
+def trigger_edge(
+    recording: Recording, speed: float, window: slice = slice(None), deviation: FloatArray | None = None
+) -> tuple[float, float] | None:
     """Return the time of the first trigger edge, from all edges of the record (or a window) together, and its standard deviation [s].
 
     A sampled edge is seen at the first sample behind it. Each one thus bounds the first edge's time from both sides;
@@ -72,6 +74,9 @@ def trigger_edge(recording: Recording, speed: float, window: slice = slice(None)
         Spindle speed, as found in the record.
     window : slice
         Where the speed was found, if not in the whole record.
+    deviation : array [rad], optional
+        Of the spindle's angle in the window from that at this speed, where it does not turn evenly; the time is that at which the edge
+        would come if it did.
 
     Returns
     -------
@@ -82,9 +87,13 @@ def trigger_edge(recording: Recording, speed: float, window: slice = slice(None)
     if found is None:
         return None
     sensor, x = found
-    edges = _rising(x) + (window.start or 0)
+    edges = _rising(x).astype(float)
     if edges.size < 2:
         return None
+    if deviation is not None:
+        # the edge lies half a sample before the one that shows it
+        edges += np.interp(edges - 0.5, np.arange(deviation.size), deviation) / speed * recording.rate
+    edges += window.start or 0
     period = 2.0 * np.pi / speed / sensor.pulses_per_revolution * recording.rate
     pace = np.mean(np.exp(2j * np.pi * edges / period))
     if np.abs(pace) < 0.5:
@@ -112,7 +121,7 @@ def angle_to_air(cut: SteadyRecord, air: SteadyRecord, teeth: int) -> tuple[floa
     cut, air : SteadyRecord
     teeth : int
     """
-    edges = [trigger_edge(each.recording, each.spindle_speed, each.window) for each in (cut, air)]
+    edges = [trigger_edge(each.recording, each.spindle_speed, *followed(each)) for each in (cut, air)]
     if edges[0] is None or edges[1] is None:
         return align(cut.flange, air.flange, teeth)
     turned, std = ((air.spindle_speed * a, cut.spindle_speed * c) for a, c in zip(edges[1], edges[0], strict=True))
@@ -123,7 +132,9 @@ def angle_to_air(cut: SteadyRecord, air: SteadyRecord, teeth: int) -> tuple[floa
     return float(trial[best]), float(np.hypot(*std))
 
 
-def trigger_delay(recording: Recording, speed: float, teeth: int, window: slice = slice(None)) -> tuple[float | None, float | None, bool]:
+def trigger_delay(
+    recording: Recording, speed: float, teeth: int, window: slice = slice(None), deviation: FloatArray | None = None
+) -> tuple[float | None, float | None, bool]:
     """Return when tooth 1 stands at immersion 0, its standard deviation [s], and whether the tooth angle at the edge is known.
 
     Where it is not, the time is that of the edge: the delay is later by the angle, the same in all cuts of a clamping. With
@@ -138,14 +149,21 @@ def trigger_delay(recording: Recording, speed: float, teeth: int, window: slice 
     teeth : int
     window : slice
         Where the speed was found, if not in the whole record.
+    deviation : array [rad], optional
+        As in `trigger_edge`.
     """
-    edge = trigger_edge(recording, speed, window)
+    edge = trigger_edge(recording, speed, window, deviation)
     sensor = None if edge is None else _trigger(recording)
     if edge is None or sensor is None or teeth % sensor.pulses_per_revolution != 0:
         return None, None, True
     if sensor.tooth_angle is None:
         return *edge, False
     return edge[0] - sensor.tooth_angle / speed, edge[1], True
+
+
+def followed(steady: SteadyRecord) -> tuple[slice, FloatArray | None]:
+    """Return where the speed of a record is known, all that was looked at if it does not change, and the angle's deviation there."""
+    return (steady.window, None) if steady.deviation is None else (steady.part, steady.deviation)
 
 
 def _trigger(recording: Recording) -> Sensor:

@@ -16,11 +16,11 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
 from rcsa_ident.remarks import Remark, says
 from rcsa_ident.shown import Shown
-from rcsa_ident.signals.alignment import angle_to_air, trigger_delay
+from rcsa_ident.signals.alignment import angle_to_air, followed, trigger_delay
 from rcsa_ident.signals.frf import AxisLines, Estimator, LineEstimator, turned_air
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
-from rcsa_ident.signals.verdict import RecordCode, Verdict, chatter, examined, raw_faults, silence, speed_faults, tooth_count_fault
+from rcsa_ident.signals.verdict import RecordCode, Verdict, chatter, examined, raw_faults, silence, smeared, speed_faults, tooth_count_fault
 
 #: Highest line that is used [Hz].
 MAX_FREQUENCY = 4300.0
@@ -141,7 +141,7 @@ def measure_cut(
         steady = steady_record(cut, axes, programmed, max_frequency, cutter.teeth)
     except Unsteady as error:
         return left_out((_not_steady(error),))
-    notes += _in_part(steady)
+    notes += _remarkable(steady)
     found = steady.spindle_speed, _harmonics(steady)
     faults = _speed_faults(steady, programmed)
     if faults:
@@ -172,7 +172,7 @@ def measure_cut(
     lines = estimator.lines(steady, still, angle, harmonic, own, slope[:, measured])
     both = {a: replace(lines[a], across=force[:, o], across_slope=slope[:, o]) for a, o in zip(axes, other, strict=True)}
     kept = {axis: both[axis].of(k) for axis, k in zip(axes, strong.T, strict=True) if k.any()}
-    measurement = CutMeasurement(cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth, steady.window))
+    measurement = CutMeasurement(cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth, *followed(steady)))
     verdict = Verdict((), notes if air is not None else (*notes, NO_AIR))
     return Reading(cut_id, tooling, programmed, verdict, measurement, *found)
 
@@ -203,17 +203,22 @@ def judge_air(cut_id: str, tooling: str, air: Recording, conditions: CuttingCond
         still = steady_record(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
     except Unsteady as error:
         return Reading(cut_id, tooling, programmed, Verdict((_not_steady(error),), looked_at.notes))
-    verdict = Verdict(_speed_faults(still, programmed), (*looked_at.notes, *_in_part(still)))
+    verdict = Verdict(_speed_faults(still, programmed), (*looked_at.notes, *_remarkable(still)))
     return Reading(cut_id, tooling, programmed, verdict, None, still.spindle_speed, _harmonics(still))
 
 
-def _in_part(steady: SteadyRecord) -> tuple[Remark, ...]:
-    """A note where a long recording was looked at in a window only."""
+def _remarkable(steady: SteadyRecord) -> tuple[Remark, ...]:
+    """Notes: that a long recording was looked at in a window only, and that a speed was followed."""
     seconds, rate = steady.recording.samples.shape[0] / steady.recording.rate, steady.recording.rate
     first, last = steady.window.start / rate, steady.window.stop / rate
-    if last - first >= seconds:
-        return ()
-    return (Remark(RecordCode.LONG, f"long: of {seconds:.4g} s those from {first:.4g} to {last:.4g} s are used, where the cut is steady"),)
+    notes = []
+    if last - first < seconds:
+        words = f"long: of {seconds:.4g} s those from {first:.4g} to {last:.4g} s are used, where the cut is steady"
+        notes.append(Remark(RecordCode.LONG, words))
+    if steady.wander is not None:
+        words = f"the speed changes by {100.0 * steady.wander:.2g} % (standard deviation) within the record, and is followed"
+        notes.append(Remark(RecordCode.FOLLOWED, words))
+    return tuple(notes)
 
 
 def _not_steady(error: Unsteady) -> Remark:
@@ -222,7 +227,8 @@ def _not_steady(error: Unsteady) -> Remark:
 
 def _speed_faults(steady: SteadyRecord, programmed: float) -> tuple[Remark, ...]:
     """The first reason against the speed of a steady part."""
-    return speed_faults(steady.displacement, steady.lines, programmed)[:1]
+    smear = smeared(steady.wander)
+    return (*speed_faults(steady.displacement, steady.lines, programmed, steady.deviation), *((smear,) if smear else ()))[:1]
 
 
 def _harmonics(steady: SteadyRecord) -> dict[Dof, int]:
@@ -244,7 +250,8 @@ def _cut_faults(
         difference, noise = difference - turned, noise + more
     forced = np.abs(difference[harmonic])
     band = (0.5 * cutter.teeth * cut.spindle_speed / (2.0 * np.pi), max_frequency)
-    reasons = [silence(forced**2, noise[harmonic]), chatter(cut.lines, list(range(len(cut.axes))), forced.max(axis=0), band)]
+    still = None if air is None else air.lines
+    reasons = [silence(forced**2, noise[harmonic]), chatter(cut.lines, list(range(len(cut.axes))), forced.max(axis=0), band, still)]
     if air is not None and cutter.equally_spaced and reasons[0] is None:
         reasons.append(tooth_count_fault(np.sum(np.abs(difference) ** 2, axis=1), cutter.teeth))
     return tuple(reason for reason in reasons if reason is not None)

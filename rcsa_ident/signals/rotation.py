@@ -22,6 +22,8 @@ _BLOCK_TURNS, _SHORTEST_BLOCK = 4.0, 0.012
 #: Times over which the lines' amplitudes are taken as one [s], one after the other: neighbours are brought into line before what lies
 #: farther apart, and at last all of the record, since what turns all orders in proportion is the spindle.
 _AMPLITUDE_TIMES = (0.25, 1.0, 4.0, np.inf)
+#: Evidence from which on a speed changes.
+_EVIDENT = 5.0
 #: Spectral densities of the angular acceleration that are tried [rad^2/s^3].
 _DENSITIES = 10.0 ** np.arange(-4.0, 5.0)
 
@@ -39,18 +41,39 @@ class Rotation:
         Middles of the blocks that told it.
     information : array, shape (b,) [1/rad^2]
         What each told of it.
+    evidence : float
+        By how much the record is likelier (logarithm) under a speed that changes than under one that does not.
     """
 
     rate: float
     angle: FloatArray
     time: FloatArray
     information: FloatArray
+    evidence: float = 0.0
 
     @property
     def spindle_speed(self) -> float:
         """Mean speed [rad/s], where the blocks told it."""
         speeds, weight = self.speeds()
         return float(np.average(speeds, weights=weight))
+
+    @property
+    def uneven(self) -> bool:
+        """True where the record says that the speed changes."""
+        return self.evidence > _EVIDENT
+
+    def about(self, speed: float) -> tuple[float, FloatArray]:
+        """Return the speed of the line that fits the angle best [rad/s], and what the angle deviates from it, shape (n,) [rad].
+
+        Parameters
+        ----------
+        speed : float [rad/s]
+            About the speed.
+        """
+        at = np.arange(self.angle.size) - 0.5 * (self.angle.size - 1)
+        off = self.angle - speed / self.rate * (at - at[0])
+        slope = float(at @ off / (at @ at))
+        return speed + slope * self.rate, off - slope * at - off.mean()
 
     @property
     def speed_std(self) -> float:
@@ -151,7 +174,7 @@ def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: Flo
     starts = np.arange(0, at.size - length + 1, hop)
     window = hann(length)
     lines = angle_sums(samples - samples.mean(axis=0), angle, starts, 2.0 / window.sum() * window, highest)[:, 1:]
-    phase, information = _common_phase(lines, np.arange(1, highest + 1)[None, :, None], hop / rate)
+    phase, information, evidence = _common_phase(lines, np.arange(1, highest + 1)[None, :, None], hop / rate)
     time = (starts + 0.5 * (length - 1)) / rate
     if starts.size < 4:
         # no more is told than was known
@@ -160,11 +183,12 @@ def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: Flo
     inside = np.clip(at / rate, time[0], time[-1])
     # beyond the blocks' middles the speed goes on as it is there
     angle = angle + spline(inside) + spline(inside, 1) * (at / rate - inside)
-    return Rotation(rate, angle - angle[0], time, information)
+    return Rotation(rate, angle - angle[0], time, information, evidence)
 
 
-def _common_phase(lines: ComplexArray, order: np.ndarray, step: float) -> tuple[FloatArray, FloatArray]:
-    """Angle [rad] that the lines of each block, shape (b, m, c), have in common beyond the expected one, and its information [1/rad^2]."""
+def _common_phase(lines: ComplexArray, order: np.ndarray, step: float) -> tuple[FloatArray, FloatArray, float]:
+    """Angle [rad] that the lines of each block, shape (b, m, c), have in common beyond the expected one, its information [1/rad^2], and
+    the evidence that it is no straight line."""
     phase = np.zeros(lines.shape[0])
     for reach in _AMPLITUDE_TIMES:
         density = None
@@ -172,13 +196,16 @@ def _common_phase(lines: ComplexArray, order: np.ndarray, step: float) -> tuple[
             turned = lines * np.exp(-1j * phase[:, None, None] * order)
             mean, noise, information = _told(turned, order, reach / step)
             change = np.sum(np.imag(np.conj(mean) * turned) * order / noise, axis=(1, 2)) / information
-            new, density = _smoothed(phase + np.clip(change, -0.3, 0.3), information, step, density)
+            new, density, _ = _smoothed(phase + np.clip(change, -0.3, 0.3), information, step, density)
             moved, phase = float(np.max(np.abs(new - phase))), new
             if moved < 1e-3:
                 break
-    # what each block itself tells, not the record's mean in it
     turned = lines * np.exp(-1j * phase[:, None, None] * order)
-    return phase, _told(turned, order, _AMPLITUDE_TIMES[0] / step)[2]
+    mean, noise, information = _told(turned, order, np.inf)
+    told = phase + np.sum(np.imag(np.conj(mean) * turned) * order / noise, axis=(1, 2)) / information
+    evidence = _smoothed(told, information, step, None)[2]
+    # what each block itself tells, not the record's mean in it
+    return phase, _told(turned, order, _AMPLITUDE_TIMES[0] / step)[2], evidence
 
 
 def _told(lines: ComplexArray, order: np.ndarray, reach: float) -> tuple[ComplexArray, FloatArray, FloatArray]:
@@ -199,8 +226,9 @@ def _local_mean(lines: ComplexArray, reach: float) -> ComplexArray:
     return (running[last] - running[first]) / (last - first)[:, None, None]
 
 
-def _smoothed(phase: FloatArray, information: FloatArray, step: float, density: float | None) -> tuple[FloatArray, float]:
-    """Phases whose speed walks at random, and the density of its steps: as told, or under which they are likeliest."""
+def _smoothed(phase: FloatArray, information: FloatArray, step: float, density: float | None) -> tuple[FloatArray, float, float]:
+    """Phases whose speed walks at random, the density of its steps (as told, or under which they are likeliest), and by how much they are
+    likelier under it than under the least."""
     n = phase.size
     # squares of second differences: D'D has five diagonals
     diagonal, first, second = np.zeros(n), np.zeros(n), np.zeros(n)
@@ -210,13 +238,14 @@ def _smoothed(phase: FloatArray, information: FloatArray, step: float, density: 
     first[1 : n - 1] -= 2.0
     first[2:] -= 2.0
     second[2:] = 1.0
-    best, likeliest, chosen = phase, -np.inf, 0.0
+    best, likeliest, least, chosen = phase, -np.inf, -np.inf, 0.0
     for each in _DENSITIES if density is None else (density,):
         scale = 1.0 / (each * step**3)
         factor = cholesky_banded(np.array([scale * second, scale * first, scale * diagonal + information]))
         smooth = cho_solve_banded((factor, False), information * phase)
         cost = np.sum(information * (phase - smooth) ** 2) + scale * np.sum(np.diff(smooth, 2) ** 2)
         likelihood = -0.5 * (cost + 2.0 * np.sum(np.log(factor[2])) - (n - 2) * np.log(scale))
+        least = max(least, likelihood) if each == _DENSITIES[0] else least
         if likelihood > likeliest:
             best, likeliest, chosen = smooth, likelihood, float(each)
-    return best, chosen
+    return best, chosen, likeliest - least

@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import next_fast_len
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.signals._kernels import order_signal, order_sums
+from rcsa_ident.signals._kernels import angle_signal, angle_sums, order_signal, order_sums
+from rcsa_ident.signals.recording import BLOCK
 from rcsa_ident.signals.steady_part import hann
 
 #: Share of the programmed speed within which the true one is looked for.
 SPEED_SEARCH = 0.01
 #: Degree of the polynomial that is fitted beside the lines.
 DRIFT_DEGREE = 4
+#: Lines beside the orders: how far one stands above the median amplitude of so many bins around it, and how many are looked for.
+_FAR_ABOVE, _FLOOR_BINS, _MOST_BESIDE = 8.0, 64, 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineSpectrum:
     """Amplitudes of a record at the multiples of its spindle frequency.
 
-    x(t) = Re sum_m amplitude[m] e^{i m Omega t} + slow drift + rest, t from the record's first sample.
+    x(t) = Re sum_m amplitude[m] e^{i m (Omega t + deviation)} + slow drift + lines beside the orders + rest, t from the record's first
+    sample.
 
     Parameters
     ----------
@@ -36,6 +41,10 @@ class LineSpectrum:
     rest : array, shape (n, c)
         What is left of the record without lines and drift.
     rate : float [Hz]
+    beside : array, shape (s,) [rad/s]
+        Frequencies of lines that stand beside the orders: the mains' hum, chatter.
+    beside_signal : array, shape (n, c)
+        What they are in the record; of no rows where there are none.
     """
 
     spindle_speed: float
@@ -44,6 +53,51 @@ class LineSpectrum:
     scatter: FloatArray
     rest: FloatArray
     rate: float
+    beside: FloatArray
+    beside_signal: FloatArray
+
+    @property
+    def off_orders(self) -> FloatArray:
+        """What the record holds beside the orders and the drift, shape (n, c)."""
+        return self.rest + self.beside_signal if self.beside.size else self.rest
+
+
+class _Comb(NamedTuple):
+    """The orders' phase over the samples: step from one to the next, and what it deviates from that, shape (n,), None where it does not."""
+
+    step: float
+    deviation: FloatArray | None = None
+
+    def angle(self, n: int) -> FloatArray:
+        """From the middle of the samples, shape (n,)."""
+        even = self.step * (np.arange(n) - 0.5 * (n - 1))
+        return even if self.deviation is None else even + self.deviation
+
+    def sums(self, data: FloatArray, highest: int) -> ComplexArray:
+        """Sums over the samples times e^{-i m angle}, m from 0, shape (highest + 1, c)."""
+        if self.deviation is None:
+            return order_sums(data, self.step, highest)
+        n = data.shape[0]
+        return angle_sums(data, self.angle(n), np.zeros(1, dtype=int), np.ones(n), highest)[0]
+
+    def products(self, n: int, highest: int) -> ComplexArray:
+        """Sums over n samples of e^{i m angle}, m from -2 highest to 2 highest."""
+        if self.deviation is None:
+            half = 0.5 * np.arange(-2 * highest, 2 * highest + 1) * self.step
+            on_line = np.abs(np.sin(half)) < 1e-15
+            return np.where(on_line, float(n), np.sin(n * half) / np.where(on_line, 1.0, np.sin(half))).astype(complex)
+        sums = self.sums(np.ones((n, 1)), 2 * highest)[:, 0]
+        return np.concatenate([sums[::-1], sums[1:].conj()])
+
+    def signal(self, amplitude: ComplexArray, n: int) -> FloatArray:
+        """Re sum_m amplitude[m] e^{i m angle}, shape (n, c)."""
+        if self.deviation is None:
+            return order_signal(amplitude, self.step, n)
+        return angle_signal(amplitude[None], self.angle(n), n)
+
+    def part(self, start: int, length: int) -> _Comb:
+        """Of samples in a row."""
+        return _Comb(self.step, None if self.deviation is None else self.deviation[start : start + length])
 
 
 def refine_speed(samples: FloatArray, rate: float, nominal: float, orders: int = 16, search: float = SPEED_SEARCH) -> float:
@@ -80,7 +134,7 @@ def refine_speed(samples: FloatArray, rate: float, nominal: float, orders: int =
     return follow_speed(centred, rate, float(2.0 * np.pi * trial[int(np.argmax(score))]), highest)
 
 
-def follow_speed(samples: FloatArray, rate: float, near: float, orders: int = 16) -> float:
+def follow_speed(samples: FloatArray, rate: float, near: float, orders: int = 16, deviation: FloatArray | None = None) -> float:
     """Return the spindle speed that fits best close to a good guess (within a tenth of a turn over the record) [rad/s].
 
     In each of up to eight blocks the lines are fitted; the speed is the one at which all blocks tell the same amplitudes
@@ -95,11 +149,13 @@ def follow_speed(samples: FloatArray, rate: float, near: float, orders: int = 16
         The guess.
     orders : int
         Highest multiple that is fitted.
+    deviation : array, shape (n,) [rad], optional
+        Of the spindle's angle from that at a constant speed.
     """
     step = near / rate
     highest = int(min(orders, 0.9 * np.pi / step))
     for _ in range(4):
-        middles, lines = _block_lines(samples, step, highest, *_blocks(samples.shape[0], 2.0 * np.pi / step))
+        middles, lines = _block_lines(samples, _Comb(step, deviation), highest, *_blocks(samples.shape[0], 2.0 * np.pi / step))
         change = _common_rotation(lines, middles)
         step += change
         if abs(change) * samples.shape[0] * highest < 1e-2:
@@ -121,13 +177,17 @@ def _blocks(n: int, period: float) -> tuple[np.ndarray, int]:
     return np.minimum(starts, n - length) + max(n - length - starts[-1], 0) // 2, length
 
 
-def _block_lines(samples: FloatArray, step: float, highest: int, starts: np.ndarray, length: int) -> tuple[FloatArray, ComplexArray]:
+def _block_lines(samples: FloatArray, comb: _Comb, highest: int, starts: np.ndarray, length: int) -> tuple[FloatArray, ComplexArray]:
     """Blocks' middles from the record's, and their amplitudes with phases from there, shapes (blocks,) and (blocks, m + 1, c)."""
     n, channels = samples.shape
-    side_by_side = np.concatenate([samples[s : s + length] for s in starts], axis=1)
-    amplitude = _fit(side_by_side, step, highest, degree=2)[0].reshape(highest + 1, starts.size, channels).transpose(1, 0, 2)
+    basis = _drift_basis(length, 2)
+    if comb.deviation is None:
+        side_by_side = np.concatenate([samples[s : s + length] for s in starts], axis=1)
+        amplitude = _fit(side_by_side, comb, highest, basis)[0].reshape(highest + 1, starts.size, channels).transpose(1, 0, 2)
+    else:
+        amplitude = np.stack([_fit(samples[s : s + length], comb.part(s, length), highest, basis)[0] for s in starts])
     middles = starts + 0.5 * (length - 1) - 0.5 * (n - 1)
-    return middles, amplitude * np.exp(-1j * np.outer(middles, np.arange(highest + 1)) * step)[:, :, None]
+    return middles, amplitude * np.exp(-1j * np.outer(middles, np.arange(highest + 1)) * comb.step)[:, :, None]
 
 
 def _common_rotation(lines: ComplexArray, middles: FloatArray) -> float:
@@ -148,10 +208,13 @@ def _common_rotation(lines: ComplexArray, middles: FloatArray) -> float:
     return float(change)
 
 
-def line_spectrum(samples: FloatArray, rate: float, spindle_speed: float, max_frequency: float) -> LineSpectrum:
+def line_spectrum(
+    samples: FloatArray, rate: float, spindle_speed: float, max_frequency: float, deviation: FloatArray | None = None
+) -> LineSpectrum:
     """Return the amplitudes at all multiples of the spindle's frequency up to `max_frequency`, by least squares.
 
-    Lines and a slow drift (a polynomial) are fitted together.
+    Lines and a slow drift (a polynomial) are fitted together, and with them lines beside the orders that stand far above the noise
+    (mains' hum): else these would leak into all orders.
 
     Parameters
     ----------
@@ -159,28 +222,87 @@ def line_spectrum(samples: FloatArray, rate: float, spindle_speed: float, max_fr
     rate : float [Hz]
     spindle_speed : float [rad/s]
     max_frequency : float [Hz]
+    deviation : array, shape (n,) [rad], optional
+        Of the spindle's angle from that at this speed, where it does not turn evenly.
     """
     n = samples.shape[0]
-    step = spindle_speed / rate
+    comb = _Comb(spindle_speed / rate, deviation)
     highest = int(min(max_frequency, 0.45 * rate) * 2.0 * np.pi / spindle_speed)
-    amplitude, drift = _fit(samples, step, highest, DRIFT_DEGREE)
-    rest = samples - order_signal(amplitude, step, n) - _drift_basis(n, DRIFT_DEGREE) @ drift
-    parts = _block_lines(samples, step, highest, np.arange(4) * (n // 4), n // 4)[1]
+    basis = _drift_basis(n, DRIFT_DEGREE)
+    amplitude, other = _fit(samples, comb, highest, basis)
+    rest = samples - comb.signal(amplitude, n) - basis @ other
+    beside, swinging = _lines_beside(rest, comb.step), np.zeros((0, samples.shape[1]))
+    if beside.size:
+        every = np.concatenate([basis, _swinging(beside, n)], axis=1)
+        amplitude, other = _fit(samples, comb, highest, every)
+        swinging = every[:, DRIFT_DEGREE:] @ other[DRIFT_DEGREE:]
+        rest = samples - comb.signal(amplitude, n) - basis @ other[:DRIFT_DEGREE] - swinging
+    parts = _block_lines(samples - swinging if beside.size else samples, comb, highest, np.arange(4) * (n // 4), n // 4)[1]
     scatter = np.sum(np.abs(parts - parts.mean(axis=0)) ** 2, axis=0) / (2.0 * 3.0 * 4.0)
-    from_start = amplitude * np.exp(-1j * np.arange(highest + 1) * step * 0.5 * (n - 1))[:, None]
-    return LineSpectrum(spindle_speed, from_start, _floor(rest, step, highest), scatter, rest, rate)
+    from_start = amplitude * np.exp(-1j * np.arange(highest + 1) * comb.step * 0.5 * (n - 1))[:, None]
+    variance = _floor(rest, comb.step, highest)
+    return LineSpectrum(spindle_speed, from_start, variance, scatter, rest, rate, beside * rate, swinging)
 
 
-def segment_lines(samples: FloatArray, rate: float, omega: FloatArray, segments: int = 8) -> ComplexArray:
-    """Return amplitudes at given frequencies in half-overlapping Hann segments [welch1967], phases from the record's start.
+def _lines_beside(rest: FloatArray, step: float) -> FloatArray:
+    """Frequencies [rad per sample] of lines that stand far above the noise around them, clear of the orders; strongest first, few."""
+    n = rest.shape[0]
+    if not 16 * _FLOOR_BINS <= n <= BLOCK:
+        # a long record tells lines apart by itself
+        return np.zeros(0)
+    window, length = hann(n)[:, None], n // 2 // _FLOOR_BINS * _FLOOR_BINS
+    found: list[float] = []
+    omega = 2.0 * np.pi * np.arange(length) / n
+    orders = omega / step
+    clear = np.abs(orders - np.round(orders)) * step > 3.5 * 2.0 * np.pi / n
+    # what a drift leaves lies lowest
+    clear[:6] = False
+    left = rest
+    while len(found) < _MOST_BESIDE:
+        power = np.abs(np.fft.rfft(left * window, axis=0)[:length]) ** 2
+        floor = np.median(power.reshape(-1, _FLOOR_BINS, power.shape[1]), axis=1).repeat(_FLOOR_BINS, axis=0)
+        ratio = np.where(clear, np.max(power / (floor + 1e-300), axis=1), 0.0)
+        peak = int(np.argmax(ratio))
+        if ratio[peak] < _FAR_ABOVE**2:
+            break
+        # a parabola through the logarithms, of all channels together
+        around = np.log(np.sum((power / (floor[peak] + 1e-300))[max(peak - 1, 0) : peak + 2], axis=1) + 1e-300)
+        bend = around[0] - 2.0 * around[1] + around[2] if around.size == 3 else 0.0
+        found.append(float(2.0 * np.pi / n * (peak + (0.5 * (around[0] - around[2]) / bend if bend < 0.0 else 0.0))))
+        columns = _swinging(np.array(found), n)
+        left = rest - columns @ np.linalg.solve(columns.T @ columns, columns.T @ rest)
+        clear &= np.abs(omega - found[-1]) > 2.5 * 2.0 * np.pi / n
+    return np.array(found)
+
+
+def _swinging(omega: FloatArray, n: int) -> FloatArray:
+    """Cosine and sine of frequencies [rad per sample], and both growing along the record: so little is told of them; shape (n, 4 s)."""
+    place = np.arange(n) - 0.5 * (n - 1)
+    phase = place[:, None] * omega
+    both = np.concatenate([np.cos(phase), np.sin(phase)], axis=1)
+    return np.concatenate([both, 2.0 / n * place[:, None] * both], axis=1)
+
+
+def segment_lines(
+    samples: FloatArray,
+    rate: float,
+    spindle_speed: float,
+    order: np.ndarray,
+    segments: int = 8,
+    deviation: FloatArray | None = None,
+) -> ComplexArray:
+    """Return amplitudes at multiples of the spindle's angle in half-overlapping Hann segments [welch1967], phases from the record's start.
 
     Parameters
     ----------
     samples : array, shape (n, c)
     rate : float [Hz]
-    omega : array, shape (m,) [rad/s]
+    spindle_speed : float [rad/s]
+    order : array of int, shape (m,)
     segments : int
         Number of segments.
+    deviation : array, shape (n,) [rad], optional
+        As in `line_spectrum`.
 
     Returns
     -------
@@ -190,31 +312,27 @@ def segment_lines(samples: FloatArray, rate: float, omega: FloatArray, segments:
     length = 2 * n // (segments + 1)
     window = hann(length)
     window = 2.0 * window / window.sum()
-    starts = [s * (n - length) // max(segments - 1, 1) for s in range(segments)]
+    angle = spindle_speed / rate * np.arange(n) + (0.0 if deviation is None else deviation)
     parts = []
-    for start in starts:
-        t = (start + np.arange(length)) / rate
-        part = samples[start : start + length]
-        parts.append(np.exp(-1j * np.outer(omega, t)) @ ((part - part.mean(axis=0)) * window[:, None]))
+    for s in range(segments):
+        part = slice(s * (n - length) // max(segments - 1, 1), s * (n - length) // max(segments - 1, 1) + length)
+        inside = samples[part]
+        parts.append(np.exp(-1j * np.outer(order, angle[part])) @ ((inside - inside.mean(axis=0)) * window[:, None]))
     return np.array(parts)
 
 
-def _fit(samples: FloatArray, step: float, highest: int, degree: int) -> tuple[ComplexArray, FloatArray]:
-    """Least-squares amplitudes (phases from the middle), and the drift's coefficients on `_drift_basis`."""
+def _fit(samples: FloatArray, comb: _Comb, highest: int, basis: FloatArray) -> tuple[ComplexArray, FloatArray]:
+    """Least-squares amplitudes (phases from the middle), and the coefficients of other columns, shape (n, k), that are fitted, too."""
     n, channels = samples.shape
     offset = samples.mean(axis=0)
-    basis = _drift_basis(n, degree)
     data = np.concatenate([samples - offset, basis], axis=1)
-    sums = order_sums(data, step, highest)
-    # unknowns: complex exponentials -highest..highest, then the drift
+    sums = comb.sums(data, highest)
+    # unknowns: complex exponentials -highest..highest, then the other columns
     both = np.concatenate([sums[:0:-1].conj(), sums])
-    half = 0.5 * np.arange(-2 * highest, 2 * highest + 1) * step
-    on_line = np.abs(np.sin(half)) < 1e-15
-    kernel = np.where(on_line, float(n), np.sin(n * half) / np.where(on_line, 1.0, np.sin(half)))
     order = np.arange(2 * highest + 1)
-    size = order.size
-    matrix = np.empty((size + degree, size + degree), dtype=complex)
-    matrix[:size, :size] = kernel[order[None, :] - order[:, None] + 2 * highest]
+    size, others = order.size, basis.shape[1]
+    matrix = np.empty((size + others, size + others), dtype=complex)
+    matrix[:size, :size] = comb.products(n, highest)[order[None, :] - order[:, None] + 2 * highest]
     matrix[:size, size:] = both[:, channels:]
     matrix[size:, :size] = both[:, channels:].conj().T
     matrix[size:, size:] = basis.T @ basis

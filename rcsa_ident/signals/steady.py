@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,8 +11,10 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
 from rcsa_ident.signals.recording import Quantity, Recording
+from rcsa_ident.signals.rotation import follow
 from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum, refine_speed, segment_lines
 from rcsa_ident.signals.steady_part import steady_part, steady_window
+from rcsa_ident.units import to_hz
 
 #: Least number of revolutions of a steady part.
 LEAST_REVOLUTIONS = 8.0
@@ -35,6 +37,8 @@ class SteadyRecord:
         1 for an air cut.
     lines : LineSpectrum
         Lines of these channels; phases from the recording's first sample.
+    deviation : array or None, shape (n,) [rad]
+        Of the spindle's angle in the steady part from that at its mean speed; None where it turns evenly.
     outputs : complex array, shape (orders, axes, o) [m]
         Displacement at each order: gap and fixture, or the gap alone where no axis has the fixture's acceleration.
     output_variance : array, shape (orders, axes, o) [m^2]
@@ -48,6 +52,7 @@ class SteadyRecord:
     part: slice
     teeth: int
     lines: LineSpectrum
+    deviation: FloatArray | None
     outputs: ComplexArray
     output_variance: FloatArray
 
@@ -71,6 +76,14 @@ class SteadyRecord:
         return self.lines.spindle_speed
 
     @property
+    def wander(self) -> float | None:
+        """Standard deviation of the spindle speed within the record, of two revolutions each, as a share; None where it turns evenly."""
+        if self.deviation is None:
+            return None
+        turns = self.deviation[:: max(round(4.0 * np.pi / self.spindle_speed * self.recording.rate), 1)]
+        return float(np.std(np.diff(turns)) / (4.0 * np.pi))
+
+    @property
     def highest_order(self) -> int:
         """Highest multiple of the spindle's frequency among the lines."""
         return self.lines.amplitude.shape[0] - 1
@@ -84,7 +97,7 @@ class SteadyRecord:
         """Return the absolute displacement in half-overlapping Hann segments, shape (count, orders, axes) [m]."""
         samples = self.recording.samples[self.part][:, self.columns]
         omega = order * self.spindle_speed
-        lines = segment_lines(samples, self.recording.rate, omega, count)
+        lines = segment_lines(samples, self.recording.rate, self.spindle_speed, order, count, self.deviation)
         lines = lines * np.exp(-1j * omega * self.part.start / self.recording.rate)[:, None]
         return np.einsum("smc,mca->sma", lines, _weights(self.recording, self.axes, self.columns, omega))
 
@@ -111,7 +124,7 @@ def steady_record(
     teeth : int
         1 for an air cut.
     whole : bool
-        Look at all of a long recording, not at a window: for who goes through all of it.
+        Look at all of a long recording, not at a window, and take its speed as constant: for who goes through all of it so.
 
     Raises
     ------
@@ -134,17 +147,24 @@ def steady_record(
         raise _no_steady_part(f"no steady part of at least {LEAST_REVOLUTIONS:.0f} revolutions")
     everything = steady == slice(0, samples.shape[0])
     speed = rough if everything else refine_speed(displacement[steady], rate, rough)
-    lines = line_spectrum(samples[steady], rate, speed, max_frequency)
+    speed, deviation = (speed, None) if whole else _turning(displacement[steady], rate, speed)
+    lines = line_spectrum(samples[steady], rate, speed, max_frequency, deviation)
     part = slice(window.start + steady.start, window.start + steady.stop)
     if part.start:
         shift = np.exp(-1j * np.arange(lines.amplitude.shape[0]) * speed * part.start / rate)
-        lines = LineSpectrum(speed, lines.amplitude * shift[:, None], lines.variance, lines.scatter, lines.rest, lines.rate)
+        lines = replace(lines, amplitude=lines.amplitude * shift[:, None])
     weight = _weights(recording, axes, columns, np.arange(lines.amplitude.shape[0]) * speed)
     noise = np.stack([_line_variance(lines, c, teeth) for c in range(len(columns))], axis=1)
     kinds = [slice(0, len(axes)), slice(len(axes), None)][: 1 if len(columns) == len(axes) else 2]
     outputs = np.stack([np.einsum("mc,mca->ma", lines.amplitude[:, k], weight[:, k]) for k in kinds], axis=2)
     variance = np.stack([np.einsum("mc,mca->ma", noise[:, k], np.abs(weight[:, k]) ** 2) for k in kinds], axis=2)
-    return SteadyRecord(recording, tuple(axes), columns, window, part, teeth, lines, outputs, variance)
+    return SteadyRecord(recording, tuple(axes), columns, window, part, teeth, lines, deviation, outputs, variance)
+
+
+def _turning(displacement: FloatArray, rate: float, speed: float) -> tuple[float, FloatArray | None]:
+    """The spindle's mean speed, followed where it changes, and what its angle deviates from that."""
+    rotation = follow(displacement, rate, np.zeros(1), np.array([to_hz(speed)]))
+    return rotation.about(speed) if rotation.uneven else (speed, None)
 
 
 def _no_steady_part(found: str) -> Unsteady:

@@ -12,13 +12,17 @@ from rcsa_ident.signals.recording import BLOCK, LONGEST, Recording
 
 #: Share of the median tooth-passing amplitude by which a block may differ and still be steady.
 STEADY_SHARE = 0.3
+#: Tooth-passing lines that are looked at, and how far one stands above its neighbours that is the cut's and not the flange's.
+_LINES, _STAND_OUT = 6, 2.0
 
 
 def steady_part(samples: FloatArray, rate: float, spindle_speed: float, teeth: int) -> slice:
     """Return the longest stretch in which the tooth-passing lines keep their amplitude.
 
-    The record is cut into blocks of two revolutions; a block belongs to the steady part if the amplitude of its first
-    three tooth-passing lines is within `STEADY_SHARE` of the median, or no farther off than such blocks scatter anyway.
+    The record is cut into blocks of two revolutions; a block belongs to the steady part if the amplitude of its
+    tooth-passing lines is within `STEADY_SHARE` of the median, or no farther off than such blocks scatter anyway. Of the
+    first six those count that stand above the orders beside them, for the flange's roundness is there in the air, too;
+    where none does, the first three.
     The median is that of the blocks' energy, so that a cut is found in a record that is mostly air. A stretch that
     begins or ends within the record loses a block there, where entry or exit may reach into it.
 
@@ -35,7 +39,7 @@ def steady_part(samples: FloatArray, rate: float, spindle_speed: float, teeth: i
     blocks = n // length
     if blocks < 4:
         return slice(0, n)
-    first, last = _longest(_block_amplitudes(samples[: blocks * length], length, spindle_speed / rate, teeth))
+    first, last = _longest(_amplitude(_block_power(samples[: blocks * length], length, spindle_speed / rate, teeth), teeth))
     begin = (first + 1) * length if first > 0 else 0
     return slice(begin, n if last == blocks else max((last - 1) * length, begin))
 
@@ -59,12 +63,12 @@ def steady_window(recording: Recording, columns: Sequence[int], spindle_speed: f
         return slice(0, min(n, LONGEST))
     step = max(BLOCK // length, 1) * length
     parts = [
-        _block_amplitudes(
+        _block_power(
             recording.samples[start : min(start + step, n // length * length)][:, columns], length, spindle_speed / recording.rate, teeth
         )
         for start in range(0, n // length * length, step)
     ]
-    middle = sum(_longest(np.concatenate(parts))) * length // 2
+    middle = sum(_longest(_amplitude(np.concatenate(parts), teeth))) * length // 2
     begin = min(max(middle - LONGEST // 2, 0), n - LONGEST)
     return slice(begin, begin + LONGEST)
 
@@ -87,17 +91,29 @@ def _longest(amplitude: FloatArray) -> tuple[int, int]:
     return int(starts[longest]), int(stops[longest])
 
 
-def _block_amplitudes(samples: FloatArray, length: int, step: float, teeth: int) -> FloatArray:
-    """Root of the power in the first three lines at multiples of `teeth` in each block of so many samples."""
+def _block_power(samples: FloatArray, length: int, step: float, teeth: int) -> FloatArray:
+    """Power of the lines 0, 1, ... in each block of so many samples, all channels together, shape (blocks, orders)."""
     blocks, channels = samples.shape[0] // length, samples.shape[1]
-    highest = int(min(3 * teeth, 0.45 * 2.0 * np.pi / step))
+    highest = int(min(_LINES * teeth + 1, 0.45 * 2.0 * np.pi / step))
     parts = samples.reshape(blocks, length, channels)
     # a Hann window keeps drift and the lines between out
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * (np.arange(length) + 0.5) / length)
     parts = (parts - parts.mean(axis=1, keepdims=True)) * window[:, None]
     side_by_side = np.ascontiguousarray(parts.transpose(1, 0, 2)).reshape(length, blocks * channels)
-    power = np.abs(order_sums(side_by_side, step, highest)[teeth::teeth]) ** 2
-    return np.sqrt(power.reshape(-1, blocks, channels).sum(axis=(0, 2)))
+    power = np.abs(order_sums(side_by_side, step, highest)) ** 2
+    return power.reshape(-1, blocks, channels).sum(axis=2).T
+
+
+def _amplitude(power: FloatArray, teeth: int) -> FloatArray:
+    """Root of the power in the lines of the teeth that are the cut's, shape (blocks,)."""
+    mean = power.mean(axis=0)
+    order = np.arange(teeth, power.shape[1], teeth)
+    if teeth > 1:
+        beside = np.maximum(mean[order - 1], mean[np.minimum(order + 1, power.shape[1] - 1)] * (order + 1 < power.shape[1]))
+        own = order[mean[order] > _STAND_OUT**2 * beside]
+    else:
+        own = order[:0]
+    return np.sqrt(power[:, own if own.size else order[:3]].sum(axis=1))
 
 
 def hann(n: int) -> FloatArray:

@@ -14,7 +14,7 @@ from rcsa_ident.signals.channel_scan import scan
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, follow_speed, line_spectrum, refine_speed
 from rcsa_ident.signals.steady_part import hann
-from rcsa_ident.units import to_rpm
+from rcsa_ident.units import to_hz, to_rpm
 
 #: Least and largest swing, peak to peak, of what a milling spindle does and a sensor tells.
 PLAUSIBLE = {Quantity.DISPLACEMENT: (2e-9, 2e-3, "m"), Quantity.ACCELERATION: (1e-4, 1e5, "m/s^2")}
@@ -28,10 +28,12 @@ ALONE = 20.0
 VISIBLE = 40.0
 #: Phase [rad] that a drifting speed may add to the highest line over the record.
 DRIFT_PHASE = 0.5
+#: Change of speed within a record, standard deviation as a share: with 0.02 of damping, a line on a resonance is then 1 % too low.
+MOST_WANDER = 0.003
 
 
 class RecordCode(StrEnum):
-    """What may be said of a record; the last five speak of one that may be used."""
+    """What may be said of a record; the last six speak of one that may be used."""
 
     UNREADABLE = "unreadable"
     NOT_FINITE = "not-finite"
@@ -48,6 +50,7 @@ class RecordCode(StrEnum):
     TOOTH_COUNT = "tooth-count"
     IMPLAUSIBLE = "implausible"
     LONG = "long"
+    FOLLOWED = "followed"
     NO_AIR_CUT = "no-air-cut"
     LOSSY = "lossy"
     CUT_OFF = "cut-off"
@@ -110,8 +113,8 @@ def raw_faults(recording: Recording) -> tuple[Remark, ...]:
     return examined(recording).reasons
 
 
-def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) -> tuple[Remark, ...]:
-    """Return what is wrong with the speed: far from the programmed one, or drifting within the record.
+def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float, deviation: FloatArray | None = None) -> tuple[Remark, ...]:
+    """Return what is wrong with the speed: far from the programmed one, or drifting within the record and not followed.
 
     Parameters
     ----------
@@ -121,6 +124,8 @@ def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) ->
         Their lines, in its first channels; others may follow.
     programmed : float [rad/s]
         The spindle speed that was set.
+    deviation : array, shape (n,) [rad], optional
+        Of the spindle's angle from that at the lines' speed, as it was followed.
     """
     speed, rate = lines.spindle_speed, lines.rate
     order = np.arange(1, lines.amplitude.shape[0])[:, None]
@@ -141,8 +146,9 @@ def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) ->
     half = samples.shape[0] // 2
     if half < 4.0 * rate * 2.0 * np.pi / speed:
         return ()
-    first = follow_speed(samples[:half], rate, speed)
-    second = follow_speed(samples[half:], rate, speed)
+    parts = (None, None) if deviation is None else (deviation[:half], deviation[half:])
+    first = follow_speed(samples[:half], rate, speed, deviation=parts[0])
+    second = follow_speed(samples[half:], rate, speed, deviation=parts[1])
     # a speed that changes linearly bends the phase of order m by m * change * T / 8 between the middle and the ends
     phase = order.size * abs(second - first) * duration / 4.0
     # halves have an eighth of the record's information on the speed each
@@ -156,10 +162,26 @@ def speed_faults(samples: FloatArray, lines: LineSpectrum, programmed: float) ->
     return ()
 
 
+def smeared(wander: float | None) -> Remark | None:
+    """Return a remark if the speed changes so much within a record that its lines are those of no one speed, else None.
+
+    Parameters
+    ----------
+    wander : float or None
+        Standard deviation of the speed as a share; None where it does not change.
+    """
+    if wander is None or wander <= MOST_WANDER:
+        return None
+    words = (
+        f"speed drifts: it changes by {100.0 * wander:.2g} % (standard deviation) within the record, at most {100.0 * MOST_WANDER:.2g} %"
+    )
+    return Remark(RecordCode.SPEED_DRIFT, f"{words} can be followed without smearing the lines")
+
+
 def _explained(lines: LineSpectrum, channels: int) -> float:
     """Share of the displacements' power that lies in the lines."""
     power = 0.5 * np.sum(np.abs(lines.amplitude[1:, :channels]) ** 2)
-    return float(power / (power + np.sum(np.mean(lines.rest[:, :channels] ** 2, axis=0))))
+    return float(power / (power + np.sum(np.mean(lines.off_orders[:, :channels] ** 2, axis=0))))
 
 
 def silence(power: FloatArray, variance: FloatArray) -> Remark | None:
@@ -178,7 +200,9 @@ def silence(power: FloatArray, variance: FloatArray) -> Remark | None:
     return Remark(RecordCode.NO_CUTTING, words)
 
 
-def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: tuple[float, float]) -> Remark | None:
+def chatter(
+    lines: LineSpectrum, channels: list[int], forced: FloatArray, band: tuple[float, float], air: LineSpectrum | None = None
+) -> Remark | None:
     """Return a remark if a vibration off the spindle's orders stands out, else None.
 
     Parameters
@@ -190,10 +214,11 @@ def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: 
         Largest tooth-passing amplitude.
     band : (float, float) [Hz]
         Frequencies between which chatter is looked for.
+    air : LineSpectrum, optional
+        Of the air cut: what is there, too, is no chatter.
     """
     n = lines.rest.shape[0]
-    window = hann(n)
-    amplitude = 2.0 * np.abs(np.fft.rfft(lines.rest[:, channels] * window[:, None], axis=0)) / window.sum()
+    amplitude = _spectrum(lines, channels)
     frequency = np.fft.rfftfreq(n, 1.0 / lines.rate)
     order = frequency * 2.0 * np.pi / lines.spindle_speed
     # a Hann line reaches two bins to each side of the spindle's orders
@@ -201,8 +226,9 @@ def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: 
     inside = clear & (frequency > band[0]) & (frequency < band[1])
     if not inside.any():
         return None
+    still = np.zeros_like(amplitude) if air is None else _beside(air, channels, frequency)
     for c in range(amplitude.shape[1]):
-        candidates = np.where(inside, amplitude[:, c], 0.0)
+        candidates = np.where(inside & (amplitude[:, c] > 2.0 * still[:, c]), amplitude[:, c], 0.0)
         peak = int(np.argmax(candidates))
         floor = float(np.median(amplitude[inside, c]))
         if candidates[peak] > CHATTER_SHARE * forced[c] and candidates[peak] > 10.0 * floor:
@@ -212,6 +238,23 @@ def chatter(lines: LineSpectrum, channels: list[int], forced: FloatArray, band: 
             )
             return Remark(RecordCode.CHATTER, words)
     return None
+
+
+def _spectrum(lines: LineSpectrum, channels: list[int]) -> FloatArray:
+    """Amplitudes of what a record holds beside the orders, shape (bins, c)."""
+    window = hann(lines.rest.shape[0])
+    return 2.0 * np.abs(np.fft.rfft(lines.off_orders[:, channels] * window[:, None], axis=0)) / window.sum()
+
+
+def _beside(lines: LineSpectrum, channels: list[int], frequency: FloatArray) -> FloatArray:
+    """Largest amplitude of a record's lines beside the orders near each frequency, shape (f, c); 0 where there is none."""
+    seen = np.zeros((frequency.size, len(channels)))
+    amplitude = _spectrum(lines, channels) if lines.beside.size else seen
+    for omega in lines.beside:
+        place = round(to_hz(omega) / lines.rate * lines.rest.shape[0])
+        near = np.abs(frequency - to_hz(omega)) < 3.0 * max(lines.rate / lines.rest.shape[0], frequency[1] - frequency[0])
+        seen[near] = np.maximum(seen[near], amplitude[max(place - 1, 0) : place + 2].max(axis=0))
+    return seen
 
 
 def _stands_out(own: FloatArray, rest: FloatArray, claimed: FloatArray) -> bool:

@@ -9,17 +9,40 @@ import numpy as np
 
 
 @numba.njit(cache=True)
-def cut_force(step, position, tooth, delay, cut, slices, path, force):
+def passed(step, ahead, angle, places):
+    """Write where in the steps each tooth ahead stood at the angle at which tooth j is now into `places`, shape (teeth, passes).
+
+    step: index of the instant, above 0; ahead: angle from tooth j to tooth j + 1 + k, of the same shape; angle: of tooth 1 in all steps.
+    Before the first step the spindle turned as between the first two.
+    """
+    teeth, passes = ahead.shape
+    for j in range(teeth):
+        for k in range(passes):
+            wanted = angle[step] - ahead[j, k]
+            if wanted <= angle[0]:
+                places[j, k] = (wanted - angle[0]) / (angle[1] - angle[0])
+                continue
+            # it turns nearly evenly: the place is one step on, or next to it
+            i = min(max(int(places[j, k] + 1.0), 0), step - 1)
+            while angle[i] > wanted:
+                i -= 1
+            while angle[i + 1] < wanted:
+                i += 1
+            places[j, k] = i + (wanted - angle[i]) / (angle[i + 1] - angle[i])
+
+
+@numba.njit(cache=True)
+def cut_force(position, tooth, places, cut, slices, before, path, force):
     """Write the force per slice sum at one instant into `force`, in feed and normal direction.
 
-    step: index of the instant; position: feed-axis position of the tool at the instant, shape (2,); tooth: angle, run-out
-    a row; delay: steps since tooth j + 1 + k stood where j is now, shape (teeth, passes); path: earlier positions.
+    position: feed-axis position of the tool at the instant, shape (2,); tooth: angle, run-out a row; places: steps at which tooth j + 1 + k
+    stood where j is now, shape (teeth, passes); before: feed per step before the first; path: earlier positions.
     cut: angle of tooth 1, entry, exit, smear, lag, force per slice: K_t b, K_r b, edge t b, edge r b.
     """
     theta, entry, leave, smear, lag = cut[0], cut[1], cut[2], cut[3], cut[4]
     force[0] = 0.0
     force[1] = 0.0
-    teeth, passes = delay.shape
+    teeth, passes = places.shape
     turn = 2.0 * math.pi
     for j in range(teeth):
         for k in range(slices):
@@ -35,10 +58,10 @@ def cut_force(step, position, tooth, delay, cut, slices, path, force):
             chip = 1e300
             for m in range(passes):
                 other = (j + 1 + m) % teeth
-                back = step - delay[j, m]
+                back = places[j, m]
                 if back < 0.0:
                     # before the first instant the tool moved along its path without vibration
-                    x, y = cut[9] * back, 0.0
+                    x, y = path[0, 2] + before * back, 0.0
                 else:
                     i = int(back)
                     part = back - i
@@ -55,19 +78,25 @@ def cut_force(step, position, tooth, delay, cut, slices, path, force):
 
 
 @numba.njit(cache=True)
-def mill(decay, gain, shape, state, tooth, delay, cut, slices, turn, force):
+def mill(decay, gain, shape, state, tooth, ahead, cut, turn, course, force):
     """March the spindle through a cut and return its outputs, shape (n, o).
 
     decay: e^{pole dt}, shape (m,); gain: of the old and the new force, shape (2, m, 2); shape: outputs of the poles, shape
     (o, m), the first two the tip's X and Y, doubled for the conjugate poles; state: of the poles at the start, shape (m,);
-    cut: as in `cut_force`, then feed per step, spindle angle per step; turn: feed axes in machine axes, shape (2, 2);
-    force: shape (n, 2), is filled, in machine axes. The force between two instants is linear, so the march is exact in it.
+    ahead: angles as in `passed`; cut: as in `cut_force`, then the number of slices; turn: feed axes in machine axes, shape (2, 2); course: angle of tooth 1, way of
+    the feed and share of the width that is cut, shape (n, 3); force: shape (n, 2), is filled, in machine axes. The force between two
+    instants is linear, so the march is exact in it.
     """
-    n = force.shape[0]
+    n, slices = force.shape[0], int(cut[9])
     m = decay.size
     outputs = shape.shape[0]
     result = np.zeros((n, outputs))
-    path = np.zeros((n, 2))
+    # the tool's place along feed and normal, and its way without vibration
+    path = np.zeros((n, 3))
+    path[:, 2] = course[:, 1]
+    angle = course[:, 0].copy()
+    before = course[1, 1] - course[0, 1]
+    places = -ahead / (angle[1] - angle[0])
     now = cut.copy()
     local = np.zeros(2)
     position = np.zeros(2)
@@ -90,7 +119,9 @@ def mill(decay, gain, shape, state, tooth, delay, cut, slices, turn, force):
         gx, gy = 0.0, 0.0
         if i > 0:
             gx, gy = force[i - 1, 0], force[i - 1, 1]
-        now[0] = cut[0] + i * cut[10]
+        now[0] = angle[i]
+        if i > 0:
+            passed(i, ahead, angle, places)
         # the new force moves the tip within the step by a compliance that is small against the cut's
         for _ in range(3 if i > 0 else 1):
             x = free[0]
@@ -98,11 +129,11 @@ def mill(decay, gain, shape, state, tooth, delay, cut, slices, turn, force):
             if i > 0:
                 x += instant[0, 0] * gx + instant[0, 1] * gy
                 y += instant[1, 0] * gx + instant[1, 1] * gy
-            position[0] = turn[0, 0] * x + turn[1, 0] * y + cut[9] * i
+            position[0] = turn[0, 0] * x + turn[1, 0] * y + course[i, 1]
             position[1] = turn[0, 1] * x + turn[1, 1] * y
-            cut_force(i, position, tooth, delay, now, slices, path, local)
-            gx = turn[0, 0] * local[0] + turn[0, 1] * local[1]
-            gy = turn[1, 0] * local[0] + turn[1, 1] * local[1]
+            cut_force(position, tooth, places, now, slices, before, path, local)
+            gx = course[i, 2] * (turn[0, 0] * local[0] + turn[0, 1] * local[1])
+            gy = course[i, 2] * (turn[1, 0] * local[0] + turn[1, 1] * local[1])
         force[i, 0] = gx
         force[i, 1] = gy
         path[i, 0] = position[0]

@@ -187,6 +187,8 @@ class CutPlan:
         Length of each record.
     settling : float [s]
         Time that is simulated before it and dropped.
+    entry, leave : float [s]
+        Of the record, in the air and while the depth rises and falls again, half each; 0 where all of it is in the material.
     """
 
     spindle_speeds: tuple[float, ...]
@@ -196,12 +198,18 @@ class CutPlan:
     feed_angle: float = 0.0
     duration: float = 0.3
     settling: float = 0.15
+    entry: float = 0.0
+    leave: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.spindle_speeds:
             raise InputError("cuts.spindle_speeds_rpm", "none", "at least one speed")
         positive("cuts.duration_s", self.duration, "s")
         non_negative("cuts.settling_s", self.settling, "s")
+        non_negative("cuts.entry_s", self.entry, "s")
+        non_negative("cuts.exit_s", self.leave, "s")
+        if self.entry + self.leave >= self.duration:
+            raise InputError("cuts.duration_s", self.duration, f"above entry_s and exit_s together, {self.entry + self.leave:g} s")
         for speed in self.spindle_speeds:
             self.conditions(speed)
 

@@ -20,6 +20,25 @@ _START_ORDERS = 512
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """How a cut goes on, instant by instant.
+
+    Parameters
+    ----------
+    angle : array, shape (n,) [rad]
+        Immersion angle of tooth 1, growing, by less than the angle between two teeth each.
+    way : array, shape (n,) [m]
+        Of the tool along the feed.
+    width : array, shape (n,) [-]
+        Share of the axial depth that is in the material: it rises at the entry and falls at the exit.
+    """
+
+    angle: FloatArray
+    way: FloatArray
+    width: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class CutHistory:
     """One simulated cut.
 
@@ -59,6 +78,7 @@ def mill_cut(
     count: int,
     start_angle: float = 0.0,
     slices: int = 8,
+    course: Course | None = None,
 ) -> CutHistory:
     """Simulate a cut of `count` instants, `step` apart, already in the material and near its steady state.
 
@@ -81,6 +101,9 @@ def mill_cut(
         Immersion of tooth 1 at the first instant.
     slices : int
         Slices of the depth, for the helix.
+    course : Course, optional
+        How the spindle turns and the tool moves on and into the material, `count` instants; it takes the place of `start_angle`. Else both
+        are even, in the material from the start.
 
     Notes
     -----
@@ -92,7 +115,8 @@ def mill_cut(
     lines = rigid_force_lines(cutter, conditions, coefficients, slices)
     order = np.arange(lines.shape[0])
     iw = 1j * speed * order
-    rotated = lines * np.exp(1j * order * start_angle)[:, None]
+    course = _even(conditions, cutter.teeth, step, count, start_angle) if course is None else course
+    rotated = course.width[0] * lines * np.exp(1j * order * course.angle[0])[:, None]
     # a real force has orders -m too: with half the line's conjugate, since lines are those of Re sum
     positive = np.where(order[:, None] == 0, 1.0, 0.5) * rotated
     state = (dynamics.inputs * ((1.0 / (iw[:, None] - dynamics.pole)).T @ positive)).sum(axis=1)
@@ -110,11 +134,12 @@ def mill_cut(
     through = 2.0 * (dynamics.outputs[rows[4:]] * dynamics.pole) @ dynamics.inputs
 
     force = np.zeros((count, 2))
-    tooth, delay, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices, start_angle)
-    result = mill(np.exp(x), gain, np.ascontiguousarray(shape), state, tooth, delay, cut, slices, turn, force)
+    tooth, ahead, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices)
+    columns = np.column_stack([course.angle, course.way, course.width])
+    result = mill(np.exp(x), gain, np.ascontiguousarray(shape), state, tooth, ahead, cut, turn, columns, force)
     return CutHistory(
         step=step,
-        angle=np.asarray(start_angle + speed * step * np.arange(count), dtype=np.float64),
+        angle=course.angle,
         force=force,
         tip=result[:, 0:2],
         flange=result[:, 2:4],
@@ -141,33 +166,41 @@ def rigid_force_lines(
         Instants of a revolution.
     """
     step = 2.0 * np.pi / conditions.spindle_speed / samples
-    tooth, delay, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices, 0.0)
+    tooth, ahead, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices)
+    course = _even(conditions, cutter.teeth, step, samples, 0.0)
+    columns = np.column_stack([course.angle, course.way, course.width])
     force = np.zeros((samples, 2))
     none = np.zeros((2, 1), dtype=complex)
-    mill(none[0], none[:, :, None] * np.ones(2), none, none[1].copy(), tooth, delay, cut, slices, turn, force)
+    mill(none[0], none[:, :, None] * np.ones(2), none, none[1].copy(), tooth, ahead, cut, turn, columns, force)
     lines = np.fft.rfft(force, axis=0)[:_START_ORDERS] / samples
     lines[1:] *= 2.0
     return lines
 
 
+def _even(conditions: CuttingConditions, teeth: int, step: float, count: int, start: float) -> Course:
+    """A spindle that turns and a tool that moves on evenly, in the material from the start."""
+    instants = np.arange(count)
+    speed = conditions.spindle_speed
+    feed = conditions.feed_per_tooth * teeth * speed / (2.0 * np.pi)
+    return Course(np.asarray(start + speed * step * instants, dtype=np.float64), feed * step * instants, np.ones(count))
+
+
 def _cut_arrays(
-    cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, step: float, slices: int, angle: float
+    cutter: Cutter, conditions: CuttingConditions, coefficients: CuttingCoefficients, step: float, slices: int
 ) -> tuple[Any, ...]:
-    """The kernel's view of a cut: teeth, delays in steps, numbers, slices, axes."""
+    """The kernel's view of a cut: teeth, angles between them, numbers, axes."""
     speed = conditions.spindle_speed
     tooth = np.stack([cutter.tooth_angle, cutter.runout], axis=1)
     # angle from tooth j to the 1st, 2nd, ... one ahead of it, up to itself one turn earlier
     ahead = np.array([np.cumsum(np.roll(cutter.pitch, -j)) for j in range(cutter.teeth)])
-    delay = ahead / (speed * step)
-    if np.min(delay) < 1.0:
-        raise InputError("step", f"{step:g} s", f"at most a tooth period, {np.min(delay) * step:g} s")
+    if np.min(ahead) < speed * step:
+        raise InputError("step", f"{step:g} s", f"at most a tooth period, {np.min(ahead) / speed:g} s")
     lag = 2.0 * conditions.axial_depth / slices * np.tan(cutter.helix) / cutter.diameter
     width = conditions.axial_depth / slices
-    feed = conditions.feed_per_tooth * cutter.teeth * speed / (2.0 * np.pi)
     c = coefficients
     cut = np.array(
         [
-            angle,
+            0.0,
             conditions.engagement.entry,
             conditions.engagement.exit,
             max(speed * step, lag),
@@ -176,11 +209,10 @@ def _cut_arrays(
             c.tangential * c.radial_ratio * width,
             c.tangential_edge * width,
             c.radial_edge * width,
-            feed * step,
-            speed * step,
+            slices,
         ]
     )
-    return tooth, delay, cut, np.ascontiguousarray(conditions.machine_from_feed)
+    return tooth, ahead, cut, np.ascontiguousarray(conditions.machine_from_feed)
 
 
 def synchronous_lines(angle: FloatArray, values: FloatArray, orders: int) -> np.ndarray:

@@ -8,7 +8,11 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, non_negative, positive
+from rcsa_ident.virtual.disturbances import Disturbances, disturbed
 from rcsa_ident.virtual.milling import CutHistory
+
+#: A laboratory's records.
+UNDISTURBED = Disturbances()
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,35 +237,34 @@ def trigger_pulse(angle: FloatArray, edge: float, width: float = 0.35) -> FloatA
 def record(
     suite: SensorSuite,
     clamping: Clamping,
-    speed: float,
-    angle: float,
+    angle: FloatArray,
     feed_angle: float,
-    count: int,
     factor: int,
     history: CutHistory | None,
     rng: np.random.Generator,
+    disturbances: Disturbances = UNDISTURBED,
 ) -> dict[str, FloatArray]:
     """Return the channels of one record, in the sensors' signal units, shape (count,) each.
 
     Parameters
     ----------
     suite : SensorSuite
+        Its rate is that at which samples are truly taken.
     clamping : Clamping
-    speed : float [rad/s]
-        True spindle speed, constant in the record.
-    angle : float [rad]
-        Immersion angle of tooth 1 at the first sample.
+    angle : array, shape (count,) [rad]
+        Immersion angle of tooth 1 at each sample.
     feed_angle : float [rad]
-    count : int
-        Number of samples.
     factor : int
         Fine instants per sample.
     history : CutHistory or None
         The simulated cut with `padding` on both sides; None is an air cut.
     rng : numpy.random.Generator
+    disturbances : Disturbances
+        What is added; how the spindle turns is in the angle.
     """
-    turned = np.asarray(angle + speed * np.arange(count) / suite.rate, dtype=np.float64)
-    gap = out_of_round(suite, clamping, turned - feed_angle, speed, factor)
+    count = angle.size
+    speed = float(angle[-1] - angle[0]) / (count - 1) * suite.rate
+    gap = out_of_round(suite, clamping, angle - feed_angle, speed, factor)
     acceleration = np.zeros((count, 2))
     if history is not None:
         step = 1.0 / (suite.rate * factor)
@@ -272,6 +275,8 @@ def record(
         for i in (0, 1):
             gap[:, i] += sample(relative[:, i], factor, step, suite.gap_delay, suite.gap_bandwidth)
             acceleration[:, i] += sample(history.acceleration[:, i], factor, step, suite.acceleration_delay, suite.acceleration_bandwidth)
+    for channel, more in zip((gap, acceleration), disturbed(disturbances, suite.rate, count, rng), strict=True):
+        channel += more
     channels: dict[str, FloatArray] = {}
     for i, axis in enumerate("xy"):
         seen = gap[:, i] + suite.gap_noise * rng.normal(size=count) + drift(suite.gap_drift, count, rng)
@@ -280,5 +285,5 @@ def record(
         seen = acceleration[:, i] + suite.acceleration_noise * rng.normal(size=count)
         channels[f"fixture_{axis}"] = suite.acceleration_sensitivity * seen
     if suite.trigger:
-        channels["trigger"] = trigger_pulse(turned, suite.tooth_angle)
+        channels["trigger"] = trigger_pulse(angle, suite.tooth_angle)
     return channels

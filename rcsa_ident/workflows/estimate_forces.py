@@ -228,7 +228,7 @@ def trigger_speed(recording: Recording) -> float:
 def _periodic(steady: SteadyRecord, programmed: float, notes: list[str]) -> None:
     """Refuse a speed whose orders the vibration does not follow; say where a good part of it does not."""
     signals = steady.displacement - steady.displacement.mean(axis=0)
-    share = 1.0 - float(np.sum(steady.lines.rest[:, : signals.shape[1]] ** 2) / max(np.sum(signals**2), 1e-300))
+    share = 1.0 - float(np.sum(steady.lines.off_orders[:, : signals.shape[1]] ** 2) / max(np.sum(signals**2), 1e-300))
     if share < UNRELATED:
         found = f"{to_rpm(programmed):.0f} rev/min, whose orders account for {100.0 * share:.0f} % of the vibration"
         raise Unsteady("spindle_speed", found, "the spindle speed to within 1 % [rev/min], in a cut without chatter")

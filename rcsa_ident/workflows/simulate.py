@@ -10,12 +10,12 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.conditions import CuttingConditions
-from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.machining_setup import Tooling, Workpiece
 from rcsa_ident.scaleout import Map
 from rcsa_ident.virtual.campaign import SimulatedCut, SimulatedRecord, TrueFlange, TrueReceptances
+from rcsa_ident.virtual.disturbances import Disturbances, turning
 from rcsa_ident.virtual.machine import CutPlan, VirtualSpindle
-from rcsa_ident.virtual.milling import CutHistory, mill_cut, synchronous_lines
+from rcsa_ident.virtual.milling import Course, CutHistory, mill_cut, synchronous_lines
 from rcsa_ident.virtual.reduction import Poles, poles, reduced
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from rcsa_ident.virtual.sensors import Clamping, SensorSuite, clamp, padding, record
@@ -40,6 +40,9 @@ class VirtualSetup(Protocol):
 
     @property
     def plan(self) -> CutPlan: ...
+
+    @property
+    def disturbances(self) -> Disturbances: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,31 +127,49 @@ class _Worker:
     setup: VirtualSetup
 
     def __call__(self, job: _Job) -> SimulatedCut:
-        suite, plan = self.setup.sensors, self.setup.plan
-        lines = np.zeros((0, 2), dtype=complex)
+        suite, plan, disturbances = self.setup.sensors, self.setup.plan, self.setup.disturbances
         count = round(plan.duration * suite.rate)
+        # the clock of the recorder may be off: nobody who reads the record knows
+        suite = replace(suite, rate=suite.rate * (1.0 + disturbances.clock_error))
+        lines = np.zeros((0, 2), dtype=complex)
+        step, lead = 1.0 / (suite.rate * OVERSAMPLING), padding(OVERSAMPLING) * OVERSAMPLING
+        settling = round(plan.settling / step)
+        total, first = settling + OVERSAMPLING * (count - 1) + 2 * lead + 1, settling + lead
+        inside = slice(first, first + OVERSAMPLING * (count - 1) + 1, OVERSAMPLING)
         records = {}
         for kind in ("cut", "air"):
             speed = job.conditions.spindle_speed * (1.0 + suite.speed_error * job.rng.normal())
-            angle = 2.0 * np.pi * job.rng.random()
+            start = 2.0 * np.pi * job.rng.random()
+            angle = turning(disturbances, speed, start, step, total, first, job.rng)
             history = None
             if kind == "cut":
                 conditions = replace(job.conditions, spindle_speed=speed)
                 cutter = replace(job.tooling.cutter, runout=job.clamping.runout)
-                history = _history(self.setup, job.dynamics, cutter, conditions, angle, count)
+                feed = conditions.feed_per_tooth * cutter.teeth * speed / (2.0 * np.pi)
+                course = Course(angle, feed * step * np.arange(total), _width(plan, step, total, first))
+                coefficients = self.setup.workpiece.coefficients
+                history = mill_cut(job.dynamics, cutter, conditions, coefficients, step, total, course=course).after(settling)
                 highest = int(2.0 * np.pi * TRUTH_FREQUENCIES[1] / speed)
-                lines = synchronous_lines(history.angle, history.force, highest + 1)
-            channels = record(suite, job.clamping, speed, angle, job.conditions.feed_angle, count, OVERSAMPLING, history, job.rng)
-            records[kind] = SimulatedRecord(speed, angle, channels)
+                lines = _lines(plan, history, lead, highest + 1)
+            channels = record(suite, job.clamping, angle[inside], job.conditions.feed_angle, OVERSAMPLING, history, job.rng, disturbances)
+            speed = float(np.mean(np.diff(angle[inside]))) * suite.rate if disturbances.speed_wander > 0.0 else speed
+            records[kind] = SimulatedRecord(speed, start, channels)
         return SimulatedCut(job.id, job.tooling.name, records, lines)
 
 
-def _history(setup: VirtualSetup, dynamics: Poles, cutter: Cutter, conditions: CuttingConditions, angle: float, count: int) -> CutHistory:
-    """The cut with what the filters need before and after, and the settling before that dropped."""
-    suite = setup.sensors
-    step = 1.0 / (suite.rate * OVERSAMPLING)
-    lead = padding(OVERSAMPLING)
-    settling = round(setup.plan.settling / step)
-    total = settling + OVERSAMPLING * (count - 1 + 2 * lead) + 1
-    start = angle - conditions.spindle_speed * step * (settling + OVERSAMPLING * lead)
-    return mill_cut(dynamics, cutter, conditions, setup.workpiece.coefficients, step, total, start).after(settling)
+def _width(plan: CutPlan, step: float, count: int, first: int) -> FloatArray:
+    """Share of the axial depth that is in the material at each instant; the record begins at instant number `first`."""
+    time, last = (np.arange(count) - first) * step, plan.duration
+    # instants, in case one of the two has no length
+    entry, leave = max(0.5 * plan.entry, step), max(0.5 * plan.leave, step)
+    rising = np.clip((time - plan.entry) / entry + 1.0, 0.0, 1.0) if plan.entry > 0.0 else np.ones(count)
+    falling = np.clip((last - plan.leave - time) / leave + 1.0, 0.0, 1.0) if plan.leave > 0.0 else np.ones(count)
+    return rising * falling
+
+
+def _lines(plan: CutPlan, history: CutHistory, lead: int, orders: int) -> np.ndarray:
+    """Lines of the true force where the tool is wholly in the material."""
+    first = lead + round(plan.entry / history.step)
+    last = history.angle.size - lead - round(plan.leave / history.step)
+    inside = slice(0, None) if plan.entry == plan.leave == 0.0 else slice(first, last)
+    return synchronous_lines(history.angle[inside], history.force[inside], orders)

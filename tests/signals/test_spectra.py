@@ -135,6 +135,6 @@ def test_what_changes_within_the_record_shows_in_the_scatter():
 def test_segments_have_the_phase_of_the_record():
     n, speed = 7168, 9000.0 * RPM
     amplitude = lines(np.random.default_rng(9), 12)
-    found = segment_lines(wave(amplitude, speed, n), RATE, np.arange(1, 13) * speed, segments=6)
+    found = segment_lines(wave(amplitude, speed, n), RATE, speed, np.arange(1, 13), segments=6)
     assert found.shape == (6, 12, 2)
     np.testing.assert_allclose(found[:, 3], np.broadcast_to(amplitude[4], (6, 2)), rtol=1e-2)

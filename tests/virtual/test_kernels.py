@@ -7,7 +7,7 @@ from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.virtual._kernels import mill
-from rcsa_ident.virtual.milling import mill_cut
+from rcsa_ident.virtual.milling import Course, mill_cut
 from rcsa_ident.virtual.reduction import Poles
 
 STEP = 1.0 / 25600.0 / 8.0
@@ -30,13 +30,13 @@ def test_march_is_exact_for_a_force_that_is_linear_in_each_step():
     gain = STEP * np.stack([first - second, second])[:, :, None] * INPUTS
     tooth = np.column_stack([0.5 * np.pi * np.arange(4), np.zeros(4)])
     speed, width = 1500.0, 2e-4
-    delay = np.tile(0.5 * np.pi * np.arange(1, 5) / (speed * STEP), (4, 1))
-    cut = np.array(
-        [1.4, DOWN.entry, DOWN.exit, speed * STEP, 0.0, 8e8 * width, 2.4e8 * width, 8e3 * width, 6e3 * width, 2e-7, speed * STEP]
-    )
+    ahead = np.tile(0.5 * np.pi * np.arange(1, 5), (4, 1))
+    cut = np.array([0.0, DOWN.entry, DOWN.exit, speed * STEP, 0.0, 8e8 * width, 2.4e8 * width, 8e3 * width, 6e3 * width, 1])
+    instants = np.arange(1200)
+    course = np.column_stack([1.4 + speed * STEP * instants, 2e-7 * instants, np.ones(1200)])
     force = np.zeros((1200, 2))
     turn = np.array([[0.8, -0.6], [0.6, 0.8]])
-    seen = mill(np.exp(x), gain, 2.0 * OUTPUTS[:2], np.zeros(2, dtype=complex), tooth, delay, cut, 1, turn, force)
+    seen = mill(np.exp(x), gain, 2.0 * OUTPUTS[:2], np.zeros(2, dtype=complex), tooth, ahead, cut, turn, course, force)
     state = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.diag(OMEGA**2), -np.diag(2.0 * ZETA * OMEGA)]])
     system = (state, np.vstack([np.zeros((2, 2)), WAY]), np.hstack([WAY.T, np.zeros((2, 2))]), np.zeros((2, 2)))
     _, expected, _ = scipy.signal.lsim(system, force, STEP * np.arange(1200))
@@ -45,14 +45,21 @@ def test_march_is_exact_for_a_force_that_is_linear_in_each_step():
     assert np.abs(seen - expected).max() < 1e-9 * np.abs(expected).max()
 
 
-def test_kernel_cuts_as_a_plain_search_of_the_past():
-    # the same chips written plainly: each tooth against the places of all teeth before it
+@pytest.mark.parametrize("growth", [0.0, 0.08])
+def test_kernel_cuts_as_a_plain_search_of_the_past(growth):
+    # the same chips written plainly: each tooth against the places of all teeth before it; the speed grows by this share
     cutter = Cutter(4, 12e-3, runout=np.array([2e-6, 1e-6, -2e-6, -1e-6]))
     system = Poles(POLE, INPUTS, OUTPUTS, NAMES)
     cut = CuttingConditions(500.0 * np.pi, 0.3e-3, 1e-4, DOWN)
     count, start = 900, 1.3
-    history = mill_cut(system, cutter, cut, EDGES, STEP, count, start, slices=1)
     speed, feed = cut.spindle_speed, cut.feed_per_tooth * 4 * cut.spindle_speed / (2.0 * np.pi)
+    time = STEP * np.arange(count)
+    angle = start + speed * (time + 0.5 * growth * time**2 / time[-1])
+    width = np.linspace(0.4, 1.0, count) if growth else np.ones(count)
+    course = Course(angle, feed * time, width) if growth else None
+    history = mill_cut(system, cutter, cut, EDGES, STEP, count, start, slices=1, course=course)
+    # before the first step it turned as in the first
+    rate = (angle[1] - angle[0]) / STEP
     centre = history.tip + np.outer(np.arange(count) * STEP * feed, [1.0, 0.0])
 
     def past(t):
@@ -60,19 +67,22 @@ def test_kernel_cuts_as_a_plain_search_of_the_past():
             return np.array([feed * t, 0.0])
         return np.array([np.interp(t, np.arange(count) * STEP, centre[:, k]) for k in (0, 1)])
 
+    def when(wanted):
+        return (wanted - angle[0]) / rate if wanted < angle[0] else np.interp(wanted, angle, time)
+
     for i in range(0, count, 7):
         force = np.zeros(2)
         for j in range(4):
-            phi = (start + speed * i * STEP + cutter.tooth_angle[j]) % (2.0 * np.pi)
-            width = np.clip((phi - DOWN.entry) / (speed * STEP) + 0.5, 0, 1) - np.clip((phi - DOWN.exit) / (speed * STEP) + 0.5, 0, 1)
+            phi = (angle[i] + cutter.tooth_angle[j]) % (2.0 * np.pi)
+            share = np.clip((phi - DOWN.entry) / (speed * STEP) + 0.5, 0, 1) - np.clip((phi - DOWN.exit) / (speed * STEP) + 0.5, 0, 1)
             radial = np.array([np.sin(phi), np.cos(phi)])
             reach = [
-                centre[i] @ radial + cutter.runout[j] - past(i * STEP - k * 0.5 * np.pi / speed) @ radial - cutter.runout[(j + k) % 4]
+                centre[i] @ radial + cutter.runout[j] - past(when(angle[i] - k * 0.5 * np.pi)) @ radial - cutter.runout[(j + k) % 4]
                 for k in (1, 2, 3, 4)
             ]
-            if width > 0.0 and min(reach) > 0.0:
+            if share > 0.0 and min(reach) > 0.0:
                 chip = min(reach)
                 tangential, normal = 800e6 * chip + 8e3, 0.3 * 800e6 * chip + 6e3
                 way = np.array([-radial[1] * tangential - radial[0] * normal, radial[0] * tangential - radial[1] * normal])
-                force += way * width * cut.axial_depth
+                force += way * share * width[i] * cut.axial_depth
         assert history.force[i] == pytest.approx(force, abs=1e-6)

@@ -14,6 +14,10 @@ FINE = 1.0 / (RATE * FACTOR)
 QUIET = SensorSuite(gap_noise=0.0, gap_drift=0.0, acceleration_noise=0.0, roundness=0.0)
 
 
+def turned(suite, speed, start, count):
+    return start + speed * np.arange(count) / suite.rate
+
+
 def fine_time(count):
     return np.arange(-padding(FACTOR) * FACTOR, (count - 1 + padding(FACTOR)) * FACTOR + 1) * FINE
 
@@ -84,7 +88,7 @@ def quiet_history(count):
 def test_gap_is_relative_to_the_fixture_and_signals_have_their_sensitivity():
     suite = dataclasses.replace(QUIET, gap_sensitivity=1e4, acceleration_sensitivity=-1e-3)
     clamping = clamp(suite, np.zeros(1), np.random.default_rng(0))
-    channels = record(suite, clamping, 900.0, 0.2, 0.0, 256, FACTOR, quiet_history(256), np.random.default_rng(1))
+    channels = record(suite, clamping, turned(suite, 900.0, 0.2, 256), 0.0, FACTOR, quiet_history(256), np.random.default_rng(1))
     time = np.arange(256) / RATE
     assert set(channels) == {"flange_x", "flange_y", "fixture_x", "fixture_y"}
     assert channels["flange_y"] == pytest.approx(1e4 * 2e-6 * np.sin(4000.0 * time), abs=1e4 * 2e-10)
@@ -94,7 +98,7 @@ def test_gap_is_relative_to_the_fixture_and_signals_have_their_sensitivity():
 def test_noise_has_its_size_and_air_cuts_nothing_else():
     suite = dataclasses.replace(QUIET, gap_noise=2e-9, acceleration_noise=0.05)
     clamping = clamp(suite, np.zeros(1), np.random.default_rng(0))
-    channels = record(suite, clamping, 900.0, 0.0, 0.0, 8000, FACTOR, None, np.random.default_rng(1))
+    channels = record(suite, clamping, turned(suite, 900.0, 0.0, 8000), 0.0, FACTOR, None, np.random.default_rng(1))
     assert np.std(channels["flange_x"]) == pytest.approx(2e-9, rel=0.05)
     assert np.std(channels["fixture_y"]) == pytest.approx(0.05, rel=0.05)
     assert abs(np.corrcoef(channels["flange_x"], channels["flange_y"])[0, 1]) < 0.05
@@ -104,7 +108,7 @@ def test_trigger_rises_where_tooth_one_stands_at_its_angle():
     suite = dataclasses.replace(QUIET, trigger=True, tooth_angle=0.6)
     clamping = clamp(suite, np.zeros(1), np.random.default_rng(0))
     speed, start = 1234.0, 2.0
-    channels = record(suite, clamping, speed, start, 0.0, 4000, FACTOR, None, np.random.default_rng(1))
+    channels = record(suite, clamping, turned(suite, speed, start, 4000), 0.0, FACTOR, None, np.random.default_rng(1))
     edges = np.flatnonzero(np.diff(channels["trigger"]) > 0.5)
     late = (start + speed * (edges + 1) / RATE - 0.6) % (2.0 * np.pi)
     assert edges.size == int(4000 / RATE * speed / (2.0 * np.pi))
@@ -122,7 +126,7 @@ def test_eccentric_cutter_has_run_out_without_mean():
 def test_history_of_another_length_is_refused():
     clamping = clamp(QUIET, np.zeros(1), np.random.default_rng(0))
     with pytest.raises(InputError, match="instants"):
-        record(QUIET, clamping, 900.0, 0.0, 0.0, 100, FACTOR, quiet_history(256), np.random.default_rng(1))
+        record(QUIET, clamping, turned(QUIET, 900.0, 0.0, 100), 0.0, FACTOR, quiet_history(256), np.random.default_rng(1))
 
 
 @pytest.mark.parametrize(("name", "value"), [("rate", 0.0), ("speed_error", 0.2), ("gap_sensitivity", 0.0), ("roundness_orders", 100)])
