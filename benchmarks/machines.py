@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,15 +44,39 @@ TURNED_SAMPLE: dict[str, tuple[float, tuple[float, ...], bool, float]] = {
 WORKSHOP = Disturbances(speed_wander=1e-3, wander_time=0.3, clock_error=1e-3, hum=2e-7, knocks=3.0, knock=1e-7)
 #: Before and behind the steady part of each cut, whose length stays as it is [s].
 ENTRY = 0.05
-#: What tells the campaigns of one machine apart: trigger or none, the factor on the noise of gap and accelerometer, what disturbs.
+
+
+class Condition(NamedTuple):
+    """What tells the campaigns of one machine apart.
+
+    Parameters
+    ----------
+    trigger : bool
+    noise : float
+        Factor on the noise of gap and accelerometer.
+    disturbances : Disturbances or None
+        Where there are some, each cut enters and leaves the material in its record, too.
+    clock_told : bool
+        Whether the error of the recorder's clock is told as the identification's remark proposes.
+    """
+
+    trigger: bool = False
+    noise: float = 1.0
+    disturbances: Disturbances | None = None
+    clock_told: bool = False
+
+
 CONDITIONS = {
-    "trigger": (True, 1.0, None),
-    "no-trigger": (False, 1.0, None),
-    "noise-x3": (False, 3.0, None),
-    "workshop": (False, 1.0, WORKSHOP),
-    "workshop-trigger": (True, 1.0, WORKSHOP),
-    "workshop-loud": (False, 1.0, replace(WORKSHOP, machine_noise=3.4)),
+    "trigger": Condition(trigger=True),
+    "no-trigger": Condition(),
+    "noise-x3": Condition(noise=3.0),
+    "workshop": Condition(disturbances=WORKSHOP, clock_told=True),
+    "workshop-trigger": Condition(trigger=True, disturbances=WORKSHOP, clock_told=True),
+    "workshop-clock": Condition(disturbances=WORKSHOP),
+    "workshop-loud": Condition(disturbances=replace(WORKSHOP, machine_noise=3.4), clock_told=True),
 }
+#: Those of the study; the others are asked for by name.
+USUAL = ("trigger", "no-trigger", "noise-x3")
 #: Toolings that cut, and those that never do: one in a holder that cut, one in another.
 CUT, HELD_OUT = ("first", "second"), ("similar", "different")
 #: The stability limit at every speed is at least so many times the depth of the cuts.
@@ -189,7 +213,7 @@ def named(names: Sequence[str]) -> list[str]:
 
 def under(machine: MachineFile, condition: str) -> MachineFile:
     """Return the machine with the sensors of one of the `CONDITIONS`."""
-    trigger, noise, disturbances = CONDITIONS[condition]
+    trigger, noise, disturbances, _ = CONDITIONS[condition]
     sensors, plan = machine.sensors, machine.plan
     gap, acceleration = noise * sensors.gap_noise, noise * sensors.acceleration_noise
     machine = replace(machine, sensors=replace(sensors, trigger=trigger, gap_noise=gap, acceleration_noise=acceleration))

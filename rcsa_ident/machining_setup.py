@@ -17,7 +17,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, IMMERSION, SPINDLE_SPEED, remarks_of
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Saved, Shown
-from rcsa_ident.signals.recording import Sensor
+from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.proportions import proportions
 from rcsa_ident.units import to_rpm
@@ -187,6 +187,8 @@ class Campaign(Shown):
     ----------
     sampling_rate : float or None [Hz]
         For files that carry none.
+    clock_error : float, default 0
+        By what share the recorder's clock runs fast: it takes that many more samples in a second than its files say.
     """
 
     name: str
@@ -195,6 +197,11 @@ class Campaign(Shown):
     workpiece: Workpiece
     toolings: Mapping[str, Tooling]
     cuts: tuple[Cut, ...]
+    clock_error: float = 0.0
+
+    def clocked(self, recording: Recording) -> Recording:
+        """Return a recording whose rate is that at which its samples were truly taken."""
+        return recording if self.clock_error == 0.0 else replace(recording, rate=recording.rate * (1.0 + self.clock_error))
 
     def cylinder_remarks(self, used: Collection[str]) -> tuple[Remark, ...]:
         """Return what to make of forces that took cutters for cylinders, for each tooling of the cuts of these ids."""

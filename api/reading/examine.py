@@ -105,6 +105,7 @@ def described(recording: Recording) -> dict[str, Any]:
 def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | None, role: str) -> tuple[dict[str, Any], Reading]:
     """Return the verdict on a cut (with its air cut, where there is one) or on an air cut, and the reading it is based on."""
     cutter = campaign.toolings[cut.tooling].cutter
+    recording, air = campaign.clocked(recording), None if air is None else campaign.clocked(air)
     try:
         with np.errstate(all="ignore"):
             if role == "air":

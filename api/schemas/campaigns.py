@@ -46,6 +46,9 @@ class HeadKeys(Body):
 
     name: Line | None = None
     sampling_rate_hz: float | None = Field(None, description="For files without a sampling rate.")
+    clock_error_percent: float | None = Field(
+        None, ge=-2.0, le=2.0, description="By how much the recorder's clock runs fast: it takes that many more samples in a second."
+    )
 
 
 class SensorKeys(Body):

@@ -221,9 +221,10 @@ def campaign_of(
         Given the table of a cut and its key ``cut`` or ``air``, returns the recording's file.
     """
     top = Table(data, where, known=_CAMPAIGN)
-    head = top.table("campaign", ("name", "sampling_rate_hz"), {})
+    head = top.table("campaign", ("name", "sampling_rate_hz", "clock_error_percent"), {})
     name = head.text("name", name)
     rate = head.number("sampling_rate_hz", "Hz", None, above=0.0, most=1e8)
+    clock = head.number("clock_error_percent", "%", 0.0, least=-2.0, most=2.0) * 1e-2
     channels = top.table("sensors")
     sensors = tuple(sensor_of(key, channels.data[key], where) for key in channels)
     if not sensors:
@@ -237,7 +238,7 @@ def campaign_of(
         if cut.id in seen:
             raise InputError(f"cuts[{i}].id", f'"{cut.id}", the id of cuts[{seen[cut.id]}]', "an id of its own", where)
         seen[cut.id] = i
-    return Campaign(name, rate, sensors, workpiece, toolings, cuts)
+    return Campaign(name, rate, sensors, workpiece, toolings, cuts, clock)
 
 
 def sensor_of(name: str, data: Any, where: str) -> Sensor:

@@ -12,6 +12,8 @@ from rcsa_ident.signals.recording import BLOCK, LONGEST, Recording
 
 #: Share of the median tooth-passing amplitude by which a block may differ and still be steady.
 STEADY_SHARE = 0.3
+#: The same at the stretch's own ends, and how many blocks are looked at there.
+EDGE_SHARE, _EDGE_BLOCKS = 0.03, 3
 #: Tooth-passing lines that are looked at, and how far one stands above its neighbours that is the cut's and not the flange's.
 _LINES, _STAND_OUT = 6, 2.0
 
@@ -88,7 +90,15 @@ def _longest(amplitude: FloatArray) -> tuple[int, int]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], steady, [False]]).astype(int)))
     starts, stops = edges[::2], edges[1::2]
     longest = int(np.argmax(stops - starts))
-    return int(starts[longest]), int(stops[longest])
+    first, last = int(starts[longest]), int(stops[longest])
+    # where the stretch begins or ends in the record, what is left of entry and exit in it is less than what was looked for
+    inside = amplitude[first:last]
+    level, spread = np.median(inside), np.median(np.abs(np.diff(inside))) if inside.size > 4 else np.inf
+    off = np.abs(inside - level) > max(EDGE_SHARE * level, 4.0 * spread)
+    reach = min(_EDGE_BLOCKS, (last - first) // 4)
+    begin = np.flatnonzero(off[:reach])[-1] + 1 if first > 0 and off[:reach].any() else 0
+    end = np.flatnonzero(off[::-1][:reach])[-1] + 1 if last < amplitude.size and off[::-1][:reach].any() else 0
+    return first + int(begin), last - int(end)
 
 
 def _block_power(samples: FloatArray, length: int, step: float, teeth: int) -> FloatArray:

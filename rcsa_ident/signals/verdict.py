@@ -14,7 +14,7 @@ from rcsa_ident.signals.channel_scan import scan
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, follow_speed, line_spectrum, refine_speed
 from rcsa_ident.signals.steady_part import hann
-from rcsa_ident.units import to_hz, to_rpm
+from rcsa_ident.units import to_rpm
 
 #: Least and largest swing, peak to peak, of what a milling spindle does and a sensor tells.
 PLAUSIBLE = {Quantity.DISPLACEMENT: (2e-9, 2e-3, "m"), Quantity.ACCELERATION: (1e-4, 1e5, "m/s^2")}
@@ -33,7 +33,7 @@ MOST_WANDER = 0.003
 
 
 class RecordCode(StrEnum):
-    """What may be said of a record; the last six speak of one that may be used."""
+    """What may be said of a record; the last seven speak of one that may be used."""
 
     UNREADABLE = "unreadable"
     NOT_FINITE = "not-finite"
@@ -51,6 +51,7 @@ class RecordCode(StrEnum):
     IMPLAUSIBLE = "implausible"
     LONG = "long"
     FOLLOWED = "followed"
+    CLOCK = "clock"
     NO_AIR_CUT = "no-air-cut"
     LOSSY = "lossy"
     CUT_OFF = "cut-off"
@@ -226,7 +227,7 @@ def chatter(
     inside = clear & (frequency > band[0]) & (frequency < band[1])
     if not inside.any():
         return None
-    still = np.zeros_like(amplitude) if air is None else _beside(air, channels, frequency)
+    still = np.zeros_like(amplitude) if air is None else _near(air, channels, frequency)
     for c in range(amplitude.shape[1]):
         candidates = np.where(inside & (amplitude[:, c] > 2.0 * still[:, c]), amplitude[:, c], 0.0)
         peak = int(np.argmax(candidates))
@@ -246,15 +247,13 @@ def _spectrum(lines: LineSpectrum, channels: list[int]) -> FloatArray:
     return 2.0 * np.abs(np.fft.rfft(lines.off_orders[:, channels] * window[:, None], axis=0)) / window.sum()
 
 
-def _beside(lines: LineSpectrum, channels: list[int], frequency: FloatArray) -> FloatArray:
-    """Largest amplitude of a record's lines beside the orders near each frequency, shape (f, c); 0 where there is none."""
-    seen = np.zeros((frequency.size, len(channels)))
-    amplitude = _spectrum(lines, channels) if lines.beside.size else seen
-    for omega in lines.beside:
-        place = round(to_hz(omega) / lines.rate * lines.rest.shape[0])
-        near = np.abs(frequency - to_hz(omega)) < 3.0 * max(lines.rate / lines.rest.shape[0], frequency[1] - frequency[0])
-        seen[near] = np.maximum(seen[near], amplitude[max(place - 1, 0) : place + 2].max(axis=0))
-    return seen
+def _near(lines: LineSpectrum, channels: list[int], frequency: FloatArray) -> FloatArray:
+    """Largest amplitude that a record holds beside the orders near each frequency, shape (f, c)."""
+    amplitude = _spectrum(lines, channels)
+    own = np.arange(amplitude.shape[0]) * lines.rate / lines.rest.shape[0]
+    step = max(own[1], frequency[1])
+    places = [frequency + shift * step for shift in range(-3, 4)]
+    return np.stack([np.max([np.interp(place, own, column) for place in places], axis=0) for column in amplitude.T], axis=1)
 
 
 def _stands_out(own: FloatArray, rest: FloatArray, claimed: FloatArray) -> bool:

@@ -83,9 +83,9 @@ def mill(decay, gain, shape, state, tooth, ahead, cut, turn, course, force):
 
     decay: e^{pole dt}, shape (m,); gain: of the old and the new force, shape (2, m, 2); shape: outputs of the poles, shape
     (o, m), the first two the tip's X and Y, doubled for the conjugate poles; state: of the poles at the start, shape (m,);
-    ahead: angles as in `passed`; cut: as in `cut_force`, then the number of slices; turn: feed axes in machine axes, shape (2, 2); course: angle of tooth 1, way of
-    the feed and share of the width that is cut, shape (n, 3); force: shape (n, 2), is filled, in machine axes. The force between two
-    instants is linear, so the march is exact in it.
+    ahead: angles as in `passed`; cut: as in `cut_force`, then the number of slices; turn: feed axes in machine axes, shape (2, 2);
+    course: angle of tooth 1, way of the feed and share of the width that is cut, shape (n, 3); force: shape (n, 2), is filled, in
+    machine axes. The force between two instants is linear, so the march is exact in it.
     """
     n, slices = force.shape[0], int(cut[9])
     m = decay.size

@@ -28,6 +28,8 @@ from rcsa_ident.tool_holder.turning import turning_pair
 
 #: Change of an unknown (all are logarithms or of order one) from which a slope is taken.
 _STEP = 1e-5
+#: Cuts from which on speeds beside the programmed ones say something, and by what share they lie beside them at least.
+_FEW_SPEEDS, _LEAST_CLOCK_ERROR = 5, 2e-4
 #: Reads the recordings of a cut: the cut itself, and its air cut where there is one.
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
 
@@ -55,7 +57,8 @@ def judge(campaign: Campaign, read: ReadCut, map: Map = map, progress: Callable[
 def judge_cut(campaign: Campaign, read: ReadCut, cut: Cut) -> Reading:
     """Return verdict and measurement of one cut, for itself (see `among_fellows`)."""
     try:
-        recording, air = read(cut)
+        recording, air = (None if each is None else campaign.clocked(each) for each in read(cut))
+        assert recording is not None
         cutter = campaign.toolings[cut.tooling].cutter
         return measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, campaign.workpiece.coefficients)
     except InputError as error:
@@ -90,7 +93,45 @@ def identify(
     InputError
         If no cut is usable.
     """
-    return of_campaign(method.run(data_of(campaign, readings), seed, map, progress), campaign)
+    found = of_campaign(method.run(data_of(campaign, readings), seed, map, progress), campaign)
+    clock = clock_remark(readings)
+    return found if clock is None else replace(found, notes=(*found.notes, clock))
+
+
+def clock_error(readings: Sequence[Reading]) -> float | None:
+    """Return by what share a recorder's clock runs fast if the spindle keeps its speed in the mean, None where it shows no error.
+
+    Parameters
+    ----------
+    readings : sequence of Reading
+    """
+    off = np.array([each.measurement.spindle_speed / each.programmed_speed - 1.0 for each in readings if each.measurement is not None])
+    if off.size < _FEW_SPEEDS:
+        return None
+    middle = float(np.median(off))
+    # of a median, from the middle half of the values
+    std = 1.25 * float(np.subtract(*np.percentile(off, [75.0, 25.0]))) / 1.35 / np.sqrt(off.size)
+    return None if abs(middle) < max(_LEAST_CLOCK_ERROR, 4.0 * std) else -middle / (1.0 + middle)
+
+
+def clock_remark(readings: Sequence[Reading]) -> Remark | None:
+    """Return what to make of speeds that all lie beside the programmed ones, None where they do not.
+
+    A recorder whose clock is off and a spindle that turns at another speed than it is told look alike; only of the former are all
+    frequencies wrong by as much.
+
+    Parameters
+    ----------
+    readings : sequence of Reading
+    """
+    error = clock_error(readings)
+    if error is None:
+        return None
+    slower = error > 0.0
+    turned = f"the spindle turned {abs(100.0 * error):.2g} % {'slower' if slower else 'faster'} than programmed in all recordings"
+    way = f"clock_error_percent = {100.0 * error:.2g} in [campaign] takes that out"
+    words = f"{turned}: if it keeps its speed, the recorder's clock is off and all frequencies are wrong by as much; {way}"
+    return Remark(RecordCode.CLOCK, words)
 
 
 def of_campaign(found: Identification, campaign: Campaign) -> Identification:

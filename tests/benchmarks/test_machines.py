@@ -173,7 +173,15 @@ def test_conditions_change_the_sensors_only(drawn):
     assert seen["no-trigger"].sensors.gap_noise == machine.sensors.gap_noise == 2e-9
     assert seen["noise-x3"].sensors.gap_noise == pytest.approx(6e-9)
     assert seen["noise-x3"].sensors.acceleration_noise == pytest.approx(0.15)
-    assert all(s.spindle is machine.spindle and s.plan is machine.plan for s in seen.values())
+    assert all(s.spindle is machine.spindle for s in seen.values())
+    for name, condition in CONDITIONS.items():
+        if condition.disturbances is None:
+            assert seen[name].plan is machine.plan
+        else:
+            # as long in the material as without entry and exit
+            plan = seen[name].plan
+            assert plan.duration - plan.entry - plan.leave == pytest.approx(machine.plan.duration)
+            assert seen[name].disturbances.speed_wander == 1e-3
     assert machine.sensors.tooth_angle != 0.0
 
 
