@@ -56,24 +56,28 @@ class Condition(NamedTuple):
         Factor on the noise of gap and accelerometer.
     disturbances : Disturbances or None
         Where there are some, each cut enters and leaves the material in its record, too.
-    clock_told : bool
-        Whether the error of the recorder's clock is told as the identification's remark proposes.
+    clock : str
+        What is told of the recorder's clock: ``exactly``, ``from the speeds`` (what the identification's remark proposes) or ``nothing``.
+    campaign : str
+        The condition whose records are taken, where they are the same.
     """
 
     trigger: bool = False
     noise: float = 1.0
     disturbances: Disturbances | None = None
-    clock_told: bool = False
+    clock: str = "nothing"
+    campaign: str = ""
 
 
 CONDITIONS = {
     "trigger": Condition(trigger=True),
     "no-trigger": Condition(),
     "noise-x3": Condition(noise=3.0),
-    "workshop": Condition(disturbances=WORKSHOP, clock_told=True),
-    "workshop-trigger": Condition(trigger=True, disturbances=WORKSHOP, clock_told=True),
-    "workshop-clock": Condition(disturbances=WORKSHOP),
-    "workshop-loud": Condition(disturbances=replace(WORKSHOP, machine_noise=3.4), clock_told=True),
+    "workshop": Condition(disturbances=WORKSHOP, clock="exactly"),
+    "workshop-speeds": Condition(disturbances=WORKSHOP, clock="from the speeds", campaign="workshop"),
+    "workshop-clock": Condition(disturbances=WORKSHOP, campaign="workshop"),
+    "workshop-trigger": Condition(trigger=True, disturbances=WORKSHOP, clock="exactly"),
+    "workshop-loud": Condition(disturbances=replace(WORKSHOP, machine_noise=3.4), clock="exactly"),
 }
 #: Those of the study; the others are asked for by name.
 USUAL = ("trigger", "no-trigger", "noise-x3")
@@ -213,7 +217,7 @@ def named(names: Sequence[str]) -> list[str]:
 
 def under(machine: MachineFile, condition: str) -> MachineFile:
     """Return the machine with the sensors of one of the `CONDITIONS`."""
-    trigger, noise, disturbances, _ = CONDITIONS[condition]
+    trigger, noise, disturbances = CONDITIONS[condition][:3]
     sensors, plan = machine.sensors, machine.plan
     gap, acceleration = noise * sensors.gap_noise, noise * sensors.acceleration_noise
     machine = replace(machine, sensors=replace(sensors, trigger=trigger, gap_noise=gap, acceleration_noise=acceleration))

@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.comparison import compared, compared_at_speeds
-from benchmarks.machines import CONDITIONS, TURNED_SAMPLE, USUAL, drawn, is_coupled, named, random_machine, turned_sample, under
+from benchmarks.machines import CONDITIONS, TURNED_SAMPLE, USUAL, Condition, drawn, is_coupled, named, random_machine, turned_sample, under
 from benchmarks.page import DOCS, append_row, draw_study, read_rows, write_block, write_rows
 from benchmarks.study_table import coupled_table, line, table
 from rcsa_ident.identification.data import IdentificationData
@@ -92,7 +92,7 @@ def machine_of(scratch: Path, name: str) -> MachineFile:
 
 def campaign_folder(scratch: Path, name: str, condition: str) -> Path:
     """Return the folder of a campaign, simulated if it is not there; what was half done is not taken for done."""
-    folder = scratch / name / condition
+    folder = scratch / name / (CONDITIONS[condition].campaign or condition)
     if folder.is_dir():
         return folder
     seed = (drawn(name) or (INSIDE_SEED,))[0]
@@ -116,13 +116,14 @@ def read_cut(campaign: Campaign, cut: Cut) -> tuple[Recording, Recording | None]
     return read(cut.recording), None if cut.air is None else read(cut.air)
 
 
-def read_data(folder: Path, clock_told: bool = False) -> tuple[Campaign, list[Reading], IdentificationData]:
-    """Return a campaign with its verdicts and its lines, the clock's error told as the speeds say it where that is wanted."""
+def read_data(folder: Path, condition: Condition = CONDITIONS["no-trigger"]) -> tuple[Campaign, list[Reading], IdentificationData]:
+    """Return a campaign with its verdicts and its lines, the clock's error told as the condition says."""
     campaign = read_campaign(folder)
+    if condition.clock == "exactly" and condition.disturbances is not None:
+        campaign = replace(campaign, clock_error=condition.disturbances.clock_error)
     readings = judge(campaign, partial(read_cut, campaign))
-    error = clock_error(readings) if clock_told else None
-    if error is not None:
-        campaign = replace(campaign, clock_error=error)
+    if condition.clock == "from the speeds":
+        campaign = replace(campaign, clock_error=clock_error(readings) or 0.0)
         readings = judge(campaign, partial(read_cut, campaign))
     return campaign, readings, data_of(campaign, readings)
 
@@ -140,7 +141,7 @@ def perform(scratch: Path, run: Run) -> dict[str, Any]:
     folder = campaign_folder(scratch, run.machine, run.condition)
     setup = machine_of(scratch, run.machine)
     begin = time.perf_counter()
-    campaign, readings, data = read_data(folder, CONDITIONS[run.condition].clock_told)
+    campaign, readings, data = read_data(folder, CONDITIONS[run.condition])
     read = time.perf_counter()
     found = METHODS[run.method].run(data, run.seed, map)
     done = time.perf_counter()

@@ -13,8 +13,9 @@ from api.work.forces import ReadPair, observed
 from api.work.machine_cache import read
 from api.work.requests import MachineText, ToolingSource
 from api.work.toolings import tooling_from
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+from rcsa_ident.signals.recording import Quantity, Recording, Role, Sensor
 from rcsa_ident.units import to_hz, to_rpm
 
 
@@ -94,19 +95,19 @@ def _planned(
     axes = tuple(axis.upper() for axis in found.estimate.axes)
     if set(axes) != set(question.axes):
         raise InputError("axes", list(question.axes), f"{' and '.join(axes)}: the axes with a displacement sensor and an identification")
-    kinds = [(sensor.quantity, None if sensor.axis is None else sensor.axis.upper()) for sensor in question.sensors]
+    names = [sensor.name for sensor in question.sensors]
 
-    def column(quantity: Quantity, axis: str) -> Column | None:
+    def column(sensor: Sensor | None) -> Column | None:
         # the samples of a replay are already in SI
-        place = next((i for i, kind in enumerate(kinds) if kind == (quantity, axis)), None)
-        return None if place is None else Column(place, question.sensors[place].sensitivity if follow else 1.0)
+        return None if sensor is None else Column(names.index(sensor.name), sensor.sensitivity if follow else 1.0)
 
-    gap = tuple(c for c in (column(Quantity.DISPLACEMENT, axis) for axis in axes) if c is not None)
-    shaken = tuple(column(Quantity.ACCELERATION, axis) for axis in axes)
+    planes = [Dof(axis.lower()) for axis in axes]
+    gap = tuple(c for c in (column(recording.sensor(Quantity.DISPLACEMENT, plane)) for plane in planes) if c is not None)
+    shaken = tuple(column(recording.accelerometer(plane, Role.FIXTURE)) for plane in planes)
     order = tuple(axes.index(axis) for axis in question.axes)
     # a replay tells what an upload of the recording does
     settling = found.observer.settling if follow else round(found.estimate.start * recording.rate)
-    plan = Plan(live_observer(found, recording, follow), gap, shaken, len(kinds), first, order, settling)
+    plan = Plan(live_observer(found, recording, follow), gap, shaken, len(names), first, order, settling)
     deviation = found.estimate.standard_deviation
     delay = max(found.response[axis].delay_at_lines for axis in found.response) * recording.rate
     ready = {

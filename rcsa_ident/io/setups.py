@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -30,7 +30,7 @@ from rcsa_ident.plausibility import (
     SPINDLE_SPEED,
     STICKOUT,
 )
-from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Sensor
+from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Role, Sensor
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, clamped
 from rcsa_ident.units import from_rpm, to_rpm
 
@@ -51,7 +51,7 @@ _SEGMENT = (
 _CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
 _MATERIAL = ("youngs_modulus_gpa", "density", "poisson", "loss_factor")
 _CAMPAIGN = ("campaign", "sensors", "workpiece", "toolings", "cuts")
-_SENSOR = ("quantity", "axis", "sensitivity", "delay_s", "bandwidth_hz")
+_SENSOR = ("quantity", "axis", "sensitivity", "delay_s", "bandwidth_hz", "role", "mount_resonance_hz")
 _TRIGGER = ("quantity", "sensitivity", "delay_s", "bandwidth_hz", "pulses_per_revolution", "tooth_angle_deg")
 _CUT = (
     "id",
@@ -229,6 +229,7 @@ def campaign_of(
     sensors = tuple(sensor_of(key, channels.data[key], where) for key in channels)
     if not sensors:
         top.refuse("sensors", "an empty table", "at least one table [sensors.<channel>]")
+    _check_roles(sensors, top)
     workpiece = workpiece_of(top.table("workpiece", WORKPIECE_KEYS))
     named = top.table("toolings")
     toolings = {key: tooling(named, key) for key in named}
@@ -239,6 +240,17 @@ def campaign_of(
             raise InputError(f"cuts[{i}].id", f'"{cut.id}", the id of cuts[{seen[cut.id]}]', "an id of its own", where)
         seen[cut.id] = i
     return Campaign(name, rate, sensors, workpiece, toolings, cuts, clock)
+
+
+def _check_roles(sensors: Sequence[Sensor], top: Table) -> None:
+    """Refuse accelerometers of one axis beside its displacement sensor that do not say what they are fixed to."""
+    shown = {sensor.axis for sensor in sensors if sensor.quantity is Quantity.DISPLACEMENT}
+    for axis in (Dof.X, Dof.Y):
+        felt = [sensor for sensor in sensors if sensor.quantity is Quantity.ACCELERATION and sensor.axis is axis]
+        silent = [sensor.name for sensor in felt if sensor.role is None]
+        if axis in shown and len(felt) > 1 and silent:
+            allowed = f"one of {', '.join(Role)}, where an axis has several accelerometers beside its displacement sensor"
+            top.refuse(f"sensors.{silent[0]}.role", "nothing", allowed)
 
 
 def sensor_of(name: str, data: Any, where: str) -> Sensor:
@@ -271,6 +283,8 @@ def sensor_of(name: str, data: Any, where: str) -> Sensor:
         table.number("bandwidth_hz", "Hz", None, above=0.0),
         table.number("pulses_per_revolution", "", 1, least=1, most=100000, whole=True),
         None if angle is None else float(np.radians(angle)),
+        Role(table.text("role", choices=tuple(Role))) if "role" in table else None,
+        table.number("mount_resonance_hz", "Hz", None, above=0.0),
     )
 
 

@@ -10,13 +10,15 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Shown
-from rcsa_ident.signals.loud_part import decimated, loud_part
+from rcsa_ident.signals.loud_part import BAND, decimated, loud_part
 from rcsa_ident.signals.off_orders import OffOrders, off_orders
-from rcsa_ident.signals.order_lines import OrderLines, order_lines
+from rcsa_ident.signals.order_lines import FOLDED_ORDERS, UNFILTERED, OrderLines, order_lines
 from rcsa_ident.signals.recording import Quantity
 from rcsa_ident.signals.rotation import Rotation
 from rcsa_ident.signals.speed_search import APART, HIGHEST_SHARE, TURNS, find_rotation, window_length
+from rcsa_ident.signals.verdict import RecordCode
 from rcsa_ident.units import from_hz, to_hz, to_rpm
 
 #: Spindle frequencies that are looked for where nothing is told [Hz]: 300 to 48 000 rev/min.
@@ -35,10 +37,10 @@ _CHATTER_SHARE, _CHATTER_OVER_ORDERS = 0.15, 0.25
 _MOST_TEETH, _TOOTH_SHARE, _SIDEBAND_SHARE = 12, 0.8, 0.6
 #: How many times stronger than others lines are that stand out.
 _STAND_OUT = 10.0
-#: Rate above which a recorder has a filter against folding [Hz]; highest frequency that a line may have been folded from [Hz].
-_FILTERED, _HIGHEST_ALIAS = 10e3, 5e3
-#: Highest order that is looked for folded back, and the explained share from which on such orders are no chance.
-_FOLDED_ORDERS, _FOLDED_GAIN = 30, 2e-3
+#: Highest frequency that a line may have been folded from [Hz].
+_HIGHEST_ALIAS = 5e3
+#: Explained share from which on folded orders are no chance.
+_FOLDED_GAIN = 2e-3
 #: Suggested speeds: most tooth passages in a period of the chatter, and how far from the present speed where no range is told.
 _MOST_WAVES, _SLOWEST, _FASTEST = 8, 0.5, 3.0
 
@@ -193,7 +195,7 @@ def listen(
     if found is None:
         words = "there are no lines at the multiples of one frequency: the spindle does not turn, or is not heard"
         return replace(nothing, verdict=Heard.NO_CUT, reasons=(words,))
-    fold = rate < _FILTERED and quantity is not Quantity.SOUND
+    fold = rate < UNFILTERED and quantity is not Quantity.SOUND
     lines, folded = _lines(part, rate, band, found.rotation, fold)
     answer = replace(nothing, other_speeds=tuple(from_hz(each) for each in found.others), folded=folded, explained_share=lines.explained)
     return _judged(answer, part, rate, lines, found.rotation, quantity, teeth, between or _around(found.rotation), fold)
@@ -222,8 +224,8 @@ def _lines(part: FloatArray, rate: float, band: float, rotation: Rotation, fold:
     length = window_length(rate, frequency, part.shape[0])
     below = max(int(min(0.49 * rate, band) / frequency), 1)
     plain = order_lines(part, rotation.angle, length, below)
-    if fold and below < _FOLDED_ORDERS:
-        both = order_lines(part, rotation.angle, length, _FOLDED_ORDERS)
+    if fold and below < FOLDED_ORDERS:
+        both = order_lines(part, rotation.angle, length, FOLDED_ORDERS)
         # both per degree of freedom: more orders explain no more of noise
         if both.explained > plain.explained + _FOLDED_GAIN:
             return both, True
@@ -242,9 +244,7 @@ def _judged(
     fold: bool,
 ) -> Listening:
     """The answer with what is said of a part whose rotation is known."""
-    frequency, order = to_hz(rotation.spindle_speed), np.arange(1, lines.power.size)
-    apparent = np.abs((order * frequency + 0.5 * rate) % rate - 0.5 * rate)
-    beside = off_orders(lines.rest, _typical(part, rate), rate, apparent, answer.band, quantity is Quantity.ACCELERATION)
+    beside = _beside(part, rate, lines, rotation, answer.band, quantity)
     power, gap = lines.power[1:], quantity is Quantity.DISPLACEMENT
     teeth = told if gap else told or _teeth(power)
     ramp, wander = _ramp(*rotation.speeds())
@@ -252,7 +252,7 @@ def _judged(
         answer, spindle_speed=rotation.spindle_speed, spindle_speed_std=rotation.speed_std, wander=wander, ramp=ramp, teeth=teeth
     )
     explained = max(lines.explained, 0.0)
-    if beside.share > max(_CHATTER_SHARE, _CHATTER_OVER_ORDERS * explained):
+    if _chatters(beside, lines):
         return _chattering(answer, beside, rate, told or _teeth(beside.beside, _SIDEBAND_SHARE) or teeth, between, fold)
     if explained < _IDLE_SHARE and not gap and (teeth is None or _on_multiples(power, teeth) < _TOOTH_SHARE):
         words = f"the spindle's orders explain {explained:.0%} of the record and the teeth do not stand out among them: nothing is cut"
@@ -269,6 +269,41 @@ def _judged(
     if teeth is not None and teeth % 2 == 0:
         reasons.append(f"chatter that repeats every second tooth would stand on the run-out's orders with {teeth} teeth: it is not judged")
     return replace(answer, verdict=Heard.STABLE, reasons=tuple(reasons), lines=tuple(beside.frequency))
+
+
+def _beside(part: FloatArray, rate: float, lines: OrderLines, rotation: Rotation, band: float, quantity: Quantity) -> OffOrders:
+    """Lines beside the orders of a part."""
+    order = np.arange(1, lines.power.size)
+    apparent = np.abs((order * to_hz(rotation.spindle_speed) + 0.5 * rate) % rate - 0.5 * rate)
+    return off_orders(lines.rest, _typical(part, rate), rate, apparent, band, quantity is Quantity.ACCELERATION)
+
+
+def _chatters(beside: OffOrders, lines: OrderLines) -> bool:
+    return beside.share > max(_CHATTER_SHARE, _CHATTER_OVER_ORDERS * max(lines.explained, 0.0))
+
+
+def heard_in_a_cut(part: FloatArray, rate: float, rotation: Rotation, teeth: int) -> Remark | None:
+    """Return what accelerometers hear that speaks against a stable cut, None where nothing does.
+
+    Parameters
+    ----------
+    part : array, shape (n, c) [m/s^2]
+        The loud part of a record.
+    rate : float [Hz]
+    rotation : Rotation
+        Of the spindle in it.
+    teeth : int
+    """
+    lines, _ = _lines(part, rate, min(BAND, 0.5 * rate), rotation, rate < UNFILTERED)
+    beside = _beside(part, rate, lines, rotation, min(BAND, 0.5 * rate), Quantity.ACCELERATION)
+    spindle = f"{to_hz(rotation.spindle_speed):.1f} Hz"
+    if _chatters(beside, lines):
+        words = f"chatter: lines at no multiple of the spindle frequency, {spindle}, hold {min(beside.share, 1.0):.0%} of the record"
+        return Remark(RecordCode.CHATTER, f"{words}; the structure's is at {beside.frequency[0]:.0f} Hz")
+    if lines.explained < _IDLE_SHARE and _on_multiples(lines.power[1:], teeth) < _TOOTH_SHARE:
+        words = f"no cutting: multiples of the spindle frequency, {spindle}, explain {max(lines.explained, 0.0):.0%} of the record"
+        return Remark(RecordCode.NO_CUTTING, f"{words}, and the teeth do not stand out among them")
+    return None
 
 
 def _typical(part: FloatArray, rate: float) -> float:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rcsa_ident.arrays import ComplexArray
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
@@ -18,9 +19,11 @@ from rcsa_ident.remarks import Remark, says
 from rcsa_ident.shown import Shown
 from rcsa_ident.signals.alignment import angle_to_air, followed, trigger_delay
 from rcsa_ident.signals.frf import AxisLines, Estimator, LineEstimator, turned_air
-from rcsa_ident.signals.recording import Recording
+from rcsa_ident.signals.listening import heard_in_a_cut
+from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
 from rcsa_ident.signals.verdict import RecordCode, Verdict, chatter, examined, raw_faults, silence, smeared, speed_faults, tooth_count_fault
+from rcsa_ident.units import to_hz
 
 #: Highest line that is used [Hz].
 MAX_FREQUENCY = 4300.0
@@ -28,9 +31,15 @@ MAX_FREQUENCY = 4300.0
 WEAKEST_FORCE = 1e-3
 #: An air cut may turn this much more slowly, and still needs the cut's highest line.
 _AIR_BEYOND = 1.02
+_MOTION = "a displacement sensor for X or Y, or an accelerometer on the spindle's housing"
 DEFAULT_ESTIMATOR = LineEstimator()
 #: Note on a cut without an air cut.
 NO_AIR = Remark(RecordCode.NO_AIR_CUT, "no air cut: run-out and roundness of the flange remain in the lines at the tooth-passing harmonics")
+#: Note on a cut without a displacement sensor.
+HOUSING = Remark(
+    RecordCode.HOUSING,
+    "the motion of the spindle's housing, from its acceleration: it tells speed, chatter and lines, but not the flange's motion",
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +58,8 @@ class CutMeasurement:
     delay, delay_std : float or None [s]
         When tooth 1 stood at immersion 0, from a trigger whose tooth angle is known; else the time of the trigger's edge.
     tooth_angle_known : bool
+    housing : bool
+        Whether the lines are those of the spindle's housing, from accelerometers, and not the flange's.
     """
 
     cut_id: str
@@ -59,6 +70,7 @@ class CutMeasurement:
     delay: float | None = None
     delay_std: float | None = None
     tooth_angle_known: bool = True
+    housing: bool = False
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -108,7 +120,8 @@ def measure_cut(
     cut_id, tooling : str
         Name of the cut and of its tooling, for the result and for messages.
     cut : Recording
-        Displacement channels for X and/or Y, accelerometers of the fixture where there are some.
+        Displacement channels for X and/or Y, accelerometers of the fixture where there are some; without any displacement accelerometers on
+        the spindle's housing.
     air : Recording or None
         The same in the air, where it was recorded.
     cutter : Cutter
@@ -123,11 +136,13 @@ def measure_cut(
     Raises
     ------
     InputError
-        If no displacement channel is there, or the air cut lacks one.
+        If no such channel is there, or the air cut lacks one.
     """
     axes = measured_axes(cut)
     if not axes:
-        raise InputError("sensors", "no displacement", "a displacement sensor for X or Y", cut_id)
+        raise InputError("sensors", "no displacement", _MOTION, cut_id)
+    if air is not None and air.sensor(Quantity.DISPLACEMENT) is None and cut.sensor(Quantity.DISPLACEMENT) is not None:
+        raise InputError("sensors", f"no displacement {axes[0].upper()}", "the same sensors for a cut and its air cut")
     programmed, looked_at = conditions.spindle_speed, examined(cut)
     notes = looked_at.notes
 
@@ -143,9 +158,13 @@ def measure_cut(
         return left_out((_not_steady(error),))
     notes += _remarkable(steady)
     found = steady.spindle_speed, _harmonics(steady)
+    harmonic = np.arange(cutter.teeth, steady.highest_order + 1, cutter.teeth)
     faults = _speed_faults(steady, programmed)
     if faults:
-        return left_out(faults, *found)
+        # what vibrates beside the orders makes a speed look as if it drifted
+        drifting = faults[0].code is RecordCode.SPEED_DRIFT
+        chattering = _chatter(steady, steady.flange, harmonic, cutter.teeth, max_frequency) if drifting else None
+        return left_out(faults if chattering is None else (chattering,), *found)
     try:
         still = None if air is None else steady_record(air, axes, programmed, _AIR_BEYOND * max_frequency, 1)
         faults = () if still is None else _speed_faults(still, programmed)
@@ -153,10 +172,12 @@ def measure_cut(
         faults = (_not_steady(error),)
     if faults:
         return left_out((faults[0].of("air cut"),), *found)
-    harmonic = np.arange(cutter.teeth, steady.highest_order + 1, cutter.teeth)
     if harmonic.size == 0:
         return left_out((Remark(RecordCode.NO_LINE, f"no tooth-passing line below {max_frequency:.0f} Hz"),), *found)
     angle, alignment_std = 0.0, 0.0
+    if steady.housing:
+        # a housing is not out of round: nothing of the air cut stands at the teeth's orders
+        still = None
     if still is not None:
         angle, alignment_std = angle_to_air(steady, still, cutter.teeth)
     reasons = _cut_faults(steady, still, angle, harmonic, cutter, max_frequency)
@@ -172,8 +193,10 @@ def measure_cut(
     lines = estimator.lines(steady, still, angle, harmonic, own, slope[:, measured])
     both = {a: replace(lines[a], across=force[:, o], across_slope=slope[:, o]) for a, o in zip(axes, other, strict=True)}
     kept = {axis: both[axis].of(k) for axis, k in zip(axes, strong.T, strict=True) if k.any()}
-    measurement = CutMeasurement(cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth, *followed(steady)))
-    verdict = Verdict((), notes if air is not None else (*notes, NO_AIR))
+    measurement = CutMeasurement(
+        cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth, *followed(steady)), steady.housing
+    )
+    verdict = Verdict((), (*notes, HOUSING) if steady.housing else notes if air is not None else (*notes, NO_AIR))
     return Reading(cut_id, tooling, programmed, verdict, measurement, *found)
 
 
@@ -191,11 +214,11 @@ def judge_air(cut_id: str, tooling: str, air: Recording, conditions: CuttingCond
     Raises
     ------
     InputError
-        If no displacement channel is there.
+        If there is neither a displacement channel nor an accelerometer on the spindle's housing.
     """
     axes, programmed = measured_axes(air), conditions.spindle_speed
     if not axes:
-        raise InputError("sensors", "no displacement", "a displacement sensor for X or Y")
+        raise InputError("sensors", "no displacement", _MOTION)
     looked_at = examined(air)
     if not looked_at.usable:
         return Reading(cut_id, tooling, programmed, looked_at)
@@ -228,7 +251,11 @@ def _not_steady(error: Unsteady) -> Remark:
 def _speed_faults(steady: SteadyRecord, programmed: float) -> tuple[Remark, ...]:
     """The first reason against the speed of a steady part."""
     smear = smeared(steady.wander)
-    return (*speed_faults(steady.displacement, steady.lines, programmed, steady.deviation), *((smear,) if smear else ()))[:1]
+    faults = speed_faults(steady.motion, steady.lines, programmed, steady.deviation)
+    if steady.housing:
+        # the highest lines of accelerometers are noise: what the following leaves of them is in their scatter
+        faults = tuple(fault for fault in faults if fault.code is not RecordCode.SPEED_DRIFT)
+    return (*faults, *((smear,) if smear else ()))[:1]
 
 
 def _harmonics(steady: SteadyRecord) -> dict[Dof, int]:
@@ -249,12 +276,23 @@ def _cut_faults(
         turned, more = turned_air(air, angle, cut.highest_order)
         difference, noise = difference - turned, noise + more
     forced = np.abs(difference[harmonic])
-    band = (0.5 * cutter.teeth * cut.spindle_speed / (2.0 * np.pi), max_frequency)
-    still = None if air is None else air.lines
-    reasons = [silence(forced**2, noise[harmonic]), chatter(cut.lines, list(range(len(cut.axes))), forced.max(axis=0), band, still)]
+    reasons = [silence(forced**2, noise[harmonic]), _chatter(cut, difference, harmonic, cutter.teeth, max_frequency, air)]
     if air is not None and cutter.equally_spaced and reasons[0] is None:
         reasons.append(tooth_count_fault(np.sum(np.abs(difference) ** 2, axis=1), cutter.teeth))
     return tuple(reason for reason in reasons if reason is not None)
+
+
+def _chatter(
+    cut: SteadyRecord, motion: ComplexArray, harmonic: np.ndarray, teeth: int, max_frequency: float, air: SteadyRecord | None = None
+) -> Remark | None:
+    """A remark if a vibration off the spindle's orders stands out among these lines."""
+    if harmonic.size == 0:
+        return None
+    if cut.rotation is not None:
+        return heard_in_a_cut(cut.motion, cut.recording.rate, cut.rotation, teeth)
+    forced = np.abs(motion[harmonic]).max(axis=0)
+    band = (0.5 * teeth * to_hz(cut.spindle_speed), max_frequency)
+    return chatter(cut.lines, list(range(len(cut.axes))), forced, band, None if air is None else air.lines)
 
 
 def fits_by_chance(cuts: Sequence[tuple[str, bool | None]]) -> list[Remark | None]:

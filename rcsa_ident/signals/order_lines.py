@@ -9,6 +9,8 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.signals._kernels import angle_signal, angle_sums
 
+#: Rate below which a recorder of motion is taken to have no filter against folding [Hz], and the highest order that is looked for then.
+UNFILTERED, FOLDED_ORDERS = 10e3, 30
 #: Share of a window's samples below which a combination of orders is not told from the others: two that fold onto one line.
 _TOLD_APART = 1e-6
 #: Standard deviations by which the mean product of neighbours stands above nothing where a line keeps its phase.

@@ -30,6 +30,17 @@ class Quantity(StrEnum):
     SOUND = "sound"
 
 
+class Role(StrEnum):
+    """What an accelerometer is fixed to."""
+
+    SPINDLE = "spindle"
+    FIXTURE = "fixture"
+    TABLE = "table"
+    WORKPIECE = "workpiece"
+
+
+#: Of a sensor on its mount, above which its response is not told by the resonance's frequency alone.
+_LEAST_MOUNT = 0.2
 #: What a campaign's sensors measure; sound gives no length.
 CAMPAIGN_QUANTITIES = tuple(quantity for quantity in Quantity if quantity is not Quantity.SOUND)
 
@@ -55,6 +66,11 @@ class Sensor:
         Marks that a trigger sees in one turn.
     tooth_angle : float or None [rad]
         Immersion angle of tooth 1 at the trigger's edge, if known.
+    role : Role or None
+        What an accelerometer is fixed to. Where it is not told: the fixture of the axis' displacement sensor, if it has one, else the
+        spindle's housing (see `Recording.accelerometer`).
+    mount_resonance : float or None [Hz]
+        Of the sensor on its mount, a magnet or wax: below it motion is shown too large, by 1 / (1 - (f / resonance)^2).
 
     Examples
     --------
@@ -73,6 +89,8 @@ class Sensor:
     bandwidth: float | None = None
     pulses_per_revolution: int = 1
     tooth_angle: float | None = None
+    role: Role | None = None
+    mount_resonance: float | None = None
 
     def __post_init__(self) -> None:
         # a dynamometer also feels along the spindle
@@ -83,10 +101,18 @@ class Sensor:
             raise InputError(f"sensors.{self.name}.sensitivity", self.sensitivity, "a finite number other than 0")
         if self.bandwidth is not None:
             positive(f"sensors.{self.name}.bandwidth_hz", self.bandwidth, "Hz")
+        if self.mount_resonance is not None:
+            positive(f"sensors.{self.name}.mount_resonance_hz", self.mount_resonance, "Hz")
+        if self.role is not None and self.quantity is not Quantity.ACCELERATION:
+            raise InputError(f"sensors.{self.name}.role", str(self.role), f"none: a {self.quantity} sensor has one place")
 
     def response(self, omega: FloatArray) -> np.ndarray:
-        """Return the sensor's frequency response: delay and first-order bandwidth, shape (n,) [-]."""
+        """Return the sensor's frequency response: delay, first-order bandwidth and its mount's resonance, shape (n,) [-]."""
         value = np.exp(-1j * np.asarray(omega) * self.delay)
+        if self.mount_resonance is not None:
+            ratio = np.asarray(omega) / (2.0 * np.pi * self.mount_resonance)
+            # nobody knows a mount's damping; where it matters, the sensor says nothing
+            value = value / np.maximum(1.0 - ratio**2, _LEAST_MOUNT)
         if self.bandwidth is not None:
             value = value / (1.0 + 1j * np.asarray(omega) / (2.0 * np.pi * self.bandwidth))
         return value
@@ -138,6 +164,12 @@ class Recording(Drawn):
     def sensor(self, quantity: Quantity, axis: Dof | None = None) -> Sensor | None:
         """Return the first sensor of this quantity and axis, or None."""
         return next((s for s in self.sensors if s.quantity is quantity and (axis is None or s.axis is axis)), None)
+
+    def accelerometer(self, axis: Dof, role: Role) -> Sensor | None:
+        """Return the first accelerometer of an axis that is fixed to this, or None; `Sensor` says what one without role is fixed to."""
+        usual = Role.FIXTURE if self.sensor(Quantity.DISPLACEMENT, axis) is not None else Role.SPINDLE
+        of_axis = (s for s in self.sensors if s.quantity is Quantity.ACCELERATION and s.axis is axis)
+        return next((s for s in of_axis if (s.role or usual) is role), None)
 
     def channel(self, quantity: Quantity, axis: Dof | None = None, part: slice = slice(None)) -> tuple[Sensor, FloatArray] | None:
         """Return the first channel of this quantity and axis with its samples, or those of a part, or None."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -60,6 +60,11 @@ class LineSpectrum:
     def off_orders(self) -> FloatArray:
         """What the record holds beside the orders and the drift, shape (n, c)."""
         return self.rest + self.beside_signal if self.beside.size else self.rest
+
+    def up_to(self, max_frequency: float) -> LineSpectrum:
+        """Return the same with the lines up to a frequency [Hz]."""
+        kept = int(max_frequency * 2.0 * np.pi / self.spindle_speed) + 1
+        return replace(self, amplitude=self.amplitude[:kept], variance=self.variance[:kept], scatter=self.scatter[:kept])
 
 
 class _Comb(NamedTuple):

@@ -153,6 +153,17 @@ def _ramp(samples: FloatArray, rate: float, lowest: float, highest: float) -> tu
     return fit if times == 1 else _lines(samples, rate, follow(samples, rate, middles, times * path / parts), times * slowest)
 
 
+def rotation_near(samples: FloatArray, rate: float, frequency: float) -> Rotation:
+    """Return how a spindle turns that turns at about this frequency.
+
+    Parameters
+    ----------
+    samples : array, shape (n, c)
+    rate, frequency : float [Hz]
+    """
+    return _fitted(samples, rate, frequency)[0]
+
+
 def _lines(samples: FloatArray, rate: float, rotation: Rotation, frequency: float) -> tuple[Rotation, OrderLines]:
     """A rotation and the lines of its orders below half the rate."""
     highest = min(max(int(0.48 * rate / frequency), 1), 2 * ORDERS)

@@ -10,9 +10,11 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError, Unsteady
-from rcsa_ident.signals.recording import Quantity, Recording
-from rcsa_ident.signals.rotation import follow
+from rcsa_ident.signals.loud_part import loud_part
+from rcsa_ident.signals.recording import Quantity, Recording, Role
+from rcsa_ident.signals.rotation import Rotation, follow
 from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum, refine_speed, segment_lines
+from rcsa_ident.signals.speed_search import rotation_near
 from rcsa_ident.signals.steady_part import steady_part, steady_window
 from rcsa_ident.units import to_hz
 
@@ -28,9 +30,9 @@ class SteadyRecord:
     ----------
     recording : Recording
     axes : tuple of Dof
-        Machine axes with a displacement sensor.
+        Machine axes with a displacement sensor; where there is none, those with an accelerometer on the spindle's housing.
     columns : tuple of int
-        Channels of the recording that matter: the axes' displacements, then the fixture's accelerations.
+        Channels of the recording that matter: the axes' own, then the accelerations of the displacement sensors' fixture.
     window, part : slice
         What was looked at (all of a recording that is not long, see `steady_window`), and the steady part in it.
     teeth : int
@@ -40,9 +42,12 @@ class SteadyRecord:
     deviation : array or None, shape (n,) [rad]
         Of the spindle's angle in the steady part from that at its mean speed; None where it turns evenly.
     outputs : complex array, shape (orders, axes, o) [m]
-        Displacement at each order: gap and fixture, or the gap alone where no axis has the fixture's acceleration.
+        Displacement at each order: gap and fixture, or the gap alone where no axis has the fixture's acceleration; the housing's, where
+        that was recorded.
     output_variance : array, shape (orders, axes, o) [m^2]
         Variance of the real and of the imaginary part each.
+    rotation : Rotation or None
+        Of the spindle in the steady part, as accelerometers on the housing told it; None where the flange's displacement did.
     """
 
     recording: Recording
@@ -55,10 +60,11 @@ class SteadyRecord:
     deviation: FloatArray | None
     outputs: ComplexArray
     output_variance: FloatArray
+    rotation: Rotation | None = None
 
     @property
     def flange(self) -> ComplexArray:
-        """Absolute displacement of the flange at each order, shape (orders, axes) [m]."""
+        """Absolute displacement of the flange, or of the housing, at each order, shape (orders, axes) [m]."""
         return np.sum(self.outputs, axis=2)
 
     @property
@@ -68,7 +74,12 @@ class SteadyRecord:
 
     def has_fixture(self, axis: Dof) -> bool:
         """Return whether the fixture's motion along an axis was recorded."""
-        return self.recording.sensor(Quantity.ACCELERATION, axis) is not None
+        return not self.housing and self.recording.accelerometer(axis, Role.FIXTURE) is not None
+
+    @property
+    def housing(self) -> bool:
+        """Whether it is the housing whose motion was recorded, and not the flange's."""
+        return self.recording.sensors[self.columns[0]].quantity is Quantity.ACCELERATION
 
     @property
     def spindle_speed(self) -> float:
@@ -76,9 +87,15 @@ class SteadyRecord:
         return self.lines.spindle_speed
 
     @property
+    def angle(self) -> FloatArray:
+        """The spindle's angle at the samples of the steady part, shape (n,) [rad]."""
+        even = self.spindle_speed / self.recording.rate * np.arange(self.part.stop - self.part.start)
+        return even if self.deviation is None else even + self.deviation
+
+    @property
     def wander(self) -> float | None:
         """Standard deviation of the spindle speed within the record, of two revolutions each, as a share; None where it turns evenly."""
-        if self.deviation is None:
+        if self.deviation is None or (self.rotation is not None and not self.rotation.uneven):
             return None
         turns = self.deviation[:: max(round(4.0 * np.pi / self.spindle_speed * self.recording.rate), 1)]
         return float(np.std(np.diff(turns)) / (4.0 * np.pi))
@@ -89,8 +106,8 @@ class SteadyRecord:
         return self.lines.amplitude.shape[0] - 1
 
     @property
-    def displacement(self) -> FloatArray:
-        """Samples of the displacement channels in the steady part, shape (n, axes) [m]."""
+    def motion(self) -> FloatArray:
+        """Samples of the axes' own channels in the steady part, shape (n, axes) [m], those of a housing [m/s^2]."""
         return self.recording.samples[self.part][:, self.columns[: len(self.axes)]]
 
     def segments(self, order: np.ndarray, count: int) -> ComplexArray:
@@ -103,8 +120,9 @@ class SteadyRecord:
 
 
 def measured_axes(recording: Recording) -> tuple[Dof, ...]:
-    """Return the axes with a displacement sensor."""
-    return tuple(axis for axis in (Dof.X, Dof.Y) if recording.sensor(Quantity.DISPLACEMENT, axis) is not None)
+    """Return the axes with a displacement sensor; where there is none at all, those with an accelerometer on the spindle's housing."""
+    shown = tuple(axis for axis in (Dof.X, Dof.Y) if recording.sensor(Quantity.DISPLACEMENT, axis) is not None)
+    return shown or tuple(axis for axis in (Dof.X, Dof.Y) if recording.accelerometer(axis, Role.SPINDLE) is not None)
 
 
 def steady_record(
@@ -116,7 +134,7 @@ def steady_record(
     ----------
     recording : Recording
     axes : sequence of Dof
-        Each with a displacement sensor in the recording.
+        As `measured_axes` returns them.
     programmed : float [rad/s]
         The spindle speed that was set; the true one is looked for near it.
     max_frequency : float [Hz]
@@ -141,14 +159,22 @@ def steady_record(
     window = slice(0, n) if whole else steady_window(recording, columns[: len(axes)], programmed, teeth)
     samples = recording.samples[window][:, columns]
     displacement = samples[:, : len(axes)]
-    rough = refine_speed(displacement, rate, programmed)
-    steady = steady_part(displacement, rate, rough, teeth)
+    accelerations = recording.sensors[columns[0]].quantity is Quantity.ACCELERATION
+    # idle or not: an accelerometer hears the machine's noise all along, and nothing else that turns
+    rough = programmed if accelerations else refine_speed(displacement, rate, programmed)
+    steady = loud_part(displacement, rate) if accelerations else steady_part(displacement, rate, rough, teeth)
     if steady.stop - steady.start < least:
         raise _no_steady_part(f"no steady part of at least {LEAST_REVOLUTIONS:.0f} revolutions")
-    everything = steady == slice(0, samples.shape[0])
+    everything = steady == slice(0, samples.shape[0]) and not accelerations
     speed = rough if everything else refine_speed(displacement[steady], rate, rough)
-    speed, deviation = (speed, None) if whole else _turning(displacement[steady], rate, speed)
-    lines = line_spectrum(samples[steady], rate, speed, max_frequency, deviation)
+    deviation, rotation = None, None
+    if accelerations:
+        rotation = rotation_near(displacement[steady], rate, to_hz(speed))
+        speed, deviation = rotation.about(speed)
+    elif not whole:
+        speed, deviation = _turning(displacement[steady], rate, speed)
+    # in acceleration lines grow with the frequency: those above what is wanted would leak into the others
+    lines = line_spectrum(samples[steady], rate, speed, rate if accelerations else max_frequency, deviation).up_to(max_frequency)
     part = slice(window.start + steady.start, window.start + steady.stop)
     if part.start:
         shift = np.exp(-1j * np.arange(lines.amplitude.shape[0]) * speed * part.start / rate)
@@ -158,7 +184,7 @@ def steady_record(
     kinds = [slice(0, len(axes)), slice(len(axes), None)][: 1 if len(columns) == len(axes) else 2]
     outputs = np.stack([np.einsum("mc,mca->ma", lines.amplitude[:, k], weight[:, k]) for k in kinds], axis=2)
     variance = np.stack([np.einsum("mc,mca->ma", noise[:, k], np.abs(weight[:, k]) ** 2) for k in kinds], axis=2)
-    return SteadyRecord(recording, tuple(axes), columns, window, part, teeth, lines, deviation, outputs, variance)
+    return SteadyRecord(recording, tuple(axes), columns, window, part, teeth, lines, deviation, outputs, variance, rotation)
 
 
 def _turning(displacement: FloatArray, rate: float, speed: float) -> tuple[float, FloatArray | None]:
@@ -172,12 +198,14 @@ def _no_steady_part(found: str) -> Unsteady:
 
 
 def _columns(recording: Recording, axes: Sequence[Dof]) -> tuple[int, ...]:
-    kinds = [(sensor.quantity, sensor.axis) for sensor in recording.sensors]
-    for axis in axes:
-        if (Quantity.DISPLACEMENT, axis) not in kinds:
+    shown = [recording.sensor(Quantity.DISPLACEMENT, axis) for axis in axes]
+    fixed = [recording.accelerometer(axis, Role.FIXTURE) for axis in axes]
+    if all(sensor is None for sensor in shown):
+        shown, fixed = [recording.accelerometer(axis, Role.SPINDLE) for axis in axes], []
+    for axis, sensor in zip(axes, shown, strict=True):
+        if sensor is None:
             raise InputError("sensors", f"no displacement {axis.upper()}", "the same sensors for a cut and its air cut")
-    wanted = [(quantity, axis) for quantity in (Quantity.DISPLACEMENT, Quantity.ACCELERATION) for axis in axes]
-    return tuple(kinds.index(kind) for kind in wanted if kind in kinds)
+    return tuple(recording.sensors.index(sensor) for sensor in (*shown, *fixed) if sensor is not None)
 
 
 def _weights(recording: Recording, axes: Sequence[Dof], columns: Sequence[int], omega: FloatArray) -> ComplexArray:

@@ -14,7 +14,7 @@ from rcsa_ident.signals.channel_scan import scan
 from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.signals.spectra import LineSpectrum, follow_speed, line_spectrum, refine_speed
 from rcsa_ident.signals.steady_part import hann
-from rcsa_ident.units import to_rpm
+from rcsa_ident.units import to_hz, to_rpm
 
 #: Least and largest swing, peak to peak, of what a milling spindle does and a sensor tells.
 PLAUSIBLE = {Quantity.DISPLACEMENT: (2e-9, 2e-3, "m"), Quantity.ACCELERATION: (1e-4, 1e5, "m/s^2")}
@@ -33,7 +33,7 @@ MOST_WANDER = 0.003
 
 
 class RecordCode(StrEnum):
-    """What may be said of a record; the last seven speak of one that may be used."""
+    """What may be said of a record; the last eight speak of one that may be used."""
 
     UNREADABLE = "unreadable"
     NOT_FINITE = "not-finite"
@@ -51,6 +51,7 @@ class RecordCode(StrEnum):
     IMPLAUSIBLE = "implausible"
     LONG = "long"
     FOLLOWED = "followed"
+    HOUSING = "housing"
     CLOCK = "clock"
     NO_AIR_CUT = "no-air-cut"
     LOSSY = "lossy"
@@ -218,12 +219,12 @@ def chatter(
     air : LineSpectrum, optional
         Of the air cut: what is there, too, is no chatter.
     """
-    n = lines.rest.shape[0]
+    n, step = lines.rest.shape[0], to_hz(lines.spindle_speed)
     amplitude = _spectrum(lines, channels)
     frequency = np.fft.rfftfreq(n, 1.0 / lines.rate)
-    order = frequency * 2.0 * np.pi / lines.spindle_speed
+    order = frequency / step
     # a Hann line reaches two bins to each side of the spindle's orders
-    clear = np.abs(order - np.round(order)) > 3.0 * 2.0 * np.pi * lines.rate / n / lines.spindle_speed
+    clear = np.abs(order - np.round(order)) * step > 3.0 * lines.rate / n
     inside = clear & (frequency > band[0]) & (frequency < band[1])
     if not inside.any():
         return None
@@ -235,7 +236,7 @@ def chatter(
         if candidates[peak] > CHATTER_SHARE * forced[c] and candidates[peak] > 10.0 * floor:
             words = (
                 f"chatter: {candidates[peak] * 1e6:.3g} µm at {frequency[peak]:.0f} Hz, which is not a multiple of the spindle frequency, "
-                f"{lines.spindle_speed / (2 * np.pi):.1f} Hz (largest tooth-passing line {forced[c] * 1e6:.3g} µm)"
+                f"{step:.1f} Hz (largest tooth-passing line {forced[c] * 1e6:.3g} µm)"
             )
             return Remark(RecordCode.CHATTER, words)
     return None

@@ -26,7 +26,7 @@ from rcsa_ident.observer.wear import WearIndicators, wear_indicators
 from rcsa_ident.shown import Drawn
 from rcsa_ident.signals.alignment import angle_to_air
 from rcsa_ident.signals.measurement import NO_AIR
-from rcsa_ident.signals.recording import Quantity, Recording
+from rcsa_ident.signals.recording import Quantity, Recording, Role
 from rcsa_ident.signals.spectra import line_spectrum
 from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
 from rcsa_ident.signals.verdict import raw_faults, speed_faults
@@ -141,7 +141,7 @@ def observe(
     if faults:
         raise Unsteady("recording", "; ".join(faults), "a record without lost, frozen or clipped samples")
     axes = tuple(axis for axis in measured_axes(cut) if axis in machine.axes)
-    if not axes:
+    if not axes or cut.sensor(Quantity.DISPLACEMENT) is None:
         raise InputError("sensors", "no displacement along an identified axis", "a displacement sensor for X or Y")
     machine.check_behind_joint(axes)
     programmed = trigger_speed(cut) if programmed is None else programmed
@@ -150,7 +150,7 @@ def observe(
     top = min(identified[1], HIGHEST * 2.0 * np.pi * cut.rate)
     steady = steady_record(cut, axes, programmed, top / (2.0 * np.pi), teeth, whole=True)
     speed = steady.spindle_speed
-    notes: list[str] = [*speed_faults(steady.displacement, steady.lines, programmed)]
+    notes: list[str] = [*speed_faults(steady.motion, steady.lines, programmed)]
     _periodic(steady, programmed, notes)
     answers = identified if machine.ends else (0.0, np.inf)
     band = _band(identified, max(BELOW * identified[0], answers[0]), top, speed, teeth, notes)
@@ -227,7 +227,7 @@ def trigger_speed(recording: Recording) -> float:
 
 def _periodic(steady: SteadyRecord, programmed: float, notes: list[str]) -> None:
     """Refuse a speed whose orders the vibration does not follow; say where a good part of it does not."""
-    signals = steady.displacement - steady.displacement.mean(axis=0)
+    signals = steady.motion - steady.motion.mean(axis=0)
     share = 1.0 - float(np.sum(steady.lines.off_orders[:, : signals.shape[1]] ** 2) / max(np.sum(signals**2), 1e-300))
     if share < UNRELATED:
         found = f"{to_rpm(programmed):.0f} rev/min, whose orders account for {100.0 * share:.0f} % of the vibration"
@@ -320,9 +320,8 @@ def _settings(
     run_out: tuple[FloatArray, ComplexArray] | None,
 ) -> AxisSettings:
     """What the record says of one axis."""
-    fixture = steady.recording.channel(Quantity.ACCELERATION, axis)
-    kinds = _kinds(steady)
-    place = None if fixture is None else kinds.index((Quantity.ACCELERATION, axis))
+    fixture = steady.recording.accelerometer(axis, Role.FIXTURE)
+    place = None if fixture is None else _kinds(steady).index((Quantity.ACCELERATION, axis))
     turned = None
     if run_out is not None:
         order, lines = run_out
@@ -334,7 +333,7 @@ def _settings(
         noise,
         acceleration_noise=_noise(steady, place) if place is not None and colours else 0.0,
         accelerometer=place is not None,
-        sensor_ratio=None if fixture is None else (omega, _gap_response(steady.recording, axis, omega) / fixture[0].response(omega)),
+        sensor_ratio=None if fixture is None else (omega, _gap_response(steady.recording, axis, omega) / fixture.response(omega)),
         run_out=turned,
         spindle_speed=speed if colours else 0.0,
     )
@@ -371,10 +370,10 @@ def _signals(recording: Recording, axes: tuple[Dof, ...]) -> tuple[FloatArray, F
     """Gap and acceleration of the axes, shape (n, a) each; an axis without accelerometer has zeros, and no use for them."""
     gap, acceleration = [], []
     for axis in axes:
-        shown, fixture = recording.channel(Quantity.DISPLACEMENT, axis), recording.channel(Quantity.ACCELERATION, axis)
+        shown, fixture = recording.channel(Quantity.DISPLACEMENT, axis), recording.accelerometer(axis, Role.FIXTURE)
         assert shown is not None
         gap.append(shown[1])
-        acceleration.append(np.zeros_like(shown[1]) if fixture is None else fixture[1])
+        acceleration.append(np.zeros_like(shown[1]) if fixture is None else recording.samples[:][:, recording.sensors.index(fixture)])
     return np.stack(gap, axis=1), np.stack(acceleration, axis=1)
 
 

@@ -108,10 +108,10 @@ def clock_error(readings: Sequence[Reading]) -> float | None:
     off = np.array([each.measurement.spindle_speed / each.programmed_speed - 1.0 for each in readings if each.measurement is not None])
     if off.size < _FEW_SPEEDS:
         return None
-    middle = float(np.median(off))
-    # of a median, from the middle half of the values
-    std = 1.25 * float(np.subtract(*np.percentile(off, [75.0, 25.0]))) / 1.35 / np.sqrt(off.size)
-    return None if abs(middle) < max(_LEAST_CLOCK_ERROR, 4.0 * std) else -middle / (1.0 + middle)
+    # a record whose speed was not found rightly is not asked
+    near = np.abs(off - np.median(off)) <= 4.5 * np.median(np.abs(off - np.median(off)))
+    mean, std = float(np.mean(off[near])), float(np.std(off[near])) / np.sqrt(np.sum(near))
+    return None if abs(mean) < max(_LEAST_CLOCK_ERROR, 4.0 * std) else -mean / (1.0 + mean)
 
 
 def clock_remark(readings: Sequence[Reading]) -> Remark | None:
@@ -187,6 +187,9 @@ def data_of(campaign: Campaign, readings: Sequence[Reading]) -> IdentificationDa
     if not measurements:
         reasons = "; ".join(dict.fromkeys(reason for each in readings for reason in each.verdict.reasons))
         raise InputError("cuts", f"none of {len(readings)} usable ({reasons})", "at least one usable cut")
+    if any(each.housing for each in measurements):
+        told = f"{sum(each.housing for each in measurements)} of {len(measurements)} cuts with accelerometers alone"
+        raise InputError("sensors", told, "a displacement sensor at the flange: the housing's motion does not tell the flange's receptance")
     receptances = {name: partial(_receptance, campaign, name) for name in campaign.toolings}
     teeth = {name: t.cutter.teeth for name, t in campaign.toolings.items()}
     known = campaign.workpiece.coefficients

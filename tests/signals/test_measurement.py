@@ -5,20 +5,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcsa_ident.cutting.force import SLOPES, force_and_slope
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.cutting.force import SLOPES, force_and_slope, force_lines
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.recordings import read_cut
 from rcsa_ident.io.setups import read_campaign, read_tooling
 from rcsa_ident.signals.measurement import among_fellows, fits_by_chance, measure_cut
-from rcsa_ident.signals.recording import Quantity, Recording, Sensor
+from rcsa_ident.signals.recording import Quantity, Recording, Role, Sensor
 from rcsa_ident.signals.verdict import RecordCode
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from rcsa_ident.workflows.identify import judge, judge_cut
 from rcsa_ident.workflows.simulate import simulate
 from tests.fixtures.paths import SAMPLES
-from tests.fixtures.synthetic import COEFFICIENTS, FIXTURE, RPM, conditions, pair
+from tests.fixtures.synthetic import COEFFICIENTS, FIXTURE, RATE, RPM, conditions, cross, pair, wave
 
 AXES = (Dof.X, Dof.Y)
 
@@ -171,11 +172,77 @@ def test_one_axis_alone():
 
 def test_missing_displacements_are_told():
     made = pair(12)
-    blind = Recording(made.cut.rate, made.cut.samples[:, 2:], made.cut.sensors[2:])
+    fixed = tuple(dataclasses.replace(sensor, role=Role.FIXTURE) for sensor in made.cut.sensors[2:])
+    blind = Recording(made.cut.rate, made.cut.samples[:, 2:], fixed)
     with pytest.raises(InputError, match="no displacement"):
         made.measure(cut=blind)
     with pytest.raises(InputError, match="no displacement X"):
         made.measure(air=blind)
+    with pytest.raises(InputError, match="no displacement X"):
+        made.measure(air=Recording(made.cut.rate, made.cut.samples[:, 2:], made.cut.sensors[2:]))
+
+
+def housing(made, recording, noise=0.05, seed=8):
+    """The record of two accelerometers on a housing that moves with `FIXTURE` of the flange, and a little noise."""
+    rng = np.random.default_rng(seed)
+    order = np.arange(made.cutter.teeth, int(2.0 * np.pi * 5000.0 / made.speed) + 1, made.cutter.teeth)
+    omega = order * made.speed
+    force = force_lines(made.cutter, conditions(made.speed / RPM), COEFFICIENTS, order)
+    moved = np.zeros((order[-1] + 1, 2), dtype=complex)
+    moved[order] = -(omega**2)[:, None] * FIXTURE * cross(omega) * force * np.exp(1j * order * made.angle)[:, None]
+    n = recording.samples.shape[0]
+    samples = wave(moved, made.speed, n) + noise * rng.normal(size=(n, 2))
+    return Recording(RATE, samples, tuple(Sensor(f"housing_{a}", Quantity.ACCELERATION, a) for a in (Dof.X, Dof.Y)))
+
+
+def test_accelerometers_on_the_housing_alone():
+    made, off, ratio = pair(seed=31), [], []
+    for seed in range(12):
+        found = made.measure(cut=housing(made, made.cut, seed=seed), air=None)
+        assert found.verdict.usable
+        assert found.measurement.housing
+        assert [note.code for note in found.verdict.notes] == [RecordCode.HOUSING]
+        assert found.spindle_speed == pytest.approx(made.speed, rel=1e-6)
+        for axis, lines in found.measurement.axes.items():
+            assert lines.outputs == 1
+            # how far the phase of all turns with the speed's own error is the delay's business
+            error = np.abs(lines.receptance) - np.abs(FIXTURE * made.expected(lines, axis))
+            off.append(error / np.sqrt(lines.variance[:, 0]))
+            # a / omega^2: a line's noise at 600 Hz is fifty times that at 4 kHz
+            noise = lines.variance[:, 0] * np.abs(lines.force) ** 2 * lines.omega**4
+            ratio.append(noise[0] / noise[-1])
+    assert np.median(ratio) == pytest.approx(1.0, abs=0.25)
+    assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.15)
+    assert not made.measure().measurement.housing
+
+
+def test_a_housing_that_chatters_below_half_a_slow_rate():
+    # orders above half the rate stand folded back; the mode beside them is what the verdict names
+    rng, speed, rate, n = np.random.default_rng(5), 6900.0 * RPM, 1650.0, 16500
+    t = np.arange(n) / rate
+    lines = np.zeros((25, 2), dtype=complex)
+    lines[4::4] = rng.normal(size=(6, 2)) + 1j * rng.normal(size=(6, 2))
+    sensors = tuple(Sensor(f"a_{a}", Quantity.ACCELERATION, a) for a in (Dof.X, Dof.Y))
+    quiet = wave(lines, speed, n, rate) + 0.02 * rng.normal(size=(n, 2))
+    cutter = Cutter(4, 12e-3)
+
+    def verdict(samples):
+        return measure_cut("c", "t", Recording(rate, samples, sensors), None, cutter, conditions(6900.0), COEFFICIENTS).verdict
+
+    assert verdict(quiet).usable
+    found = verdict(quiet + 3.0 * np.cos(2.0 * np.pi * 275.0 * t)[:, None]).reasons
+    assert [reason.code for reason in found] == [RecordCode.CHATTER]
+    assert "the structure's is at 275 Hz" in found[0]
+
+
+def test_a_mount_that_resonates_is_undone():
+    made = pair(seed=31)
+    loose = housing(made, made.cut)
+    told = tuple(dataclasses.replace(sensor, mount_resonance=10e3) for sensor in loose.sensors)
+    plain, undone = (made.measure(cut=dataclasses.replace(loose, sensors=s), air=None).measurement for s in (loose.sensors, told))
+    for axis, lines in plain.axes.items():
+        ratio = undone.axes[axis].receptance / lines.receptance
+        np.testing.assert_allclose(ratio, 1.0 - (lines.omega / (2.0 * np.pi * 10e3)) ** 2, rtol=1e-9)
 
 
 def test_other_channels_are_left_alone():

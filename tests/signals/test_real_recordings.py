@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rcsa_ident.cutting.coefficients import CuttingCoefficients
+from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
+from rcsa_ident.cutting.cutter import Cutter
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.io.open_recording import open_recording
 from rcsa_ident.signals.listening import Heard, Listening
+from rcsa_ident.signals.measurement import measure_cut
+from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.signals.tap import tap
+from rcsa_ident.signals.verdict import RecordCode
 from rcsa_ident.units import from_rpm, to_rpm
 from rcsa_ident.workflows.listen import listen_to
 
@@ -48,6 +56,30 @@ def test_stable_cuts_tell_speed_and_teeth(part):
 
 def test_orders_of_a_recorder_without_a_filter_stand_folded():
     assert heard("CutsAlongX__EBI_T25_0p25IN_6900RPM").folded
+
+
+@pytest.mark.parametrize("part", [*CUTS, "EBI_T50_0p25IN_6900RPM", "PCB_6000RPM_AirCut"])
+def test_accelerometers_alone_are_cuts_of_a_campaign(part):
+    """What a campaign makes of them, speed and teeth as they are told."""
+    (path,) = [each for each in SHARED.rglob("*") if part in each.name]
+    opened = open_recording(path)
+    _, channels = opened.of()
+    axes = [Dof(next(word for word in each.name.lower().split() if word in "xyz")) for each in channels]
+    chosen = [(each, axis) for each, axis in zip(channels, axes, strict=True) if axis is not Dof.Z]
+    samples = np.stack([each.samples for each, _ in chosen], axis=1)
+    recording = Recording(opened.rate, samples, tuple(Sensor(each.name, Quantity.ACCELERATION, axis) for each, axis in chosen))
+    rpm = float(re.search(r"(\d+)RPM", path.name)[1])
+    conditions = CuttingConditions(from_rpm(rpm), 3e-3, 5e-5, Engagement(0.0, 0.5 * np.pi))
+    teeth = CUTS[part][1] if part in CUTS else 4
+    reading = measure_cut(part, "tool", recording, None, Cutter(teeth, 12.7e-3), conditions, CuttingCoefficients(9e8, 0.3))
+    if "AirCut" in part:
+        assert [reason.code for reason in reading.verdict.reasons] == [RecordCode.NO_CUTTING]
+    elif part in CUTS:
+        assert reading.verdict.usable, reading.verdict
+        assert to_rpm(reading.spindle_speed) == pytest.approx(CUTS[part][0], rel=1e-3)
+    else:
+        assert [reason.code for reason in reading.verdict.reasons] == [RecordCode.CHATTER]
+        assert "at 275 Hz" in reading.verdict.reasons[0]
 
 
 def test_chatter_of_a_cut_is_named_with_its_aliases():

@@ -274,5 +274,6 @@ def test_an_air_cut_alone(good):
     assert judge_air("c", "t", short, conditions(9000.0)).verdict.reasons[0].startswith("too short")
     frozen = changed(good.air, lambda x: x.__setitem__((slice(None), 1), 0.5))
     assert judge_air("c", "t", frozen, conditions(9000.0)).verdict.reasons[0].startswith("no signal")
+    none = Recording(RATE, good.air.samples[:, :1], (Sensor("trigger", Quantity.TRIGGER),))
     with pytest.raises(InputError, match="no displacement"):
-        judge_air("c", "t", Recording(RATE, good.air.samples[:, 2:], good.air.sensors[2:]), conditions(9000.0))
+        judge_air("c", "t", none, conditions(9000.0))
