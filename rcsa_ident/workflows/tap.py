@@ -15,6 +15,8 @@ from rcsa_ident.signals.tap import HitEstimator, TapFrf, tap
 
 #: How many times as long as the hammer's pulses the other channels go on.
 _LONGER = 3.0
+#: Relative difference of rates that are one: those of time stamps are not told to the last digit.
+_SAME_RATE = 1e-4
 #: How often a response is differentiated, by the words of commands and queries, and by what a channel's unit says.
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _OF_UNIT = {Quantity.DISPLACEMENT: 0, Quantity.ACCELERATION: 2}
@@ -79,8 +81,8 @@ def tap_recordings(
         pairs.append((hammer.samples, moved.samples))
         derivative = derivative if moved.quantity is None else _OF_UNIT.get(moved.quantity, derivative)
         said += [remark for remark in (*recording.remarks, *remarks) if remark not in said]
-    rates = sorted({recording.rate for recording in recordings})
-    if len(rates) != 1:
+    rates = sorted(recording.rate for recording in recordings)
+    if not rates or rates[-1] > (1.0 + _SAME_RATE) * rates[0]:
         raise InputError("sampling_rate_hz", ", ".join(f"{rate:g}" for rate in rates) or "no recording", "one rate for all recordings [Hz]")
     return replace(tap(rates[0], pairs, derivative, estimator, sensor_mass), axis=axis), said
 
