@@ -1,10 +1,10 @@
 // What one recording says: dropped, or recorded here with the microphone; no machine and no campaign is needed.
 import { send } from "../api.js";
-import { add, fill, h, head, waiting } from "../dom.js";
+import { add, fill, h, head, tell, waiting, whisper } from "../dom.js";
 import { dropZone } from "../drop.js";
 import { busy, clearFaults, failed, field, quantity, select, showProblem } from "../forms.js";
 import { remember, to } from "../router.js";
-import { listenAnswer } from "./listen_answer.js";
+import { listenAnswer, said } from "./listen_answer.js";
 import { recorderCard } from "./recorder_card.js";
 
 /** What the address keeps. */
@@ -62,7 +62,7 @@ export async function view(_args, query, place) {
     ),
     h("p", null, again),
   );
-  const answers = h("div", { class: "view", "aria-live": "polite" });
+  const answers = h("div", { class: "view" });
   let last = null;
 
   function asked() {
@@ -83,9 +83,13 @@ export async function view(_args, query, place) {
     question.set("curves", "true");
     try {
       const headers = { "Content-Type": "application/octet-stream" };
-      const answer = await send("POST", `listen?${question}`, { body: file, headers });
-      if (last === file) fill(answers, listenAnswer(await answer.json(), file));
+      const found = await (await send("POST", `listen?${question}`, { body: file, headers })).json();
+      if (last !== file) return;
+      fill(answers, listenAnswer(found, file));
+      whisper(said(found));
+      answers.scrollIntoView({ block: "start" });
     } catch (error) {
+      if (last !== file) return;
       fill(answers);
       const fields = (error.errors ?? []).map((each) => each.field);
       if (fields.some((name) => form.querySelector(`[data-field="${CSS.escape(name)}"]`))) showProblem(form, error);
@@ -100,14 +104,18 @@ export async function view(_args, query, place) {
   const zone = dropZone(
     "Drop a recording of a cut",
     "The sound of a phone as WAV, or a file of any sensor: CSV and other text, FLAC, HDF5, TDMS, UFF 58, MATLAB, Parquet.",
-    ([file]) => hear(file),
+    (files) => {
+      if (files.length > 1) tell(`${files[0].name} is listened to: one recording at a time.`);
+      return hear(files[0]);
+    },
     { folder: false },
   );
   const recorder = recorderCard(hear);
   add(
     place,
     head("Listen", "One recording of a cut says at once: stable or chatter, how fast the spindle turns, and which speed to try next.", listenTabs("listen")),
-    h("div", { class: "columns" }, zone, recorder),
+    // who holds a phone records, who sits at a desk has a file
+    h("div", { class: "columns" }, matchMedia("(pointer: coarse)").matches ? [recorder, zone] : [zone, recorder]),
     form,
     answers,
   );

@@ -27,6 +27,9 @@ export function listenAnswer(found, file) {
   ];
 }
 
+/** The verdict in a line. */
+export const said = (found) => `${SAID[found.verdict]}${found.spindle_speed_rpm === null ? "" : `, at ${plain(found.spindle_speed_rpm)} rev/min`}`;
+
 const sentence = (text) => `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
 
 function headline(found) {

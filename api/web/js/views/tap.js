@@ -1,7 +1,7 @@
 // Hits of a hammer to an FRF: dropped, averaged, looked at, and handed on as a file.
 import { send } from "../api.js";
 import { axis, chart, colour, legend } from "../charts.js";
-import { add, card, fill, h, head, mark, note, save, table, waiting } from "../dom.js";
+import { add, card, fill, h, head, mark, note, save, table, waiting, whisper } from "../dom.js";
 import { dropZone } from "../drop.js";
 import { frfFigure } from "../figures.js";
 import { busy, clearFaults, failed, field, quantity, select, showProblem } from "../forms.js";
@@ -60,7 +60,7 @@ export async function view(_args, _query, place) {
     ),
     h("p", null, again),
   );
-  const answers = h("div", { class: "view", "aria-live": "polite" });
+  const answers = h("div", { class: "view" });
   let last = null;
 
   /** Ask for the receptance of the files, in one of the forms that the service has. */
@@ -92,8 +92,12 @@ export async function view(_args, _query, place) {
     fill(answers, waiting("Looking at the hits …"));
     try {
       const found = await (await ask("application/json")).json();
-      if (last === files) fill(answers, shown(found, (kind, name) => download(kind, name)));
+      if (last !== files) return;
+      fill(answers, shown(found, download));
+      whisper(`A receptance from ${found.used} of ${found.hits.length} hits`);
+      answers.scrollIntoView({ block: "start" });
     } catch (error) {
+      if (last !== files) return;
       fill(answers);
       refused(error);
     }
