@@ -34,6 +34,7 @@ from api.routes import (
     identifications,
     keys,
     libraries,
+    listening,
     machines,
     materials,
     multi_upload,
@@ -135,7 +136,8 @@ def create_app(
     app.include_router(health.router)
     app.include_router(static_files.router)
     about = (keys, usage, machines, toolings, versions, libraries, dropped_files, holders, materials, schemas, examples, example_campaign)
-    for each in (*about, campaigns, recordings, resumable_upload, tus, multi_upload, tool_change, identifications, forces, streams):
+    taken = (listening, campaigns, recordings, resumable_upload, tus, multi_upload)
+    for each in (*about, *taken, tool_change, identifications, forces, streams):
         app.include_router(each.router, prefix=V1)
     app.add_middleware(HeadRequests, router=app.router)
     app.add_middleware(AccessMonitor, components=components)

@@ -57,8 +57,8 @@ def told(path: Path) -> tuple[Listening, FloatArray, float, Quantity, float]:
     opened = open_recording(path)
     quantity, channels = opened.of()
     began = time.perf_counter()
-    answer, samples = listen_to(opened.rate, [each.samples for each in channels], quantity, TOLD.get(path.name))
-    return answer, samples, opened.rate, quantity, time.perf_counter() - began
+    answer = listen_to(opened.rate, [each.samples for each in channels], quantity, TOLD.get(path.name))
+    return answer, answer.record.samples, opened.rate, quantity, time.perf_counter() - began
 
 
 def table(paths: Sequence[Path]) -> list[str]:

@@ -226,14 +226,15 @@ def main(arguments: Sequence[str]) -> None:
     print(f"scratch folder: {scratch}", flush=True)
     rows = run(scratch, named(given.machines), given.conditions, given.methods, given.seeds, given.processes)
     kinds = {
-        "study": [row for row in rows if not is_coupled(row["machine"])],
+        "study": [row for row in rows if not is_coupled(row["machine"]) and row["condition"] in USUAL],
+        "workshop": [row for row in rows if not is_coupled(row["machine"]) and row["condition"] not in USUAL],
         "coupled": [row for row in rows if row["machine"] not in TURNED_SAMPLE and is_coupled(row["machine"])],
         "turned_sample": [row for row in rows if row["machine"] in TURNED_SAMPLE],
     }
     for name, members in kinds.items():
         if not members:
             continue
-        text = table(members) if name == "study" else coupled_table(members)
+        text = coupled_table(members) if is_coupled(members[0]["machine"]) else table(members)
         print(f"\n{text}")
         if given.page:
             write_rows(DOCS / ("study.jsonl" if name == "study" else f"study_{name}.jsonl"), members)

@@ -52,12 +52,14 @@ if TYPE_CHECKING:
         connect,
         estimate_forces,
         identify,
+        listen,
         plot_lobes,
         read_machine,
         read_modes,
         read_result,
         read_tap_tests,
         sample_campaign,
+        tap,
     )
 
 __all__ = [
@@ -92,6 +94,7 @@ __all__ = [
     "estimate_forces",
     "hz",
     "identify",
+    "listen",
     "material",
     "normal_modes",
     "plot_lobes",
@@ -111,6 +114,7 @@ __all__ = [
     "stability_lobes",
     "stability_map",
     "surface_location_error",
+    "tap",
 ]
 
 #: Where each name lives, as the block above says it to editors.
@@ -146,8 +150,8 @@ _ROOMS = {
     "tool_holder.geometry": ("MATERIALS", "BeamSegment", "Contact", "clamped"),
     "units": ("hz", "rpm"),
     "verbs": (
-        "advise", "connect", "estimate_forces", "identify", "plot_lobes", "read_machine", "read_modes", "read_result", "read_tap_tests",
-        "sample_campaign",
+        "advise", "connect", "estimate_forces", "identify", "listen", "plot_lobes", "read_machine", "read_modes", "read_result",
+        "read_tap_tests", "sample_campaign", "tap",
     ),
 }  # fmt: skip
 _HOME = {name: f"rcsa_ident.{room}" for room, names in _ROOMS.items() for name in names}

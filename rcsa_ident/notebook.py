@@ -21,6 +21,7 @@ from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.identified import Result
 from rcsa_ident.io.curves import write_tip_csv
+from rcsa_ident.io.exports import write_tap
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.flanges import write_flange_machine
 from rcsa_ident.io.forces import write_forces
@@ -39,10 +40,14 @@ from rcsa_ident.report.curves import is_tip, receptance_figure, recording_figure
 from rcsa_ident.report.drawing import tooling_svg
 from rcsa_ident.report.forces import force_history
 from rcsa_ident.report.html import report_html
+from rcsa_ident.report.listening import listening_figure
 from rcsa_ident.report.lobes import map_figure, save_figure, stability_figure, surface_figure
 from rcsa_ident.report.summaries import mode_rows, two_digits
+from rcsa_ident.report.tap import tap_figure
 from rcsa_ident.shown import Drawn, Shown
+from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.recording import Recording
+from rcsa_ident.signals.tap import TapFrf
 from rcsa_ident.stability.advice import Advice
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.stability_map import StabilityMap
@@ -91,6 +96,8 @@ figure_of.register(StabilityLobes, stability_figure)
 figure_of.register(StabilityMap, map_figure)
 figure_of.register(SurfaceError, surface_figure)
 figure_of.register(Recording, recording_figure)
+figure_of.register(Listening, listening_figure)
+figure_of.register(TapFrf, tap_figure)
 
 
 @figure_of.register
@@ -174,6 +181,11 @@ def _(recording: Recording) -> dict[str, Writer]:
 
 
 @formats.register
+def _(found: TapFrf) -> dict[str, Writer]:
+    return {suffix: partial(write_tap, found=found) for suffix in (".csv", ".uff", ".frf")}
+
+
+@formats.register
 def _(estimate: ForceEstimate) -> dict[str, Writer]:
     return {".csv": partial(write_forces, estimate=estimate)}
 
@@ -245,6 +257,17 @@ def _(advice: Advice) -> str:
     ]
     header = ("rev/min", "recommended depth [mm]", "stability limit [mm]", "ended by", "cm³/min", "kW")
     return _page(advice, _table(header, points), _list(advice.remarks), _svg(figure_of(advice)))
+
+
+@html.register
+def _(answer: Listening) -> str:
+    return _page(answer, _list(answer.reasons), *([] if answer.record is None else [_svg(figure_of(answer))]))
+
+
+@html.register
+def _(found: TapFrf) -> str:
+    left_out = [f"{hit.time:.3g} s of recording {hit.record + 1} is left out: {hit.reason}" for hit in found.hits if hit.reason]
+    return _page(found, _list(left_out), _svg(figure_of(found)))
 
 
 @html.register

@@ -20,6 +20,7 @@ from api.schemas.forces import ForceAnswer, StreamsAnswer, StreamSummary
 from api.schemas.holders import CatalogueAnswer, Holders
 from api.schemas.keys import KeyAnswer, MadeKey
 from api.schemas.libraries import Example, ExampleCampaign, Examples, ImportAnswer
+from api.schemas.listening import ListenAnswer, TapAnswer
 from api.schemas.machines import Frf, Identification, IdentificationSummary, MachineAnswer, Modes
 from api.schemas.materials import MaterialAnswer, Materials
 from api.schemas.queries import AdviceAnswer, TipAnswer
@@ -129,7 +130,7 @@ class Client(Uploads, Jobs):
     def import_toolings(self, library: bytes, **assumed: Any) -> ImportAnswer:
         """Import the toolings of a Fusion 360 or HSM tool library; `replace` overwrites existing ones."""
         kind = "application/zip" if library.startswith(b"PK") else "application/json"
-        query = {key: str(value).lower() if isinstance(value, bool) else value for key, value in assumed.items() if value is not None}
+        query = _query(assumed)
         return read(ImportAnswer, self.send("POST", "/toolings/import", content=library, params=query, headers={"Content-Type": kind}))
 
     def holders(self) -> Holders:
@@ -151,6 +152,27 @@ class Client(Uploads, Jobs):
         return read(
             TestedCutsAnswer, self.send("POST", "/tested-cuts/preview", content=text.encode(), headers={"Content-Type": "text/csv"})
         )
+
+    def listen(self, recording: Path, **further: Any) -> ListenAnswer:
+        """Return what a recording says; options channel, quantity, teeth, speed_rpm, speeds_from, speeds_to, rate_hz, curves."""
+        query = {"name": recording.name, **_query(further)}
+        with recording.open("rb") as opened:
+            headers = {"Content-Type": "application/octet-stream"}
+            answer = self.send("POST", "/listen", content=opened, params=query, headers=headers, **self.long_timeout)
+        return read(ListenAnswer, answer)
+
+    def tap(self, *hits: Path, **further: Any) -> TapAnswer:
+        """Return the receptance of hammer hits; options axis, force, response, quantity, estimator, sensor_mass_g, rate_hz."""
+        return read(TapAnswer, self._tap(hits, further, "application/json"))
+
+    def tap_file(self, *hits: Path, uff: bool = False, **further: Any) -> str:
+        """Return the text of FRF.csv, or of a universal file, of hammer hits; options as of `tap`."""
+        return self._tap(hits, further, "application/x-uff" if uff else "text/csv").text
+
+    def _tap(self, hits: tuple[Path, ...], further: Mapping[str, Any], kind: str) -> httpx2.Response:
+        with ExitStack() as opened:
+            files = [("hits", (path.name, opened.enter_context(path.open("rb")))) for path in hits]
+            return self.send("POST", "/tap", files=files, params=_query(further), headers={"Accept": kind}, **self.long_timeout)
 
     def schema(self, name: str) -> Json:
         """Return the JSON Schema of a TOML file: tooling, campaign, machine or modes."""
@@ -234,3 +256,8 @@ class Client(Uploads, Jobs):
     def withdraw_key(self, id: str) -> None:
         """Revoke an API key."""
         self.send("DELETE", f"/keys/{id}")
+
+
+def _query(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters of a query; what is None is left out."""
+    return {key: str(value).lower() if isinstance(value, bool) else value for key, value in given.items() if value is not None}

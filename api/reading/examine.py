@@ -34,14 +34,15 @@ def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None)
         write_normalised(upload.target, found, signals, sensors)
         return recorded(found, signals, sensors)
     except InputError as error:
-        raise _with_client_name(error, upload) from None
+        raise with_client_name(error, upload.path, upload.name) from None
     except RecursionError:
         raise InputError("recording", "a file nested too deeply to be read", "a complete file", upload.name) from None
 
 
-def _with_client_name(error: InputError, upload: Upload) -> InputError:
-    found = error.found.replace(str(upload.path), upload.name) if isinstance(error.found, str) else error.found
-    return InputError(error.field, found, error.allowed.replace(str(upload.path), upload.name), upload.name)
+def with_client_name(error: InputError, path: Path, name: str) -> InputError:
+    """Return an error whose file is called as the client calls it."""
+    found = error.found.replace(str(path), name) if isinstance(error.found, str) else error.found
+    return InputError(error.field, found, error.allowed.replace(str(path), name), name)
 
 
 def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) -> dict[str, Any]:

@@ -10,10 +10,11 @@ from rcsa_ident.signals.recording import Sensor
 
 
 def warm() -> None:
-    """Import and compile what a verdict needs, see `examine.warm`."""
-    from api.reading import examine
+    """Import and compile what a verdict needs, see `examine.warm`, and what listening does."""
+    from api.reading import examine, hearing
 
     examine.warm()
+    hearing.warm()
 
 
 def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) -> dict[str, Any]:
@@ -28,6 +29,20 @@ def read_alone(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) 
     from api.reading import examine
 
     return examine.described(examine.read_upload(upload, sensors, rate))
+
+
+def listen(path: Path, name: str, asked: dict[str, Any]) -> dict[str, Any]:
+    """Return what a recording says, see `hearing.listen`."""
+    from api.reading import hearing
+
+    return hearing.listen(path, name, asked)
+
+
+def tap(asked: dict[str, Any], *hits: Upload) -> dict[str, Any]:
+    """Return the receptance of hammer hits, see `hearing.tap`."""
+    from api.reading import hearing
+
+    return hearing.tap(asked, *hits)
 
 
 def recording_and_air(cut: Path, air: Path | None) -> tuple[Any, Any]:

@@ -66,9 +66,11 @@ def _utf8(text: str) -> str:
 
 @asynccontextmanager
 async def form(
-    request: Request, components: Components, group: str, texts: Collection[str], files: Collection[str]
+    request: Request, components: Components, group: str, texts: Collection[str], files: Collection[str], several: bool = False
 ) -> AsyncIterator[tuple[dict[str, bytes], dict[str, tuple[str, Received]]]]:
     """Texts and files of a form by field; files are on the disk until the end of the context.
+
+    With `several` a file's field may come again: the further ones are `field[1]`, `field[2]` and so on.
 
     Raises
     ------
@@ -82,7 +84,8 @@ async def form(
         async for event in events(request, components):
             if isinstance(event, Head):
                 head, text, part = event, bytearray(), None
-                if head.field in found or head.field in received or head.field not in {*texts, *files}:
+                again = head.field in received and not several
+                if head.field in found or again or head.field not in {*texts, *files}:
                     allowed = f"each once: {', '.join([*texts, *files])}"
                     fault = {"field": head.field[:80] or "part", "found": "such a part", "allowed": allowed}
                     raise Problem(422, f"a part of the form: found {head.field[:80]!r}, allowed is {allowed}", [fault])
@@ -90,7 +93,8 @@ async def form(
                     part = await stack.enter_async_context(new_part(components, group))
             elif event is None:
                 if isinstance(part, Part):
-                    received[head.field] = (head.name or "", await complete(part))
+                    place = f"{head.field}[{len(received)}]" if head.field in received else head.field
+                    received[place] = (head.name or "", await complete(part))
                 else:
                     found[head.field] = bytes(text)
             elif isinstance(part, Part):

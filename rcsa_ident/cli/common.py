@@ -43,6 +43,8 @@ _OPTIONS = {
     "runout": ("runout_um", "in um"),
     "feed_per_tooth": ("feed_per_tooth_mm", ""),
     "quantity": ("quantity", ""),
+    "force": ("force", ""),
+    "response": ("response", ""),
     "channel": ("channel", ""),
     "sampling_rate_hz": ("rate_hz", ""),
 }

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from rcsa_ident.cli.common import Json, Stages, answers, emit, say, writable
 from rcsa_ident.errors import InputError
-from rcsa_ident.units import from_rpm, to_rpm
-
-if TYPE_CHECKING:
-    from rcsa_ident.signals.listening import Listening
+from rcsa_ident.units import from_rpm
 
 
 class Listened(StrEnum):
@@ -40,6 +37,7 @@ def listen(
 ) -> None:
     """Tell from a recording alone: the spindle's speed, teeth, whether it cuts stably or chatters, and which speeds to try."""
     from rcsa_ident.io.open_recording import open_recording
+    from rcsa_ident.report.summaries import listening_row
     from rcsa_ident.signals.recording import Quantity
     from rcsa_ident.workflows.listen import listen_to
 
@@ -59,49 +57,20 @@ def listen(
             try:
                 measured, channels = opened.of(told, channel)
                 speed = None if speed_rpm is None else from_rpm(speed_rpm)
-                answer, samples = listen_to(opened.rate, [each.samples for each in channels], measured, teeth, speed, between)
+                answer = listen_to(opened.rate, [each.samples for each in channels], measured, teeth, speed, between, path.name)
             except InputError as error:
                 raise error.at(str(path)) from None
         if plot is not None:
             from rcsa_ident.report.listening import listening_figure
 
-            listening_figure(samples, opened.rate, answer, measured, path.name).savefig(plot, dpi=150)
-        row = {"recording": str(path), "channels": [each.name for each in channels], "quantity": str(measured)}
-        answers_.append(row | as_row(answer, opened.remarks))
+            listening_figure(answer).savefig(plot, dpi=150)
+        answers_.append({"recording": str(path)} | listening_row(answer, [each.name for each in channels], opened.remarks))
         if not json_:
             _show(answers_[-1])
     if json_:
         emit(answers_[0] if len(answers_) == 1 else {"recordings": answers_})
     elif plot is not None:
         say(f"written: {plot}")
-
-
-def as_row(answer: Listening, remarks: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return what a recording says in the units of the shop floor."""
-
-    def rpm(speed: float | None) -> float | None:
-        return None if speed is None else to_rpm(speed)
-
-    return {
-        "verdict": str(answer.verdict),
-        "reasons": [*answer.reasons, *remarks],
-        "spindle_speed_rpm": rpm(answer.spindle_speed),
-        "spindle_speed_std_rpm": rpm(answer.spindle_speed_std),
-        "other_speeds_rpm": [to_rpm(speed) for speed in answer.other_speeds],
-        "speed_wander_percent": None if answer.wander is None else 100.0 * answer.wander,
-        "ramp": None if answer.ramp is None else [to_rpm(speed) for speed in answer.ramp],
-        "teeth": answer.teeth,
-        "explained_share": answer.explained_share,
-        "folded_orders": answer.folded,
-        "chatter_frequencies_hz": list(answer.chatter),
-        "chatter_aliases_hz": list(answer.aliases),
-        "chatter_lines_hz": list(answer.lines),
-        "suggested_speeds_rpm": [to_rpm(speed) for speed in answer.suggested_speeds],
-        "events": [{"event": event.kind, "time_s": event.time} for event in answer.events],
-        "duration_s": answer.duration,
-        "part_s": list(answer.part),
-        "band_hz": answer.band,
-    }
 
 
 def _show(row: dict[str, Any]) -> None:

@@ -17,6 +17,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import AXES, write_frf_csv
 from rcsa_ident.io.files import replacing, write_text
 from rcsa_ident.io.uff import DISPLACEMENT, EXCITATION_FORCE, FRF, UffAxis, UffFunction, write_uff
+from rcsa_ident.signals.tap import TapFrf
 from rcsa_ident.units import to_hz
 
 #: Directions as universal files number them; a slope dy/dz is a rotation about -X.
@@ -25,6 +26,24 @@ _DIRECTIONS = {Dof.X: 1, Dof.Y: 2, Dof.Z: 3, Dof.SLOPE_X: 5, Dof.SLOPE_Y: -4}
 _NODES = {"tip": 1, "spindle": 2, "flange": 2, "fixture": 3}
 _KIND = {False: "t", True: "r"}
 _LOAD = {False: "F", True: "M"}
+#: Files that a receptance of hammer hits is written to.
+TAP_SUFFIXES = (".csv", ".uff", ".unv", ".frf")
+
+
+def write_tap(path: str | Path, found: TapFrf) -> None:
+    """Write a receptance of hammer hits, as the path's suffix says: FRF.csv, UFF 58, or text columns as CutPro's."""
+    path = Path(path)
+    suffix, frequency = path.suffix.lower(), to_hz(found.omega)
+    if suffix not in TAP_SUFFIXES:
+        raise InputError("path", suffix or "no suffix", ", ".join(TAP_SUFFIXES), str(path))
+    if suffix == ".csv":
+        write_frf_csv(path, frequency, {found.axis: found.receptance})
+    elif suffix == ".frf":
+        rows = (f"{f:.9g} {h.real:.9e} {h.imag:.9e}" for f, h in zip(frequency, found.receptance, strict=True))
+        write_text(path, "\n".join(["Frequency [Hz] Real [m/N] Imaginary [m/N]", *rows]) + "\n")
+    else:
+        tip = Coordinate("tip", Dof(found.axis.lower()))
+        write_receptances_uff(path, {found.axis: Receptance(found.omega, found.receptance[:, None, None], (tip,), (tip,))}, "hammer hits")
 
 
 def write_receptances_uff(path: str | Path, receptances: Mapping[str, Receptance], title: str, binary: bool = False) -> None:

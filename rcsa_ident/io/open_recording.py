@@ -30,6 +30,8 @@ _DERIVATIVES = {0: Quantity.DISPLACEMENT, 2: Quantity.ACCELERATION}
 _RATE_WORDS = re.compile(r"(?:sampl\w*[ _]?(?:rate|freq\w*)|abtastrate)\D*(?P<value>\d+(?:[.,]\d+)?)", re.IGNORECASE)
 #: Lines of remarks in front of the names, at most.
 _MOST_HEADER = 200
+#: Tables of text.
+TEXT = (".csv", ".txt", ".dat", ".tsv", ".asc")
 #: Formats of sound.
 _SOUND = {".wav", ".flac", ".ogg", ".oga", ".opus", ".aiff", ".aif", ".caf", ".mp3", ".w64", ".rf64", ".au"}
 
@@ -95,7 +97,7 @@ class OpenRecording:
         return quantity, kept
 
 
-def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: float | None = None) -> OpenRecording:
+def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: float | None = None, suffix: str = "") -> OpenRecording:
     """Return a recording as its file tells it: text tables with names and units above them, and sound, without settings.
 
     Parameters
@@ -106,6 +108,8 @@ def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: fl
         Channels that are wanted; none for all.
     default_rate : float or None [Hz]
         Rate of a file that carries none.
+    suffix : str
+        Format of a file whose name does not tell it.
 
     Raises
     ------
@@ -113,21 +117,21 @@ def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: fl
         The file cannot be read, or does not tell what is needed; the message names the option that does.
     """
     path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix in (".csv", ".txt", ".dat", ".tsv", ".asc"):
+    suffix = (suffix or path.suffix).lower()
+    if suffix in TEXT:
         return _text(path, default_rate)
     if suffix in _SOUND:
-        return _sound(path, names)
+        return _sound(path, names, suffix)
     if not names:
         raise InputError("channel", "none", f"names of channels: those of a file '{suffix}' are not listed here", str(path))
-    rate, signals = read_signals(path, names, default_rate)
+    rate, signals = read_signals(path, names, default_rate, suffix)
     return OpenRecording(rate, tuple(OpenChannel(name, "", None, signal[:]) for name, signal in zip(names, signals, strict=True)))
 
 
-def _sound(path: Path, names: Sequence[str]) -> OpenRecording:
+def _sound(path: Path, names: Sequence[str], suffix: str) -> OpenRecording:
     """The first channel of a sound, or those that are named: those of one recorder hear nearly the same."""
     wanted = list(names) or ["ch1"]
-    rate, signals = read_signals(path, wanted)
+    rate, signals = read_signals(path, wanted, suffix=suffix)
     channels = tuple(OpenChannel(name, "", Quantity.SOUND, signal[:]) for name, signal in zip(wanted, signals, strict=True))
     return OpenRecording(rate, channels, () if names else ("taken as sound, the first channel of the file",))
 

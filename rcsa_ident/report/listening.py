@@ -8,32 +8,35 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rcsa_ident.arrays import FloatArray
+from rcsa_ident.errors import InputError
 from rcsa_ident.report.figures import _STYLE, _TRUTH, COLOURS
 from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.recording import Quantity
-from rcsa_ident.signals.steady_part import hann
+from rcsa_ident.signals.spectra import envelope, mean_spectrum, spectrogram
 from rcsa_ident.units import to_hz, to_rpm
 
 _UNITS = {Quantity.ACCELERATION: "m/s²", Quantity.DISPLACEMENT: "m", Quantity.FORCE: "N", Quantity.SOUND: "of full scale"}
 _ORDER, _CHATTER = "#52606d", "#C8501A"
-#: Points of the signal that are drawn, orders of the spectrum, and decibels of the spectrogram.
-_POINTS, _ORDERS, _RANGE = 2000, 40, 60.0
+#: Points of the signal that are drawn, orders of the spectrum, columns and decibels of the spectrogram.
+_POINTS, _ORDERS, _COLUMNS, _RANGE = 2000, 40, 400, 60.0
 
 
-def listening_figure(samples: FloatArray, rate: float, answer: Listening, quantity: Quantity, name: str = "") -> Figure:
+def listening_figure(answer: Listening) -> Figure:
     """Draw a recording and what it says.
 
     Parameters
     ----------
-    samples : array, shape (n, c)
-        Those that were judged; the loudest channel is drawn.
-    rate : float [Hz]
     answer : Listening
-    quantity : Quantity
-    name : str
-        Of the recording, for the title.
+        With its record.
+
+    Raises
+    ------
+    InputError
+        It has none.
     """
-    signal = samples[:, int(np.argmax(samples.var(axis=0)))]
+    if answer.record is None:
+        raise InputError("record", "none", "what a recording says together with its samples")
+    signal, rate, quantity, name = answer.record.loudest, answer.record.rate, answer.record.quantity, answer.record.name
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(8.4, 8.6), layout="constrained")
         top, middle, bottom = figure.subplots(3, 1, height_ratios=(1.0, 1.4, 1.4))
@@ -51,29 +54,24 @@ def _headline(answer: Listening) -> str:
 
 
 def _signal(ax: Axes, signal: FloatArray, rate: float, answer: Listening, unit: str) -> None:
-    width = max(signal.size // _POINTS, 1)
-    parts = signal[: signal.size // width * width].reshape(-1, width)
-    time = np.arange(parts.shape[0]) * width / rate
-    ax.fill_between(time, parts.min(axis=1), parts.max(axis=1), color=COLOURS["X"], lw=0.3)
+    width, low, high = envelope(signal, _POINTS)
+    ax.fill_between(np.arange(low.size) * width / rate, low, high, color=COLOURS["X"], lw=0.3)
     ax.axvspan(*answer.part, color="#009E73", alpha=0.12, lw=0.0, label="judged")
     ax.set(xlim=(0.0, answer.duration), xlabel="time [s]", ylabel=f"signal [{unit}]", title="signal, and the part that was judged")
     ax.legend(loc="upper right")
 
 
 def _spectrogram(ax: Axes, signal: FloatArray, rate: float, answer: Listening) -> None:
-    length = int(min(max(0.1 * rate, 64), signal.size))
-    starts = np.linspace(0, signal.size - length, min(400, max(signal.size // max(length // 4, 1), 1))).astype(int)
-    window = hann(length)
-    power = np.array([np.abs(np.fft.rfft((signal[s : s + length] - signal[s : s + length].mean()) * window)) ** 2 for s in starts]).T
+    step, level = spectrogram(signal, rate, _COLUMNS)
     high = min(answer.band, 0.5 * rate)
-    rows = int(high * length / rate) + 1
-    level = 10.0 * np.log10(power[:rows] + 1e-300)
+    rows = int(high / step) + 1
+    level = level[:rows]
     ax.imshow(
         level,
         origin="lower",
         aspect="auto",
         cmap="viridis",
-        extent=(0.0, signal.size / rate, 0.0, rows * rate / length),
+        extent=(0.0, signal.size / rate, 0.0, rows * step),
         vmin=level.max() - _RANGE,
         vmax=level.max(),
     )
@@ -91,12 +89,7 @@ def _spectrogram(ax: Axes, signal: FloatArray, rate: float, answer: Listening) -
 
 def _orders(ax: Axes, signal: FloatArray, rate: float, answer: Listening, unit: str) -> None:
     part = signal[int(answer.part[0] * rate) : int(answer.part[1] * rate)]
-    length = int(min(2.0 * rate, part.size))
-    window = hann(length)
-    starts = range(0, part.size - length + 1, max(length // 2, 1))
-    parts = [np.abs(np.fft.rfft((part[s : s + length] - part[s : s + length].mean()) * window)) ** 2 for s in starts]
-    amplitude = 2.0 * np.sqrt(np.mean(parts, axis=0)) / window.sum()
-    frequency = np.arange(amplitude.size) * rate / length
+    frequency, amplitude = mean_spectrum(part, rate)
     spindle = None if answer.spindle_speed is None else to_hz(answer.spindle_speed)
     high = answer.band if spindle is None else min(answer.band, _ORDERS * spindle)
     shown = (frequency > 0.2 * (spindle or 0.0)) & (frequency <= high)

@@ -16,7 +16,9 @@ from rcsa_ident.dynamics.modal import ModalModel, directions
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.measurement import Reading
+from rcsa_ident.signals.tap import TapFrf
 from rcsa_ident.stability.advice import Advice, OperatingPoint, PlannedCut
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally
@@ -349,6 +351,63 @@ def frf_summary(receptance: UncertainReceptance, coordinates: Sequence[Coordinat
             raise InputError("tooling", "a receptance that is not finite", "a tooling whose receptance is finite at every frequency")
         (axes if row == col else cross)[name] = {key: None if part is None else part.tolist() for key, part in parts.items()}
     return {"frequency_hz": np.round(to_hz(receptance.omega), 9).tolist(), "axes": axes, "cross": cross}
+
+
+def listening_row(answer: Listening, channels: Sequence[str], remarks: Sequence[str] = ()) -> dict[str, Any]:
+    """Return what channels of a recording say in the units of the shop floor.
+
+    Parameters
+    ----------
+    answer : Listening
+        With its record.
+    channels : sequence of str
+    remarks : sequence of str
+        What was taken as given when the recording was opened.
+    """
+    assert answer.record is not None
+
+    def rpm(speed: float | None) -> float | None:
+        return None if speed is None else to_rpm(speed)
+
+    return {
+        "channels": list(channels),
+        "quantity": str(answer.record.quantity),
+        "verdict": str(answer.verdict),
+        "reasons": [*answer.reasons, *remarks],
+        "spindle_speed_rpm": rpm(answer.spindle_speed),
+        "spindle_speed_std_rpm": rpm(answer.spindle_speed_std),
+        "other_speeds_rpm": [to_rpm(speed) for speed in answer.other_speeds],
+        "speed_wander_percent": None if answer.wander is None else 100.0 * answer.wander,
+        "ramp": None if answer.ramp is None else [to_rpm(speed) for speed in answer.ramp],
+        "teeth": answer.teeth,
+        "explained_share": answer.explained_share,
+        "folded_orders": answer.folded,
+        "chatter_frequencies_hz": list(answer.chatter),
+        "chatter_aliases_hz": list(answer.aliases),
+        "chatter_lines_hz": list(answer.lines),
+        "suggested_speeds_rpm": [to_rpm(speed) for speed in answer.suggested_speeds],
+        "events": [{"event": event.kind, "time_s": event.time} for event in answer.events],
+        "duration_s": answer.duration,
+        "part_s": list(answer.part),
+        "band_hz": answer.band,
+    }
+
+
+def tap_row(found: TapFrf, names: Sequence[str], remarks: Sequence[str]) -> dict[str, Any]:
+    """Return what became of hammer hits.
+
+    Parameters
+    ----------
+    found : TapFrf
+    names : sequence of str
+        Of the recordings, in their order.
+    remarks : sequence of str
+    """
+    rows = [
+        {"recording": names[hit.record], "time_s": hit.time, "force_n": hit.force, "left_out": hit.reason or None} for hit in found.hits
+    ]
+    band = to_hz(found.omega[[0, -1]]).tolist()
+    return {"hits": rows, "used": found.used, "band_hz": band, "window_decay_per_s": found.window_decay, "remarks": list(remarks)}
 
 
 def finite(value: float | None, unit: float = 1.0) -> float | None:

@@ -11,16 +11,14 @@ from rcsa_ident.signals.tap import TapFrf
 from rcsa_ident.units import to_hz
 
 
-def tap_figure(found: TapFrf, axis: str) -> Figure:
+def tap_figure(found: TapFrf) -> Figure:
     """Draw a receptance from hammer hits over frequency.
 
     Parameters
     ----------
     found : TapFrf
-    axis : str
-        X or Y.
     """
-    rows = 2 if found.coherence is None else 3
+    axis, rows = found.axis, 2 if found.coherence is None else 3
     frequency, size = to_hz(found.omega), np.abs(found.receptance)
     band = 2.0 * np.sqrt(found.variance)
     with mpl.rc_context(_STYLE):

@@ -11,7 +11,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.remarks import Remark
-from rcsa_ident.shown import Shown
+from rcsa_ident.shown import Drawn
 from rcsa_ident.signals.loud_part import BAND, decimated, loud_part
 from rcsa_ident.signals.off_orders import OffOrders, off_orders
 from rcsa_ident.signals.order_lines import FOLDED_ORDERS, UNFILTERED, OrderLines, order_lines
@@ -70,8 +70,33 @@ class Event(NamedTuple):
     time: float | None
 
 
+class Record(NamedTuple):
+    """What was listened to.
+
+    Parameters
+    ----------
+    samples : array, shape (n, c)
+        Lost samples are filled.
+    rate : float [Hz]
+    quantity : Quantity
+    name : str
+        Of the recording.
+    """
+
+    samples: FloatArray
+    rate: float
+    quantity: Quantity
+    name: str = ""
+
+    @property
+    def loudest(self) -> FloatArray:
+        """The channel that moves most, shape (n,)."""
+        loudest: FloatArray = self.samples[:, int(np.argmax(self.samples.var(axis=0)))]
+        return loudest
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Listening(Shown):
+class Listening(Drawn):
     """What a recording says.
 
     Parameters
@@ -107,6 +132,8 @@ class Listening(Shown):
     suggested_speeds : tuple of float [rad/s]
         Speeds that put a whole number of tooth passages on the chatter's period.
     events : tuple of Event
+    record : Record or None
+        The samples, for the figure.
     """
 
     verdict: Heard
@@ -127,6 +154,7 @@ class Listening(Shown):
     lines: tuple[float, ...] = ()
     suggested_speeds: tuple[float, ...] = ()
     events: tuple[Event, ...] = ()
+    record: Record | None = None
 
     def __str__(self) -> str:
         if self.spindle_speed is None:

@@ -366,3 +366,59 @@ def _floor(rest: FloatArray, step: float, highest: int) -> FloatArray:
     # the line itself took one bin's noise with it
     bins = np.maximum(high - low - 1, 1)
     return 2.0 / n * (cumulative[high] - cumulative[low]) / bins[:, None]
+
+
+def envelope(signal: FloatArray, points: int) -> tuple[int, FloatArray, FloatArray]:
+    """Return samples per interval, and the smallest and largest value in each of at most `points` intervals, shape (p,).
+
+    Parameters
+    ----------
+    signal : array, shape (n,)
+    points : int
+    """
+    width = max(-(-signal.size // points), 1)
+    starts = np.arange(0, signal.size, width)
+    return width, np.minimum.reduceat(signal, starts), np.maximum.reduceat(signal, starts)
+
+
+def mean_spectrum(signal: FloatArray, rate: float, seconds: float = 2.0) -> tuple[FloatArray, FloatArray]:
+    """Return frequencies [Hz] and amplitudes, shape (m,), of a record: root mean square over windows that overlap by half.
+
+    Parameters
+    ----------
+    signal : array, shape (n,)
+    rate : float [Hz]
+    seconds : float
+        Length of a window; that of the record where it is shorter.
+    """
+    length = int(min(seconds * rate, signal.size))
+    window = hann(length)
+    starts = range(0, signal.size - length + 1, max(length // 2, 1))
+    power = np.mean([_power(signal[s : s + length], window) for s in starts], axis=0)
+    amplitude: FloatArray = 2.0 * np.sqrt(power) / window.sum()
+    return np.arange(amplitude.size) * rate / length, amplitude
+
+
+def spectrogram(signal: FloatArray, rate: float, columns: int, seconds: float = 0.1) -> tuple[float, FloatArray]:
+    """Return the step of frequency [Hz] and the level [dB], shape (m, c), of windows that follow each other.
+
+    Parameters
+    ----------
+    signal : array, shape (n,)
+    rate : float [Hz]
+    columns : int
+        Most of them; fewer where they would overlap by more than three quarters.
+    seconds : float
+        Length of a window.
+    """
+    length = int(min(max(seconds * rate, 64), signal.size))
+    window = hann(length)
+    starts = np.linspace(0, signal.size - length, min(columns, max(signal.size // max(length // 4, 1), 1))).astype(int)
+    power = np.array([_power(signal[s : s + length], window) for s in starts]).T
+    level: FloatArray = 10.0 * np.log10(power + 1e-300)
+    return rate / length, level
+
+
+def _power(part: FloatArray, window: FloatArray) -> FloatArray:
+    power: FloatArray = np.abs(np.fft.rfft((part - part.mean()) * window)) ** 2
+    return power

@@ -10,7 +10,9 @@ import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError, positive
+from rcsa_ident.shown import Drawn
 from rcsa_ident.signals.frf import coherence, h1, h2, hv
+from rcsa_ident.units import to_hz
 
 #: Share of the strongest hit's force above which a sample belongs to a hit, and below which its pulse has ended.
 _HIT, _PULSE = 0.2, 0.02
@@ -64,8 +66,8 @@ class Hit:
     reason: str = ""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TapFrf:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TapFrf(Drawn):
     """A receptance from hammer hits.
 
     Parameters
@@ -81,6 +83,8 @@ class TapFrf:
     window_decay : float [1/s]
         Of the exponential window of force and responses, 0 without one: the receptance is that at i omega + window_decay, every mode
         decays so much faster.
+    axis : str
+        Machine axis of hammer and response, X or Y.
     """
 
     omega: FloatArray
@@ -89,6 +93,11 @@ class TapFrf:
     coherence: FloatArray | None
     hits: tuple[Hit, ...]
     window_decay: float = 0.0
+    axis: str = "X"
+
+    def __str__(self) -> str:
+        band = f"{to_hz(float(self.omega[0])):.0f} to {to_hz(float(self.omega[-1])):.0f} Hz"
+        return f"receptance {self.axis} from {self.used} of {len(self.hits)} hits, {band}"
 
     @property
     def used(self) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals.channel_scan import ChannelScan, scan
-from rcsa_ident.signals.listening import Event, Listening, listen
+from rcsa_ident.signals.listening import Event, Listening, Record, listen
 from rcsa_ident.signals.recording import LONGEST, Quantity, Recording, Sensor
 
 #: Share of samples that may be lost; more say nothing.
@@ -26,8 +26,9 @@ def listen_to(
     teeth: int | None = None,
     spindle_speed: float | None = None,
     between: tuple[float, float] | None = None,
-) -> tuple[Listening, FloatArray]:
-    """Return what channels of one quantity say, lost and saturated samples told, and the samples that were judged, shape (n, c).
+    name: str = "",
+) -> Listening:
+    """Return what channels of one quantity say, lost and saturated samples told, with the samples that were judged.
 
     Parameters
     ----------
@@ -36,6 +37,8 @@ def listen_to(
         Lost samples are NaN.
     quantity, teeth, spindle_speed, between
         As of `rcsa_ident.signals.listening.listen`.
+    name : str
+        Of the recording.
 
     Raises
     ------
@@ -45,7 +48,7 @@ def listen_to(
     Examples
     --------
     >>> time = np.arange(96000) / 48000.0
-    >>> answer, _ = listen_to(48000.0, [np.cos(2 * np.pi * 400 * time) + 0.1 * np.cos(2 * np.pi * 100 * time)], Quantity.SOUND)
+    >>> answer = listen_to(48000.0, [np.cos(2 * np.pi * 400 * time) + 0.1 * np.cos(2 * np.pi * 100 * time)], Quantity.SOUND)
     >>> print(answer, answer.teeth)
     stable at 6000.0 rev/min 4
     """
@@ -63,7 +66,8 @@ def listen_to(
     if spare:
         words = f"of {whole.shape[0] / rate:.4g} s those from {spare / rate:.4g} to {(spare + MOST) / rate:.4g} s were listened to"
         answer = replace(answer, reasons=(*answer.reasons, words))
-    return replace(answer, events=tuple(sorted((*answer.events, *events), key=lambda event: event.time or 0.0))), filled
+    events = sorted((*answer.events, *events), key=lambda event: event.time or 0.0)
+    return replace(answer, events=tuple(events), record=Record(filled, rate, quantity, name))
 
 
 def _events(found: Sequence[ChannelScan], rate: float) -> list[Event]:

@@ -3,14 +3,113 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
+from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.signals.tap import HitEstimator, TapFrf, tap
 
 #: How many times as long as the hammer's pulses the other channels go on.
 _LONGER = 3.0
+#: Relative difference of rates that are one: those of time stamps are not told to the last digit.
+_SAME_RATE = 1e-4
+#: How often a response is differentiated, by the words of commands and queries, and by what a channel's unit says.
+DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
+_OF_UNIT = {Quantity.DISPLACEMENT: 0, Quantity.ACCELERATION: 2}
+
+
+class Channel(Protocol):
+    """A channel as a file tells it."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def quantity(self) -> Quantity | None: ...
+    @property
+    def samples(self) -> FloatArray: ...
+
+
+class Opened(Protocol):
+    """A recording as a file tells it: rate [Hz], channels, and what was guessed."""
+
+    @property
+    def rate(self) -> float: ...
+    @property
+    def channels(self) -> Sequence[Channel]: ...
+    @property
+    def remarks(self) -> Sequence[str]: ...
+
+
+def tap_recordings(
+    recordings: Sequence[Opened],
+    force: str | None = None,
+    response: str | None = None,
+    quantity: str = "acceleration",
+    estimator: HitEstimator = HitEstimator.H1,
+    sensor_mass: float = 0.0,
+    axis: str = "X",
+) -> tuple[TapFrf, list[str]]:
+    """Return the receptance that recordings of hits give together, and what was taken as given, in sentences.
+
+    Parameters
+    ----------
+    recordings : sequence of Opened
+        Each with one hit or several.
+    force, response : str or None
+        Names of channels; else the one that is a force, or comes in pulses, and the only other one.
+    quantity : str
+        What the response measures where its unit does not say: acceleration, velocity or displacement.
+    estimator, sensor_mass
+        As of `rcsa_ident.signals.tap.tap`.
+    axis : str
+        Machine axis of hammer and response, X or Y.
+
+    Raises
+    ------
+    InputError
+        A channel is not told, the recordings have several rates, or no hit can be used.
+    """
+    if quantity not in DERIVATIVES:
+        raise InputError("quantity", quantity, ", ".join(DERIVATIVES))
+    derivative, pairs, said = DERIVATIVES[quantity], [], []
+    for recording in recordings:
+        hammer, moved, remarks = _pair(recording, force, response)
+        pairs.append((hammer.samples, moved.samples))
+        derivative = derivative if moved.quantity is None else _OF_UNIT.get(moved.quantity, derivative)
+        said += [remark for remark in (*recording.remarks, *remarks) if remark not in said]
+    rates = sorted(recording.rate for recording in recordings)
+    if not rates or rates[-1] > (1.0 + _SAME_RATE) * rates[0]:
+        raise InputError("sampling_rate_hz", ", ".join(f"{rate:g}" for rate in rates) or "no recording", "one rate for all recordings [Hz]")
+    return replace(tap(rates[0], pairs, derivative, estimator, sensor_mass), axis=axis), said
+
+
+def _pair(recording: Opened, force: str | None, response: str | None) -> tuple[Channel, Channel, list[str]]:
+    """The hammer's channel, the response's, and what was guessed."""
+    channels, said = recording.channels, []
+    forces = [i for i, each in enumerate(channels) if each.quantity is Quantity.FORCE]
+    if force is not None:
+        hammer = _named("force", force, channels)
+    elif len(forces) == 1:
+        hammer = forces[0]
+    else:
+        hammer = hammer_channel([each.samples for each in channels])
+        said.append(f"{channels[hammer].name}, which comes in pulses, was taken as the hammer's force [N]")
+    others = [i for i in range(len(channels)) if i != hammer]
+    if response is None and len(others) != 1:
+        raise InputError("response", ", ".join(channels[i].name for i in others) or "none", "the name of one channel")
+    return channels[hammer], channels[others[0] if response is None else _named("response", response, channels)], said
+
+
+def _named(field: str, name: str, channels: Sequence[Channel]) -> int:
+    places = [i for i, each in enumerate(channels) if each.name == name]
+    if len(places) != 1:
+        found = "two of that name" if places else "no such channel"
+        raise InputError(field, f"{name}: {found}", f"one channel of the file: {', '.join(each.name for each in channels)}")
+    return places[0]
 
 
 def hammer_channel(channels: Sequence[FloatArray]) -> int:

@@ -41,7 +41,7 @@ def heard(part: str, **told: object) -> Listening:
     (path,) = [each for each in SHARED.rglob("*") if part in each.name]
     opened = open_recording(path)
     quantity, channels = opened.of()
-    return listen_to(opened.rate, [each.samples for each in channels], quantity, **told)[0]
+    return listen_to(opened.rate, [each.samples for each in channels], quantity, **told)
 
 
 @pytest.mark.parametrize("part", CUTS)

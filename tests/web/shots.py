@@ -46,6 +46,8 @@ def views(machine: str, campaign: str, job: str) -> dict[str, str]:
         "tool_card": f"#/card?machine={machine}&tooling=Example S4-shrink",
         "forces": f"#/forces?machine={machine}",
         "live": "#/forces/live",
+        "listen": "#/listen",
+        "tap": "#/tap",
     }
 
 

@@ -47,7 +47,7 @@ function wholeView(zone, onfiles) {
 }
 
 /** A field for files that are let go anywhere over the page, with buttons for those who choose them. */
-export function dropZone(title, words, onfiles, { small = false } = {}) {
+export function dropZone(title, words, onfiles, { small = false, folder: folders = true } = {}) {
   const picked = (input) => {
     if (input.files.length) onfiles([...input.files]);
     input.value = "";
@@ -77,8 +77,8 @@ export function dropZone(title, words, onfiles, { small = false } = {}) {
     h(
       "div",
       { class: "row-of-buttons" },
-      h("button", { type: "button", class: small ? "" : "primary", onclick: () => folder.click() }, "Choose a folder"),
-      h("button", { type: "button", onclick: () => files.click() }, "Choose files"),
+      folders ? h("button", { type: "button", class: small ? "" : "primary", onclick: () => folder.click() }, "Choose a folder") : null,
+      h("button", { type: "button", class: folders ? "" : "primary", onclick: () => files.click() }, "Choose files"),
     ),
     files,
     folder,

@@ -29,11 +29,14 @@ route("toolings/edit/:name", "toolings", view("tooling"));
 route("changes", "toolings", view("changes"));
 route("change", "change", view("change"));
 route("card", "change", view("tool_card"));
+route("listen", "listen", view("listen"));
+route("tap", "listen", view("tap"));
 route("forces", "forces", view("forces"));
 route("forces/live", "forces", view("live"));
 
 const SECTIONS = [
   ["machines", "Machines", "Machines", ""],
+  ["listen", "Listen", "Listen", "listen"],
   ["recordings", "Recordings", "Cuts", "recordings"],
   ["identification", "Identification", "Identify", "identification"],
   ["toolings", "Toolings", "Tools", "toolings"],

@@ -46,7 +46,7 @@ export function exampleCard(fault) {
 /** What to do first where there is no machine. */
 export function noMachine(words) {
   const fault = h("div");
-  const box = empty("No machine yet", words, tryButton(fault), link(to(""), "Begin with a machine of your own", "button"));
+  const box = empty("No machine yet", words, tryButton(fault), link(to(""), "Begin with a machine of your own", "button"), link(to("listen"), "Listen to one recording", "button"));
   box.append(fault);
   return box;
 }

@@ -170,6 +170,7 @@ function upload(machine, fault) {
         h("code", null, "rcsa-ident decouple"),
       ),
       input,
+      h("div", { class: "hint" }, "Hammer tests that it takes come from ", link(to("tap"), "raw hits"), "."),
     ),
   );
 }

@@ -26,7 +26,7 @@ export async function view(_args, _query, place) {
         "Recordings of cuts you make anyway go in. Tooltip FRFs, stability lobes and forces of any tooling come out.",
       ),
       box,
-      exampleCard(box),
+      h("div", { class: "columns" }, listenCard(), exampleCard(box)),
       zone,
       h(
         "ol",
@@ -48,6 +48,15 @@ export async function view(_args, _query, place) {
     h("div", { class: "columns" }, makeCard(), examples(box, !machines.some((m) => m.example))),
   );
 }
+
+/** The door that asks for nothing: no machine, no campaign. */
+const listenCard = () =>
+  card(
+    "Only one recording, or a phone?",
+    null,
+    h("p", null, "Listen to a cut: stable or chatter, how fast the spindle turns, and which speed to try next. Nothing else is needed."),
+    h("div", { class: "row-of-buttons" }, link(to("listen"), "Listen to a cut", "button primary"), link(to("tap"), "Hammer hits", "button")),
+  );
 
 const stage = (title, words) => h("li", null, h("strong", null, title), h("span", { class: "soft" }, words));
 

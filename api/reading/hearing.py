@@ -1,0 +1,145 @@
+"""What a recording says, and hits of a hammer as an FRF, in the reader process: answers are plain JSON types, curves have few points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from api.reading.campaign_text import Upload
+from api.reading.examine import with_client_name
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.exports import write_tap
+from rcsa_ident.io.open_recording import OpenRecording, open_recording
+from rcsa_ident.report.summaries import listening_row, tap_row
+from rcsa_ident.signals.listening import Listening
+from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.signals.spectra import envelope, mean_spectrum, spectrogram
+from rcsa_ident.signals.tap import HitEstimator, TapFrf
+from rcsa_ident.units import from_rpm, to_hz
+from rcsa_ident.workflows.listen import listen_to
+from rcsa_ident.workflows.tap import tap_recordings
+
+#: Points of the signal and of a spectrum, columns and rows of the spectrogram, and the decibels that it shows.
+_POINTS, _LINES, _COLUMNS, _ROWS, _RANGE = 800, 1600, 200, 140, 60.0
+#: Orders of a spectrum, and how far it goes beyond the chatter.
+_ORDERS, _BEYOND = 60, 1.3
+_UNITS = {Quantity.ACCELERATION: "m/s²", Quantity.DISPLACEMENT: "m", Quantity.FORCE: "N", Quantity.SOUND: "of full scale"}
+
+
+def listen(path: Path, name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a recording says, as `rcsa-ident listen --json` does.
+
+    Parameters
+    ----------
+    name : str
+        Given by the client; its suffix is the format.
+    asked : mapping
+        The query's parameters by name: channel, quantity, teeth, speed_rpm, speeds_from, speeds_to, rate_hz, curves.
+    """
+    opened = _opened(path, name, asked["channel"], asked["rate_hz"])
+    try:
+        quantity, channels = opened.of(None if asked["quantity"] is None else Quantity(asked["quantity"]), asked["channel"])
+        speed = None if asked["speed_rpm"] is None else from_rpm(asked["speed_rpm"])
+        between = None if asked["speeds_from"] is None else (from_rpm(asked["speeds_from"]), from_rpm(asked["speeds_to"]))
+        answer = listen_to(opened.rate, [each.samples for each in channels], quantity, asked["teeth"], speed, between, name)
+    except InputError as error:
+        raise with_client_name(error, path, name) from None
+    row = {"recording": name} | listening_row(answer, [each.name for each in channels], opened.remarks)
+    return row | {"curves": _curves(answer) if asked["curves"] else None}
+
+
+def tap(asked: Mapping[str, Any], *hits: Upload) -> dict[str, Any]:
+    """Return the receptance that recordings of hits give, and what became of each hit; where `file` is asked, written to the target.
+
+    Parameters
+    ----------
+    asked : mapping
+        The query's parameters by name: axis, force, response, quantity, estimator, sensor_mass_g, rate_hz; and file, a suffix.
+    *hits : Upload
+        All with one target.
+    """
+    wanted = [name for name in (asked["force"], asked["response"]) if name is not None]
+    opened = [_opened(hit.path, hit.name, wanted, asked["rate_hz"]) for hit in hits]
+    chosen = {name: asked[name] for name in ("force", "response", "quantity", "axis")}
+    found, remarks = tap_recordings(opened, **chosen, estimator=HitEstimator(asked["estimator"]), sensor_mass=1e-3 * asked["sensor_mass_g"])
+    if asked["file"]:
+        # the suffix says how, and a target has none
+        made = hits[0].target.with_name(hits[0].target.name + asked["file"])
+        try:
+            write_tap(made, found)
+            made.replace(hits[0].target)
+        finally:
+            made.unlink(missing_ok=True)
+    return tap_row(found, [hit.name for hit in hits], remarks) | _receptance(found)
+
+
+def _opened(path: Path, name: str, names: Sequence[str], rate: float | None) -> OpenRecording:
+    try:
+        return open_recording(path, names, rate, Path(name).suffix)
+    except InputError as error:
+        raise with_client_name(error, path, name) from None
+    except RecursionError:
+        raise InputError("recording", "a file nested too deeply to be read", "a complete file", name) from None
+
+
+def _curves(answer: Listening) -> dict[str, Any]:
+    """What a page draws: the loudest channel over time, its spectrum over the judged part, and its spectrogram."""
+    assert answer.record is not None
+    signal, rate = answer.record.loudest, answer.record.rate
+    width, low, high = envelope(signal, _POINTS)
+    high_hz = min(answer.band, 0.5 * rate)
+    frequency, amplitude = mean_spectrum(signal[int(answer.part[0] * rate) : int(answer.part[1] * rate)], rate)
+    spindle, last = to_hz(answer.spindle_speed or 0.0), max([0.0, *answer.chatter])
+    far = min(high_hz, max(_ORDERS * spindle, _BEYOND * last)) if spindle > 0.0 else high_hz
+    # a slow drift is no sound
+    shown = (frequency > 0.2 * spindle) & (frequency > 0.0) & (frequency <= far)
+    highest = _highest(amplitude[shown], _LINES)
+    step, level = spectrogram(signal, rate, _COLUMNS)
+    level = level[: int(high_hz / step) + 1]
+    together = -(-level.shape[0] // _ROWS)
+    starts = np.arange(0, level.shape[0], together)
+    rows = np.clip(np.maximum.reduceat(level, starts, axis=0) - level.max(), -_RANGE, 0.0)
+    return {
+        "unit": _UNITS.get(answer.record.quantity, ""),
+        "signal": {"step_s": width / rate, "low": _short(low), "high": _short(high)},
+        "spectrum": {"frequency_hz": _short(frequency[shown][highest], 7), "amplitude": _short(amplitude[shown][highest])},
+        "spectrogram": {
+            "duration_s": signal.size / rate,
+            "highest_hz": level.shape[0] * step,
+            "row_hz": together * step,
+            "level_db": np.rint(rows).astype(int).tolist(),
+        },
+    }
+
+
+def _receptance(found: TapFrf) -> dict[str, Any]:
+    """The receptance over frequency, at most so many lines: of neighbours the largest."""
+    kept = _highest(np.abs(found.receptance), _LINES)
+    spread = _short(np.sqrt(found.variance[kept]))
+    curve = {"re": _short(found.receptance.real[kept]), "im": _short(found.receptance.imag[kept]), "re_std": spread, "im_std": spread}
+    return {
+        "frequency_hz": _short(to_hz(found.omega[kept]), 9),
+        "axes": {found.axis: curve},
+        "coherence": None if found.coherence is None else _short(found.coherence[kept]),
+    }
+
+
+def _highest(size: FloatArray, most: int) -> np.ndarray:
+    """Places of at most so many values: the largest one of neighbours."""
+    width = max(-(-size.size // most), 1)
+    return np.array([start + int(np.argmax(size[start : start + width])) for start in range(0, size.size, width)], dtype=int)
+
+
+def _short(values: FloatArray, digits: int = 5) -> list[float]:
+    return [float(f"{value:.{digits}g}") for value in np.nan_to_num(values)]
+
+
+def warm() -> None:
+    """Listen to a second of sound and average a hit: imports and compiles what both need."""
+    rate, time = 8192.0, np.arange(8192) / 8192.0
+    wave = np.sum([np.cos(200.0 * np.pi * m * time) for m in (1, 2, 4, 8)], axis=0)
+    listen_to(rate, [wave + 0.1 * np.random.default_rng(1).standard_normal(time.size)], Quantity.SOUND)
