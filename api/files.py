@@ -51,6 +51,8 @@ class Partial:
         Where the whole belongs.
     replacing : bool
         Whether it takes the place of other content.
+    sha256 : str
+        That the whole has, as announced; empty where it is not.
     """
 
     offset: int
@@ -59,6 +61,7 @@ class Partial:
     campaign: str = ""
     name: str = ""
     replacing: bool = False
+    sha256: str = ""
 
     @property
     def complete(self) -> bool:
