@@ -68,7 +68,7 @@ class SpeaksTus(Guarded):
             method = Headers(scope=scope).get("x-http-method-override", method).upper()
         match, found = super().matches(dict(scope, method=method))
         # the log tells what was done
-        return match, found | {"method": method} if match is Match.FULL else found
+        return match, {**found, "method": method} if match is Match.FULL else found
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Answer]]:
         """Return the handler of a request."""

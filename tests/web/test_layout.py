@@ -16,6 +16,7 @@ from rcsa_ident.machining_setup import CutSpec
 from rcsa_ident.report.html import ToolCard, tool_cards_html
 from rcsa_ident.units import rpm
 from rcsa_ident.workflows.tool_change import ToolChange, advise
+from tests.api.recordings import content, declared
 from tests.fixtures import by_hand
 from tests.fixtures.paths import TOOLINGS
 from tests.fixtures.service import Served
@@ -96,14 +97,26 @@ _CLIPPED = """() => {
 }"""
 
 
-def test_lists_show_their_choice_whole(opened, client: Client, served: Served, shop: str):
+def test_toolings_side_by_side_stand_in_sight(opened, shop: str):
+    page = opened(f"#/change?machine={shop}&tooling=T1&tooling=T1-long", viewport={"width": 1440, "height": 900})
+    table = page.locator(".scrolls", has=page.get_by_role("table", name="Toolings side by side"))
+    expect(table).to_contain_text("Removes", timeout=60_000)
+    assert table.evaluate("(e) => e.scrollWidth <= e.clientWidth")
+
+
+def test_lists_show_their_choice_whole(opened, client: Client, served: Served, shop: str, tmp_path: Path):
     client.write_tooling("A mill that stands 62 mm out", by_hand.TOOLING)
+    campaign = client.make_campaign(shop, declared()).id
+    (tmp_path / "c0_cut.h5").write_bytes(content(tmp_path))
+    client.upload(campaign, tmp_path / "c0_cut.h5")
     page = opened(f"#/machines/{shop}")
-    for address in ("#/campaigns/new", f"#/change?machine={shop}&tooling=T1", "#/toolings/edit/T1"):
+    addresses = ("#/campaigns/new", f"#/change?machine={shop}&tooling=T1", "#/toolings/edit/T1", "#/forces", "#/forces/live?rate=0.25")
+    for address in addresses:
         page.goto(f"{served.url}/{address}")
         page.wait_for_selector("h1")
-        page.locator("main select").first.wait_for(state="attached")
+        page.locator("main select:has(option)").first.wait_for(state="attached")
         for width in (390, 1440):
             page.set_viewport_size({"width": width, "height": 860})
             assert page.evaluate(_CLIPPED) == [], (address, width)
     client.forget_tooling("A mill that stands 62 mm out")
+    client.forget_campaign(campaign)

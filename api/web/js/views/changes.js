@@ -17,7 +17,8 @@ export const inWords = (change) =>
 
 export async function view(_args, query, place) {
   add(place, head("Changes", "Who wrote which tooling, machine or identification, when and why. Nothing that was replaced is lost."));
-  add(place, await trail({}, Number(query.get("entries")) || SOME, (count) => keep({ entries: count > SOME ? count : null })));
+  const onmore = (count) => keep({ entries: count });
+  add(place, h("section", { class: "card", "aria-label": "All changes" }, await trail({}, Number(query.get("entries")) || SOME, onmore)));
 }
 
 /** The trail, newest first: all of it, or that of one thing; `onmore` hears how many entries are shown. */
@@ -56,7 +57,7 @@ const COLUMNS = (fault) => [
 
 function wayBack(change, fault) {
   if (!change.etag || change.kind === "machine") return null;
-  return change.holds ? h("span", { class: "soft" }, "There now") : restoreButton(change, fault);
+  return change.holds ? h("span", { class: "soft nowrap" }, "There now") : restoreButton(change, fault);
 }
 
 function restoreButton(change, fault) {
