@@ -51,6 +51,8 @@ class Partial:
         Where the whole belongs.
     replacing : bool
         Whether it takes the place of other content.
+    sha256 : str
+        That the whole has, as announced; empty where it is not.
     """
 
     offset: int
@@ -59,6 +61,7 @@ class Partial:
     campaign: str = ""
     name: str = ""
     replacing: bool = False
+    sha256: str = ""
 
     @property
     def complete(self) -> bool:
@@ -128,6 +131,8 @@ class Files:
     def __init__(self, folder: Path, group_bytes: int = 1 << 62, free_bytes: int = 0) -> None:
         self.folder, self.group_bytes, self.free_bytes = folder, group_bytes, free_bytes
         self.hashed: dict[tuple[Any, ...], float] = {}
+        #: What the clock showed when the monotonic one stood at 0.
+        self.began = time.time() - time.monotonic()
         #: Sizes of the files of a folder by name, of those alone that never change.
         self.sizes: dict[Path, dict[str, int]] = {}
         #: Held from the rename of a file until its row is written, and while files without a row are removed.
@@ -235,14 +240,15 @@ class Files:
             each.unlink(missing_ok=True)
 
     def sweep(self, kept: Mapping[str, Container[tuple[str, str]]], now: float | None = None) -> int:
-        """Remove stale parts and files that no row refers to, and return how many.
+        """Remove stale parts and files that no row refers to, and return how many. The caller holds `lock`.
 
         Parameters
         ----------
         kept : mapping of group to files
             Files that rows refer to.
         """
-        now, count = time.time() if now is None else now, 0
+        # of a clock that jumps and one that cannot, the earlier: a part that is being written never looks older than it is
+        now, count = min(time.time(), self.began + time.monotonic()) if now is None else now, 0
         known = {_folder_name(group): files for group, files in kept.items()}
         for folder in self.folder.iterdir() if self.folder.is_dir() else ():
             for kind, age in ((UPLOADS, STALE_FILE), (NORMALISED, STALE_FILE), (PARTS, STALE_PART)):

@@ -3,6 +3,7 @@
 Every route of the interface is sent what parsers fear: JSON of a million brackets, digits, keys or empty lists, TOML of dotted keys and
 deep headers, forms of many parts and endless headers, ZIP archives that grow, long query strings, entity tags and header values. The
 one that costs the service's own process most is told of each route, with what its other processes have worked, and the most memory of any.
+``--legitimate`` sends what is allowed in their place, at the limits that the service tells, and prints the table of docs/service.md.
 ``--most-seconds`` and ``--most-megabytes`` end with exit code 1 beyond them.
 """
 
@@ -20,7 +21,7 @@ from typing import Any, NamedTuple
 
 from api.schemas.campaigns import EXAMPLE
 from api.schemas.toolings import EXAMPLE as TOOLING
-from benchmarks.service import ask, machine_text, serving, use
+from benchmarks.service import ask, machine_text, others, serving, use
 
 #: Just below the limit of a body.
 LARGEST = 15_900_000
@@ -28,22 +29,32 @@ _FORM = "multipart/form-data"
 
 
 class Cost(NamedTuple):
-    """What a request has cost: core time of the service's own process and of its others [s], memory at the peak [MB], and the answer."""
+    """What a request has cost.
+
+    Core time of the service's own process and of its others [s], memory that the first took more at its peak and all that one of the others
+    had at most [MB], and the answer.
+    """
 
     seconds: float
     elsewhere: float
     megabytes: float
+    largest: float
     words: str
     status: int
 
 
 def main(arguments: list[str]) -> None:
-    """Print a table of the worst request of every route."""
+    """Print the worst request of every route."""
     parser = argparse.ArgumentParser(prog="benchmarks hostile", description=__doc__)
     parser.add_argument("--only", default="", help="routes whose path holds this")
     parser.add_argument("--most-seconds", type=float, default=float("inf"))
     parser.add_argument("--most-megabytes", type=float, default=float("inf"))
+    parser.add_argument("--legitimate", action="store_true")
     given = parser.parse_args(arguments)
+    if given.legitimate:
+        from benchmarks.legitimate import table
+
+        return table(given.only)
     worst: list[tuple[str, Cost]] = []
     with tempfile.TemporaryDirectory() as folder, serving(Path(folder)) as (port, process):
         interface = ask(port, "GET", "/openapi.json", None)
@@ -55,7 +66,7 @@ def main(arguments: list[str]) -> None:
             if given.only not in path:
                 continue
             for method, operation in item.items():
-                costs = [_cost(port, process, *request) for request in _requests(method.upper(), path, operation, machine, campaign)]
+                costs = [cost_of(port, process, *request) for request in _requests(method.upper(), path, operation, machine, campaign)]
                 worst.append((f"{method.upper()} {path}", max(costs)._replace(megabytes=max(cost.megabytes for cost in costs))))
                 print(_line(*worst[-1]), flush=True)
     beyond = [cost for _, cost in worst if cost.seconds > given.most_seconds or cost.megabytes > given.most_megabytes]
@@ -142,9 +153,12 @@ def _archive() -> bytes:
     return sink.getvalue()
 
 
-def _cost(port: int, process: int, words: str, method: str, path: str, headers: dict[str, str], body: bytes) -> Cost:
+def cost_of(port: int, process: int, words: str, method: str, path: str, headers: dict[str, str], body: bytes) -> Cost:
+    """Return what a request costs until its answer is read."""
     own, before = _seconds(process), use(process)
     resting = _peak(process, anew=True)
+    for id in others(process):
+        _peak(id, anew=True)
     connection = HTTPConnection("127.0.0.1", port, timeout=300)
     status = 0
     try:
@@ -158,7 +172,8 @@ def _cost(port: int, process: int, words: str, method: str, path: str, headers: 
     finally:
         connection.close()
     spent, total = _seconds(process) - own, use(process)[0] - before[0]
-    return Cost(spent, max(total - spent, 0.0), _peak(process) - resting, words, status)
+    largest = max((_peak(id) for id in others(process)), default=0.0)
+    return Cost(spent, max(total - spent, 0.0), _peak(process) - resting, largest, words, status)
 
 
 def _seconds(process: int) -> float:
@@ -168,7 +183,11 @@ def _seconds(process: int) -> float:
 
 def _peak(process: int, anew: bool = False) -> float:
     """Most memory that the process has had since the peak was set to what it has now [MB]."""
-    if anew:
-        Path(f"/proc/{process}/clear_refs").write_text("5", encoding="utf-8")
-    lines = Path(f"/proc/{process}/status").read_text(encoding="utf-8").splitlines()
-    return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM:")) / 1e3
+    try:
+        if anew:
+            Path(f"/proc/{process}/clear_refs").write_text("5", encoding="utf-8")
+        lines = Path(f"/proc/{process}/status").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        # it has ended
+        return 0.0
+    return next((int(line.split()[1]) for line in lines if line.startswith("VmHWM:")), 0) / 1e3

@@ -82,18 +82,30 @@ def measured(process: int, words: str, loaded: Callable[[], tuple[int, float, fl
 
 def use(process: int) -> tuple[float, float]:
     """Return the seconds of a core that a process and its descendants have taken, and their memory [MB]; zeros where nobody tells."""
-    parents, seconds = {}, {}
+    mine = {process} | others(process)
+    ticks = sum(int(field) for id in mine for field in (_stat(id) or ["0"] * 13)[11:13])
+    return ticks / os.sysconf("SC_CLK_TCK"), sum(_memory(id) for id in mine)
+
+
+def others(process: int) -> set[int]:
+    """Return the processes that a process has started, and theirs."""
+    parents = {}
     for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            fields = (folder / "stat").read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        parents[int(folder.name)] = int(fields[1])
-        seconds[int(folder.name)] = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        fields = _stat(int(folder.name))
+        if fields:
+            parents[int(folder.name)] = int(fields[1])
     mine = {process}
     while more := {id for id, parent in parents.items() if parent in mine} - mine:
         mine |= more
-    return sum(seconds.get(id, 0.0) for id in mine), sum(_memory(id) for id in mine)
+    return mine - {process}
+
+
+def _stat(process: int) -> list[str]:
+    """Fields behind the name, none where there is no such process."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+    except OSError:
+        return []
 
 
 def _memory(process: int) -> float:

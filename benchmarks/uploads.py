@@ -30,12 +30,12 @@ def run() -> list[dict[str, Any]]:
     rows = []
     with tempfile.TemporaryDirectory(dir=".") as text:
         folder = Path(text)
-        large = _recording(folder / "large.h5")
+        large = recording(folder / "large.h5")
         size = large.stat().st_size
         disk = min(_disk(large, folder / "copy") for _ in range(REPEATS))
         with serving(folder / "data") as (port, _):
             machine = ask(port, "POST", "/v1/machines", {"name": "m"})["id"]
-            path = f"/v1/campaigns/{_campaign(port, machine)}/recordings/"
+            path = f"/v1/campaigns/{campaign_of(port, machine)}/recordings/"
             # what reads is imported and compiled by the first
             _put(port, path + "c0.h5", large)
             verdict = min(_put(port, path + f"c{k + 1}.h5", large, k)[1] for k in range(REPEATS))
@@ -59,8 +59,8 @@ def _disk(source: Path, target: Path) -> float:
     return time.perf_counter() - start
 
 
-def _recording(path: Path) -> Path:
-    """Four channels of a cut at 51.2 kHz, as long as the size asks for."""
+def recording(path: Path) -> Path:
+    """Write four channels of a cut at 51.2 kHz, as long as `SIZE` asks for."""
     from rcsa_ident.io.hdf5 import write_hdf5
 
     rng = np.random.default_rng(1)
@@ -81,7 +81,8 @@ def _sensors() -> dict[str, Any]:
     }
 
 
-def _campaign(port: int, machine: str) -> str:
+def campaign_of(port: int, machine: str) -> str:
+    """Make a campaign whose cuts are large recordings, c0.h5, f0.h5 and so on, and return its id."""
     from benchmarks.service import new_tooling
 
     conditions = {

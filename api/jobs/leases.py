@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import Sequence
-from datetime import UTC, datetime, timedelta
+import time
+from datetime import UTC, datetime
 
 from api.stores.entities import Unavailable
 from api.stores.jobs import Jobs
@@ -14,23 +14,47 @@ from api.stores.jobs import Jobs
 log = logging.getLogger("rcsa_ident.jobs")
 
 
-def sweep(jobs: Jobs, seconds: float, now: datetime | None = None) -> Sequence[str]:
-    """Cancel the jobs that are to be watched and have not been for so many seconds, and return their ids."""
-    now = datetime.now(UTC) if now is None else now
-    why = f"cancelled: the page that asked for it has not followed it for {seconds:g} s; ask again"
-    before, when = ((now - timedelta(seconds=each)).isoformat(timespec="milliseconds") for each in (seconds, 0.0))
-    return jobs.abandon(before, when, json.dumps({"detail": why, "errors": []}))
+class Leases:
+    """Ends the jobs that are to be watched and are not.
+
+    Clocks jump, and differ between machines: what counts is for how long nobody has changed the time at which a job was watched last.
+
+    Parameters
+    ----------
+    jobs : Jobs
+    seconds : float [s]
+        For which a job goes on that nobody watches.
+    """
+
+    def __init__(self, jobs: Jobs, seconds: float) -> None:
+        self.jobs, self.seconds = jobs, seconds
+        self.seen: dict[str, tuple[str, float]] = {}
+
+    def sweep(self, now: float | None = None) -> list[str]:
+        """Cancel the jobs that have not been watched for so long, as far as this was seen, and return their ids.
+
+        Parameters
+        ----------
+        now : float, optional [s]
+            Of the monotonic clock.
+        """
+        now = time.monotonic() if now is None else now
+        found = self.jobs.watched()
+        self.seen = {id: self.seen[id] if self.seen.get(id, ("", now))[0] == when else (when, now) for id, when in found.items()}
+        why = f"cancelled: the page that asked for it has not followed it for {self.seconds:g} s; ask again"
+        over, problem = datetime.now(UTC).isoformat(timespec="milliseconds"), json.dumps({"detail": why, "errors": []})
+        # somebody may have come back meanwhile
+        stale = [(id, when) for id, (when, since) in self.seen.items() if now - since > self.seconds]
+        return [id for id, when in stale if self.jobs.abandon(id, when, over, problem)]
 
 
 async def maintain(jobs: Jobs, seconds: float) -> None:
-    """Sweep four times in that time."""
-    # who could not follow a job while the service was down gets time to come back
-    pause = seconds
+    """Sweep four times in that time; who could not follow a job while the service was down gets all of it to come back."""
+    leases = Leases(jobs, seconds)
     while True:
-        await asyncio.sleep(pause)
-        pause = seconds / 4.0
         try:
-            for id in await asyncio.to_thread(sweep, jobs, seconds):
+            for id in await asyncio.to_thread(leases.sweep):
                 log.info("nobody follows the job any more: it is cancelled", extra={"fields": {"job": id}})
         except Unavailable as error:
             log.warning("the sweep of abandoned jobs is postponed", extra={"fields": {"error": type(error).__name__}})
+        await asyncio.sleep(seconds / 4.0)

@@ -112,6 +112,8 @@ class Uploads:
             campaign = await asyncio.to_thread(self.store.campaigns.get, state.group, state.campaign)
             if campaign is not None and state.name in files_of(campaign.text):
                 whole = await asyncio.to_thread(received, path)
+                if state.sha256 not in ("", whole.sha256):
+                    raise InputError("Upload-Metadata", f"content with the SHA-256 {whole.sha256}", state.sha256)
                 with suppress(KeyError):
                     # else the campaign has gone meanwhile
                     await self.take(campaign, state.name, whole, state.replacing)

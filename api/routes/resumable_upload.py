@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace as replaced
 from functools import partial
 from pathlib import Path
@@ -148,44 +148,56 @@ async def receive(
 ) -> int | tuple[int, Recording]:
     """Append the body of a request to an upload; return the offset behind it, or status and recording where nothing is missing."""
     refuse_encoded(request)
+    with alone(components, campaign, name), components.uploads.admitted(campaign.group):
+        state = await _go_on(components, campaign, name, upload.offset, upload.length)
+        replacing = upload.replace or state.replacing
+        state = replaced(state, group=campaign.group, campaign=campaign.id, name=name, replacing=replacing)
+        path = components.files.partial(campaign.group, partial_name(campaign.id, name))[0]
+        part = await _append(request, components, campaign.group, path, state, checksum)
+        try:
+            if part.size < state.length:
+                return part.size
+            received = await complete(part)
+            check_digest(upload.whole, received.sha256)
+            check_digest(state.sha256 or None, received.sha256, "Upload-Metadata")
+            stored = await take(components, campaign, name, received, replacing)
+        except (InputError, Problem) as error:
+            # kept unless they are at fault: the disk may have room again, or the client may replace the other content
+            if isinstance(error, InputError) or error.status in (404, 422):
+                await run_in_threadpool(components.files.forget, path)
+            raise
+        finally:
+            part.close()
+        await run_in_threadpool(components.files.forget, path)
+        return stored
+
+
+@contextmanager
+def alone(components: Components, campaign: Campaign, name: str) -> Iterator[None]:
+    """Keep other requests from writing the same upload meanwhile."""
     key = (campaign.id, name)
     if key in components.uploads.writing:
         # perhaps by the same client, whose lost connection has not been noticed yet
         raise Problem(503, "another request is writing this recording", headers={"Retry-After": "2"})
     components.uploads.writing.add(key)
     try:
-        with components.uploads.admitted(campaign.group):
-            state = await _go_on(components, campaign, name, upload.offset, upload.length)
-            replacing = upload.replace or state.replacing
-            state = replaced(state, group=campaign.group, campaign=campaign.id, name=name, replacing=replacing)
-            path = components.files.partial(campaign.group, partial_name(campaign.id, name))[0]
-            part = await _append(request, components, campaign.group, path, state, checksum)
-            try:
-                if part.size < state.length:
-                    return part.size
-                received = await complete(part)
-                check_digest(upload.whole, received.sha256)
-                stored = await take(components, campaign, name, received, replacing)
-            except (InputError, Problem) as error:
-                # kept unless they are at fault: the disk may have room again, or the client may replace the other content
-                if isinstance(error, InputError) or error.status in (404, 422):
-                    await run_in_threadpool(components.files.forget, path)
-                raise
-            finally:
-                part.close()
-            await run_in_threadpool(components.files.forget, path)
-            return stored
+        yield
     finally:
         components.uploads.writing.discard(key)
 
 
 async def state_of(components: Components, campaign: Campaign, name: str) -> Partial | None:
     """State of an upload; one that lacks no byte is stored first: to a client such an upload is one that is kept."""
+    await finish(components, campaign, name)
+    return await run_in_threadpool(_state, components, campaign, name)
+
+
+async def finish(components: Components, campaign: Campaign, name: str) -> None:
+    """Store an upload that lacks no byte, unless its content may not take the place of the recording's."""
     path, state = await run_in_threadpool(components.files.partial, campaign.group, partial_name(campaign.id, name))
     if state is not None and state.complete:
         with storage_problems(), suppress(Taken):
             await components.uploads.finish(path, replaced(state, group=campaign.group, campaign=campaign.id, name=name))
-    return await run_in_threadpool(_state, components, campaign, name)
 
 
 def _state(components: Components, campaign: Campaign, name: str) -> Partial | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import re
 from collections.abc import Callable, Coroutine
 from typing import Annotated, Any
 
@@ -11,7 +12,10 @@ from fastapi import APIRouter, Depends, Header, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import PlainTextResponse
+from starlette.datastructures import Headers
 from starlette.responses import Response as Answer
+from starlette.routing import Match
+from starlette.types import Scope
 
 from api.components import Components, ThisService
 from api.conventions import CampaignId, guard, problems
@@ -19,7 +23,7 @@ from api.files import Partial
 from api.problems import Problem, of_input, of_validation
 from api.reading.uploads import partial_name
 from api.routes.recordings import RecordingName, named
-from api.routes.resumable_upload import Checksum, Upload, receive, state_of
+from api.routes.resumable_upload import Checksum, Upload, alone, finish, receive, state_of
 from api.security import Guarded, WhoAsks
 from api.stores.campaigns import Campaign
 from api.transfer.body_stream import check_room, storage_problems
@@ -30,6 +34,7 @@ EXTENSIONS = "creation,termination,checksum"
 ALGORITHMS = ("sha1", "sha256", "md5")
 PART = "application/offset+octet-stream"
 _SAID = {"Tus-Resumable": VERSION}
+_SHA256 = re.compile("[0-9a-f]{64}")
 _BODY = {"required": True, "content": {PART: {"schema": {"type": "string", "format": "binary"}}}}
 _TUS: dict[str, Any] = {"Tus-Resumable": {"description": "Version of the protocol.", "schema": {"type": "string"}}}
 _OFFSET: dict[str, Any] = {"Upload-Offset": {"description": "Number of bytes received.", "schema": {"type": "string"}}}
@@ -43,7 +48,8 @@ Metadata = Annotated[
     Header(
         alias="Upload-Metadata",
         max_length=4000,
-        description="`filename` and its name in the campaign in Base64; `replace` takes the place of a recording with other content.",
+        description="`filename` and its name in the campaign in Base64; `replace` takes the place of a recording with other content; "
+        "`sha256` is that of the whole file in hexadecimal digits, checked at its end: who creates the same upload again goes on with it.",
     ),
 ]
 Announced = Annotated[
@@ -53,7 +59,16 @@ Announced = Annotated[
 
 
 class SpeaksTus(Guarded):
-    """Routes that name the version of the protocol in every answer."""
+    """Routes that name the version of the protocol in every answer, and that go by the method which X-HTTP-Method-Override says."""
+
+    def matches(self, scope: Scope) -> tuple[Match, Scope]:
+        """Whether a request is for this route; in front of clients that send POST alone, the header says what they mean."""
+        method = scope["method"] if scope["type"] == "http" else ""
+        if method == "POST":
+            method = Headers(scope=scope).get("x-http-method-override", method).upper()
+        match, found = super().matches(dict(scope, method=method))
+        # the log tells what was done
+        return match, {**found, "method": method} if match is Match.FULL else found
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Answer]]:
         """Return the handler of a request."""
@@ -109,7 +124,8 @@ async def options(id: CampaignId, components: ThisService) -> Response:
     status_code=201,
     response_class=PlainTextResponse,
     summary="Begin an upload by tus",
-    description="The file name of the metadata is one that the campaign names. The upload lives for a day without a new byte.",
+    description="The file name of the metadata is one that the campaign names. The upload lives for a day without a new byte. "
+    "One that another client has begun is never begun anew.",
     openapi_extra=guard("upload", parameters=_PARAMETERS),
     responses={
         201: {
@@ -117,7 +133,7 @@ async def options(id: CampaignId, components: ThisService) -> Response:
             "headers": _TUS | _OFFSET,
             "content": {"text/plain": {"schema": {"type": "string"}}},
         },
-        **problems(404, 412, 413, 422),
+        **problems(404, 409, 412, 413, 422),
     },
 )
 async def create(
@@ -128,12 +144,13 @@ async def create(
         raise InputError("Upload-Metadata", metadata[:80], "a filename: its name in the campaign, in Base64")
     campaign, name, _ = await run_in_threadpool(named, components, caller.group, id, told["filename"])
     await check_room(components, caller.group, length)
-    if (campaign.id, name) in components.uploads.writing:
-        raise Problem(503, "another request is writing this recording", headers={"Retry-After": "2"})
-    state = Partial(0, length, caller.group, campaign.id, name, told.get("replace", "") not in ("", "false", "0"))
-    await run_in_threadpool(_begin, components, campaign, state)
+    replacing = told.get("replace", "") not in ("", "false", "0")
+    state = Partial(0, length, caller.group, campaign.id, name, replacing, _digest(told.get("sha256", "")))
+    await finish(components, campaign, name)
+    with alone(components, campaign, name):
+        offset = await run_in_threadpool(_begin, components, campaign, state)
     path = request.url_for("send_part", id=id, name=name).path
-    return PlainTextResponse("", 201, {"Location": path, "Upload-Offset": "0"})
+    return PlainTextResponse("", 201, {"Location": path, "Upload-Offset": str(offset)})
 
 
 @router.head(
@@ -197,12 +214,24 @@ async def give_up(id: CampaignId, name: RecordingName, components: ThisService, 
     return Response(status_code=204)
 
 
-def _begin(components: Components, campaign: Campaign, state: Partial) -> None:
-    path, _ = components.files.partial(campaign.group, partial_name(campaign.id, state.name))
+def _begin(components: Components, campaign: Campaign, state: Partial) -> int:
+    """Begin an upload, or go on with that of the same content; return its offset.
+
+    Clients that meet 409 for a part ask for the offset and send what follows there. Were an upload begun anew under one of them, or
+    lent to two with different files of one length, both would go on, and what both are told to be their file would be a mixture.
+    """
+    path, there = components.files.partial(campaign.group, partial_name(campaign.id, state.name))
+    if there is not None and not there.complete:
+        if state.sha256 and (there.length, there.replacing, there.sha256) == (state.length, state.replacing, state.sha256):
+            return there.offset
+        found = f"{there.offset} of {there.length} bytes have come, of the SHA-256 {there.sha256 or 'that nobody has told'}"
+        allowed = "HEAD and PATCH to go on with that upload, DELETE to give it up, or the same length, `replace` and `sha256`"
+        raise Problem(409, "this recording is being uploaded", [{"field": "Upload-Metadata", "found": found, "allowed": allowed}])
     with storage_problems():
         components.files.forget(path)
         path.touch()
         components.files.note(path, state)
+    return 0
 
 
 def _length(components: Components, campaign: Campaign, name: str) -> int:
@@ -222,6 +251,12 @@ def _metadata(text: str) -> dict[str, str]:
         except (binascii.Error, UnicodeDecodeError):
             raise InputError("Upload-Metadata", pair[:80], "pairs of a key and UTF-8 text in Base64, divided by commas") from None
     return found
+
+
+def _digest(text: str) -> str:
+    if text and not _SHA256.fullmatch(text):
+        raise InputError("Upload-Metadata", f"sha256 {text[:80]}", "64 hexadecimal digits in lower case, in Base64")
+    return text
 
 
 def _checksum(text: str) -> Checksum:

@@ -188,8 +188,11 @@ class Jobs(Protocol):
     def watch(self, id: str, when: str) -> None:
         """Note that somebody follows a job, where that matters."""
 
-    def abandon(self, before: str, when: str, problem: str) -> Sequence[str]:
-        """Cancel the open jobs that were watched before a time last, for this reason, and return their ids."""
+    def watched(self) -> Mapping[str, str]:
+        """Return when the open jobs that are to be watched were so last, by their ids."""
+
+    def abandon(self, id: str, watched: str, when: str, problem: str) -> bool:
+        """Cancel an open job that has not been watched since, for this reason; return whether there was one."""
 
     def open(self) -> Sequence[Job]:
         """Return all jobs that are queued or running, in the order of their turn: groups take turns, each with its oldest first."""

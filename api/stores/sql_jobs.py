@@ -99,19 +99,20 @@ class SqlJobs:
         with self.store.writing() as connection:
             connection.execute(update(t).where(t.c.id == id, t.c.watched.is_not(None)).values(watched=when))
 
-    def abandon(self, before: str, when: str, problem: str) -> Sequence[str]:
-        t, ended = tables.jobs, []
-        alone = (t.c.state.in_(OPEN), t.c.watched < before)
+    def watched(self) -> Mapping[str, str]:
+        t = tables.jobs
         with self.store.reading() as connection:
-            ids = connection.execute(select(t.c.id).where(*alone)).scalars().all()
-        for id in ids:
-            with self.store.writing() as connection:
-                # somebody may have come back meanwhile
-                found = connection.execute(select(t).where(t.c.id == id, *alone).with_for_update()).first()
-                if found is not None:
-                    _cancel(connection, found, when, problem)
-                    ended.append(id)
-        return ended
+            rows = connection.execute(select(t.c.id, t.c.watched).where(t.c.state.in_(OPEN), t.c.watched.is_not(None))).all()
+        return {row.id: row.watched for row in rows}
+
+    def abandon(self, id: str, watched: str, when: str, problem: str) -> bool:
+        t = tables.jobs
+        with self.store.writing() as connection:
+            alone = (t.c.id == id, t.c.state.in_(OPEN), t.c.watched == watched)
+            found = connection.execute(select(t).where(*alone).with_for_update()).first()
+            if found is not None:
+                _cancel(connection, found, when, problem)
+        return found is not None
 
     def open(self) -> Sequence[Job]:
         t, turn = tables.jobs, _turns()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +17,9 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.units import from_rpm
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rcsa_ident.machine.machine import TipSource
     from rcsa_ident.stability.advice import Advice
 
 #: Toolings and stickouts that are compared at once.
@@ -70,6 +75,13 @@ def advise(
         Path | None, typer.Option(help="ADVICE.csv to write: recommended depth over speed for each tooling.", show_default=False)
     ] = None,
     plot: Plot = None,
+    card: Annotated[
+        Path | None,
+        typer.Option(
+            help="CARD.html to write, a page of A4 for each tooling: drawing, recommended cuts, conditions and warnings.",
+            show_default=False,
+        ),
+    ] = None,
     bands: Bands = True,
     stiffness_spread: StiffnessSpread = 0.05,
     json_: Json = False,
@@ -79,8 +91,9 @@ def advise(
     from rcsa_ident.workflows.tool_change import advise as ask
 
     check_plot(plot)
-    if out is not None:
-        writable(out)
+    for path in (out, card):
+        if path is not None:
+            writable(path)
     if cut.feed_per_tooth_mm is None:
         raise InputError("--feed-per-tooth-mm", "nothing", "the feed per tooth [mm]: power and removal rate grow with it")
     shares = (
@@ -105,11 +118,18 @@ def advise(
         from rcsa_ident.report.lobes import save_figure
 
         save_figure(advice_figure(answered), str(plot))
+    if card is not None:
+        from rcsa_ident.io.files import write_text
+        from rcsa_ident.report.html import ToolCard, tool_cards_html
+
+        about, versions = _machine_of(machine, files, tip), [_version(path) for path in files]
+        cards = [ToolCard(tool, asked, told, about, *shares, versions) for tool, told in zip(toolings, answered, strict=True)]
+        write_text(card, tool_cards_html(cards, datetime.now().astimezone()))
     remarks = list(dict.fromkeys(remark for answer in answered for remark in answer.remarks))
     if json_:
         from rcsa_ident.report.summaries import advice_summary
 
-        files_ = {name: str(path) for name, path in (("out", out), ("plot", plot)) if path is not None}
+        files_ = {name: str(path) for name, path in (("out", out), ("plot", plot), ("card", card)) if path is not None}
         emit({"toolings": [advice_summary(answer) for answer in answered], "warnings": remarks, "seconds": stages.seconds, **files_})
         return
     from rcsa_ident.cli.tables import show_comparison, show_planned, show_points, show_windows
@@ -126,9 +146,21 @@ def advise(
         show_comparison(answered)
     for remark in remarks:
         warn(remark)
-    for word, path in (("drawn", plot), ("written", out)):
+    for word, path in (("drawn", plot), ("written", out), ("written", card)):
         if path is not None:
             say(f"{word}: {path}")
+
+
+def _machine_of(machine: TipSource, files: Sequence[Path], tip: TipOptions) -> str:
+    """What takes the toolings, in words."""
+    if tip.modes is not None or tip.frf:
+        return f"the tip itself, of {tip.modes or ', '.join(tip.frf or [])}"
+    return f"{machine}, of {files[0].name}"
+
+
+def _version(path: Path) -> str:
+    """Name and first digits of a file's SHA-256."""
+    return f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()[:12]}"
 
 
 def _planned(text: str, max_depth_mm: float) -> tuple[float, float]:

@@ -1,26 +1,39 @@
-"""One HTML page without scripts: what was recorded, what was found, what it is good for."""
+"""HTML pages without scripts: what was recorded, what was found, what it is good for; and a tool's recommended cuts on a sheet of paper."""
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
 from rcsa_ident.identification.parameters import JOINT
 from rcsa_ident.identification.result import AxisResult, Identification
-from rcsa_ident.machining_setup import Campaign
+from rcsa_ident.machining_setup import Campaign, CutSpec, Tooling
 from rcsa_ident.report import figures
+from rcsa_ident.report.drawing import tooling_svg
 from rcsa_ident.report.lobes import stability_figure
-from rcsa_ident.report.summaries import coefficient_rows, lobes_summary, mode_rows, peak_row, recording_rows, two_digits, whole_mode_rows
+from rcsa_ident.report.summaries import (
+    advice_summary,
+    coefficient_rows,
+    lobes_summary,
+    mode_rows,
+    peak_row,
+    recording_rows,
+    two_digits,
+    whole_mode_rows,
+)
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.stability.advice import Advice
-from rcsa_ident.units import to_hz
+from rcsa_ident.units import to_hz, to_rpm
 from rcsa_ident.version import __version__
 
 #: A logarithm that the data leave open by more than this is not told by them.
@@ -94,15 +107,10 @@ def report_html(
     deviations : mapping of Dof to (array, array), optional
         Standard deviations of each mode's natural frequency [rad/s] and damping ratio.
     """
-    from jinja2 import Environment, StrictUndefined
-
     rows = recording_rows(readings)
     tooling_of = {cut.id: cut.tooling for cut in campaign.cuts}
-    template = files("rcsa_ident.report").joinpath("template.html").read_text(encoding="utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"two_digits": two_digits, "thousandths": _thousandths}
-    return environment.from_string(template).render(
-        version=__version__,
+    return _rendered(
+        "template.html",
         campaign=campaign,
         found=found,
         status=str(found.status),
@@ -128,6 +136,100 @@ def report_html(
         known=any(page.error for page in toolings),
         seconds=dict(seconds or {}),
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ToolCard:
+    """What those at the machine need of a tooling.
+
+    Parameters
+    ----------
+    tooling : Tooling
+    cut : CutSpec
+        With its feed per tooth.
+    advice : Advice
+    machine : str
+        In words.
+    tolerance, probability, reserve : float
+        Shares of speed, of the machines that the records allow, and of depth that the recommended depth keeps.
+    versions : sequence of str
+        What it was computed from.
+    """
+
+    tooling: Tooling
+    cut: CutSpec
+    advice: Advice
+    machine: str
+    tolerance: float
+    probability: float
+    reserve: float
+    versions: Sequence[str] = ()
+
+
+def tool_cards_html(cards: Sequence[ToolCard], when: datetime) -> str:
+    """Return recommended cuts with drawing, warnings and conditions, each tooling on one page of A4."""
+    return _rendered("tool_card.html", cards=[_card(card) for card in cards], when=f"{when:%Y-%m-%d %H:%M}")
+
+
+def _card(card: ToolCard) -> dict[str, Any]:
+    cutter, assembly, cut = card.tooling.cutter, card.tooling.assembly, card.cut
+    feed, width = cut.feed_per_tooth or 0.0, cut.engagement.immersion
+    speeds = to_rpm(card.advice.lobes.spindle_speed[[0, -1]])
+    pressure = f"K_tc {_plain(cut.coefficients['tangential'] * 1e-6)} N/mm²" if "tangential" in cut.coefficients else None
+    return {
+        "name": card.advice.tooling,
+        "drawing": b64encode(tooling_svg(card.tooling).encode()).decode(),
+        "told": advice_summary(card.advice),
+        "warnings": list(dict.fromkeys(card.advice.remarks)),
+        "max_depth_mm": 1e3 * card.advice.lobes.max_depth,
+        "feed_of_turn_mm": 1e3 * feed * cutter.teeth,
+        "drawn": card.advice.lobes.drawn is not None,
+        "conditions": [
+            ("Machine", card.machine),
+            ("Teeth cut", f"from {cut.engagement}, {_strategy(cut.engagement)}"),
+            ("Radial immersion", f"{_plain(100.0 * width, 1)} %, {_plain(1e3 * width * cutter.diameter, 2)} mm wide"),
+            ("Feed per tooth", f"{_plain(1e3 * feed, 4)} mm"),
+            ("Feed direction", f"{_plain(float(np.degrees(cut.feed_angle)), 1)}° from +X to +Y"),
+            ("Material", ", ".join(filter(None, (cut.material, pressure))) or "as in the identification"),
+            ("Speeds asked for", f"{_plain(float(speeds[0]))} to {_plain(float(speeds[1]))} rev/min"),
+        ],
+        "tooling": [
+            ("Teeth", str(cutter.teeth)),
+            ("Cutting diameter", f"{_plain(1e3 * cutter.diameter, 1)} mm"),
+            ("Helix", f"{_plain(float(np.degrees(cutter.helix)), 1)}°"),
+            ("Stickout", f"{_plain(1e3 * assembly.stickout, 1)} mm"),
+            ("Insertion", f"{_plain(1e3 * assembly.insertion, 1)} mm"),
+        ],
+        "tolerance": card.tolerance,
+        "probability": card.probability,
+        "reserve": card.reserve,
+        "versions": card.versions,
+    }
+
+
+def _strategy(engagement: Engagement) -> str:
+    up, down = bool(np.isclose(engagement.entry, 0.0)), bool(np.isclose(engagement.exit, np.pi))
+    return "slot" if up and down else "up milling" if up else "down milling" if down else "between both sides"
+
+
+def _rendered(template: str, **known: Any) -> str:
+    from jinja2 import Environment, StrictUndefined
+
+    text = files("rcsa_ident.report").joinpath(template).read_text(encoding="utf-8")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters |= {"two_digits": two_digits, "thousandths": _thousandths, "plain": _plain, "number": _number}
+    return environment.from_string(text).render(version=__version__, **known)
+
+
+def _number(value: float | None, digits: int = 0) -> str:
+    """A number with thin spaces between thousands."""
+    return "–" if value is None or not np.isfinite(value) else f"{value:,.{digits}f}".replace(",", "\u202f").replace("-", "−")
+
+
+def _plain(value: float, digits: int = 0) -> str:
+    """The same with no more digits than it has."""
+    text = _number(value, digits)
+    return text.rstrip("0").rstrip(".") if digits else text
 
 
 def _thousandths(value: complex, places: int) -> str:

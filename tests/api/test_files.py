@@ -154,6 +154,32 @@ def test_what_nobody_refers_to_is_swept_once_it_is_old(files):
     assert everything(files) == []
 
 
+@pytest.mark.parametrize("jump", [-1e8, -STALE_PART, 2.0 * STALE_PART, 1e8])
+def test_a_clock_that_jumps_makes_no_part_old(tmp_path, monkeypatch, jump):
+    clock, steady, wall = time.time, time.monotonic, [0.0]
+    passed = [0.0]
+    monkeypatch.setattr(time, "time", lambda: clock() + passed[0] + wall[0])
+    monkeypatch.setattr(time, "monotonic", lambda: steady() + passed[0])
+    files = Files(tmp_path / "files")
+
+    def part():
+        found = files.part("A")
+        found.close()
+        os.utime(found.path, (time.time(), time.time()))
+        return found.path
+
+    before, wall[0] = part(), jump
+    after = part()
+    assert files.sweep({}) == 0
+    # both grow old all the same, the one on the other side of the jump later
+    passed[0] = 1.1 * STALE_PART
+    assert files.sweep({}) == 1
+    passed[0] += abs(jump)
+    assert files.sweep({}) == 1
+    assert not before.exists()
+    assert not after.exists()
+
+
 def test_sweeping_before_anything_came(files):
     assert files.sweep({}) == 0
 

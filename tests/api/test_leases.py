@@ -9,7 +9,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from api.jobs import leases
-from api.jobs.leases import sweep
+from api.jobs.leases import Leases
 from api.live import jobs as followed
 from api.settings import Settings
 from api.stores.entities import Unavailable
@@ -22,8 +22,8 @@ LONG_AGO = "2026-01-01T00:00:00.000+00:00"
 HERE = {"Prefer": "respond-async, while-watched"}
 
 
-def after(seconds: float) -> datetime:
-    return datetime.now(UTC) + timedelta(seconds=seconds)
+def now(later: float = 0.0) -> str:
+    return (datetime.now(UTC) + timedelta(seconds=later)).isoformat(timespec="milliseconds")
 
 
 def asked(client, machine: str, **headers: str) -> str:
@@ -39,9 +39,11 @@ def test_only_what_is_to_be_watched_and_is_not_ends(store, machine):
     working = running(store, machine, kind="lobes", watched=LONG_AGO)
     seen = running(store, machine, kind="lobes", watched=LONG_AGO)
     own, identification = running(store, machine, kind="lobes"), running(store, machine)
+    swept = Leases(store.jobs, 120.0).sweep
+    assert swept(0.0) == swept(119.0) == []
     for each in (seen, own, identification):
-        store.jobs.watch(each, after(0.0).isoformat(timespec="milliseconds"))
-    assert sorted(sweep(store.jobs, 120.0)) == sorted([waiting, working])
+        store.jobs.watch(each, now())
+    assert sorted(swept(121.0)) == sorted([waiting, working])
     for id in (waiting, working):
         ended = store.jobs.find(id)
         assert (ended.state, ended.finished is not None) == ("cancelled", True)
@@ -49,10 +51,21 @@ def test_only_what_is_to_be_watched_and_is_not_ends(store, machine):
         assert [event.kind for event in store.jobs.events(id, 0, 9)][-1] == "end"
         assert store.jobs.text(id, "question") is None
     assert {store.jobs.find(id).state for id in (seen, own, identification)} == {"running"}
-    assert sweep(store.jobs, 120.0) == []
+    assert swept(240.0) == []
     # it was watched once, and is no more
-    assert sweep(store.jobs, 120.0, after(121.0)) == [seen]
+    assert swept(242.0) == [seen]
     assert {store.jobs.find(id).state for id in (own, identification)} == {"running"}
+
+
+@pytest.mark.parametrize("jump", [-3600.0, 600.0, 1e8])
+def test_a_clock_that_jumps_neither_ends_nor_keeps_a_job(store, machine, jump):
+    id = running(store, machine, kind="lobes", watched=now())
+    swept = Leases(store.jobs, 120.0).sweep
+    assert swept(0.0) == []
+    # all that the service writes is of the other clock from now on, and half a lease later somebody asks
+    store.jobs.watch(id, now(jump))
+    assert swept(60.0) == swept(170.0) == []
+    assert swept(181.0) == [id]
 
 
 def test_whoever_comes_back_meanwhile_keeps_it(store, machine, monkeypatch):
@@ -62,11 +75,14 @@ def test_whoever_comes_back_meanwhile_keeps_it(store, machine, monkeypatch):
 
     def late():
         monkeypatch.setattr(store, "writing", writing)
-        store.jobs.watch(id, after(0.0).isoformat(timespec="milliseconds"))
+        store.jobs.watch(id, now())
         return writing()
 
+    swept = Leases(store.jobs, 120.0).sweep
+    swept(0.0)
     monkeypatch.setattr(store, "writing", late)
-    assert sweep(store.jobs, 120.0) == []
+    assert swept(121.0) == []
+    assert store.writing == writing
     assert store.jobs.find(id).state == "running"
 
 
@@ -81,8 +97,10 @@ def test_asking_for_it_and_opening_its_events_are_watching(shop, store, monkeypa
         assert store.jobs.find(id).watched > LONG_AGO, path
     store.jobs.watch(id, LONG_AGO)
     # a look at something else is none
+    swept = Leases(store.jobs, 120.0).sweep
+    swept(0.0)
     client.http.get("/v1/machines")
-    assert sweep(store.jobs, 120.0) == [id]
+    assert swept(121.0) == [id]
     found = client.lobe_job(id)
     assert (found.job.state, found.answer) == ("cancelled", None)
     assert found.job.problem.detail == "cancelled: the page that asked for it has not followed it for 120 s; ask again"
@@ -94,7 +112,8 @@ def test_what_is_asked_for_without_goes_on(shop, store, prefer):
     id = asked(client, machine, Prefer=prefer)
     client.lobe_job(id)
     assert store.jobs.find(id).watched is None
-    assert sweep(store.jobs, 60.0, after(1e6)) == []
+    swept = Leases(store.jobs, 60.0).sweep
+    assert swept(0.0) == swept(1e6) == []
 
 
 def test_a_stream_of_it_ends_in_time_for_the_next(shop, store, tmp_path):

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import os
 import signal
+import subprocess
+import sys
 
 import httpx2
 import pytest
@@ -12,8 +15,11 @@ from tusclient.client import TusClient
 from tusclient.exceptions import TusCommunicationError
 
 from api.client import Client
+from tests.api.in_process import embedded, service
 from tests.api.recordings import content, declared
+from tests.fixtures.paths import ROOT
 from tests.fixtures.service import serving
+from tests.fixtures.waiting import until
 
 SAYS = {"Tus-Resumable": "1.0.0"}
 PART = SAYS | {"Content-Type": "application/offset+octet-stream"}
@@ -135,6 +141,154 @@ def test_other_content_needs_to_be_told(place, tmp_path):
     other = content(tmp_path, seed=1)
     assert sent(client, begun(client, path, len(other)), other, 0).status_code == 409
     assert sent(client, begun(client, path, len(other), replace="true"), other, 0).status_code == 204
+
+
+def test_a_client_that_sends_only_post_says_what_it_means(place):
+    client, path, raw = place
+    where = begun(client, path, len(raw))
+
+    def meant(method, content=b"", **headers):
+        return client.post(where, content=content, headers=PART | {"X-HTTP-Method-Override": method} | headers)
+
+    assert meant("PATCH", raw[:1000], **{"Upload-Offset": "0"}).headers["upload-offset"] == "1000"
+    assert meant("head").headers["upload-offset"] == "1000"
+    assert client.post(path, headers={"X-HTTP-Method-Override": "OPTIONS"}).headers["tus-version"] == "1.0.0"
+    assert meant("PUT").status_code == 405
+    # what a link alone can send changes nothing
+    assert client.get(where, headers=SAYS | {"X-HTTP-Method-Override": "DELETE"}).status_code == 405
+    assert client.head(where, headers=SAYS).headers["upload-offset"] == "1000"
+    assert meant("DELETE").status_code == 204
+    assert client.head(where, headers=SAYS).status_code == 404
+    # and beside these paths the header says nothing
+    assert client.post("/v1/machines", json={"name": "n"}, headers={"X-HTTP-Method-Override": "DELETE"}).status_code == 201
+
+
+def test_an_upload_that_has_begun_is_not_begun_anew_by_another(place, tmp_path):
+    client, path, raw = place
+    where = begun(client, path, len(raw))
+    for sent_so_far in (0, 1000):
+        if sent_so_far:
+            assert sent(client, where, raw[:1000], 0).status_code == 204
+        for length in (len(raw), 5):
+            headers = SAYS | {"Upload-Length": str(length), "Upload-Metadata": metadata(filename=NAME, sha256="0" * 64)}
+            answer = client.post(path, headers=headers)
+            # clients that find a location in any answer would follow it
+            assert (answer.status_code, answer.headers.get("location")) == (409, None)
+            assert f"{sent_so_far} of {len(raw)} bytes" in answer.json()["errors"][0]["found"]
+        assert client.head(where, headers=SAYS).headers["upload-offset"] == str(sent_so_far)
+    assert client.delete(where, headers=SAYS).status_code == 204
+    assert sent(client, begun(client, path, len(raw)), raw, 0).status_code == 204
+
+
+def test_the_same_content_goes_on_where_it_stands(place):
+    """A client that has lost the address, or the answer to its creation."""
+    client, path, raw = place
+    told = {"sha256": hashlib.sha256(raw).hexdigest()}
+    where = begun(client, path, len(raw), **told)
+    assert sent(client, where, raw[:1000], 0).status_code == 204
+    headers = SAYS | {"Upload-Length": str(len(raw)), "Upload-Metadata": metadata(filename=NAME, **told)}
+    again = client.post(path, headers=headers)
+    assert (again.status_code, again.headers["location"], again.headers["upload-offset"]) == (201, where, "1000")
+    # unless it is to take the place of other content, which the first is not
+    assert client.post(path, headers=headers | {"Upload-Metadata": metadata(filename=NAME, replace="true", **told)}).status_code == 409
+    assert sent(client, where, raw[1000:], 1000).status_code == 204
+
+
+def test_a_file_that_is_not_the_announced_one_is_refused_at_its_end(place):
+    client, path, raw = place
+    headers = SAYS | {"Upload-Length": str(len(raw)), "Upload-Metadata": metadata(filename=NAME, sha256="ABC")}
+    assert client.post(path, headers=headers).status_code == 422
+    where = begun(client, path, len(raw), sha256="0" * 64)
+    answer = sent(client, where, raw, 0)
+    assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "Upload-Metadata")
+    assert client.head(where, headers=SAYS).status_code == 404
+
+
+def test_what_another_group_uploads_is_not_there(guarded_http, tmp_path):
+    http, keys = guarded_http
+    raw = content(tmp_path)
+    owner, other, reader = ({"X-API-Key": keys[name]} for name in ("upload", "other", "read"))
+    client = Client(http=http, key=keys["admin"])
+    id = client.make_campaign(client.make_machine("m").id, declared(2)).id
+    path = f"/v1/campaigns/{id}/uploads"
+    begin = SAYS | {"Upload-Length": str(len(raw)), "Upload-Metadata": metadata(filename=NAME)}
+    where = http.post(path, headers=begin | owner).headers["location"]
+    assert http.patch(where, content=raw[:1000], headers=PART | {"Upload-Offset": "0"} | owner).status_code == 204
+    for key, status in ((other, 404), (reader, 403), ({}, 401)):
+        assert http.post(path, headers=begin | key).status_code == status
+        assert http.head(where, headers=SAYS | key).status_code == status
+        assert http.patch(where, content=raw[1000:], headers=PART | {"Upload-Offset": "1000"} | key).status_code == status
+        assert http.delete(where, headers=SAYS | key).status_code == status
+        override = PART | {"X-HTTP-Method-Override": "DELETE"} | key
+        assert http.post(where, headers=override).status_code == status
+    assert http.head(where, headers=SAYS | owner).headers["upload-offset"] == "1000"
+    assert http.patch(where, content=raw[1000:], headers=PART | {"Upload-Offset": "1000"} | owner).status_code == 204
+
+
+def test_a_quota_that_is_full_refuses_an_upload_before_its_first_byte(store, tmp_path):
+    raw = content(tmp_path)
+    with service(store, tmp_path, group_bytes=len(raw) + 1000) as http:
+        client = Client(http=http)
+        id = client.make_campaign(client.make_machine("m").id, declared(2)).id
+        path = f"/v1/campaigns/{id}/uploads"
+        headers = SAYS | {"Upload-Length": str(len(raw) + 2000), "Upload-Metadata": metadata(filename=NAME)}
+        answer = http.post(path, headers=headers)
+        assert (answer.status_code, f"may keep {len(raw) + 1000}" in answer.json()["detail"]) == (413, True)
+        assert http.head(f"{path}/{NAME}", headers=SAYS).status_code == 404
+        # parts count as soon as they have come, of whichever recording
+        where = begun(http, path, len(raw))
+        assert sent(http, where, raw[:2000], 0).status_code == 204
+        beside = SAYS | {"Upload-Length": str(len(raw)), "Upload-Metadata": metadata(filename="c1_cut.h5")}
+        assert http.post(path, headers=beside).status_code == 413
+
+
+#: Ends this process while it stores the whole: before anything of it is kept, or when all is.
+DYING = """
+import os, signal, sys
+from pathlib import Path
+from api.reading.uploads import Uploads
+from tests.api.in_process import embedded, service
+from tests.api.test_tus import sent
+
+folder, where, offset, when = Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]), sys.argv[4]
+take = Uploads.take
+
+async def dying(*arguments):
+    if when == "after":
+        await take(*arguments)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+Uploads.take = dying
+with service(embedded(folder), folder) as http:
+    sent(http, where, (folder / "upload").read_bytes()[offset:], offset)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere there is no such signal")
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_a_kill_between_the_last_byte_and_its_acknowledgement(tmp_path, when):
+    """The client asks how much has come, hears that all has, and the recording is there, once."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    raw = content(tmp_path)
+    (folder / "upload").write_bytes(raw)
+    with service(embedded(folder), folder) as http:
+        client = Client(http=http)
+        id = client.make_campaign(client.make_machine("m").id, declared(2)).id
+        where = begun(http, f"/v1/campaigns/{id}/uploads", len(raw))
+        assert sent(http, where, raw[:1000], 0).status_code == 204
+    words = [sys.executable, "-c", DYING, str(folder), where, "1000", when]
+    ended = subprocess.run(words, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False, cwd=ROOT)
+    assert ended.returncode == -signal.SIGKILL, ended.stderr[-2000:]
+    with service(embedded(folder), folder) as http:
+        # until the start has stored it, another request is writing it
+        until(lambda: http.head(where, headers=SAYS).status_code != 503)
+        assert http.head(where, headers=SAYS).headers["upload-offset"] == str(len(raw))
+        rows = http.get(f"/v1/campaigns/{id}/recordings").json()["items"]
+        assert [(row["name"], row["sha256"]) for row in rows] == [(NAME, hashlib.sha256(raw).hexdigest())]
+        until(lambda: not list((folder / "files").rglob("*.part")))
+        assert len(list((folder / "files").glob("*/uploads/*"))) == 1
 
 
 @pytest.mark.slow

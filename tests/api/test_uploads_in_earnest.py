@@ -23,6 +23,7 @@ import uvicorn
 from api.client import Client
 from api.files import STALE_FILE, STALE_PART, UPLOADS
 from api.main import create_app
+from api.reading.examine import write_normalised
 from api.settings import Settings
 from api.stores.sql import open_store
 from tests.api.in_process import Here, embedded, refused, service
@@ -301,6 +302,35 @@ def test_parts_outlive_a_full_disk(http, client, tmp_path, monkeypatch):
     answer = http.head(url)
     assert (answer.status_code, answer.headers["upload-offset"]) == (204, str(len(raw)))
     assert client.recording(campaign, "c0_cut.h5").sha256 == hashlib.sha256(raw).hexdigest()
+    assert len(files_in(tmp_path)) == 2
+
+
+@pytest.mark.parametrize("face", ["put", "patch"])
+def test_a_sweep_while_an_upload_is_stored_takes_nothing_of_it(http, client, tmp_path, monkeypatch, face):
+    """Whatever the clock shows: neither what is being read, nor files whose row does not stand yet."""
+    campaign = client.make_campaign(client.make_machine("m").id, declared(1)).id
+    url, raw = f"/v1/campaigns/{campaign}/recordings/c0_cut.h5", content(tmp_path)
+    components, clock, sweeps = http.app.state.components, time.time, []
+    write, put = write_normalised, components.store.recordings.put
+
+    def reading(*arguments):
+        write(*arguments)
+        components.uploads.sweep()
+
+    def storing(*arguments):
+        sweeps.append(threading.Thread(target=components.uploads.sweep))
+        sweeps[0].start()
+        # it would be over by now, did it not wait for the row
+        sweeps[0].join(0.2)
+        assert sweeps[0].is_alive()
+        return put(*arguments)
+
+    monkeypatch.setattr(time, "time", lambda: clock() + 30.0 * STALE_PART)
+    monkeypatch.setattr("api.reading.examine.write_normalised", reading)
+    monkeypatch.setattr(components.store.recordings, "put", storing)
+    assert http.request(face, url, content=raw, headers=BINARY | {"Upload-Offset": "0", "Upload-Length": str(len(raw))}).status_code == 201
+    sweeps[0].join()
+    assert hashlib.sha256(http.get(f"{url}/file").content).hexdigest() == hashlib.sha256(raw).hexdigest()
     assert len(files_in(tmp_path)) == 2
 
 

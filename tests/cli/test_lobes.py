@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
+import re
+from base64 import b64decode
+from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -236,6 +240,34 @@ def test_advice_from_modes(shop):
     assert weak["highest_removal"][0]["spindle_speed_rpm"] <= 20000.0
     assert weak["highest_removal"][0]["bound"] == "power"
     assert "highest removal rate" in run(*common, "--depth-mm", 40, "--max-depth-mm", 50).stdout
+
+
+def test_a_card_says_what_the_answer_says(result_file, tmp_path):
+    """The recommended cuts of every tooling, with drawing, conditions, warnings and what they were computed from."""
+    tool = tmp_path / "A & B.toml"
+    tool.write_text((result_file.parent / "T1.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    asked = ("advise", result_file, tool, *FEED, "--immersion", "20%", "--speed-from", 8000, "--speed-to", 12000, "--reserve", 15)
+    answer = answer_of(*asked, "--stickout-mm", "60,70", "--card", tmp_path / "C.html")
+    assert answer["card"] == str(tmp_path / "C.html")
+    text = unescape((tmp_path / "C.html").read_text(encoding="utf-8")).replace("\u202f", "")
+    cards = text.split("<article>")[1:]
+    assert len(cards) == len(answer["toolings"]) == 2
+    for card, told, stickout in zip(cards, answer["toolings"], ("60 mm", "70 mm"), strict=True):
+        rows = [re.findall(r"<td>(.*?)</td>", row) for row in re.findall(r"<tr><td>.*?</tr>", card, flags=re.DOTALL)]
+        assert [[float(cell) for cell in row[:2]] for row in rows] == [
+            [round(cut["spindle_speed_rpm"]), round(cut["recommended_depth_mm"], 2)] for cut in told["highest_removal"]
+        ]
+        # four teeth
+        assert float(rows[0][3]) == round(0.4 * told["highest_removal"][0]["spindle_speed_rpm"])
+        svg = b64decode(re.search(r"data:image/svg\+xml;base64,([^\"]+)", card)[1]).decode()
+        assert told["tooling"] in unescape(svg)
+        assert all(warning in card for warning in answer["warnings"])
+        digest = hashlib.sha256(tool.read_bytes()).hexdigest()[:12]
+        for words in ("stays 15 % below", "20 %, 2.4 mm wide", "down milling", f"A & B.toml {digest}", stickout, "8000 to 12000 rev/min"):
+            assert words in card
+    assert "<script" not in text
+    assert "written" in run(*asked, "--card", tmp_path / "C.html").stdout
+    assert "no/C.html" in run(*asked, "--card", tmp_path / "no" / "C.html", code=2).stderr
 
 
 @pytest.mark.slow

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
-from playwright.sync_api import expect
+from playwright.sync_api import Browser, expect
 
 from api.client import Client
+from rcsa_ident.io.identifications import machine_from_json
+from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.machining_setup import CutSpec
+from rcsa_ident.report.html import ToolCard, tool_cards_html
+from rcsa_ident.units import rpm
+from rcsa_ident.workflows.tool_change import ToolChange, advise
+from tests.api.recordings import content, declared
 from tests.fixtures import by_hand
+from tests.fixtures.paths import TOOLINGS
 from tests.fixtures.service import Served
 from tests.web.conftest import drop
 
@@ -28,6 +39,26 @@ def test_a_tool_card_prints_on_one_page(opened, shop: str):
     assert card.locator("tbody tr").count() >= 1
     expect(card.locator("img.drawing")).to_be_visible()
     assert page.pdf(format="A4").count(b"/Type /Page\n") == 1
+
+
+def test_cards_of_the_command_line_print_on_a_page_each(browser: Browser, result: str, tmp_path: Path):
+    machine = machine_from_json(json.loads(result), "RESULT.json")
+    cards = []
+    for file in sorted(TOOLINGS.glob("*.toml"))[:2]:
+        tooling, cut = read_tooling(file), CutSpec(feed_per_tooth=1e-4)
+        told = advise(ToolChange(machine, tooling, cut, rpm(6000, 12_000, 100), 10e-3))
+        warned = replace(told, remarks=("a sentence of a warning as long as they are at most, " * 3,) * 4)
+        cards.append(ToolCard(tooling, cut, warned, str(machine), 0.01, 0.95, 0.1, ("RESULT.json 0123456789ab", file.name)))
+    page = browser.new_page()
+    (tmp_path / "CARD.html").write_text(tool_cards_html(cards, datetime(2026, 1, 2, 3, 4, tzinfo=UTC)), encoding="utf-8")
+    page.goto((tmp_path / "CARD.html").as_uri())
+    assert page.locator("footer").first.inner_text().startswith("2026-01-02 03:04 · RESULT.json 0123456789ab")
+    assert page.locator("img").evaluate_all("all => all.every((each) => each.naturalWidth > 0)")
+    assert page.pdf(format="A4", prefer_css_page_size=True).count(b"/Type /Page\n") == 2
+    # nothing sticks out on a phone
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    page.close()
 
 
 def test_the_whole_view_takes_what_is_dropped(opened, tmp_path: Path):
@@ -66,14 +97,26 @@ _CLIPPED = """() => {
 }"""
 
 
-def test_lists_show_their_choice_whole(opened, client: Client, served: Served, shop: str):
+def test_toolings_side_by_side_stand_in_sight(opened, shop: str):
+    page = opened(f"#/change?machine={shop}&tooling=T1&tooling=T1-long", viewport={"width": 1440, "height": 900})
+    table = page.locator(".scrolls", has=page.get_by_role("table", name="Toolings side by side"))
+    expect(table).to_contain_text("Removes", timeout=60_000)
+    assert table.evaluate("(e) => e.scrollWidth <= e.clientWidth")
+
+
+def test_lists_show_their_choice_whole(opened, client: Client, served: Served, shop: str, tmp_path: Path):
     client.write_tooling("A mill that stands 62 mm out", by_hand.TOOLING)
+    campaign = client.make_campaign(shop, declared()).id
+    (tmp_path / "c0_cut.h5").write_bytes(content(tmp_path))
+    client.upload(campaign, tmp_path / "c0_cut.h5")
     page = opened(f"#/machines/{shop}")
-    for address in ("#/campaigns/new", f"#/change?machine={shop}&tooling=T1", "#/toolings/edit/T1"):
+    addresses = ("#/campaigns/new", f"#/change?machine={shop}&tooling=T1", "#/toolings/edit/T1", "#/forces", "#/forces/live?rate=0.25")
+    for address in addresses:
         page.goto(f"{served.url}/{address}")
         page.wait_for_selector("h1")
-        page.locator("main select").first.wait_for(state="attached")
+        page.locator("main select:has(option)").first.wait_for(state="attached")
         for width in (390, 1440):
             page.set_viewport_size({"width": width, "height": 860})
             assert page.evaluate(_CLIPPED) == [], (address, width)
     client.forget_tooling("A mill that stands 62 mm out")
+    client.forget_campaign(campaign)

@@ -2,7 +2,7 @@
 import { Problem } from "./api.js";
 import { choices, fill, h, icon, note } from "./dom.js";
 import { shareOf } from "./jobs.js";
-import { mayLeave, route, show, to, where } from "./router.js";
+import { keep, mayLeave, route, show, to, where } from "./router.js";
 import { runningFor, watchJobs } from "./running.js";
 import { allMachines, choose, forgetAll, knownMachines, machine } from "./state.js";
 import { isInch, setInch } from "./units.js";
@@ -13,26 +13,35 @@ const view =
   async (...given) =>
     (await import(`./views/${file}.js`))[name](...given);
 
+/** A view of the machine that this person works at: its address says which one, so whoever gets it sees the same. */
+const ofMachine = (shown) => async (args, query, place) => {
+  await allMachines();
+  const asked = query.get("machine");
+  if (knownMachines().some((m) => m.id === asked)) choose(asked);
+  if (machine() && place.isConnected) keep({ machine: machine().id });
+  return shown(args, query, place);
+};
+
 route("", "machines", view("machines"));
 route("machines/:id", "machines", view("machine"));
 route("machines/:id/recordings", "recordings", view("recordings"));
-route("recordings", "recordings", view("recordings"));
-route("campaigns/new", "recordings", view("campaign_form"));
+route("recordings", "recordings", ofMachine(view("recordings")));
+route("campaigns/new", "recordings", ofMachine(view("campaign_form")));
 route("campaigns/:id", "recordings", view("campaign"));
 route("campaigns/:id/:name", "recordings", view("recording"));
-route("identification", "identification", view("identifications"));
+route("identification", "identification", ofMachine(view("identifications")));
 route("machines/:id/identification", "identification", view("identifications"));
 route("identifications/:id", "identification", view("identification"));
 route("toolings", "toolings", view("toolings"));
 route("toolings/new", "toolings", view("tooling"));
 route("toolings/edit/:name", "toolings", view("tooling"));
 route("changes", "toolings", view("changes"));
-route("change", "change", view("change"));
+route("change", "change", ofMachine(view("change")));
 route("card", "change", view("tool_card"));
 route("listen", "listen", view("listen"));
 route("tap", "listen", view("tap"));
-route("forces", "forces", view("forces"));
-route("forces/live", "forces", view("live"));
+route("forces", "forces", ofMachine(view("forces")));
+route("forces/live", "forces", ofMachine(view("live")));
 
 const SECTIONS = [
   ["machines", "Machines", "Machines", ""],
@@ -96,7 +105,11 @@ function picker() {
         // what is open belongs to the other machine
         if (/^(campaigns|identifications|machines)\//.test(where().path))
           location.hash = to(section === "machines" ? `machines/${list.value}` : section);
-        else refresh();
+        else {
+          // its campaigns are its own
+          if (where().query.has("machine")) keep({ machine: list.value, campaign: null, recording: null, watch: null });
+          refresh();
+        }
       },
     },
     known.map((m) => h("option", { value: m.id, selected: m.id === here?.id }, m.name)),

@@ -61,6 +61,13 @@ export function remember(path, query) {
   history.replaceState(null, "", address);
 }
 
+/** Write some of what a view shows into its address; what is empty stands there no more. */
+export function keep(changed) {
+  const { path, query } = where();
+  const before = Object.fromEntries([...query.keys()].map((name) => [name, query.getAll(name)]));
+  remember(path, { ...before, ...changed });
+}
+
 /** Show the view of the address now. */
 export async function show(place, onshow, onerror) {
   const mine = (turn += 1);

@@ -4,7 +4,7 @@ import { add, choices, fill, h, head, link, note, save } from "../dom.js";
 import { dropZone } from "../drop.js";
 import { confirmed, failed } from "../forms.js";
 import { filling, makeExample } from "../next_step.js";
-import { go, to } from "../router.js";
+import { go, keep, to } from "../router.js";
 import { knownMachines } from "../state.js";
 import { queueFor } from "../uploads.js";
 import { text } from "../units.js";
@@ -21,7 +21,7 @@ const SHOWN = [
 export async function view({ id }, query, place) {
   let campaign = await get(`campaigns/${id}`);
   const queue = queueFor(id);
-  let filter = query.get("show") ?? "all";
+  let filter = SHOWN.some(([name]) => name === query.get("show")) ? query.get("show") : "all";
   const fault = h("div");
   const counts = h("section", { class: "card", "aria-label": "State" });
   const strangers = h("div");
@@ -59,6 +59,7 @@ export async function view({ id }, query, place) {
         h("h2", null, "Verdicts"),
         choices("Which cuts are shown", SHOWN, filter, (value) => {
           filter = value;
+          keep({ show: value === "all" ? null : value });
           rows();
         }),
       ),
@@ -75,7 +76,9 @@ export async function view({ id }, query, place) {
     save(`${campaign.name}.zip`, await getBlob(`campaigns/${id}/archive`));
   });
 
-  let open = null;
+  const first = campaign.cuts.find((cut) => cut.id === query.get("cut") && cut.cut.uploaded);
+  let open = first?.id ?? null;
+  if (first) detailed(first, [first.cut, first.air].find((file) => file?.uploaded && file.name === query.get("recording"))?.name);
   function rows() {
     const shown = campaign.cuts
       .map((cut) => ({ cut, state: stateOf(cut, queue) }))
@@ -96,10 +99,15 @@ export async function view({ id }, query, place) {
     if (focused) list.querySelector(`[data-cut="${CSS.escape(focused)}"]`)?.focus();
   }
 
+  function detailed(cut, recording = null) {
+    fill(detail, open ? recordingPanel(campaign, cut, recording, (name) => keep({ recording: name })) : null);
+  }
+
   function toggle(cut) {
     open = open === cut.id ? null : cut.id;
+    keep({ cut: open, recording: null });
     rows();
-    fill(detail, open ? recordingPanel(campaign, cut) : null);
+    detailed(cut);
     if (open) detail.scrollIntoView({ block: "nearest", behavior: "smooth" });
   }
 

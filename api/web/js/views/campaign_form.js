@@ -64,7 +64,7 @@ export async function view(_args, _query, place) {
   const material = h("input", { autocomplete: "off" });
   material.value = "EN AW-6082";
   const ktc = quantity("Tangential coefficient", "pressure", 902, { name: "workpiece.tangential_coefficient_mpa" });
-  const krc = quantity("Radial over tangential", "none", 0.26, { name: "workpiece.radial_ratio" });
+  const krc = quantity("Radial over tangential", "none", 0.26, { name: "workpiece.radial_ratio", double: true });
   const common = {
     tooling: select(
       toolings.map((t) => [t.name, t.name]),

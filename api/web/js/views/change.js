@@ -4,7 +4,7 @@ import { add, empty, h, head, link } from "../dom.js";
 import { busy, clearFaults, showProblem } from "../forms.js";
 import { nextStep } from "../next_step.js";
 import { remember, to } from "../router.js";
-import { allMachines, choose, machine } from "../state.js";
+import { machine } from "../state.js";
 import { answers, standing } from "./change_answers.js";
 import { changeForm } from "./change_form.js";
 import { methods } from "./change_question.js";
@@ -14,14 +14,7 @@ import { notComputed } from "./headline.js";
 const BEFORE = "What stands below answers the question before.";
 
 export async function view(_args, query, place) {
-  const [machines, toolings, { items: materials }, kinds] = await Promise.all([
-    allMachines(),
-    all("toolings"),
-    get("materials"),
-    methods(),
-  ]);
-  const asked = query.get("machine");
-  if (asked && machines.some((m) => m.id === asked)) choose(asked);
+  const [toolings, { items: materials }, kinds] = await Promise.all([all("toolings"), get("materials"), methods()]);
   const here = machine();
   add(place, head("Tool change", "Tooltip FRF and stability lobes of any tooling, also one that never cut."));
   if (!here?.identification?.axes.length) return void add(place, await nextStep(here, "After that every tooling has its lobes."));

@@ -78,10 +78,10 @@ function comparison(found, summaries, question) {
     column("Stickout", "length", (r) => r.stickout, 1),
     column("Stable at any speed", "depth", (r) => r.lobes.absolute_limit_mm),
     column("Highest limit at", "speed", (r) => r.pocket?.spindle_speed_rpm),
-    limit("stability limit", (r) => r.pocket),
+    limit("Stability limit", (r) => r.pocket),
     column("Recommended speed", "speed", (r) => r.best?.spindle_speed_rpm),
-    column("recommended depth", "depth", (r) => r.best?.recommended_depth_mm),
-    limit("stability limit", (r) => r.best),
+    column("Recommended depth", "depth", (r) => r.best?.recommended_depth_mm),
+    limit("Stability limit", (r) => r.best),
     column("Removes", "removal", (r) => r.best?.removal_rate_cm3_per_min),
   ];
   const box = card("Side by side", null, table("Toolings side by side", columns, rows), reserve(found, question));

@@ -2,6 +2,7 @@
 import { get, part, post, Problem, send } from "../api.js";
 import { add, fill, h, head, note, table, tell } from "../dom.js";
 import { busy, confirmed, failed } from "../forms.js";
+import { keep } from "../router.js";
 import { allMachines } from "../state.js";
 
 const SOME = 50;
@@ -14,13 +15,14 @@ export const inWords = (change) =>
   `${whoOf(change)} ${change.action} ${thingOf(change)}${change.restores ? ` from its version ${change.restores}` : ""}` +
   `${change.why ? `: “${change.why}”` : "."}`;
 
-export async function view(_args, _query, place) {
+export async function view(_args, query, place) {
   add(place, head("Changes", "Who wrote which tooling, machine or identification, when and why. Nothing that was replaced is lost."));
-  add(place, await trail());
+  const onmore = (count) => keep({ entries: count });
+  add(place, h("section", { class: "card", "aria-label": "All changes" }, await trail({}, Number(query.get("entries")) || SOME, onmore)));
 }
 
-/** The trail, newest first: all of it, or that of one thing. */
-export async function trail(wanted = {}) {
+/** The trail, newest first: all of it, or that of one thing; `onmore` hears how many entries are shown. */
+export async function trail(wanted = {}, count = SOME, onmore = () => {}) {
   const box = h("div", { class: "view" });
   const fault = h("div");
   const list = h("div");
@@ -34,8 +36,15 @@ export async function trail(wanted = {}) {
     earlier.hidden = !after;
   }
   const earlier = h("button", { type: "button", class: "quiet" }, "Show earlier ones");
-  earlier.addEventListener("click", busy(earlier, more));
-  await more();
+  earlier.addEventListener(
+    "click",
+    busy(earlier, async () => {
+      await more();
+      onmore(changes.length);
+    }),
+  );
+  do await more();
+  while (after && changes.length < count);
   return add(box, fault, list, earlier);
 }
 
@@ -48,7 +57,7 @@ const COLUMNS = (fault) => [
 
 function wayBack(change, fault) {
   if (!change.etag || change.kind === "machine") return null;
-  return change.holds ? h("span", { class: "soft" }, "There now") : restoreButton(change, fault);
+  return change.holds ? h("span", { class: "soft nowrap" }, "There now") : restoreButton(change, fault);
 }
 
 function restoreButton(change, fault) {

@@ -3,7 +3,7 @@ import { all, get, part, Problem, problemOf, send } from "../api.js";
 import { add, card, fill, h, head, save, waiting } from "../dom.js";
 import { busy, clearFaults, field, quantity, select, showProblem } from "../forms.js";
 import { nextStep } from "../next_step.js";
-import { remember, to } from "../router.js";
+import { keep, to } from "../router.js";
 import { allMachines, machine } from "../state.js";
 import { forceResults } from "./force_results.js";
 
@@ -83,7 +83,7 @@ export async function view(_args, query, place) {
 
   if (picker.any) {
     const how = method();
-    const smooth = h("input", { type: "checkbox", id: "smooth", checked: true });
+    const smooth = h("input", { type: "checkbox", id: "smooth", checked: query.get("smooth") !== "no" });
     const button = h("button", { class: "primary" }, "Show forces");
     const form = h(
       "form",
@@ -96,7 +96,7 @@ export async function view(_args, query, place) {
     form.addEventListener(
       "submit",
       busy(button, () => {
-        remember("forces", { campaign: picker.which.value, recording: picker.recording.value, method: how.value });
+        keep({ campaign: picker.which.value, recording: picker.recording.value, method: how.value, smooth: smooth.checked ? null : "no" });
         const body = {
           machine: here.id,
           campaign: picker.which.value,

@@ -4,7 +4,7 @@ import { add, card, empty, fill, h, head, link, mark, note, table } from "../dom
 import { legend, SERIES, uplot } from "../charts.js";
 import { liveChart } from "../live_chart.js";
 import { field, select } from "../forms.js";
-import { to } from "../router.js";
+import { keep, to } from "../router.js";
 import { open, Window } from "../stream.js";
 import { factor, plain, q } from "../units.js";
 import { leftOut } from "./force_results.js";
@@ -120,6 +120,7 @@ export async function view(_args, query, place) {
   });
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
+    keep({ campaign: picker.which.value, recording: picker.recording.value, rate: rate.value === "1" ? null : rate.value, watch: null });
     const recording = await get(`campaigns/${picker.which.value}/recordings/${encodeURIComponent(picker.recording.value)}`).catch(
       () => null,
     );
@@ -130,6 +131,14 @@ export async function view(_args, query, place) {
       picker.recording.value,
     );
   });
+
+  function watch(stream) {
+    keep({ watch: stream.session });
+    start(
+      { watch: stream.session, envelope: Math.max(1, Math.round(stream.sampling_rate_hz / perSecond())) },
+      stream.name || stream.tooling,
+    );
+  }
 
   async function list() {
     try {
@@ -154,11 +163,7 @@ export async function view(_args, query, place) {
                         "button",
                         {
                           type: "button",
-                          onclick: () =>
-                            start(
-                              { watch: s.session, envelope: Math.max(1, Math.round(s.sampling_rate_hz / perSecond())) },
-                              s.name || s.tooling,
-                            ),
+                          onclick: () => watch(s),
                         },
                         "Watch",
                       ),
@@ -173,12 +178,15 @@ export async function view(_args, query, place) {
               ),
         ),
       );
+      return items;
     } catch (error) {
       fill(streams, note("bad", error.message));
       if (!(error instanceof Problem)) console.error(error);
+      return [];
     }
   }
-  await list();
+  const watched = (await list()).find((stream) => stream.session === query.get("watch"));
+  if (watched) watch(watched);
   const poll = setInterval(() => !document.hidden && list(), 5000);
   const again = () => plot?.repaint();
   window.addEventListener("theme", again);

@@ -30,7 +30,7 @@ export function lobesCard(found, removal, question, tested, ontested, look) {
     });
   draw();
   const first = found.lobes[0];
-  const start = look.at ?? recommended(found, 0)[0]?.spindle_speed_rpm ?? first.spindle_speed_rpm[0];
+  const start = look.at ?? Math.round(recommended(found, 0)[0]?.spindle_speed_rpm ?? first.spindle_speed_rpm[0]);
   const speed = quantity("At a speed of", "speed", start);
   const read = h("ul", { class: "reads", "aria-live": "polite" });
   const show = () => {

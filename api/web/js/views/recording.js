@@ -3,7 +3,7 @@ import { get, getBlob, part } from "../api.js";
 import { add, card, choices, fill, h, head, link, note, save } from "../dom.js";
 import { axis, chart, colour, legend, safe, SERIES } from "../charts.js";
 import { failed } from "../forms.js";
-import { to } from "../router.js";
+import { go, to } from "../router.js";
 import { factor, plain, unit } from "../units.js";
 import { sizeOf } from "./machines.js";
 
@@ -13,12 +13,12 @@ export async function view({ id, name }, _query, place) {
   add(
     place,
     head(name, campaign.name, link(to(`campaigns/${id}`), "All cuts", "button")),
-    cut ? recordingPanel(campaign, cut, name) : note("doubt", "The campaign names no such recording."),
+    cut ? recordingPanel(campaign, cut, name, (other) => go(`campaigns/${id}/${part(other)}`)) : note("doubt", "The campaign names no such recording."),
   );
 }
 
-/** What a row of the verdicts opens: the cut's recording, and its air cut's. */
-export function recordingPanel(campaign, cut, first = null) {
+/** What a row of the verdicts opens: the cut's recording, and its air cut's; `onpick` hears which one is looked at. */
+export function recordingPanel(campaign, cut, first, onpick) {
   const box = h("div", { class: "view" });
   const names = [
     [cut.cut, "Cut"],
@@ -29,7 +29,11 @@ export function recordingPanel(campaign, cut, first = null) {
   const chosen = first ?? names[0][0];
   const show = (name) => shown(box, campaign.id, name);
   show(chosen);
-  return card(cut.id, names.length > 1 ? choices("Recording", names, chosen, show) : null, box);
+  const pick = (name) => {
+    show(name);
+    onpick(name);
+  };
+  return card(cut.id, names.length > 1 ? choices("Recording", names, chosen, pick) : null, box);
 }
 
 async function shown(box, id, name) {

@@ -42,7 +42,7 @@ function cardOf(tooling) {
   return h(
     "section",
     { class: "card tooling" },
-    h("a", { href: edit, class: "picture", tabindex: "-1", "aria-hidden": "true" }, libraryDrawing(tooling.name)),
+    h("a", { href: edit, class: "picture", tabindex: "-1", "aria-hidden": "true" }, libraryDrawing(tooling.name, { brief: true })),
     h("h2", null, link(edit, tooling.name)),
     h(
       "p",

@@ -1,0 +1,278 @@
+"""What the dearest request that the service takes costs it, route by route: called by ``hostile --legitimate``.
+
+Every route is asked for as much as it gives: pages of 200, toolings of 400 segments, 12 of 190 at 5000 speeds, receptances of 20 000
+lines, campaigns of 2000 cuts, recordings of 79 s of four channels. Where a limit of work refuses that, half as much is asked for.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import tomli_w
+
+from api.client import Client
+from api.schemas.queries import MOST_SPEEDS, MOST_TESTED, MOST_TOOLINGS
+from api.schemas.toolings import MOST_SEGMENTS
+from api.work.tasks import MOST_LINES
+from benchmarks.hostile import Cost, cost_of
+from benchmarks.service import ask, machine_text, new_tooling, serving
+from benchmarks.uploads import SAMPLES, campaign_of, recording
+
+_BINARY = {"Content-Type": "application/octet-stream"}
+_JSON = {"Content-Type": "application/json"}
+_TUS = {"Tus-Resumable": "1.0.0"}
+_PAGE = 200
+#: Routes that cost less are counted alone [s].
+SLIGHT = 0.05
+_LISTS = ("machines", "toolings", "changes", "recordings", "campaigns", "identifications", "keys")
+#: Segments of tool and of holder in what is computed: two elements each, and 400 may be computed with.
+_COMPUTED = 95
+#: A recording of the sample campaign.
+CUT = "S1-ER32-00_cut.h5"
+
+
+class Ask(NamedTuple):
+    """A request: what it is in words, path, headers and body."""
+
+    words: str
+    path: str
+    headers: dict[str, str]
+    body: bytes = b""
+
+
+class Shop(NamedTuple):
+    """What the service holds.
+
+    Ids of a machine, a campaign of 160 recordings, jobs of an identification and of lobes, a key, a campaign of large recordings, and one.
+    """
+
+    machine: str
+    campaign: str
+    job: str
+    lobes: str
+    key: str
+    large: str
+    raw: bytes
+
+
+def table(only: str) -> None:
+    """Print a line of Markdown for every route whose path holds a text, and that takes longer than `SLIGHT`."""
+    with tempfile.TemporaryDirectory() as text, serving(Path(text) / "data") as (port, process):
+        interface = ask(port, "GET", "/openapi.json", None)
+        shop = _shop(port, Path(text))
+        routes = [(method.upper(), path) for path, item in interface["paths"].items() for method in item if only in path]
+        print("| route | asked for | s | s elsewhere | MB more | MB elsewhere |\n|---|---|---|---|---|---|", flush=True)
+        slight = 0
+        for method, path in sorted(routes, key=_last):
+            costs = [_dearest(port, process, method, ladder) for ladder in _ladders(method, path, shop)]
+            cost = max(costs, key=lambda each: each.seconds + each.elsewhere)
+            if cost.seconds + cost.elsewhere < SLIGHT:
+                slight += 1
+                continue
+            more, largest = max(each.megabytes for each in costs), max(each.largest for each in costs)
+            told = f"{cost.seconds:.2f} | {cost.elsewhere:.1f} | {more:.0f} | {largest:.0f}"
+            print(f"| {method} {path.removeprefix('/v1')} | {cost.words} | {told} |", flush=True)
+    print(f"{slight} more of {len(routes)} routes take less than {SLIGHT:g} s")
+
+
+def _last(route: tuple[str, str]) -> tuple[int, int]:
+    """What begins work that goes on comes late, what deletes what others need later, and machines, with which all goes, last."""
+    method, path = route
+    begins = method == "POST" and path.endswith(("/identifications", "/examples/campaign"))
+    return (2 + path.endswith("/machines/{id}"), -len(path)) if method == "DELETE" else (int(begins), 0)
+
+
+def _dearest(port: int, process: int, method: str, ladder: Iterator[Ask]) -> Cost:
+    """Cost of the first request that is taken, or refused for what stands there already."""
+    refused = ""
+    for each in ladder:
+        cost = cost_of(port, process, each.words, method, each.path, each.headers, each.body)
+        if 200 <= cost.status < 300 or cost.status == 409:
+            return cost
+        refused = f"{method} {each.path}, {each.words}: {cost.status}"
+    raise RuntimeError(refused)
+
+
+def _shop(port: int, folder: Path) -> Shop:
+    """Fill the service."""
+    with Client(f"http://127.0.0.1:{port}") as client:
+        for k in range(_PAGE):
+            client.make_machine(f"machine {k}")
+            client.write_tooling(f"T{k}", _full(k))
+        machine = client.make_machine("identified").id
+        client.identify(machine, machine_text())
+        client.write_tooling("T0", new_tooling(0))
+        campaign = client.upload_folder(machine, SAMPLES).id
+        example = client.make_example().campaign
+        while not all(cut.verdict for cut in client.campaign(example).cuts):
+            time.sleep(0.5)
+        job = client.wait(client.identify_campaign(example).id).id
+        large = campaign_of(port, machine)
+        raw = recording(folder / "large.h5").read_bytes()
+        (folder / "c0.h5").write_bytes(raw)
+        client.upload(large, folder / "c0.h5")
+        told = {"Upload-Length": str(len(raw)), "Upload-Metadata": _filename("f3.h5")}
+        client.send("POST", f"/campaigns/{large}/uploads", headers=_TUS | told)
+        lobes = client.lobes_later(machine, "T0", speeds={"from_rpm": 4000, "to_rpm": 20_000, "step_rpm": 20}).id
+        while (told := client.lobe_job(lobes, wait=20)).job.finished is None:
+            pass
+        if told.answer is None:
+            raise RuntimeError(told.job.problem)
+        key = client.send("POST", "/keys", json={"scopes": ["read"]}).json()["id"]
+    return Shop(machine, campaign, job, lobes, key, large, raw)
+
+
+def _full(seed: int = 0, parts: int = MOST_SEGMENTS) -> dict[str, Any]:
+    """A tooling of as many segments as one may have, or so many in tool and holder each."""
+    keys = new_tooling(seed)
+    keys["tool"] = {
+        "stickout_mm": 60.0,
+        "segments": [{"length_mm": 100.0 / parts, "outer_diameter_mm": 12.0, "material": "carbide"}] * parts,
+    }
+    part = {"length_mm": 80.0 / parts, "outer_diameter_mm": 50.0, "inner_diameter_mm": 12.0, "material": "steel"}
+    keys["holder"] = {"insertion_mm": 40.0, "segments": [part] * parts}
+    return keys
+
+
+def _halved(words: str, most: int, make: Callable[[int], tuple[str, Any]], headers: dict[str, str] | None = None) -> Iterator[Ask]:
+    """The same question with half as much again and again."""
+    while most > 0:
+        path, body = make(most)
+        sent = b"" if body is None else body if isinstance(body, bytes) else json.dumps(body).encode()
+        yield Ask(words.format(f"{most:,}".replace(",", " ")), path, headers or ({} if body is None else _JSON), sent)
+        most //= 2
+
+
+def _ladders(method: str, path: str, shop: Shop) -> Iterator[Iterator[Ask]]:
+    """Questions of a route, each from the largest on."""
+    asked = _questions(shop).get(f"{method} {path.removeprefix('/v1')}")
+    if asked is not None:
+        yield from asked
+        return
+    ids = {"/machines/": shop.machine, "/identifications/": shop.job, "/lobes/": shop.lobes, "/keys/": shop.key}
+    id = next((found for part, found in ids.items() if part in path), shop.campaign)
+    place = path.replace("{id}", id).replace("{version}", "1")
+    place = place.replace("{name}", "tooling" if "/schemas/" in path else "T0" if "/toolings/" in path else CUT)
+    listed = method == "GET" and path.rpartition("/")[2] in _LISTS
+    yield iter([Ask(f"a page of {_PAGE}" if listed else "", f"{place}?limit={_PAGE}" if listed else place, {}, b"")])
+
+
+def _questions(shop: Shop) -> dict[str, list[Iterator[Ask]]]:
+    """Routes whose largest question has a form of its own."""
+    recordings = f"/v1/campaigns/{shop.large}/recordings"
+    uploads = f"/v1/campaigns/{shop.large}/uploads"
+    length = str(len(shop.raw))
+    large = f"{len(shop.raw) / 1e6:.0f} MB, 79 s of four channels"
+    form = b'--x\r\nContent-Disposition: form-data; name="files"; filename="f2.h5"\r\n\r\n' + _varied(shop.raw, 1) + b"\r\n--x--\r\n"
+
+    def speeds(count: int) -> dict[str, float]:
+        return {"from_rpm": 4000.0, "to_rpm": 20_000.0, "step_rpm": 16_000.0 / max(count - 1, 1)}
+
+    def queried(path: str, toolings: int, **further: Any) -> Callable[[int], tuple[str, Any]]:
+        keys = {
+            "machine": shop.machine,
+            "toolings": [_full(k, _COMPUTED) for k in range(toolings)],
+            "cut": {"feed_per_tooth_mm": 0.1},
+            **further,
+        }
+        return lambda count: (path, keys | {"speeds": speeds(count)})
+
+    def several(path: str) -> list[Iterator[Ask]]:
+        return [
+            _halved(f"{MOST_TOOLINGS} toolings of {2 * _COMPUTED} segments, {{}} speeds", MOST_SPEEDS, queried(path, MOST_TOOLINGS)),
+            _halved("full discretisation, {} speeds", MOST_SPEEDS, queried(path, 1, method="full-discretisation")),
+        ]
+
+    def cuts(count: int) -> dict[str, Any]:
+        shared = {"spindle_speed_rpm": 8000.0, "axial_depth_mm": 0.4, "feed_per_tooth_mm": 0.1}
+        shared |= {"entry_angle_deg": 90.0, "exit_angle_deg": 180.0}
+        rows = [{"id": f"c{k}", "tooling": "T0", "feed_direction": "+X", "cut": f"c{k}.h5", **shared} for k in range(count)]
+        sensors = {"flange_x": {"quantity": "displacement", "axis": "X", "sensitivity": 1.0e4}}
+        workpiece = {"name": "w", "tangential_coefficient_mpa": 902.0, "radial_ratio": 0.26}
+        return {"sensors": sensors, "workpiece": workpiece, "toolings": {"T0": new_tooling(0)}, "cuts": rows}
+
+    def lines(path: str, **further: Any) -> Callable[[int], tuple[str, Any]]:
+        top = 4000.0
+        if further:
+            return lambda count: (path, further | {"from_hz": 100.0, "to_hz": top, "step_hz": (top - 100.0) / (count - 1)})
+        return lambda count: (f"{path}?from_hz=100&to_hz={top}&step_hz={(top - 100.0) / (count - 1)}", None)
+
+    tests = "spindle_speed_rpm,axial_depth_mm,verdict\n" + "8000,1.0,stable\n" * MOST_TESTED
+    geometry = {"DC": 12.0, "LB": 60.0, "LCF": 26.0, "NOF": 4, "OAL": 104.0, "SFDM": 12.0, "shoulder-length": 30.0}
+    chuck = {"gaugeLength": 80.0, "segments": [{"height": 0.4, "lower-diameter": 50.0, "upper-diameter": 50.0}] * MOST_SEGMENTS}
+    tool = {"type": "flat end mill", "unit": "millimeters", "BMC": "carbide", "geometry": geometry, "holder": chuck}
+
+    def library(count: int) -> tuple[str, Any]:
+        return "/v1/toolings/import", {"data": [tool | {"description": f"I{k}"} for k in range(count)]}
+
+    def frames(path: str, sent: bytes, **headers: str) -> list[Iterator[Ask]]:
+        return [iter([Ask(large, path, _BINARY | headers, sent)])]
+
+    def dropped(count: int) -> tuple[str, Any]:
+        named = {"campaign.toml": cuts(count)} | {f"T{k}.toml": new_tooling(k) for k in range(199)}
+        return "/v1/campaigns/preview", {"files": [{"name": name, "text": tomli_w.dumps(keys)} for name, keys in named.items()]}
+
+    def plain(path: str, body: Any) -> list[Iterator[Ask]]:
+        return [iter([Ask("", path, _JSON, json.dumps(body).encode())])]
+
+    forces = {"machine": shop.machine, "campaign": shop.campaign, "recording": CUT}
+    whole = {"Content-Type": "application/offset+octet-stream", "Upload-Offset": "0"} | _TUS
+    return {
+        "POST /keys": plain("/v1/keys", {"scopes": ["read"]}),
+        "POST /machines": plain("/v1/machines", {"name": "n"}),
+        "POST /identifications": plain("/v1/identifications", {"campaign": shop.campaign}),
+        "POST /forces": plain("/v1/forces", forces),
+        "PUT /machines/{id}/identification": [
+            iter([Ask("7 modes an axis, whole posterior", f"/v1/machines/{shop.machine}/identification", _JSON, machine_text().encode())])
+        ],
+        "GET /machines/{id}/identification/frf": [
+            _halved("{} lines", MOST_LINES, lines(f"/v1/machines/{shop.machine}/identification/frf"))
+        ],
+        "PUT /toolings/{name}": [_halved("{} segments", 2 * MOST_SEGMENTS, lambda _: ("/v1/toolings/T0", _full()))],
+        "POST /toolings/drawing": [_halved("{} segments", 2 * MOST_SEGMENTS, lambda _: ("/v1/toolings/drawing", _full()))],
+        "GET /toolings/{name}/drawing": [iter([Ask(f"{2 * MOST_SEGMENTS} segments", "/v1/toolings/T1/drawing", {})])],
+        "POST /toolings/{name}/differences": [
+            _halved("{} segments", 2 * MOST_SEGMENTS, lambda _: ("/v1/toolings/T0/differences", _full(9)))
+        ],
+        "POST /toolings/import": [_halved("{} tools of a CAM library", 8192, library)],
+        "POST /campaigns/preview": [_halved("200 files, a campaign of {} cuts", 2000, dropped)],
+        "POST /tested-cuts/preview": [
+            iter([Ask(f"{MOST_TESTED} cuts", "/v1/tested-cuts/preview", {"Content-Type": "text/csv"}, tests.encode())])
+        ],
+        "GET /holders/{taper}/{chuck}": [iter([Ask("", "/v1/holders/HSK-A63/ER32?bore_mm=12", {})])],
+        "GET /examples/{name}": [iter([Ask("", "/v1/examples/sample-campaign.zip", {})])],
+        "POST /machines/{id}/campaigns": [_halved("{} cuts", 2000, lambda count: (f"/v1/machines/{shop.machine}/campaigns", cuts(count)))],
+        "PUT /campaigns/{id}/recordings/{name}": frames(f"{recordings}/c1.h5", _varied(shop.raw, 0)),
+        "PATCH /campaigns/{id}/recordings/{name}": frames(
+            f"{recordings}/c2.h5", _varied(shop.raw, 2), **{"Upload-Offset": "0", "Upload-Length": length}
+        ),
+        "POST /campaigns/{id}/recordings": [iter([Ask(large, recordings, {"Content-Type": "multipart/form-data; boundary=x"}, form)])],
+        "HEAD /campaigns/{id}/recordings/{name}": [iter([Ask(large, f"{recordings}/c0.h5", {})])],
+        "GET /campaigns/{id}/recordings/{name}/file": [iter([Ask(large, f"{recordings}/c0.h5/file", {})])],
+        "GET /campaigns/{id}/recordings/{name}/spectrum": [iter([Ask(large, f"{recordings}/c0.h5/spectrum?points=10000", {})])],
+        "GET /campaigns/{id}/recordings/{name}/signal": [iter([Ask(large, f"{recordings}/c0.h5/signal?points=10000", {})])],
+        "GET /campaigns/{id}/archive": [iter([Ask("160 recordings", f"/v1/campaigns/{shop.campaign}/archive", {})])],
+        "POST /campaigns/{id}/uploads": [iter([Ask("", uploads, _TUS | {"Upload-Length": length, "Upload-Metadata": _filename("f1.h5")})])],
+        "OPTIONS /campaigns/{id}/uploads": [iter([Ask("", uploads, {})])],
+        "HEAD /campaigns/{id}/uploads/{name}": [iter([Ask("", f"{uploads}/f1.h5", _TUS)])],
+        "PATCH /campaigns/{id}/uploads/{name}": [iter([Ask(large, f"{uploads}/f1.h5", whole, _varied(shop.raw, 3))])],
+        "DELETE /campaigns/{id}/uploads/{name}": [iter([Ask("", f"{uploads}/f3.h5", _TUS)])],
+        "POST /tooltip": [_halved("{} lines", MOST_LINES, lines("/v1/tooltip", machine=shop.machine, tooling=_full(0, _COMPUTED)))],
+        "POST /lobes": several("/v1/lobes"),
+        "POST /advice": several("/v1/advice"),
+    }
+
+
+def _varied(raw: bytes, seed: int) -> bytes:
+    """Other samples at the end: the same content again would not be read."""
+    return raw[:-4] + (seed + 1).to_bytes(4, "little")
+
+
+def _filename(name: str) -> str:
+    return f"filename {base64.b64encode(name.encode()).decode()}"
