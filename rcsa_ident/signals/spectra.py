@@ -11,7 +11,7 @@ from scipy.fft import next_fast_len
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.signals._kernels import angle_signal, angle_sums, order_signal, order_sums
-from rcsa_ident.signals.recording import BLOCK
+from rcsa_ident.signals.recording import BLOCK, LONGEST
 from rcsa_ident.signals.steady_part import hann
 
 #: Share of the programmed speed within which the true one is looked for.
@@ -20,6 +20,9 @@ SPEED_SEARCH = 0.01
 DRIFT_DEGREE = 4
 #: Lines beside the orders: how far one stands above the median amplitude of so many bins around it, and how many are looked for.
 _FAR_ABOVE, _FLOOR_BINS, _MOST_BESIDE = 8.0, 64, 8
+#: Power over the median of half a turn in which something knocked, the largest share of them that knocks are, and how often they are
+#: filled: each time with an error smaller by that share.
+_KNOCK, _MOST_KNOCKED, _FILLINGS = 12.0, 0.25, 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +47,7 @@ class LineSpectrum:
     beside : array, shape (s,) [rad/s]
         Frequencies of lines that stand beside the orders: the mains' hum, chatter.
     beside_signal : array, shape (n, c)
-        What they are in the record; of no rows where there are none.
+        What they are in the record.
     """
 
     spindle_speed: float
@@ -59,7 +62,7 @@ class LineSpectrum:
     @property
     def off_orders(self) -> FloatArray:
         """What the record holds beside the orders and the drift, shape (n, c)."""
-        return self.rest + self.beside_signal if self.beside.size else self.rest
+        return self.rest + self.beside_signal
 
     def up_to(self, max_frequency: float) -> LineSpectrum:
         """Return the same with the lines up to a frequency [Hz]."""
@@ -219,7 +222,7 @@ def line_spectrum(
     """Return the amplitudes at all multiples of the spindle's frequency up to `max_frequency`, by least squares.
 
     Lines and a slow drift (a polynomial) are fitted together, and with them lines beside the orders that stand far above the noise
-    (mains' hum): else these would leak into all orders.
+    (mains' hum): else these would leak into all orders. Short stretches in which something knocked are left out.
 
     Parameters
     ----------
@@ -234,19 +237,55 @@ def line_spectrum(
     comb = _Comb(spindle_speed / rate, deviation)
     highest = int(min(max_frequency, 0.45 * rate) * 2.0 * np.pi / spindle_speed)
     basis = _drift_basis(n, DRIFT_DEGREE)
-    amplitude, other = _fit(samples, comb, highest, basis)
-    rest = samples - comb.signal(amplitude, n) - basis @ other
-    beside, swinging = _lines_beside(rest, comb.step), np.zeros((0, samples.shape[1]))
+
+    def fitted(values: FloatArray, beside: FloatArray) -> tuple[ComplexArray, FloatArray, FloatArray]:
+        """Amplitudes, what they and the drift are in the record, and what the lines beside them are."""
+        every = np.concatenate([basis, _swinging(beside, n)], axis=1) if beside.size else basis
+        amplitude, other = _fit(values, comb, highest, every)
+        return amplitude, comb.signal(amplitude, n) + basis @ other[:DRIFT_DEGREE], every[:, DRIFT_DEGREE:] @ other[DRIFT_DEGREE:]
+
+    amplitude, known, swinging = fitted(samples, np.zeros(0))
+    beside = _lines_beside(samples - known, comb.step)
     if beside.size:
-        every = np.concatenate([basis, _swinging(beside, n)], axis=1)
-        amplitude, other = _fit(samples, comb, highest, every)
-        swinging = every[:, DRIFT_DEGREE:] @ other[DRIFT_DEGREE:]
-        rest = samples - comb.signal(amplitude, n) - basis @ other[:DRIFT_DEGREE] - swinging
-    parts = _block_lines(samples - swinging if beside.size else samples, comb, highest, np.arange(4) * (n // 4), n // 4)[1]
+        amplitude, known, swinging = fitted(samples, beside)
+    hit, values = _knocked(samples - known - swinging, comb.step), samples
+    for again in range(_FILLINGS if hit.any() else 0):
+        # what a knock hides is what the rest of the record says of it
+        values = np.where(hit[:, None], known + swinging, samples)
+        beside = beside if again else _lines_beside(values - known, comb.step)
+        amplitude, known, swinging = fitted(values, beside)
+    parts = _block_lines(values - swinging, comb, highest, np.arange(4) * (n // 4), n // 4)[1]
     scatter = np.sum(np.abs(parts - parts.mean(axis=0)) ** 2, axis=0) / (2.0 * 3.0 * 4.0)
     from_start = amplitude * np.exp(-1j * np.arange(highest + 1) * comb.step * 0.5 * (n - 1))[:, None]
-    variance = _floor(rest, comb.step, highest)
-    return LineSpectrum(spindle_speed, from_start, variance, scatter, rest, rate, beside * rate, swinging)
+    rest = samples - known - swinging
+    # where a knock was, nothing was told
+    share = 1.0 - float(np.mean(hit))
+    variance = _floor(np.where(hit[:, None], 0.0, rest), comb.step, highest) / share**2
+    return LineSpectrum(spindle_speed, from_start, variance, scatter / share**2, rest, rate, beside * rate, swinging)
+
+
+def _knocked(rest: FloatArray, step: float) -> np.ndarray:
+    """Samples in which something knocked, shape (n,): short stretches far louder than the record mostly is."""
+    n, length = rest.shape[0], max(round(np.pi / step), 8)
+    blocks, hit = n // length, np.zeros(rest.shape[0], dtype=bool)
+    if blocks < 8 or n > LONGEST:
+        return hit
+    energy = np.mean(rest[: blocks * length].reshape(blocks, length, -1) ** 2, axis=1)
+    loud = np.any(energy > _KNOCK * np.median(energy, axis=0), axis=1)
+    if loud.mean() > _MOST_KNOCKED:
+        # what lasts is no knock
+        return hit
+    # it begins and ends within blocks
+    wide = loud | np.roll(loud, 1) | np.roll(loud, -1)
+    hit[: blocks * length] = np.repeat(wide, length)
+    hit[blocks * length :] = wide[-1]
+    turn = round(2.0 * np.pi / step)
+    for start, stop in np.flatnonzero(np.diff(np.concatenate([[False], hit, [False]]))).reshape(-1, 2):
+        first, later = rest[start : max(stop - turn, start)], rest[min(start + turn, stop) : stop]
+        # what comes again every turn is a force that changes
+        if len(first) > turn and np.sum(first * later) > 0.5 * np.sqrt(np.sum(first**2) * np.sum(later**2)):
+            hit[start:stop] = False
+    return hit
 
 
 def _lines_beside(rest: FloatArray, step: float) -> FloatArray:

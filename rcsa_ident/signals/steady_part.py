@@ -16,6 +16,8 @@ STEADY_SHARE = 0.3
 EDGE_SHARE, _EDGE_BLOCKS = 0.03, 3
 #: Tooth-passing lines that are looked at, and how far one stands above its neighbours that is the cut's and not the flange's.
 _LINES, _STAND_OUT = 6, 2.0
+#: Power over its neighbours' from which on a line is wholly the cut's.
+_CLEAREST = 100.0
 
 
 def steady_part(samples: FloatArray, rate: float, spindle_speed: float, teeth: int) -> slice:
@@ -120,10 +122,13 @@ def _amplitude(power: FloatArray, teeth: int) -> FloatArray:
     order = np.arange(teeth, power.shape[1], teeth)
     if teeth > 1:
         beside = np.maximum(mean[order - 1], mean[np.minimum(order + 1, power.shape[1] - 1)] * (order + 1 < power.shape[1]))
-        own = order[mean[order] > _STAND_OUT**2 * beside]
+        clear = mean[order] / np.maximum(beside, 1e-300)
+        own = order[clear > _STAND_OUT**2]
+        # each counts by how clearly it is the cut's: a strong one may still be the flange's
+        weight = np.minimum(clear[clear > _STAND_OUT**2], _CLEAREST) / mean[own]
     else:
-        own = order[:0]
-    return np.sqrt(power[:, own if own.size else order[:3]].sum(axis=1))
+        own, weight = order[:0], np.zeros(0)
+    return np.sqrt(power[:, own] @ weight if own.size else power[:, order[:3]].sum(axis=1))
 
 
 def hann(n: int) -> FloatArray:

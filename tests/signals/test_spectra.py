@@ -138,3 +138,60 @@ def test_segments_have_the_phase_of_the_record():
     found = segment_lines(wave(amplitude, speed, n), RATE, speed, np.arange(1, 13), segments=6)
     assert found.shape == (6, 12, 2)
     np.testing.assert_allclose(found[:, 3], np.broadcast_to(amplitude[4], (6, 2)), rtol=1e-2)
+
+
+def knock(n, start, hertz=400.0, size=1e-7, damping=0.04):
+    since = np.maximum(np.arange(n) - start, 0) / RATE
+    return size * (np.exp(-damping * 2.0 * np.pi * hertz * since) * np.sin(2.0 * np.pi * hertz * since))[:, None] * np.array([1.0, -0.7])
+
+
+def test_knocks_are_left_out():
+    rng = np.random.default_rng(12)
+    n, speed = 7168, 9000.0 * RPM
+    amplitude, noise = lines(rng, 20), 2e-9
+    clean = wave(amplitude, speed, n) + noise * rng.normal(size=(n, 2))
+    quiet, knocked = (line_spectrum(x, RATE, speed, 3000.0) for x in (clean, clean + knock(n, 2000) + knock(n, 5000, 700.0)))
+    error, before = (np.abs(found.amplitude[1:20] - amplitude[1:20]) for found in (knocked, quiet))
+    # a tenth of the record is gone, and what the knocks would have added is not there
+    assert np.sqrt(np.mean(error**2)) < 1.5 * np.sqrt(np.mean(before**2))
+    assert np.sqrt(np.mean(error**2 / (2.0 * knocked.variance[1:20]))) == pytest.approx(1.0, abs=0.35)
+    # and it is still in what the record holds beside its lines
+    assert np.abs(knocked.off_orders).max() > 5e-8
+    # a record that gets louder by and by is no knock
+    growing = line_spectrum(clean * np.linspace(0.5, 1.5, n)[:, None], RATE, speed, 3000.0)
+    assert np.median(growing.scatter[4]) > 10.0 * np.median(quiet.scatter[4])
+
+
+@pytest.mark.parametrize("hertz", [(50.0, 100.0), (60.0,), (333.0, 1271.0)])
+def test_lines_beside_the_orders_do_not_leak_into_them(hertz):
+    rng = np.random.default_rng(13)
+    n, speed = 7168, 9000.0 * RPM
+    amplitude, noise = lines(rng, 20), 2e-9
+    t = np.arange(n) / RATE
+    clean = wave(amplitude, speed, n) + noise * rng.normal(size=(n, 2))
+    hum = sum(2e-7 * np.cos(2.0 * np.pi * f * t[:, None] + rng.random(2)) for f in hertz)
+    found = line_spectrum(clean + hum, RATE, speed, 3000.0)
+    np.testing.assert_allclose(np.sort(found.beside) / (2.0 * np.pi), hertz, atol=0.2)
+    np.testing.assert_allclose(found.beside_signal, hum, atol=1.5e-9)
+    error = np.abs(found.amplitude[1:20] - amplitude[1:20])
+    assert np.sqrt(np.mean(error**2)) < 1.5 * noise * np.sqrt(2.0 / n) * np.sqrt(2.0)
+    # a tenth of what they would be without
+    assert np.sqrt(np.mean(found.variance)) < 1.3 * noise * np.sqrt(2.0 / n)
+
+
+def test_an_uneven_angle_is_followed_by_its_lines():
+    rng = np.random.default_rng(14)
+    n, speed, noise = 7168, 9000.0 * RPM, 2e-9
+    amplitude = lines(rng, 20)
+    u = np.linspace(-1.0, 1.0, n)
+    deviation = 0.08 * np.cos(2.5 * np.pi * u) + 0.05 * u**2
+    angle = speed * np.arange(n) / RATE + deviation
+    x = np.real(np.exp(1j * np.outer(angle, np.arange(amplitude.shape[0]))) @ amplitude) + noise * rng.normal(size=(n, 2))
+    told, untold = line_spectrum(x, RATE, speed, 3000.0, deviation), line_spectrum(x, RATE, speed, 3000.0)
+    error = np.abs(told.amplitude[1:20] - amplitude[1:20]) / np.sqrt(2.0 * told.variance[1:20])
+    assert np.sqrt(np.mean(error**2)) == pytest.approx(1.0, abs=0.3)
+    assert told.rest.std() < 1.05 * noise
+    assert untold.rest.std() > 20.0 * noise
+    segments = segment_lines(x, RATE, speed, np.arange(1, 13), 6, deviation)
+    np.testing.assert_allclose(segments.mean(axis=0), amplitude[1:13], atol=5e-10)
+    assert follow_speed(x, RATE, speed, deviation=deviation) == pytest.approx(speed, rel=2e-8)
