@@ -13,7 +13,8 @@ from api.reading.examine import with_client_name
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.exports import write_tap
-from rcsa_ident.io.open_recording import OpenRecording, open_recording
+from rcsa_ident.io.open_recording import open_recording
+from rcsa_ident.io.told_tables import OpenRecording
 from rcsa_ident.report.summaries import listening_row, tap_row
 from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.recording import Quantity

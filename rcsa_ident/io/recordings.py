@@ -33,7 +33,7 @@ def _of(module: str) -> Reader:
 READERS: dict[str, Reader] = {
     ".h5": _of("hdf5"),
     ".hdf5": _of("hdf5"),
-    ".csv": _of("text_columns"),
+    ".csv": _of("told_tables"),
     ".tdms": _of("tdms"),
     ".uff": _of("uff_records"),
     ".unv": _of("uff_records"),

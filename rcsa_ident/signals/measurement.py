@@ -162,7 +162,7 @@ def measure_cut(
     faults = _speed_faults(steady, programmed)
     if faults:
         # what vibrates beside the orders makes a speed look as if it drifted
-        drifting = faults[0].code is RecordCode.SPEED_DRIFT
+        drifting = faults[0].code is RecordCode.SPEED_DRIFT and smeared(steady.wander) is None
         chattering = _chatter(steady, steady.flange, harmonic, cutter.teeth, max_frequency) if drifting else None
         return left_out(faults if chattering is None else (chattering,), *found)
     try:

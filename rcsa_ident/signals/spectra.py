@@ -300,19 +300,23 @@ def _lines_beside(rest: FloatArray, step: float) -> FloatArray:
     orders = omega / step
     clear = np.abs(orders - np.round(orders)) * step > 3.5 * 2.0 * np.pi / n
     # what a drift leaves lies lowest
-    clear[:6] = False
+    clear[:6], clear[-1] = False, False
     left = rest
     while len(found) < _MOST_BESIDE:
         power = np.abs(np.fft.rfft(left * window, axis=0)[:length]) ** 2
-        floor = np.median(power.reshape(-1, _FLOOR_BINS, power.shape[1]), axis=1).repeat(_FLOOR_BINS, axis=0)
-        ratio = np.where(clear, np.max(power / (floor + 1e-300), axis=1), 0.0)
+        floor = np.median(power.reshape(-1, _FLOOR_BINS, power.shape[1]), axis=1).repeat(_FLOOR_BINS, axis=0) + 1e-300
+        ratio = np.where(clear, np.max(power / floor, axis=1), 0.0)
         peak = int(np.argmax(ratio))
         if ratio[peak] < _FAR_ABOVE**2:
             break
         # a parabola through the logarithms, of all channels together
-        around = np.log(np.sum((power / (floor[peak] + 1e-300))[max(peak - 1, 0) : peak + 2], axis=1) + 1e-300)
-        bend = around[0] - 2.0 * around[1] + around[2] if around.size == 3 else 0.0
-        found.append(float(2.0 * np.pi / n * (peak + (0.5 * (around[0] - around[2]) / bend if bend < 0.0 else 0.0))))
+        low, top, high = np.log(np.sum(power[peak - 1 : peak + 2] / floor[peak], axis=1))
+        if top < max(low, high):
+            # the side of what belongs to an order
+            clear[peak] = False
+            continue
+        bend = low - 2.0 * top + high
+        found.append(float(2.0 * np.pi / n * (peak + (0.5 * (low - high) / bend if bend < 0.0 else 0.0))))
         columns = _swinging(np.array(found), n)
         left = rest - columns @ np.linalg.solve(columns.T @ columns, columns.T @ rest)
         clear &= np.abs(omega - found[-1]) > 2.5 * 2.0 * np.pi / n

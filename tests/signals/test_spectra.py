@@ -195,3 +195,16 @@ def test_an_uneven_angle_is_followed_by_its_lines():
     segments = segment_lines(x, RATE, speed, np.arange(1, 13), 6, deviation)
     np.testing.assert_allclose(segments.mean(axis=0), amplitude[1:13], atol=5e-10)
     assert follow_speed(x, RATE, speed, deviation=deviation) == pytest.approx(speed, rel=2e-8)
+
+
+def test_what_rings_near_an_order_is_no_line_beside_it():
+    # a transient at 1067 Hz, whose sides reach beyond what belongs to order 8 at 1064 Hz
+    rng = np.random.default_rng(15)
+    n, speed = 7168, 7980.0 * RPM
+    amplitude = lines(rng, 20)
+    x = wave(amplitude, speed, n) + knock(n, 0, 1067.0, 6e-8, 0.01) + 2e-9 * rng.normal(size=(n, 2))
+    found = line_spectrum(x, RATE, speed, 3000.0)
+    order = found.beside / speed
+    assert np.all(np.abs(order - np.round(order)) * speed > 3.0 * 2.0 * np.pi * RATE / n)
+    error = np.abs(found.amplitude[1:20] - amplitude[1:20]) / np.sqrt(2.0 * found.variance[1:20])
+    assert np.sqrt(np.mean(error**2)) < 1.6

@@ -1,0 +1,78 @@
+"""Recordings of a campaign whose text tells itself: a preamble with the rate, names, and units in a line of their own."""
+
+import numpy as np
+import pytest
+
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.errors import InputError
+from rcsa_ident.io.recordings import read_recording
+from rcsa_ident.signals.recording import Quantity, Sensor
+
+SENSORS = tuple(Sensor(f"F{a}", Quantity.FORCE, a_) for a, a_ in (("x", Dof.X), ("y", Dof.Y), ("z", Dof.Z)))
+N, RATE = 3000, 10000.0
+FORCE = np.random.default_rng(1).normal(scale=80.0, size=(N, 3)).round(4)
+PREAMBLE = ["DynoWare,Version 2.5", "Path:,D:\\data\\", "Date:, ", "Sampling rate [Hz]:,10000", "Cycles:,1"]
+
+
+def table(delimiter=",", decimal=".", unit="N", scale=1.0, time=True, preamble=PREAMBLE, start=8.0):
+    head = [line.replace(",", delimiter) for line in preamble]
+    names, units = ["Fx", "Fy", "Fz"], [unit] * 3
+    columns = FORCE * scale
+    if time:
+        names, units, columns = ["Time", *names], ["s", *units], np.column_stack([start + np.arange(N) / RATE, columns])
+    rows = [delimiter.join(f"{value:.9g}" for value in row).replace(".", decimal) for row in columns]
+    return "\n".join([*head, delimiter.join(names), delimiter.join(units), *rows]) + "\n"
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        {},
+        {"time": False},
+        {"delimiter": ";", "decimal": ","},
+        {"delimiter": "\t"},
+        {"unit": "kN", "scale": 1e-3},
+        {"unit": "lbf", "scale": 1.0 / 4.4482216152605},
+        {"preamble": []},
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "cp1252"])
+def test_a_preamble_and_units_are_read(tmp_path, shape, encoding):
+    (tmp_path / "cut.csv").write_text(table(**shape), encoding=encoding)
+    recording = read_recording(tmp_path / "cut.csv", SENSORS)
+    assert recording.rate == pytest.approx(RATE, rel=1e-6)
+    np.testing.assert_allclose(recording.samples, FORCE, rtol=1e-6, atol=1e-6)
+
+
+def test_a_plain_table_stays_what_it_was(tmp_path):
+    text = table(preamble=[]).replace("s,N,N,N\n", "")
+    (tmp_path / "cut.csv").write_text(text.replace("Fx", "Fx [kN]"))
+    with pytest.raises(InputError, match="channel Fx"):
+        read_recording(tmp_path / "cut.csv", SENSORS)
+    (tmp_path / "cut.csv").write_text(f"# made by hand\n{text}")
+    np.testing.assert_allclose(read_recording(tmp_path / "cut.csv", SENSORS).samples, FORCE, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (table().replace("Fz", "Mz"), "Fz"),
+        (table(time=False).replace("Sampling rate", "Something"), "sampling_rate_hz"),
+        (table().replace("\ns,", "\nfurlongs,"), "furlongs"),
+    ],
+)
+def test_what_is_not_told_is_asked_for(tmp_path, text, words):
+    (tmp_path / "cut.csv").write_text(text)
+    with pytest.raises(InputError, match=words) as caught:
+        read_recording(tmp_path / "cut.csv", SENSORS)
+    assert "cut.csv" in str(caught.value)
+
+
+def test_a_channel_that_stands_still_is_there(tmp_path):
+    still = FORCE.copy()
+    still[:, 2] = 0.0
+    rows = "\n".join(",".join(f"{value:.6g}" for value in row) for row in still)
+    (tmp_path / "cut.csv").write_text("\n".join([*PREAMBLE, "Fx,Fy,Fz", "N,N,N"]) + f"\n{rows}\n")
+    recording = read_recording(tmp_path / "cut.csv", SENSORS)
+    assert recording.samples.shape == (N, 3)
+    assert not recording.samples[:, 2].any()
