@@ -274,6 +274,7 @@ def sensor_of(name: str, data: Any, where: str) -> Sensor:
     if sensitivity == 0.0:
         table.refuse("sensitivity", "0", "a number other than 0 [V/m, V/(m/s^2), V/N], 1.0 where the file is in SI")
     angle = table.number("tooth_angle_deg", "deg", None, least=-360.0, most=360.0)
+    role = table.text("role", None, choices=tuple(Role))
     return Sensor(
         name,
         quantity,
@@ -283,7 +284,7 @@ def sensor_of(name: str, data: Any, where: str) -> Sensor:
         table.number("bandwidth_hz", "Hz", None, above=0.0),
         table.number("pulses_per_revolution", "", 1, least=1, most=100000, whole=True),
         None if angle is None else float(np.radians(angle)),
-        Role(table.text("role", choices=tuple(Role))) if "role" in table else None,
+        None if role is None else Role(role),
         table.number("mount_resonance_hz", "Hz", None, above=0.0),
     )
 

@@ -239,25 +239,26 @@ def line_spectrum(
     basis = _drift_basis(n, DRIFT_DEGREE)
 
     def fitted(values: FloatArray, beside: FloatArray) -> tuple[ComplexArray, FloatArray, FloatArray]:
-        """Amplitudes, what they and the drift are in the record, and what the lines beside them are."""
+        """Amplitudes, what they and the drift leave of the record, and what the lines beside them are."""
         every = np.concatenate([basis, _swinging(beside, n)], axis=1) if beside.size else basis
         amplitude, other = _fit(values, comb, highest, every)
-        return amplitude, comb.signal(amplitude, n) + basis @ other[:DRIFT_DEGREE], every[:, DRIFT_DEGREE:] @ other[DRIFT_DEGREE:]
+        left = samples - comb.signal(amplitude, n) - basis @ other[:DRIFT_DEGREE]
+        return amplitude, left, every[:, DRIFT_DEGREE:] @ other[DRIFT_DEGREE:]
 
-    amplitude, known, swinging = fitted(samples, np.zeros(0))
-    beside = _lines_beside(samples - known, comb.step)
+    amplitude, left, swinging = fitted(samples, np.zeros(0))
+    beside = _lines_beside(left, comb.step)
     if beside.size:
-        amplitude, known, swinging = fitted(samples, beside)
-    hit, values = _knocked(samples - known - swinging, comb.step), samples
+        amplitude, left, swinging = fitted(samples, beside)
+    hit, values = _knocked(left - swinging, comb.step), samples
     for again in range(_FILLINGS if hit.any() else 0):
         # what a knock hides is what the rest of the record says of it
-        values = np.where(hit[:, None], known + swinging, samples)
-        beside = beside if again else _lines_beside(values - known, comb.step)
-        amplitude, known, swinging = fitted(values, beside)
+        values = np.where(hit[:, None], samples - left + swinging, samples)
+        beside = beside if again else _lines_beside(values - samples + left, comb.step)
+        amplitude, left, swinging = fitted(values, beside)
     parts = _block_lines(values - swinging, comb, highest, np.arange(4) * (n // 4), n // 4)[1]
     scatter = np.sum(np.abs(parts - parts.mean(axis=0)) ** 2, axis=0) / (2.0 * 3.0 * 4.0)
     from_start = amplitude * np.exp(-1j * np.arange(highest + 1) * comb.step * 0.5 * (n - 1))[:, None]
-    rest = samples - known - swinging
+    rest = left - swinging
     # where a knock was, nothing was told
     share = 1.0 - float(np.mean(hit))
     variance = _floor(np.where(hit[:, None], 0.0, rest), comb.step, highest) / share**2
