@@ -12,7 +12,7 @@ from api.schemas.common import Answer, Body, Fault, Line
 from api.schemas.toolings import EXAMPLE as TOOLING
 from api.schemas.toolings import Text, ToolingKeys
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.signals.recording import Quantity, Sensor
+from rcsa_ident.signals.recording import Quantity, Role, Sensor
 
 FileName = Annotated[str, StringConstraints(min_length=1, max_length=1000)]
 
@@ -61,6 +61,8 @@ class SensorKeys(Body):
     )
     delay_s: float | None = Field(None, ge=-1.0, le=1.0)
     bandwidth_hz: float | None = Field(None, gt=0.0)
+    role: Literal["spindle", "fixture", "table", "workpiece"] | None = Field(None, description="What an accelerometer is fixed to.")
+    mount_resonance_hz: float | None = Field(None, gt=0.0, description="Of the sensor on its mount, a magnet or wax.")
     pulses_per_revolution: int | None = Field(None, ge=1, le=100_000)
     tooth_angle_deg: float | None = Field(None, ge=-360.0, le=360.0)
 
@@ -75,6 +77,8 @@ class SensorKeys(Body):
             self.bandwidth_hz,
             1 if self.pulses_per_revolution is None else self.pulses_per_revolution,
             None if self.tooth_angle_deg is None else math.radians(self.tooth_angle_deg),
+            None if self.role is None else Role(self.role),
+            self.mount_resonance_hz,
         )
 
 

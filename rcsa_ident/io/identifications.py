@@ -155,6 +155,10 @@ def _sensor_to_json(sensor: Sensor) -> dict[str, Any]:
         data["delay_s"] = sensor.delay
     if sensor.bandwidth is not None:
         data["bandwidth_hz"] = sensor.bandwidth
+    if sensor.role is not None:
+        data["role"] = str(sensor.role)
+    if sensor.mount_resonance is not None:
+        data["mount_resonance_hz"] = sensor.mount_resonance
     return data
 
 

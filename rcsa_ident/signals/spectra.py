@@ -46,8 +46,8 @@ class LineSpectrum:
     rate : float [Hz]
     beside : array, shape (s,) [rad/s]
         Frequencies of lines that stand beside the orders: the mains' hum, chatter.
-    beside_signal : array, shape (n, c)
-        What they are in the record.
+    beside_signal : array, shape (n, c), or None
+        What they are in the record, where there are some.
     """
 
     spindle_speed: float
@@ -57,12 +57,12 @@ class LineSpectrum:
     rest: FloatArray
     rate: float
     beside: FloatArray
-    beside_signal: FloatArray
+    beside_signal: FloatArray | None
 
     @property
     def off_orders(self) -> FloatArray:
         """What the record holds beside the orders and the drift, shape (n, c)."""
-        return self.rest + self.beside_signal
+        return self.rest if self.beside_signal is None else self.rest + self.beside_signal
 
     def up_to(self, max_frequency: float) -> LineSpectrum:
         """Return the same with the lines up to a frequency [Hz]."""
@@ -238,30 +238,31 @@ def line_spectrum(
     highest = int(min(max_frequency, 0.45 * rate) * 2.0 * np.pi / spindle_speed)
     basis = _drift_basis(n, DRIFT_DEGREE)
 
-    def fitted(values: FloatArray, beside: FloatArray) -> tuple[ComplexArray, FloatArray, FloatArray]:
-        """Amplitudes, what they and the drift leave of the record, and what the lines beside them are."""
+    def fitted(values: FloatArray, beside: FloatArray) -> tuple[ComplexArray, FloatArray, FloatArray | None]:
+        """Amplitudes, what they, the drift and the lines beside them leave of the record, and what the latter are."""
         every = np.concatenate([basis, _swinging(beside, n)], axis=1) if beside.size else basis
         amplitude, other = _fit(values, comb, highest, every)
         left = samples - comb.signal(amplitude, n) - basis @ other[:DRIFT_DEGREE]
-        return amplitude, left, every[:, DRIFT_DEGREE:] @ other[DRIFT_DEGREE:]
+        swinging = every[:, DRIFT_DEGREE:] @ other[DRIFT_DEGREE:] if beside.size else None
+        return amplitude, left if swinging is None else left - swinging, swinging
 
-    amplitude, left, swinging = fitted(samples, np.zeros(0))
-    beside = _lines_beside(left, comb.step)
+    amplitude, rest, swinging = fitted(samples, np.zeros(0))
+    beside = _lines_beside(rest, comb.step)
     if beside.size:
-        amplitude, left, swinging = fitted(samples, beside)
-    hit, values = _knocked(left - swinging, comb.step), samples
+        amplitude, rest, swinging = fitted(samples, beside)
+    hit, values = _knocked(rest, comb.step), samples
     for again in range(_FILLINGS if hit.any() else 0):
         # what a knock hides is what the rest of the record says of it
-        values = np.where(hit[:, None], samples - left + swinging, samples)
-        beside = beside if again else _lines_beside(values - samples + left, comb.step)
-        amplitude, left, swinging = fitted(values, beside)
-    parts = _block_lines(values - swinging, comb, highest, np.arange(4) * (n // 4), n // 4)[1]
+        values = np.where(hit[:, None], samples - rest, samples)
+        heard = values - samples + rest
+        beside = beside if again else _lines_beside(heard if swinging is None else heard + swinging, comb.step)
+        amplitude, rest, swinging = fitted(values, beside)
+    parts = _block_lines(values if swinging is None else values - swinging, comb, highest, np.arange(4) * (n // 4), n // 4)[1]
     scatter = np.sum(np.abs(parts - parts.mean(axis=0)) ** 2, axis=0) / (2.0 * 3.0 * 4.0)
     from_start = amplitude * np.exp(-1j * np.arange(highest + 1) * comb.step * 0.5 * (n - 1))[:, None]
-    rest = left - swinging
     # where a knock was, nothing was told
     share = 1.0 - float(np.mean(hit))
-    variance = _floor(np.where(hit[:, None], 0.0, rest), comb.step, highest) / share**2
+    variance = _floor(np.where(hit[:, None], 0.0, rest) if hit.any() else rest, comb.step, highest) / share**2
     return LineSpectrum(spindle_speed, from_start, variance, scatter / share**2, rest, rate, beside * rate, swinging)
 
 
@@ -277,7 +278,9 @@ def _knocked(rest: FloatArray, step: float) -> np.ndarray:
         # what lasts is no knock
         return hit
     # it begins and ends within blocks
-    wide = loud | np.roll(loud, 1) | np.roll(loud, -1)
+    wide = loud.copy()
+    wide[1:] |= loud[:-1]
+    wide[:-1] |= loud[1:]
     hit[: blocks * length] = np.repeat(wide, length)
     hit[blocks * length :] = wide[-1]
     turn = round(2.0 * np.pi / step)

@@ -28,7 +28,7 @@ ALONE = 20.0
 VISIBLE = 40.0
 #: Phase [rad] that a drifting speed may add to the highest line over the record.
 DRIFT_PHASE = 0.5
-#: Change of speed within a record, standard deviation as a share: with 0.02 of damping, a line on a resonance is then 1 % too low.
+#: Change of speed within a record, standard deviation as a share: with a damping ratio of 0.02, a line on a resonance is then 2 % too low.
 MOST_WANDER = 0.003
 
 

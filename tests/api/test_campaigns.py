@@ -14,6 +14,7 @@ import pytest
 
 from api.reading.campaign_text import FORMATS, campaign_of_text, declare, files_of, recording_name, toml_text
 from api.reading.campaigns import load_campaign
+from api.schemas.campaigns import SensorKeys
 from api.transfer.archives import zipped
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.status import too_few
@@ -365,10 +366,16 @@ def test_a_campaign_that_can_not_be_loaded_says_why(client, machine, store):
 
 def test_texts_of_campaigns_come_back_as_they_were():
     data = declared(2)
+    data["campaign"]["clock_error_percent"] = 0.1
+    data["sensors"]["fixture_x"]["role"] = "fixture"
+    data["sensors"]["felt_x"] = {"quantity": "acceleration", "axis": "X", "sensitivity": 1.0, "role": "table", "mount_resonance_hz": 8e3}
     name, text, cuts = declare(data, lambda _: None)
     assert (name, cuts) == ("by hand", 2)
     assert json.loads(text)["cuts"] == data["cuts"]
     campaign = campaign_of_text(text, lambda name: Path("/x") / name)
+    assert campaign.clock_error == pytest.approx(1e-3)
+    assert [sensor.role for sensor in campaign.sensors if sensor.name == "felt_x"] == ["table"]
+    assert SensorKeys(**data["sensors"]["felt_x"]).sensor("felt_x").mount_resonance == 8e3
     assert campaign.cuts[1].air == Path("/x/c1_air.h5")
     toml = tomllib.loads(toml_text(text))
     assert toml["sensors"] == data["sensors"]

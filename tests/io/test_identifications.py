@@ -18,6 +18,7 @@ from rcsa_ident.io.identifications import (
     speed_band_to_json,
 )
 from rcsa_ident.io.results import read_result, write_result
+from rcsa_ident.signals.recording import Quantity, Role, Sensor
 from tests.fixtures import by_hand
 
 
@@ -181,3 +182,12 @@ def test_a_broken_speed_band_is_not_read(path, found, key, value, words):
     with pytest.raises(InputError) as error:
         read_result(path)
     assert words in str(error.value)
+
+
+def test_sensors_come_back_with_role_and_mount(tmp_path, found):
+    campaign = by_hand.campaign(tmp_path)
+    felt = Sensor("felt_x", Quantity.ACCELERATION, Dof.X, 2.0, 1e-5, 9e3, role=Role.SPINDLE, mount_resonance=8e3)
+    told = replace(campaign, sensors=(*campaign.sensors, felt))
+    write_result(tmp_path / "S.json", identification_to_json(replace(found, sensors=told.sensors), told, []))
+    read = machine_from_json(read_result(tmp_path / "S.json"), "S.json")
+    assert next(sensor for sensor in read.sensors if sensor.name == "felt_x") == felt

@@ -15,7 +15,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.setups import read_campaign, read_tooling
 from rcsa_ident.io.toolings import write_tooling
-from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.signals.recording import Quantity, Recording, Role
 from rcsa_ident.tool_holder.geometry import MATERIALS
 
 
@@ -340,3 +340,37 @@ def test_a_dynamometer_also_feels_along_the_spindle(campaign):
     path = campaign / "campaign.toml"
     path.write_text(path.read_text().replace('"displacement"\naxis = "X"', '"force"\naxis = "Z"', 1))
     assert Dof.Z in {sensor.axis for sensor in read_campaign(campaign).sensors if sensor.quantity is Quantity.FORCE}
+
+
+def test_what_an_accelerometer_is_fixed_to(campaign, campaign_text):
+    text = campaign_text.replace(
+        "[sensors.trigger]", '[sensors.other_x]\nquantity = "acceleration"\naxis = "X"\nsensitivity = 1.0\n[sensors.trigger]'
+    )
+    (campaign / "campaign.toml").write_text(text)
+    with pytest.raises(InputError, match="role: found nothing, allowed is one of spindle, fixture, table, workpiece"):
+        read_campaign(campaign)
+    told = text.replace("[sensors.other_x]\n", '[sensors.other_x]\nrole = "spindle"\nmount_resonance_hz = 9000.0\n')
+    told = told.replace("[sensors.fixture_x]\n", '[sensors.fixture_x]\nrole = "fixture"\n')
+    (campaign / "campaign.toml").write_text(told)
+    found = {sensor.name: sensor for sensor in read_campaign(campaign).sensors}
+    assert (found["other_x"].role, found["other_x"].mount_resonance) == (Role.SPINDLE, 9000.0)
+    assert found["fixture_x"].role is Role.FIXTURE
+    (campaign / "campaign.toml").write_text(told.replace('role = "spindle"', 'role = "ceiling"'))
+    with pytest.raises(InputError, match="role"):
+        read_campaign(campaign)
+    (campaign / "campaign.toml").write_text(campaign_text.replace("[sensors.flange_x]\n", '[sensors.flange_x]\nrole = "spindle"\n'))
+    with pytest.raises(InputError, match="has one place"):
+        read_campaign(campaign)
+
+
+def test_a_clock_that_is_off(campaign, campaign_text):
+    assert read_campaign(campaign).clock_error == 0.0
+    (campaign / "campaign.toml").write_text(campaign_text.replace("[campaign]\n", "[campaign]\nclock_error_percent = 0.1\n"))
+    read = read_campaign(campaign)
+    assert read.clock_error == pytest.approx(1e-3)
+    recording = Recording(51200.0, np.zeros((10, 1)), read.sensors[:1])
+    # it takes more samples in a second than it says
+    assert read.clocked(recording).rate == pytest.approx(51251.2)
+    (campaign / "campaign.toml").write_text(campaign_text.replace("[campaign]\n", "[campaign]\nclock_error_percent = 5.0\n"))
+    with pytest.raises(InputError, match="clock_error_percent"):
+        read_campaign(campaign)

@@ -173,6 +173,7 @@ def test_lines_beside_the_orders_do_not_leak_into_them(hertz):
     found = line_spectrum(clean + hum, RATE, speed, 3000.0)
     np.testing.assert_allclose(np.sort(found.beside) / (2.0 * np.pi), hertz, atol=0.2)
     np.testing.assert_allclose(found.beside_signal, hum, atol=1.5e-9)
+    assert line_spectrum(clean, RATE, speed, 3000.0).beside_signal is None
     error = np.abs(found.amplitude[1:20] - amplitude[1:20])
     assert np.sqrt(np.mean(error**2)) < 1.5 * noise * np.sqrt(2.0 / n) * np.sqrt(2.0)
     # a tenth of what they would be without
