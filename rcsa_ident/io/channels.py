@@ -17,7 +17,7 @@ from rcsa_ident.io.files import MEGABYTE
 from rcsa_ident.io.time_base import uniform
 from rcsa_ident.io.validated_table import listed
 from rcsa_ident.remarks import Remark
-from rcsa_ident.signals.recording import LONGEST
+from rcsa_ident.signals.recording import LONGEST, Quantity
 
 RATE = "sampling_rate_hz"
 TIME_COLUMNS = ("time", "time_s")
@@ -53,6 +53,8 @@ class StoredChannel:
         return self.read(0, self.size)
 
 
+#: Units of a signal before its sensitivity, in volts.
+VOLTAGES = {"V": 1.0, "mV": 1e-3}
 #: A channel's samples: an array, or what reads parts of one.
 Channel = FloatArray | StoredChannel
 
@@ -64,11 +66,17 @@ class Signals(list[Channel]):
     ----------
     channels : sequence of Channel
     notes : tuple of Remark
+    units : tuple of (str, Quantity or None)
+        The unit that the file says of each channel, and what it measures: samples of a known quantity are in SI already, those of a voltage
+        in volts. Empty where the file says none.
     """
 
-    def __init__(self, channels: Sequence[Channel], notes: tuple[Remark, ...] = ()) -> None:
+    def __init__(
+        self, channels: Sequence[Channel], notes: tuple[Remark, ...] = (), units: tuple[tuple[str, Quantity | None], ...] = ()
+    ) -> None:
         super().__init__(channels)
         self.notes = notes
+        self.units = units
 
 
 def notes_of(channels: Sequence[Channel]) -> tuple[Remark, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.channels import LARGEST_DATA, Channel, StoredChannel, notes_of
+from rcsa_ident.io.channels import LARGEST_DATA, VOLTAGES, Channel, Signals, StoredChannel, notes_of
 from rcsa_ident.io.files import MEGABYTE
 from rcsa_ident.machining_setup import Cut
 from rcsa_ident.signals.recording import Quantity, Recording, Sensor
@@ -170,6 +170,8 @@ def in_si(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) 
         As they stand in the file.
     sensors : tuple of Sensor
     """
+    if isinstance(signals, Signals) and signals.units:
+        _check_units(signals.units, sensors)
     size = 8 * signals[0].size * len(sensors)
     if size > LARGEST_DATA:
         found = f"{size / MEGABYTE:.3g} MB of samples"
@@ -184,6 +186,21 @@ def in_si(rate: float, signals: Sequence[Channel], sensors: tuple[Sensor, ...]) 
     samples[np.isinf(samples)] = np.nan
     samples.setflags(write=False)
     return Recording(rate, samples, sensors, notes_of(signals))
+
+
+def _check_units(units: Sequence[tuple[str, Quantity | None]], sensors: Sequence[Sensor]) -> None:
+    """Refuse sensors that contradict the units which their file says itself."""
+    for sensor, (unit, quantity) in zip(sensors, units, strict=True):
+        if sensor.quantity is Quantity.TRIGGER:
+            continue
+        if quantity is not None and quantity is not sensor.quantity:
+            raise InputError(f"sensors.{sensor.name}.quantity", str(sensor.quantity), f"{quantity}: the file's unit is {unit}")
+        if quantity is not None and sensor.sensitivity != 1.0:
+            allowed = f"1.0: the file says {unit}, and its samples are turned into SI"
+            raise InputError(f"sensors.{sensor.name}.sensitivity", sensor.sensitivity, allowed)
+        if unit in VOLTAGES and sensor.sensitivity == 1.0:
+            allowed = f"the sensor's sensitivity [V per SI unit]: the file is in {unit}"
+            raise InputError(f"sensors.{sensor.name}.sensitivity", sensor.sensitivity, allowed)
 
 
 def read_cut(sensors: tuple[Sensor, ...], default_rate: float | None, cut: Cut) -> tuple[Recording, Recording | None]:

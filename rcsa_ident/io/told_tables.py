@@ -12,7 +12,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError
 from rcsa_ident.io import text_columns
-from rcsa_ident.io.channels import Channel, the_only
+from rcsa_ident.io.channels import VOLTAGES, Channel, Signals, the_only
 from rcsa_ident.io.files import MEGABYTE, existing_file, read_bytes
 from rcsa_ident.io.frf_files import FORCES, MOTIONS
 from rcsa_ident.io.text_columns import DELIMITERS, LARGEST_TEXT, decoded
@@ -111,9 +111,10 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     """
     if not _has_preamble(path):
         return text_columns.read_channels(path, names, default_rate)
-    opened = told_table(path, default_rate, still=True)
+    opened = told_table(path, default_rate, names)
     present = [each.name for each in opened.channels]
-    return opened.rate, [opened.channels[the_only(name, present, "")].samples for name in names]
+    channels = [opened.channels[the_only(name, present, "")] for name in names]
+    return opened.rate, Signals([each.samples for each in channels], units=tuple((each.unit, each.quantity) for each in channels))
 
 
 def _has_preamble(path: Path) -> bool:
@@ -129,7 +130,7 @@ def _has_preamble(path: Path) -> bool:
     return sum(bool(line.strip()) and not line.lstrip().startswith("#") for line in lines[:start]) > 1
 
 
-def told_table(path: Path, default_rate: float | None, still: bool = False) -> OpenRecording:
+def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = ()) -> OpenRecording:
     """Return a text table as its own lines tell it.
 
     Parameters
@@ -137,8 +138,8 @@ def told_table(path: Path, default_rate: float | None, still: bool = False) -> O
     path : path
     default_rate : float or None [Hz]
         Rate of a file that carries none.
-    still : bool
-        Also channels that hold one value throughout.
+    wanted : sequence of str
+        Channels that are there though they hold one value throughout, or have a unit that nobody knows.
 
     Raises
     ------
@@ -150,7 +151,7 @@ def told_table(path: Path, default_rate: float | None, still: bool = False) -> O
     lines = [line.rstrip(" \t;,") for line in lines]
     start, delimiter, comma = _first_numbers(lines, where)
     width = len(_cells(lines[start], delimiter))
-    names, units, rate = _header(lines[:start], delimiter, width)
+    names, units, rate = _header(lines[:start], delimiter, width, wanted)
     values = _numbers(lines, start, delimiter, comma, width, where)
     remarks = []
     time = [i for i, name in enumerate(names) if _TIME.match(name)]
@@ -180,7 +181,7 @@ def told_table(path: Path, default_rate: float | None, still: bool = False) -> O
     assert rate is not None
     channels = []
     for i, (name, unit) in enumerate(zip(names, units, strict=True)):
-        if i in time or not (still or np.ptp(np.nan_to_num(values[:, i])) > 0.0):
+        if i in time or not (name in wanted or np.ptp(np.nan_to_num(values[:, i])) > 0.0):
             continue
         factor, quantity = _of_unit(unit)
         channels.append(OpenChannel(name, unit, quantity, np.ascontiguousarray(values[:, i] * factor)))
@@ -227,12 +228,13 @@ def _is_number(cell: str, comma: bool) -> bool:
     return True
 
 
-def _header(above: Sequence[str], delimiter: str, width: int) -> tuple[list[str], list[str], float | None]:
+def _header(above: Sequence[str], delimiter: str, width: int, wanted: Sequence[str]) -> tuple[list[str], list[str], float | None]:
     """Names and units of the columns, and a rate, from the lines above them: the last ones of the table's width are names, then units."""
     tables = [cells for line in above if len(cells := _cells(line.lstrip("# "), delimiter)) == width and any(cells)]
     names = tables[-1] if tables else [f"column {i + 1}" for i in range(width)]
     units = [""] * width
-    if len(tables) > 1 and all(cell == "" or _known_unit(cell) for cell in tables[-1]):
+    known = len(tables) > 1 and all(cell == "" or _known_unit(cell) for cell in tables[-1])
+    if known or (len(tables) > 1 and wanted and set(wanted) <= set(tables[-2]) - set(tables[-1])):
         names, units = tables[-2], tables[-1]
     found = [_NAME_AND_UNIT.match(name) for name in names]
     units = [each["unit"].strip() if each and not unit else unit for each, unit in zip(found, units, strict=True)]
@@ -246,7 +248,7 @@ def _header(above: Sequence[str], delimiter: str, width: int) -> tuple[list[str]
 
 
 def _known_unit(text: str) -> bool:
-    return (_seconds(text) is not None and text != "") or _of_unit(text)[1] is not None or text in ("-", "%", "V", "mV", "rpm")
+    return (_seconds(text) is not None and text != "") or _of_unit(text)[1] is not None or text in ("-", "%", "rpm", *VOLTAGES)
 
 
 def _seconds(unit: str) -> float | None:
@@ -260,6 +262,8 @@ def _of_unit(unit: str) -> tuple[float, Quantity | None]:
         return MOTIONS[plain][0], _DERIVATIVES[MOTIONS[plain][1]]
     if plain in FORCES:
         return FORCES[plain], Quantity.FORCE
+    if unit.strip() in VOLTAGES:
+        return VOLTAGES[unit.strip()], None
     return 1.0, None
 
 

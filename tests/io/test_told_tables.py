@@ -76,3 +76,31 @@ def test_a_channel_that_stands_still_is_there(tmp_path):
     recording = read_recording(tmp_path / "cut.csv", SENSORS)
     assert recording.samples.shape == (N, 3)
     assert not recording.samples[:, 2].any()
+
+
+def with_sensitivity(value, quantity=Quantity.FORCE):
+    return tuple(Sensor(f"F{a}", quantity, a_, value) for a, a_ in (("x", Dof.X), ("y", Dof.Y)))
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("V", 1e-3), ("mV", 1.0)])
+def test_volts_have_a_sensitivity(tmp_path, unit, scale):
+    (tmp_path / "cut.csv").write_text(table(unit=unit, scale=scale))
+    recording = read_recording(tmp_path / "cut.csv", with_sensitivity(1e-3))
+    np.testing.assert_allclose(recording.samples, FORCE[:, :2], rtol=1e-6, atol=1e-6)
+    with pytest.raises(InputError, match=rf"sensitivity: found 1.0, allowed is the sensor's sensitivity .* the file is in {unit}"):
+        read_recording(tmp_path / "cut.csv", with_sensitivity(1.0))
+
+
+def test_what_the_sensors_say_may_not_contradict_the_file(tmp_path):
+    (tmp_path / "cut.csv").write_text(table(unit="kN", scale=1e-3))
+    with pytest.raises(InputError, match=r"sensors.Fx.sensitivity: found 0.001, allowed is 1.0: the file says kN"):
+        read_recording(tmp_path / "cut.csv", with_sensitivity(1e-3))
+    (tmp_path / "cut.csv").write_text(table(unit="um"))
+    with pytest.raises(InputError, match=r"sensors.Fx.quantity: found force, allowed is displacement: the file's unit is um"):
+        read_recording(tmp_path / "cut.csv", with_sensitivity(1.0))
+
+
+def test_a_unit_that_nobody_knows_is_the_sensitivitys_business(tmp_path):
+    (tmp_path / "cut.csv").write_text(table(unit="pC"))
+    recording = read_recording(tmp_path / "cut.csv", with_sensitivity(2.0))
+    np.testing.assert_allclose(recording.samples, 0.5 * FORCE[:, :2], rtol=1e-6, atol=1e-6)
