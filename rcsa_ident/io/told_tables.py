@@ -210,7 +210,7 @@ def _first_numbers(lines: Sequence[str], where: str) -> tuple[int, str, bool]:
             cells = _cells(line, delimiter)
             if len(cells) < 2:
                 continue
-            following = _cells(lines[i + 1], delimiter) if i + 1 < len(lines) else []
+            following = _cells(next((later for later in lines[i + 1 : _MOST_HEADER + 2] if later.strip()), ""), delimiter)
             for comma in (False, True) if delimiter != "," else (False,):
                 if len(following) == len(cells) and all(_is_number(cell, comma) for cell in (*cells, *following)):
                     return i, delimiter, comma

@@ -70,6 +70,8 @@ CALLS = [
     *((method, "/campaigns/c/uploads", None, "upload") for method in ("OPTIONS", "POST")),
     *((method, "/campaigns/c/uploads/n", None, "upload") for method in ("HEAD", "PATCH", "DELETE")),
     ("POST", "/tooltip", {"machine": "m", "tooling": "t"}, "run"),
+    ("POST", "/listen", None, "run"),
+    ("POST", "/tap", None, "run"),
     ("POST", "/lobes", {"machine": "m", "toolings": ["t"]}, "run"),
     ("GET", "/lobes/j", None, "read"),
     ("GET", "/lobes/j/events", None, "read"),

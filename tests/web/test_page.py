@@ -329,7 +329,7 @@ def test_a_holder_of_the_catalogue_takes_the_place_of_the_one_there(opened, clie
 def test_names_of_others_are_text(opened, client: Client, served: Served, result: str):
     id = client.make_machine("Named by others", HOSTILE).id
     client.identify(id, result.replace("mode 1", HOSTILE))
-    client.write_tooling("zz-hostile", by_hand.TOOLING.replace('name = "T1"', f"name = '{HOSTILE}'"))
+    client.write_tooling("A-hostile", by_hand.TOOLING.replace('name = "T1"', f"name = '{HOSTILE}'"))
     head, cut, *_ = (SAMPLES / "campaign.toml").read_text().split("[[cuts]]")
     text = f"{head}[[cuts]]{cut}".replace('"HPM sample machine"', f"'{HOSTILE}'").replace('id = "S1-ER32-00"', f"id = '{HOSTILE}'")
     for path in (SAMPLES / "toolings").glob("*.toml"):
@@ -345,12 +345,12 @@ def test_names_of_others_are_text(opened, client: Client, served: Served, result
         f"#/machines/{id}/recordings",
         f"#/campaigns/{made['id']}",
         "#/toolings",
-        "#/toolings/edit/zz-hostile",
+        "#/toolings/edit/A-hostile",
     ):
         page.goto(f"{served.url}/{address}")
         page.wait_for_selector("h1")
         page.wait_for_timeout(200)
-        if address not in ("#/toolings", "#/toolings/edit/zz-hostile"):
+        if address not in ("#/toolings", "#/toolings/edit/A-hostile"):
             expect(page.locator("main")).to_contain_text("<b>bold</b>")
         assert page.locator("img[src='x'], main b").count() == 0
     page.goto(f"{served.url}/#/campaigns/{made['id']}")
