@@ -31,6 +31,7 @@ STUDIES = (
     "hostile",
     "dependencies",
     "recordings",
+    "dynamometer",
 )
 
 

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks import dynamometer
+from benchmarks.dynamometer import FILES
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.io.open_recording import open_recording
 from rcsa_ident.signals.listening import Listening
@@ -21,7 +23,6 @@ from rcsa_ident.signals.recording import Quantity
 from rcsa_ident.units import to_hz, to_rpm
 from rcsa_ident.workflows.listen import listen_to
 
-FILES = Path(__file__).resolve().parents[2] / "shared" / "data"
 #: What is told, by the file's name: a sound of six teeth.
 TOLD = {"Chatter.wav": 6, "Stable.wav": 6}
 #: Orders of the peer, and how far its windows look about the mean speed.
@@ -128,7 +129,7 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--out", type=Path, help="page whose tables are written anew")
     given = parser.parse_args(arguments)
     files = [*sorted((FILES / "milling_acceleration").glob("*.csv")), *sorted((FILES / "milling_sound").glob("*.wav"))]
-    tables = ["\n".join(table(files)), "\n".join(costs())]
+    tables = ["\n".join(table(files)), "\n".join(costs()), "\n".join(dynamometer.table())]
     print("\n\n".join(tables))
     if given.out is not None:
         given.out.write_text(_with_tables(given.out.read_text(encoding="utf-8"), tables), encoding="utf-8")

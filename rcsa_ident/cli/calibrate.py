@@ -29,9 +29,17 @@ class CalibrationMethod(StrEnum):
     signal = "signal"
 
 
+class Axes(StrEnum):
+    """Whether the sensors' axes are believed."""
+
+    told = "told"
+    auto = "auto"
+
+
 class SensorModel(StrEnum):
     """What a dynamometer does to the force, to be found with the coefficients."""
 
+    auto = "auto"
     none = "none"
     first = "first-order"
     second = "second-order"
@@ -44,9 +52,12 @@ def calibrate(
     method: Annotated[
         CalibrationMethod, typer.Option(help="Mean forces over the feed, or the whole force over time.")
     ] = CalibrationMethod.mean,
+    axes: Annotated[
+        Axes, typer.Option(help="Axes and signs of the sensors as the campaign tells them, or found by trying all on the cuts.")
+    ] = Axes.told,
     plot: Annotated[Path | None, typer.Option(help="Figure of the mean forces (png, svg, pdf).", show_default=False)] = None,
     max_frequency: Annotated[float, typer.Option(help="Highest line that method signal fits, Hz.")] = 2000.0,
-    dynamometer: Annotated[SensorModel, typer.Option(help="Model of the dynamometer that method signal fits.")] = SensorModel.none,
+    dynamometer: Annotated[SensorModel, typer.Option(help="Model of the dynamometer that method signal fits.")] = SensorModel.auto,
     resonance: Annotated[float, typer.Option(help="First guess of the dynamometer's bandwidth or resonance, Hz.")] = 3000.0,
     free_helix: Annotated[bool, typer.Option(help="Fit the helix angle as well (method signal).")] = False,
     json_: Json = False,
@@ -67,14 +78,15 @@ def calibrate(
         writable(plot, "--plot")
     positive("--max-frequency", max_frequency, "Hz")
     setup = read_campaign(campaign)
-    order = list(SensorModel).index(dynamometer)
-    sensor = Dynamometer(order, positive("--resonance", resonance, "Hz"))
+    resonance = positive("--resonance", resonance, "Hz")
+    sensor = None if dynamometer is SensorModel.auto else Dynamometer(list(SensorModel).index(dynamometer) - 1, resonance)
     stages = Stages(quiet=json_)
     read = partial(read_cut, setup.sensors, setup.sampling_rate)
     with stages.stage("calibration") as line:
-        found = run(setup, read, method is CalibrationMethod.signal, max_frequency, sensor, free_helix, line)
+        found = run(setup, read, method is CalibrationMethod.signal, max_frequency, sensor, free_helix, axes is Axes.auto, line)
     if found.forces.of("K_tc")[0] <= 0.0:
-        raise InputError("K_tc", f"{found.forces.of('K_tc')[0] * 1e-6:.4g} MPa", "; ".join(found.forces.reasons), str(campaign))
+        why = "; ".join([*found.forces.reasons, *([] if axes is Axes.auto else ["try --axes auto"])])
+        raise InputError("K_tc", f"{found.forces.of('K_tc')[0] * 1e-6:.4g} MPa", f"a number above zero ({why})", str(campaign))
     workpiece = Workpiece(setup.workpiece.name, found.forces.coefficients)
     write_workpiece(out, workpiece, _remarks(setup, found))
     if plot is not None:
@@ -82,6 +94,8 @@ def calibrate(
 
         save(mean_forces(_groups(found)), plot)
     doubts = [*found.forces.reasons]
+    if not found.choices and any("axes of the sensors" in doubt for doubt in doubts):
+        doubts.append("try --axes auto")
     if json_:
         emit(_summary(found) | {"seconds": stages.seconds, "out": str(out)})
     else:
@@ -120,13 +134,14 @@ def _summary(found: Calibrated) -> dict[str, Any]:
         "misfit": forces.misfit,
         "cuts_used": [m.cut_id for m in found.used],
         "cuts_left_out": [{"id": cut, "reason": reason} for cut, reason in found.left_out],
+        "once_per_revolution_n": {m.cut_id: m.once_per_revolution.tolist() for m in found.used},
+        "axes": [{"shows": list(c.shown()), "unexplained": c.unexplained} for c in found.choices],
         "reasons": list(forces.reasons),
         "notes": [*found.notes, *forces.notes],
     }
     if found.signal is not None:
         signal = found.signal
         data["signal"] = {
-            "sensor_axes": signal.axes.tolist(),
             "runout_um": {name: (1e6 * offsets).tolist() for name, offsets in signal.runout.items()},
             "helix_deg": None if signal.helix is None else math.degrees(signal.helix),
             "dynamometer": signal.sensor.tolist(),
@@ -149,6 +164,8 @@ def _show(found: Calibrated) -> None:
     out = console()
     show(table)
     out.print(f"unexplained: {100.0 * forces.misfit:.2g} % of the force")
+    if once := [float(m.once_per_revolution[:2].max()) for m in found.used if m.record.cutter.teeth > 1]:
+        out.print(f"once per revolution: up to {max(once):.3g} N, the cutter's run-out")
     if found.signal is not None:
         for name, offsets in found.signal.runout.items():
             out.print(f"run-out of {name}: {', '.join(f'{1e6 * o:+.2f}' for o in offsets)} µm", markup=False)

@@ -23,6 +23,7 @@ LEAST_CUTS = 3
 _NORMAL_95 = 1.959964
 #: Condition number of the scaled regression from which on coefficients cannot be told apart.
 _WORST_CONDITION = 1e5
+_OTHER_AXES = "sign or axes of the sensors may be others than told: they can be tried all"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -200,9 +201,9 @@ def plausible(names: Sequence[str], value: FloatArray, half_width: FloatArray) -
     reasons = []
     tangential, width = known["K_tc"]
     if tangential <= 0.0:
-        reasons.append("K_tc is below zero: the force is not the one on the tool in the machine's axes (sign or axes of the sensors?)")
+        reasons.append(f"K_tc is below zero: the force is not the one on the tool in the machine's axes; {_OTHER_AXES}")
     elif width > 0.5 * tangential:
         reasons.append(f"K_tc is known only to {100.0 * width / tangential:.0f} %: use more feeds, or feeds farther apart")
     if tangential > 0.0 and not -0.2 <= known["K_rc"][0] / tangential <= 2.0:
-        reasons.append(f"K_rc / K_tc is {known['K_rc'][0] / tangential:.2g}: unusual; are axes or engagement as the campaign says?")
+        reasons.append(f"K_rc / K_tc is {known['K_rc'][0] / tangential:.2g}: unusual; is the engagement as told? {_OTHER_AXES}")
     return tuple(reasons)

@@ -1,18 +1,18 @@
-"""Cutting coefficients from the whole force over time: run-out, tooth angle, sensor axes and the dynamometer's own dynamics as unknowns."""
+"""Cutting coefficients from the whole force over time: run-out, tooth angle and the dynamometer's own dynamics as unknowns."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.cutting.calibration import NAMES, ForceCalibration, plausible
-from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.force import unit_lines
+from rcsa_ident.cutting.force_record import ANGLES, ForceRecord
 from rcsa_ident.cutting.regression import cluster_covariance, student_quantile
 from rcsa_ident.errors import InputError
 
@@ -20,47 +20,13 @@ from rcsa_ident.errors import InputError
 CUTS_FOR_SCATTER = 4
 #: Share of the force's size that may stay unexplained.
 WORST_MISFIT = 0.05
-_ANGLES = 72
 _STEPS = 60
+#: Resonances of a dynamometer with its workpiece from which the search begins [Hz], and the share of the misfit that one has to leave.
+_RESONANCES, _WORTH = (900.0, 2500.0), 0.9
 #: Prior of an eccentricity's component [m] and of a helix' tangent: wide, they only keep what no force feels in place.
 _RUNOUT_PRIOR, _HELIX_PRIOR = 2e-5, 0.3
 #: Prior of the logarithms of a dynamometer's frequency and damping.
 _SENSOR_PRIOR = 1.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ForceRecord:
-    """The lines of one cut's force, F = Re sum_m lines[m] e^{i m angle}, by least squares over its time series.
-
-    Parameters
-    ----------
-    cutter : Cutter
-    conditions : CuttingConditions
-        The cut as programmed, with the spindle speed that was found in the record.
-    clamping : str
-        Records of one clamping share the run-out.
-    lines : complex array, shape (m + 1, 2) [N]
-        Orders 0 to m; X and Y. Sensors with a known response are undone.
-    variance : array, shape (m + 1, 2) [N^2]
-        Variance of the real and of the imaginary part each, noise only.
-    blocks : complex array, shape (b, m + 1, 2) [N]
-        What each block of whole revolutions says more or less than all of them: their mean is near zero.
-    """
-
-    cutter: Cutter
-    conditions: CuttingConditions
-    clamping: str
-    lines: ComplexArray
-    variance: FloatArray
-    blocks: ComplexArray
-
-    def __post_init__(self) -> None:
-        for name, dtype in (("lines", complex), ("variance", float), ("blocks", complex)):
-            object.__setattr__(self, name, frozen(getattr(self, name), dtype))
-        if self.lines.shape != self.variance.shape or self.blocks.shape[1:] != self.lines.shape:
-            raise InputError(
-                "force lines", f"{self.lines.shape}, {self.variance.shape}, {self.blocks.shape}", "shapes that belong together"
-            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,8 +64,6 @@ class SignalCalibration:
     Parameters
     ----------
     forces : ForceCalibration
-    axes : array, shape (2, 2)
-        Sensors' X and Y over the force on the tool: a signed permutation.
     runout : dict of clamping to array, shape (teeth,) [m]
     helix : float or None [rad]
         The helix angle found, where it was an unknown.
@@ -112,7 +76,6 @@ class SignalCalibration:
     """
 
     forces: ForceCalibration
-    axes: FloatArray
     runout: dict[str, FloatArray]
     helix: float | None
     angle: FloatArray
@@ -125,7 +88,7 @@ class _Problem:
     """Residuals of all cuts over one vector: scaled coefficients, angles, eccentricities, tan(helix), sensor."""
 
     def __init__(self, records: Sequence[ForceRecord], dynamometer: Dynamometer, free_helix: bool, runout: bool) -> None:
-        self.records, self.dynamometer, self.free_helix = records, dynamometer, free_helix
+        self.records, self.dynamometer, self.free_helix = [r.transverse for r in records], dynamometer, free_helix
         self.clampings = list(dict.fromkeys(r.clamping for r in records)) if runout else []
         k = len(records)
         self.angles = slice(4, 4 + k)
@@ -134,11 +97,7 @@ class _Problem:
         self.sensor = slice(self.helix.stop, self.helix.stop + 2 * dynamometer.order)
         self.size = self.sensor.stop
         # only the teeth's own lines as long as no run-out is in the model
-        self.orders = [
-            np.arange(r.lines.shape[0]) if runout or not r.cutter.equally_spaced else np.arange(0, r.lines.shape[0], r.cutter.teeth)
-            for r in records
-        ]
-        self.axes = np.eye(2)
+        self.orders = [np.arange(r.lines.shape[0]) if runout else r.own_orders for r in records]
         self.model_error = 0.0
         self.scale = np.ones(4)
 
@@ -157,8 +116,7 @@ class _Problem:
         record, orders = self.records[k], self.orders[k]
         columns = unit_lines(self.cutter(k, theta), record.conditions, orders, runout=bool(self.clampings)) * self.scale
         columns = columns * np.exp(1j * orders * theta[self.angles][k])[:, None, None]
-        seen = np.einsum("ab,mbc->mac", self.axes, columns)
-        return seen * self.dynamometer.response(orders * record.conditions.spindle_speed, theta[self.sensor])[:, :, None]
+        return columns * self.dynamometer.response(orders * record.conditions.spindle_speed, theta[self.sensor])[:, :, None]
 
     def weights(self, k: int) -> FloatArray:
         """One over the standard deviation of each line's real part: noise, and a share of the record's force."""
@@ -213,7 +171,7 @@ def eccentric(cutter: Cutter, components: FloatArray) -> FloatArray:
 
 
 def calibrate_signal(
-    records: Sequence[ForceRecord], dynamometer: Dynamometer | None = None, free_helix: bool = False, free_axes: bool = True
+    records: Sequence[ForceRecord], dynamometer: Dynamometer | None = None, free_helix: bool = False, start: FloatArray | None = None
 ) -> SignalCalibration:
     """Return the coefficients that explain the force over time.
 
@@ -221,11 +179,12 @@ def calibrate_signal(
     ----------
     records : sequence of ForceRecord, length k
     dynamometer : Dynamometer, optional
-        What to find of the sensor; by default it follows the force.
+        What to find of the sensor. By default it follows the force, and where that leaves more than `WORST_MISFIT` unexplained, a
+        resonance per axis is tried and kept if it explains a good part of that.
     free_helix : bool
         Whether the helix is an unknown, too; one for all records.
-    free_axes : bool
-        Whether the sensors' axes may be exchanged or turned round; else they are the machine's and the force is the one on the tool.
+    start : array, shape (4,) [N/m^2 or N/m], optional
+        K_tc, K_rc, K_te, K_re to find the tooth angles with, such as those of the mean forces; else each record tells its own.
 
     Notes
     -----
@@ -234,11 +193,21 @@ def calibrate_signal(
     explain is learned as a share of the force. Intervals are the wider ones of two sandwiches: scores of blocks of
     revolutions, and scores of whole cuts (`regression.cluster_covariance`), the tooth angles profiled out.
     """
-    dynamometer = dynamometer or Dynamometer()
     if not records:
         raise InputError("records", "none", "at least one record of the cutting force")
+    if dynamometer is not None:
+        return _fitted(records, dynamometer, free_helix, start)
+    stiff = _fitted(records, Dynamometer(), free_helix, start)
+    if stiff.forces.misfit <= WORST_MISFIT:
+        return stiff
+    trials = [_fitted(records, Dynamometer(2, frequency), free_helix, start) for frequency in _RESONANCES]
+    best = min(trials, key=lambda trial: trial.forces.misfit)
+    return best if best.forces.misfit < _WORTH * stiff.forces.misfit else stiff
+
+
+def _fitted(records: Sequence[ForceRecord], dynamometer: Dynamometer, free_helix: bool, start: FloatArray | None) -> SignalCalibration:
     problem = _Problem(records, dynamometer, free_helix, runout=False)
-    theta, notes = _start(problem, free_axes)
+    theta = _start(problem, start)
     theta = _polish(problem, theta)
     if any(r.cutter.teeth > 1 for r in records):
         problem, theta = _with_runout(problem, theta)
@@ -249,52 +218,27 @@ def calibrate_signal(
         theta = _polish(problem, theta)
         if abs(problem.model_error - before) < 0.02 * problem.model_error:
             break
-    return _answer(problem, theta, notes)
+    return _answer(problem, theta)
 
 
-def _start(problem: _Problem, free_axes: bool) -> tuple[FloatArray, list[str]]:
-    """Tooth angles by scanning, coefficients by linear least squares, for the sensor axes that explain the records best."""
-    sensible = [np.array(m, dtype=float) for m in _signed_permutations()] if free_axes else [np.eye(2)]
-    found: list[tuple[float, FloatArray, FloatArray]] = []
-    for axes in sensible:
-        problem.axes = axes
-        theta, cost = np.zeros(problem.size), 0.0
-        if problem.free_helix:
-            theta[problem.helix] = np.tan(problem.records[0].cutter.helix)
-        solutions = []
-        for k in range(len(problem.records)):
-            best = _scan(problem, k, theta)
-            cost += best[0]
-            theta[problem.angles.start + k] = best[1]
-            solutions.append(best[2])
-        theta[:4] = np.median(solutions, axis=0)
-        found.append((cost, axes, theta))
-    found.sort(key=lambda f: f[0])
-    if not np.isfinite(found[0][0]):
-        raise InputError("force", "no tooth angle at which K_tc is above zero", "the force of the cut that the campaign describes")
-    cost, problem.axes, theta = found[0]
+def _start(problem: _Problem, start: FloatArray | None) -> FloatArray:
+    """Tooth angles by scanning, with known coefficients or with those that fit each record best."""
+    theta = np.zeros(problem.size)
+    if problem.free_helix:
+        theta[problem.helix] = np.tan(problem.records[0].cutter.helix)
+    if start is not None:
+        theta[problem.angles] = [record.tooth_angle(start)[0] for record in problem.records]
+        theta[:4] = start
+    else:
+        scanned = [_scan(problem, k, theta) for k in range(len(problem.records))]
+        if not all(np.isfinite(cost) for cost, _, _ in scanned):
+            raise InputError("force", "no tooth angle at which K_tc is above zero", "the force of the cut that the campaign describes")
+        theta[problem.angles] = [angle for _, angle, _ in scanned]
+        theta[:4] = np.median([solution for _, _, solution in scanned], axis=0)
     problem.scale = np.maximum(np.abs(theta[:4]), 1e-6 * np.abs(theta[:4]).max())
     problem.scale[2:] = np.maximum(problem.scale[2:], 1e-6 * problem.scale[0])
     theta[:4] /= problem.scale
-    notes = []
-    if not np.array_equal(problem.axes, np.eye(2)):
-        notes.append(f"sensor axes: {_axes_in_words(problem.axes)}")
-    if len(found) > 1 and found[1][0] < 1.5 * cost:
-        notes.append("other signs or axes of the sensors explain the records nearly as well")
-    return theta, notes
-
-
-def _signed_permutations() -> list[list[list[int]]]:
-    turns = [([a, 0], [0, b]) for a, b in product((1, -1), repeat=2)] + [([0, a], [b, 0]) for a, b in product((1, -1), repeat=2)]
-    return [[list(first), list(second)] for first, second in turns]
-
-
-def _axes_in_words(axes: FloatArray) -> str:
-    words = []
-    for name, row in zip("XY", axes, strict=True):
-        i = int(np.argmax(np.abs(row)))
-        words.append(f"{name} shows {'-' if row[i] < 0 else '+'}{'XY'[i]} of the force on the tool")
-    return ", ".join(words)
+    return theta
 
 
 def _scan(problem: _Problem, k: int, theta: FloatArray) -> tuple[float, float, FloatArray]:
@@ -306,7 +250,7 @@ def _scan(problem: _Problem, k: int, theta: FloatArray) -> tuple[float, float, F
     target = record.lines[orders].ravel() * weight
     right = np.concatenate([target.real, target.imag])
     best = (np.inf, 0.0, np.zeros(4))
-    angles = np.arange(_ANGLES * (record.cutter.teeth if reach > 6.0 else 1)) * reach
+    angles = np.arange(ANGLES * (record.cutter.teeth if reach > 6.0 else 1)) * reach
     for angle in angles / angles.size:
         turned = (columns * (weight * np.exp(1j * orders * angle))[:, None, None]).reshape(-1, 4)
         design = np.concatenate([turned.real, turned.imag])
@@ -324,7 +268,7 @@ def _scan(problem: _Problem, k: int, theta: FloatArray) -> tuple[float, float, F
 def _with_runout(problem: _Problem, theta: FloatArray) -> tuple[_Problem, FloatArray]:
     """The problem with a run-out per clamping: its best of a grid for the first record, then each record's own first tooth."""
     full = _Problem(problem.records, problem.dynamometer, problem.free_helix, runout=True)
-    full.axes, full.scale, full.model_error = problem.axes, problem.scale, 0.01
+    full.scale, full.model_error = problem.scale, 0.01
     wider = np.zeros(full.size)
     wider[:4], wider[full.angles] = theta[:4], theta[problem.angles]
     wider[full.helix], wider[full.sensor] = theta[problem.helix], theta[problem.sensor]
@@ -400,7 +344,8 @@ def _learn(problem: _Problem, theta: FloatArray) -> None:
     problem.model_error = float(np.sqrt(0.5 * (low + high)))
 
 
-def _answer(problem: _Problem, theta: FloatArray, notes: list[str]) -> SignalCalibration:
+def _answer(problem: _Problem, theta: FloatArray) -> SignalCalibration:
+    notes: list[str] = []
     slope, left = problem.jacobian(theta), problem.residual(theta)
     count = [2 * 2 * o.size for o in problem.orders]
     edges = np.concatenate([[0], np.cumsum(count)])
@@ -430,24 +375,25 @@ def _answer(problem: _Problem, theta: FloatArray, notes: list[str]) -> SignalCal
         cut_width = student_quantile(dof) * np.sqrt(np.diag(between)) * scale
         covariance = between
     else:
-        notes = [
-            *notes,
-            f"{len(problem.records)} cuts are too few to estimate their scatter: the intervals contain these recordings' noise only",
-        ]
+        few = f"{len(problem.records)} cuts are too few to estimate their scatter"
+        notes.append(f"{few}: the intervals contain these recordings' noise only")
     covariance = (covariance * scale[:, None] * scale)[:4, :4]
     width = np.maximum(noise_width, np.where(np.isfinite(cut_width), cut_width, 0.0))[:4]
     value = theta[:4] * problem.scale
     for i in (2, 3):
         if value[i] < 0.0 and -value[i] > width[i]:
-            notes = [*notes, f"{NAMES[i]} is below zero, {value[i] * 1e-3:.2g} N/mm: the model is incomplete; set to 0"]
+            notes.append(f"{NAMES[i]} is below zero, {value[i] * 1e-3:.2g} N/mm: the model is incomplete; set to 0")
     data = slice(0, edges[-1])
     weight = np.concatenate([np.tile(problem.weights(k).ravel(), 2) for k in range(len(count))])
     force = np.sqrt(sum(np.sum(np.abs(r.lines[o]) ** 2) for r, o in zip(problem.records, problem.orders, strict=True)))
     misfit = float(np.linalg.norm(left[data] / weight) / force)
     reasons = plausible(NAMES[:4], value, width)
     if misfit > WORST_MISFIT:
-        more = "a dynamometer that does not follow (its resonance can be an unknown)? vibration?"
-        reasons = (*reasons, f"{100.0 * misfit:.0f} % of the force over time remains unexplained: {more}")
+        # what no model explains may as well belong to the coefficients
+        width = np.maximum(width, misfit * np.abs(value))
+        more = "other dynamics of the dynamometer" if problem.dynamometer.order else "a dynamometer that does not follow"
+        left_over = f"{100.0 * misfit:.0f} % of the force over time remains unexplained, and no interval is narrower"
+        reasons = (*reasons, f"{left_over}: {more}, or vibration?")
     forces = ForceCalibration("signal", NAMES[:4], value, covariance, width, misfit, reasons, tuple(notes))
     runout = {
         name: eccentric(next(r.cutter for r in problem.records if r.clamping == name), theta[problem.ecc][2 * i : 2 * i + 2])
@@ -457,4 +403,4 @@ def _answer(problem: _Problem, theta: FloatArray, notes: list[str]) -> SignalCal
     sensor = start * np.exp(theta[problem.sensor].reshape(2, -1))
     helix = float(np.arctan(theta[problem.helix][0])) if problem.free_helix else None
     angle = np.mod(theta[problem.angles], 2.0 * np.pi)
-    return SignalCalibration(forces, frozen(problem.axes), runout, helix, frozen(angle), frozen(sensor), noise_width[:4], cut_width[:4])
+    return SignalCalibration(forces, runout, helix, frozen(angle), frozen(sensor), noise_width[:4], cut_width[:4])

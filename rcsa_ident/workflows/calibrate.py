@@ -11,7 +11,9 @@ from rcsa_ident.arrays import FloatArray
 from rcsa_ident.cutting.calibration import ForceCalibration, calibrate_mean_force, mean_force_matrix
 from rcsa_ident.cutting.conditions import CuttingConditions
 from rcsa_ident.cutting.cutter import Cutter
-from rcsa_ident.cutting.signal_fit import Dynamometer, ForceRecord, SignalCalibration, calibrate_signal
+from rcsa_ident.cutting.force_axes import CLEAR, AxesChoice, axes_choices
+from rcsa_ident.cutting.force_record import ForceRecord
+from rcsa_ident.cutting.signal_fit import Dynamometer, SignalCalibration, calibrate_signal
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.machining_setup import Campaign, Cut
@@ -27,6 +29,8 @@ MAX_FREQUENCY = 2000.0
 LEAST_REVOLUTIONS, MOST_BLOCKS = 16.0, 24
 #: Largest share of lost samples; they are bridged by straight lines.
 LOST_SHARE = 1e-3
+#: Scatter in two revolutions over the cut's below which nothing is cut, and how many such blocks tell where zero is.
+IDLE_SHARE, LEAST_IDLE = 0.1, 4
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
 
 
@@ -38,19 +42,27 @@ class MeasuredForce:
     ----------
     cut_id : str
     record : ForceRecord
-        Lines of the forces along X and Y.
-    mean : array, shape (2,) or (3,) [N]
-        Over whole revolutions, the air cut's subtracted: X, Y and along the axis where that is measured.
-    mean_std : array, like `mean` [N]
+        Lines of the forces, as the sensors are told or as `force_axes` found them.
     duration : float [s]
         Of the steady part.
+    zeroed : bool
+        Whether the sensors' zero is known, from the air cut or from stretches in which nothing is cut.
     """
 
     cut_id: str
     record: ForceRecord
-    mean: FloatArray
-    mean_std: FloatArray
     duration: float
+    zeroed: bool
+
+    @property
+    def mean(self) -> FloatArray:
+        """Mean force over whole revolutions, zero taken out: X, Y and, where it is measured, along the axis, shape (c,) [N]."""
+        return self.record.mean
+
+    @property
+    def once_per_revolution(self) -> FloatArray:
+        """Amplitude at the spindle's own order, shape (c,) [N]: run-out, or a workpiece that turns with nothing else."""
+        return np.abs(self.record.lines[1])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +74,8 @@ class Calibrated:
     forces : ForceCalibration
     signal : SignalCalibration or None
         With the method of that name.
+    choices : tuple of AxesChoice
+        Where the axes were asked for: all that are physical, the one that was taken first; else none.
     used : tuple of MeasuredForce
     left_out : tuple of (cut id, reason)
     notes : tuple of str
@@ -69,6 +83,7 @@ class Calibrated:
 
     forces: ForceCalibration
     signal: SignalCalibration | None
+    choices: tuple[AxesChoice, ...]
     used: tuple[MeasuredForce, ...]
     left_out: tuple[tuple[str, str], ...]
     notes: tuple[str, ...]
@@ -96,7 +111,8 @@ def measure_force(
     recording : Recording
         With force sensors along X and Y, and along the axis (Z) where there is one.
     air : Recording or None
-        The same without cutting: where zero is.
+        The same without cutting: where zero is. Without it the record's own idle stretches tell, before and after the cut; between
+        them a charge amplifier drifts evenly.
     max_frequency : float [Hz]
 
     Raises
@@ -129,15 +145,11 @@ def measure_force(
     blocks = _block_deviations(spectrum.rest, rate, speed, omega.size) * undo[None]
     variance = np.maximum(spectrum.variance, 1e-300) * np.abs(undo) ** 2
     lines = spectrum.amplitude * undo
-    zero = np.zeros(samples.shape[1])
-    if air is not None:
-        still, _ = _forces(air, cut_id)
-        if still.shape[1] != samples.shape[1]:
-            raise InputError("sensors", "other forces in the air cut", "the same sensors for a cut and its air cut", cut_id)
-        zero = np.nanmean(still, axis=0)
-    lines[0] -= zero
-    record = ForceRecord(cutter, replace(conditions, spindle_speed=speed), clamping, lines[:, :2], variance[:, :2], blocks[:, :, :2])
-    return MeasuredForce(cut_id, record, lines[0].real, np.sqrt(variance[0]), inside.shape[0] / rate)
+    zero = _idle_level(samples, part, round(4.0 * np.pi / speed * rate)) if air is None else _air_level(air, samples.shape[1], cut_id)
+    if zero is not None:
+        lines[0] -= zero
+    record = ForceRecord(cutter, replace(conditions, spindle_speed=speed), clamping, lines, variance, blocks)
+    return MeasuredForce(cut_id, record, inside.shape[0] / rate, zero is not None)
 
 
 def _forces(recording: Recording, cut_id: str) -> tuple[FloatArray, list]:
@@ -147,6 +159,35 @@ def _forces(recording: Recording, cut_id: str) -> tuple[FloatArray, list]:
         raise InputError("sensors", f"no force along {' and '.join(missing)}", 'sensors with quantity = "force" for X and Y', cut_id)
     kept = [f for f in found if f is not None]
     return np.stack([f[1] for f in kept], axis=1), [f[0] for f in kept]
+
+
+def _air_level(air: Recording, channels: int, cut_id: str) -> FloatArray:
+    still, _ = _forces(air, cut_id)
+    if still.shape[1] != channels:
+        raise InputError("sensors", "other forces in the air cut", "the same sensors for a cut and its air cut", cut_id)
+    return np.asarray(np.nanmean(still, axis=0))
+
+
+def _idle_level(samples: FloatArray, part: slice, length: int) -> FloatArray | None:
+    """Level of what is idle before and after the steady part, carried to its middle, shape (c,); None where nothing is idle."""
+    loud = _blocks(samples[part], length).std(axis=1).sum(axis=1)
+    found = []
+    for start, stop in ((0, part.start), (part.stop, samples.shape[0])):
+        blocks = _blocks(samples[start:stop], length)
+        idle = np.flatnonzero(blocks.std(axis=1).sum(axis=1) < IDLE_SHARE * np.median(loud))
+        if idle.size >= LEAST_IDLE:
+            found.append((start + (idle.mean() + 0.5) * length, np.median(blocks[idle].mean(axis=1), axis=0)))
+    if not found:
+        return None
+    (first, level), (last, later) = found[0], found[-1]
+    share = (0.5 * (part.start + part.stop) - first) / (last - first) if len(found) > 1 else 0.0
+    return np.asarray(level + share * (later - level))
+
+
+def _blocks(samples: FloatArray, length: int) -> FloatArray:
+    """Whole blocks of so many samples, shape (b, length, c)."""
+    count = samples.shape[0] // length
+    return samples[: count * length].reshape(count, length, samples.shape[1])
 
 
 def _bridged(samples: FloatArray, cut_id: str) -> FloatArray:
@@ -184,6 +225,7 @@ def calibrate(
     max_frequency: float = MAX_FREQUENCY,
     dynamometer: Dynamometer | None = None,
     free_helix: bool = False,
+    any_axes: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Calibrated:
     """Return the cutting coefficients of a campaign of cuts at several feeds.
@@ -199,8 +241,10 @@ def calibrate(
     max_frequency : float [Hz]
         Highest line of the signal's fit.
     dynamometer : Dynamometer, optional
-        What to find of the sensor, with the signal's fit.
+        What to find of the sensor, with the signal's fit; see `calibrate_signal`.
     free_helix : bool
+    any_axes : bool
+        Find which channel shows which axis and sign; else they are as told.
     """
     used, left_out = [], []
     for done, cut in enumerate(campaign.cuts, start=1):
@@ -213,12 +257,48 @@ def calibrate(
             progress(done, len(campaign.cuts))
     if not used:
         raise InputError("cuts", f"none of {len(campaign.cuts)} usable ({left_out[0][1]})", "recordings of the cutting force")
-    notes = [] if any(cut.air is not None for cut in campaign.cuts) else ["no air cuts: the sensors' own zero level is used"]
+    unzeroed = [measured.cut_id for measured in used if not measured.zeroed]
+    notes = [f"{', '.join(unzeroed)}: no air cut and no idle stretch, the sensors' own zero is used"] if unzeroed else []
     notes += campaign.cylinder_remarks({measured.cut_id for measured in used})
+    choices = axes_choices([measured.record for measured in used]) if any_axes else ()
+    if choices:
+        used = [replace(measured, record=_turned(measured.record, choices[0].axes)) for measured in used]
+        notes += _on_axes(choices, [sensor.name for sensor in campaign.sensors if sensor.quantity is Quantity.FORCE])
+    whole = (tuple(used), tuple(left_out), tuple(notes))
     if not signal:
-        return Calibrated(_mean(used), None, tuple(used), tuple(left_out), tuple(notes))
-    found = calibrate_signal([m.record for m in used], dynamometer, free_helix)
-    return Calibrated(_with_axial(found, used), found, tuple(used), tuple(left_out), tuple(notes))
+        return Calibrated(_mean(used), None, choices, *whole)
+    found = calibrate_signal([m.record for m in used], dynamometer, free_helix, _start(used))
+    return Calibrated(_with_axial(found, used), found, choices, *whole)
+
+
+def _turned(record: ForceRecord, axes: FloatArray) -> ForceRecord:
+    """The record of the force on the tool; a channel along the axis that other cuts do not have is left out."""
+    return (record if record.lines.shape[1] == axes.shape[0] else record.transverse).seen_through(axes)
+
+
+def _on_axes(choices: Sequence[AxesChoice], names: Sequence[str]) -> list[str]:
+    """What was chosen in words, and how far the next choice is behind."""
+
+    def words(choice: AxesChoice) -> str:
+        return ", ".join(f"{name} shows {axis}" for name, axis in zip(names, choice.shown(), strict=False))
+
+    first = choices[0]
+    left = f"{100.0 * first.unexplained:.0f} % of the force over time unexplained"
+    notes = [f"axes of the force on the tool: {words(first)} ({left}){', as told' if first.as_told else ''}"]
+    if len(choices) > 1:
+        close = choices[1].unexplained < CLEAR * first.unexplained
+        behind = f"{words(choices[1])} ({100.0 * choices[1].unexplained:.0f} %)"
+        notes.append(f"the next choice of axes explains nearly as much: {behind}" if close else f"next choice of axes: {behind}")
+    return notes
+
+
+def _start(used: Sequence[MeasuredForce]) -> FloatArray | None:
+    """Coefficients of the mean forces, where there are feeds enough and they are a cut's."""
+    try:
+        mean = _mean(used)
+    except InputError:
+        return None
+    return None if mean.reasons else np.array([mean.of(name)[0] for name in ("K_tc", "K_rc", "K_te", "K_re")])
 
 
 def _mean(used: Sequence[MeasuredForce]) -> ForceCalibration:

@@ -75,7 +75,8 @@ def test_json(force_campaign, tmp_path):
     assert k["unit"] == "MPa"
     assert abs(k["value"] - 800.0) < max(2.0 * k["half_width_95"], 5.0)
     assert answer["cuts_used"] == ["c0", "c1", "c2", "c3", "c4"]
-    assert answer["signal"]["sensor_axes"] == [[1.0, 0.0], [0.0, 1.0]]
+    assert answer["axes"] == []
+    assert answer["signal"]["dynamometer"] == [[], []]
 
 
 @pytest.mark.slow
@@ -86,9 +87,13 @@ def test_a_wrong_sign_is_refused_with_the_reason(force_campaign, tmp_path):
     result = run("calibrate", folder, "--out", tmp_path / "W.toml", code=2)
     assert "sign or axes" in result.output
     assert not (tmp_path / "W.toml").exists()
-    # the signal's fit finds the sign by itself
-    text = run("calibrate", folder, "--out", tmp_path / "W.toml", "--method", "signal").output
-    assert "X shows -X" in text.replace("\n", " ")
+    assert "--axes auto" in result.output.replace("\n", " ")
+    for method in ("mean", "signal"):
+        text = run("calibrate", folder, "--out", tmp_path / "W.toml", "--method", method, "--axes", "auto").output
+        assert "force_x shows -X, force_y shows -Y" in text.replace("\n", " ")
+        assert read_workpiece(tmp_path / "W.toml").coefficients.tangential == pytest.approx(TRUE[0], rel=0.06)
+    answer = json.loads(run("calibrate", folder, "--out", tmp_path / "W.toml", "--axes", "auto", "--json").output)
+    assert answer["axes"][0]["shows"] == ["-X", "-Y"]
 
 
 def test_no_force_at_all(small_campaign, tmp_path):

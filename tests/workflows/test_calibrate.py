@@ -10,6 +10,7 @@ import pytest
 
 from rcsa_ident.cutting.calibration import calibrate_mean_force
 from rcsa_ident.cutting.force import force_history
+from rcsa_ident.cutting.force_axes import axes_choices
 from rcsa_ident.cutting.signal_fit import Dynamometer, calibrate_signal
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
@@ -77,8 +78,8 @@ def test_intervals_hold_the_truth(depth, engagement, resonance):
 def test_the_signal_tells_more_than_the_means():
     rng = np.random.default_rng(3)
     made = recorded(simulated(5, 4e-4, DOWN)[0], rng, 0.0, sign=-1.0)
-    found = calibrate_signal([m.record for m in made])
-    np.testing.assert_array_equal(found.axes, -np.eye(2))
+    assert axes_choices([m.record for m in made])[0].shown() == ("-X", "-Y")
+    found = calibrate_signal([m.record.seen_through(-np.eye(2)) for m in made])
     np.testing.assert_allclose(found.forces.value, TRUE, rtol=0.012)
     mean = calibrate_mean_force([(m.record.cutter, m.record.conditions) for m in made], -np.array([m.mean for m in made]))
     assert np.all(found.forces.half_width < mean.half_width)
@@ -139,6 +140,25 @@ def test_campaign_with_what_must_be_left_out():
     np.testing.assert_allclose(signal.forces.value, TRUE, rtol=0.02)
 
 
+def test_zero_from_the_idle_stretches_of_a_record():
+    """Air, cut, air, on a charge amplifier that drifts by half the mean force: the level between both idle stretches is taken out."""
+    rng = np.random.default_rng(14)
+    conditions = plan()[2]
+    force = true_force(conditions, 0.4, RATE, 0.3)
+    idle = np.zeros((round(0.2 * RATE), 2))
+    whole = np.concatenate([idle, force, idle]) + 0.3 * rng.normal(size=(force.shape[0] + 2 * idle.shape[0], 2))
+    zero = np.array([30.0, -20.0])
+    drift = zero + np.linspace(0.0, 1.0, whole.shape[0])[:, None] * 0.5 * force.mean(axis=0)
+    told = measure_force("c", "a", Recording(RATE, force, SENSORS), None, CUTTER, conditions)
+    found = measure_force("c", "a", Recording(RATE, whole + drift, SENSORS), None, CUTTER, conditions)
+    assert found.zeroed
+    assert not told.zeroed
+    np.testing.assert_allclose(found.mean, told.mean, atol=0.02 * np.abs(told.mean).max())
+    # only one of them: its level holds for the whole record
+    before = measure_force("c", "a", Recording(RATE, whole[: -idle.shape[0]] + zero, SENSORS), None, CUTTER, conditions)
+    np.testing.assert_allclose(before.mean, told.mean, atol=0.02 * np.abs(told.mean).max())
+
+
 def test_few_lost_samples_are_bridged():
     conditions = plan()[2]
     force = true_force(conditions, 0.4, RATE, 0.3)
@@ -181,7 +201,7 @@ def test_a_force_along_the_axis_gives_the_axial_coefficients(signal):
     assert found.forces.of("K_ac")[0] == pytest.approx(0.15 * TRUE[0], rel=0.03)
     assert found.forces.of("K_ae")[0] == pytest.approx(2e3, rel=0.1)
     assert found.forces.coefficients.axial_ratio == pytest.approx(0.15, rel=0.03)
-    assert found.notes == ("no air cuts: the sensors' own zero level is used",)
+    assert found.notes == ("c0, c1, c2, c3, c4: no air cut and no idle stretch, the sensors' own zero is used",)
 
 
 def test_nothing_usable():
