@@ -45,6 +45,7 @@ from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Too
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.virtual.milling import mill_cut
 from rcsa_ident.virtual.reduction import Poles
+from rcsa_ident.workflows.listen import listen_to
 
 _CUTTER = Cutter(2, 0.012)
 _COEFFICIENTS = CuttingCoefficients(9e8, 0.3)
@@ -72,6 +73,16 @@ def _recordings() -> None:
         for each in (cut, 0.1 * air):
             records.append(Recording(rate, each[:, None] + 1e-9 * rng.standard_normal((each.size, len(sensors))), sensors))
         measure_cut("warm", "warm", records[0], records[1], _CUTTER, _CONDITIONS, _COEFFICIENTS)
+
+
+def _listening() -> None:
+    rng = np.random.default_rng(1)
+    time = np.arange(24000) / 12000.0
+    angle = _SPEED * time * (1.0 + 1e-3 * time)
+    # chatter beside the orders, so that its sidebands are searched, too
+    sound = np.cos(2.0 * angle) + 0.3 * np.cos(angle) + np.cos(2.0 * np.pi * 1234.0 * time) + 0.01 * rng.standard_normal(time.size)
+    for channels in ([sound], [sound, 0.5 * sound]):
+        listen_to(12000.0, channels, Quantity.SOUND)
 
 
 def _lines(outputs: int) -> IdentificationData:
@@ -164,6 +175,7 @@ def _virtual_machine() -> None:
 STEPS: dict[str, Callable[[], None]] = {
     "tool-holder": _tool_holder,
     "recordings": _recordings,
+    "listening": _listening,
     "default method": _default_method,
     "paper's method": _paper_method,
     "tips": _tips,
