@@ -288,7 +288,7 @@ def listen(
     Parameters
     ----------
     recording : path
-        Sound of a phone, text with names and units, or any other format with the names of its channels.
+        Of any format that a campaign reads, or a text table.
     channels : sequence of str
         That are listened to; by default all of one quantity, of a sound the first.
     quantity : Quantity or str, optional

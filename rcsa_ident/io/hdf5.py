@@ -31,6 +31,8 @@ MOST_CHUNKS = 100_000
 MOST_OBJECTS = 10_000
 #: Levels of structs.
 _DEEPEST = 16
+#: Bytes of a unit's name.
+_LONGEST_UNIT = 64
 FILTERS = {
     h5py.h5z.FILTER_DEFLATE: "deflate",
     h5py.h5z.FILTER_SHUFFLE: "shuffle",
@@ -94,6 +96,35 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         raise
     except _BROKEN as error:
         raise InputError("recording", _cause(error), "a complete HDF5 file", where) from None
+
+
+def told_channels(path: Path) -> list[tuple[str, str]]:
+    """Return the vectors of numbers on the root, each with the text of its attribute ``unit`` or ``units``, empty without one."""
+    where = str(path)
+    existing_file(path, "recording", LARGEST_FILE)
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            vectors = [name for name in _hard_links(file, where) if file.get(name, getclass=True) is h5py.Dataset]
+            return [
+                (name, _unit(file[name]))
+                for name in vectors
+                if len(file[name].shape or ()) == 1 and file[name].size > 1 and file[name].dtype.kind in "iuf"
+            ]
+    except InputError:
+        raise
+    except _BROKEN as error:
+        raise InputError("recording", _cause(error), "a complete HDF5 file", where) from None
+
+
+def _unit(dataset: h5py.Dataset) -> str:
+    for name in ("unit", "units"):
+        if not h5py.h5a.exists(dataset.id, name.encode()):
+            continue
+        described = h5py.h5a.open(dataset.id, name.encode())
+        if described.dtype.kind in "SO" and math.prod(described.shape) == 1 and described.dtype.itemsize <= _LONGEST_UNIT:
+            text = np.ravel(dataset.attrs[name])[0]
+            return (text.decode("utf-8", "replace") if isinstance(text, bytes) else str(text))[:_LONGEST_UNIT]
+    return ""
 
 
 def _part(path: Path, name: str, first: int, end: int) -> FloatArray:

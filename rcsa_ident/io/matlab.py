@@ -9,7 +9,8 @@ from __future__ import annotations
 import re
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Protocol
 
@@ -23,6 +24,8 @@ from rcsa_ident.io.validated_table import listed
 
 #: Variables that hold the rate [Hz].
 RATES = (RATE, "Fs", "fs")
+#: Signals of a matrix that are listed.
+_MOST_LISTED = 16
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
@@ -55,6 +58,30 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None, 
     time : str or None
         Name of the vector of times, where the file's names do not tell it.
     """
+    with _tables(path) as tables:
+        return _read(tables, names, default_rate, time, str(path))
+
+
+def told_channels(path: Path) -> list[tuple[str, str]]:
+    """Return the vectors of numbers on the root, and the signals of its matrices, but times and rates, each with an empty unit."""
+    found: list[tuple[str, str]] = []
+    with _tables(path) as tables:
+        for name in tables.names(""):
+            if name in (*TIME_COLUMNS, "t", *RATES):
+                continue
+            try:
+                shape = tables.shape(name)
+            except InputError:  # a text, a struct, a cell
+                continue
+            signals, samples = min(shape), max(shape)
+            if len(shape) == 2 and 0 < signals < samples:
+                found += [(name if signals == 1 else f"{name}({i + 1})", "") for i in range(min(signals, _MOST_LISTED))]
+    return found
+
+
+@contextmanager
+def _tables(path: Path) -> Iterator[Tables]:
+    """What a file of either version tells."""
     where = str(path)
     with existing_file(path, "recording", 1 << 62).open("rb") as file:
         newer = file.read(HEADER + 512 + len(_HDF5))[512 : 512 + len(_HDF5)] == _HDF5
@@ -62,9 +89,10 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None, 
         from rcsa_ident.io.hdf5 import matlab_tables
 
         with matlab_tables(path, (*NUMBERS, "logical")) as tables:
-            return _read(tables, names, default_rate, time, where)
+            yield tables
+        return
     try:
-        return _read(Version5(mapped(path, "recording", LARGEST_FILE), where), names, default_rate, time, where)
+        yield Version5(mapped(path, "recording", LARGEST_FILE), where)
     except (struct.error, zlib.error, UnicodeDecodeError) as error:
         raise InputError("recording", f"one that cannot be read ({error})", COMPLETE, where) from None
 

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.recordings import read_signals
-from rcsa_ident.io.told_tables import OpenChannel, OpenRecording, told_table
+from rcsa_ident.io.channels import RATE
+from rcsa_ident.io.recordings import READERS, SOUND, read_signals
+from rcsa_ident.io.told_tables import OpenChannel, OpenRecording, name_and_unit, of_unit, told_table
 from rcsa_ident.signals.recording import Quantity
 
 #: Tables of text.
 TEXT = (".csv", ".txt", ".dat", ".tsv", ".asc")
-#: Formats of sound.
-_SOUND = {".wav", ".flac", ".ogg", ".oga", ".opus", ".aiff", ".aif", ".caf", ".mp3", ".w64", ".rf64", ".au"}
+#: Formats whose readers list a file's channels.
+_LISTING = {
+    ".h5": "hdf5",
+    ".hdf5": "hdf5",
+    ".tdms": "tdms",
+    ".mat": "matlab",
+    ".parquet": "parquet",
+    ".uff": "uff_records",
+    ".unv": "uff_records",
+}
 
 
 def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: float | None = None, suffix: str = "") -> OpenRecording:
@@ -22,7 +32,7 @@ def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: fl
     Parameters
     ----------
     path : path
-        Formats that do not list their channels here need `names`.
+        Text tables with names and units above them, sound, and the formats whose channels have names and may have units.
     names : sequence of str
         Channels that are wanted; none for all.
     default_rate : float or None [Hz]
@@ -39,12 +49,27 @@ def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: fl
     suffix = (suffix or path.suffix).lower()
     if suffix in TEXT:
         return told_table(path, default_rate)
-    if suffix in _SOUND:
+    if suffix in SOUND:
         return _sound(path, names, suffix)
-    if not names:
-        raise InputError("channel", "none", f"names of channels: those of a file '{suffix}' are not listed here", str(path))
-    rate, signals = read_signals(path, names, default_rate, suffix)
-    return OpenRecording(rate, tuple(OpenChannel(name, "", None, signal[:]) for name, signal in zip(names, signals, strict=True)))
+    if suffix not in _LISTING:
+        raise InputError("recording", f"suffix '{suffix}'", f"one of {', '.join(dict.fromkeys([*TEXT, *READERS]))}", str(path))
+    told: dict[str, str] = dict(import_module(f"rcsa_ident.io.{_LISTING[suffix]}").told_channels(path))
+    units = {name: name_and_unit(name)[1] or unit for name, unit in told.items()}
+    # beside channels of known units there may be others of another length or rate
+    wanted = list(names) or [name for name, unit in units.items() if of_unit(unit)[1] is not None] or list(units)
+    if not wanted:
+        raise InputError("channel", "none", "names of channels: the file has no vectors of numbers at its top", str(path))
+    try:
+        rate, signals = read_signals(path, wanted, default_rate, suffix)
+    except InputError as error:
+        if (error.field, error.found) == (RATE, "nothing"):
+            raise InputError(RATE, "nothing in the file", "the rate [Hz], told", str(path)) from None
+        raise
+    channels = []
+    for name, signal in zip(wanted, signals, strict=True):
+        factor, quantity = of_unit(units.get(name, ""))
+        channels.append(OpenChannel(name, units.get(name, ""), quantity, factor * signal[:]))
+    return OpenRecording(rate, tuple(channels))
 
 
 def _sound(path: Path, names: Sequence[str], suffix: str) -> OpenRecording:

@@ -68,14 +68,8 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     """
     where = str(path)
     raw = mapped(path, "recording", LARGEST_FILE)
-    if len(raw) < 12 or raw[:4] != _MAGIC or raw[-4:] != _MAGIC:
-        raise InputError("recording", "a file that does not begin and end with PAR1", COMPLETE, where)
-    footer = struct.unpack_from("<I", raw, len(raw) - 8)[0]
-    if footer > min(LARGEST_FOOTER, len(raw) - 12):
-        allowed = f"at most {LARGEST_FOOTER // MEGABYTE} MB, inside of the file"
-        raise InputError("recording", f"a description of {footer} bytes", allowed, where)
+    described = _described(raw, where)
     try:
-        described = _struct(raw, len(raw) - 8 - footer)[0]
         wanted, rate = _checked(described, names, default_rate, raw, where)
     except (IndexError, struct.error):
         raise InputError("recording", "a description that cannot be read", COMPLETE, where) from None
@@ -108,6 +102,31 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         return placed(columns[-1][:], columns[:-1], rate)
     except Irregular as error:
         raise InputError(f"column {wanted[-1]} row {error.row + 1}", error.found, error.allowed, where) from None
+
+
+def told_channels(path: Path) -> list[tuple[str, str]]:
+    """Return the names of the columns of numbers but the time, each with an empty unit: the format names none."""
+    where = str(path)
+    try:
+        columns = _structs(_described(mapped(path, "recording", LARGEST_FILE), where), 2)[1:]
+        names = [each[4, _BYTES].decode("utf-8", "replace") for each in columns if (4, _BYTES) in each and _kind(each) in _NUMBERS]
+    except IndexError:
+        raise InputError("recording", "a description that cannot be read", COMPLETE, where) from None
+    return [(name, "") for name in names if name.lower() not in TIME_COLUMNS]
+
+
+def _described(raw: Bytes, where: str) -> Struct:
+    """The description at the file's end."""
+    if len(raw) < 12 or raw[:4] != _MAGIC or raw[-4:] != _MAGIC:
+        raise InputError("recording", "a file that does not begin and end with PAR1", COMPLETE, where)
+    footer = struct.unpack_from("<I", raw, len(raw) - 8)[0]
+    if footer > min(LARGEST_FOOTER, len(raw) - 12):
+        allowed = f"at most {LARGEST_FOOTER // MEGABYTE} MB, inside of the file"
+        raise InputError("recording", f"a description of {footer} bytes", allowed, where)
+    try:
+        return _struct(raw, len(raw) - 8 - footer)[0]
+    except (IndexError, struct.error):
+        raise InputError("recording", "a description that cannot be read", COMPLETE, where) from None
 
 
 def _numbers(table: Any, name: str, pyarrow: Any) -> FloatArray:

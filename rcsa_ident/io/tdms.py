@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import re
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,8 @@ from rcsa_ident.io.files import Bytes, mapped
 from rcsa_ident.io.validated_table import listed
 
 COMPLETE = "a complete TDMS file"
+#: Properties that name a channel's unit.
+_UNITS = ("unit_string", "NI_UnitDescription")
 MOST_SEGMENTS = 100_000
 #: Objects over all segments, as the library lists them, and properties.
 MOST_ENTRIES = 1_000_000
@@ -63,6 +66,28 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     default_rate : float or None [Hz]
         For a file that carries no rate.
     """
+    with _opened(path) as (file, size):
+        return _channels(file, names, default_rate, size, str(path))
+
+
+def told_channels(path: Path) -> list[tuple[str, str]]:
+    """Return the names of a file's channels that hold numbers, each with its unit, empty where the file says none."""
+    with _opened(path) as (file, _):
+        present = [channel for group in file.groups() for channel in group.channels()]
+        units = [str(next((c.properties[key] for key in _UNITS if key in c.properties), "")) for c in present]
+        held = [len(c) > 1 and c.dtype.kind in "iuf" for c in present]
+        return [pair for pair, numbers in zip(zip(_plain_names(present), units, strict=True), held, strict=True) if numbers]
+
+
+def _plain_names(present: Sequence[Any]) -> list[str]:
+    """Names of channels, with their group where another one has the same."""
+    short = [channel.name for channel in present]
+    return [f"{channel.group_name}/{channel.name}" if short.count(channel.name) > 1 else channel.name for channel in present]
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[Any, int]]:
+    """The file as the library has it, its structure checked before, and its size [bytes]."""
     where = str(path)
     raw = mapped(path, "recording", LARGEST_STORED)
     if raw[:4] != b"TDSm":
@@ -78,7 +103,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     try:
         # opened here: given a path, the library would also read an index beside the file
         with np.errstate(all="ignore"), path.open("rb") as opened, TdmsFile.open(opened, raw_timestamps=True) as file:
-            return _channels(file, names, default_rate, len(raw), where)
+            yield file, len(raw)
     except InputError:
         raise
     except Exception as error:
@@ -171,8 +196,7 @@ def _segment_paths(raw: bytes, order: str, size: int, most: int, where: str) -> 
 
 def _channels(file: Any, names: Sequence[str], default: float | None, size: int, where: str) -> tuple[float, list[Channel]]:
     present = [channel for group in file.groups() for channel in group.channels()]
-    short = [channel.name for channel in present]
-    plain = [f"{c.group_name}/{c.name}" if short.count(c.name) > 1 else c.name for c in present]
+    plain = _plain_names(present)
     found = []
     for name in names:
         full = [f"{channel.group_name}/{channel.name}" for channel in present]

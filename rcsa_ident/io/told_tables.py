@@ -183,7 +183,7 @@ def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = (
     for i, (name, unit) in enumerate(zip(names, units, strict=True)):
         if i in time or not (name in wanted or np.ptp(np.nan_to_num(values[:, i])) > 0.0):
             continue
-        factor, quantity = _of_unit(unit)
+        factor, quantity = of_unit(unit)
         channels.append(OpenChannel(name, unit, quantity, np.ascontiguousarray(values[:, i] * factor)))
     if not channels:
         raise InputError("recording", f"columns {listed(names)}", "a column of numbers that move beside the time", where)
@@ -236,9 +236,9 @@ def _header(above: Sequence[str], delimiter: str, width: int, wanted: Sequence[s
     known = len(tables) > 1 and all(cell == "" or _known_unit(cell) for cell in tables[-1])
     if known or (len(tables) > 1 and wanted and set(wanted) <= set(tables[-2]) - set(tables[-1])):
         names, units = tables[-2], tables[-1]
-    found = [_NAME_AND_UNIT.match(name) for name in names]
-    units = [each["unit"].strip() if each and not unit else unit for each, unit in zip(found, units, strict=True)]
-    names = [each["name"].strip() if each else name for each, name in zip(found, names, strict=True)]
+    found = [name_and_unit(name) for name in names]
+    units = [unit or own for (_, own), unit in zip(found, units, strict=True)]
+    names = [name for name, _ in found]
     rate = None
     for line in above:
         match = _RATE_WORDS.search(line)
@@ -248,15 +248,21 @@ def _header(above: Sequence[str], delimiter: str, width: int, wanted: Sequence[s
 
 
 def _known_unit(text: str) -> bool:
-    return (_seconds(text) is not None and text != "") or _of_unit(text)[1] is not None or text in ("-", "%", "rpm", *VOLTAGES)
+    return (_seconds(text) is not None and text != "") or of_unit(text)[1] is not None or text in ("-", "%", "rpm", *VOLTAGES)
 
 
 def _seconds(unit: str) -> float | None:
     return _SECONDS.get(unit.strip().lower())
 
 
-def _of_unit(unit: str) -> tuple[float, Quantity | None]:
-    """SI units per unit and what it measures; (1, None) where it says nothing that is known."""
+def name_and_unit(text: str) -> tuple[str, str]:
+    """Return both of ``name (unit)`` or ``name [unit]``; the unit is empty where none is told."""
+    found = _NAME_AND_UNIT.match(text)
+    return (found["name"].strip(), found["unit"].strip()) if found else (text, "")
+
+
+def of_unit(unit: str) -> tuple[float, Quantity | None]:
+    """Return SI units per unit and what it measures; (1, None) where it says nothing that is known."""
     plain = unit.strip().lower().replace(" ", "").replace("²", "2").replace("^", "").replace("**", "").replace("µ", "u").replace("μ", "u")
     if plain in MOTIONS and MOTIONS[plain][1] in _DERIVATIVES:
         return MOTIONS[plain][0], _DERIVATIVES[MOTIONS[plain][1]]

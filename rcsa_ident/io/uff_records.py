@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -40,10 +41,7 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         For a file that carries no rate.
     """
     where = str(path)
-    existing_file(path, "recording", LARGEST_FILE)
-    records = [f for f in read_uff(path) if f.kind in _TIME_KINDS and f.abscissa_axis.kind in _TIME_AXIS and not np.iscomplexobj(f.values)]
-    if not records:
-        raise InputError("recording", "no time response", f"a function of type 1 ({KINDS[1]}) with real numbers", where)
+    records = _records(path)
     found = [_the_only(name, records, where) for name in names]
     check_lengths(names, [f.values.size for f in found], where)
     rates = [_rate(f, name, default_rate) for name, f in zip(names, found, strict=True)]
@@ -56,6 +54,22 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
         if abs(apart) * rates[0] > 0.5 + _SPREAD * abs(each.abscissa[0]) * rates[0] * 2.0:
             raise InputError(f"start of channel {name}", f"{apart:.3g} s later", f"channels that start together as {names[0]}", each.where)
     return rates[0], [f.values for f in found]
+
+
+def told_channels(path: Path) -> list[tuple[str, str]]:
+    """Return what the file calls its time responses, each by a name of its own, with the label of its unit, empty where it has none."""
+    records = _records(path)
+    every = Counter(name for function in records for name in function.names)
+    named = [(next((name for name in function.names if every[name] == 1), None), function.ordinate.unit) for function in records]
+    return [(name, unit) for name, unit in named if name is not None]
+
+
+def _records(path: Path) -> list[UffFunction]:
+    existing_file(path, "recording", LARGEST_FILE)
+    records = [f for f in read_uff(path) if f.kind in _TIME_KINDS and f.abscissa_axis.kind in _TIME_AXIS and not np.iscomplexobj(f.values)]
+    if not records:
+        raise InputError("recording", "no time response", f"a function of type 1 ({KINDS[1]}) with real numbers", str(path))
+    return records
 
 
 def _the_only(name: str, records: Sequence[UffFunction], where: str) -> UffFunction:

@@ -6,6 +6,7 @@ import io
 import json
 import struct
 
+import h5py
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
@@ -123,6 +124,25 @@ def header(rate: int = 22050, data: int = 0, channels: int = 1, bits: int = 32, 
     return b"RIFF" + struct.pack("<I", 0xFFFFFFFF) + b"WAVEfmt " + struct.pack("<I", 16) + format_ + b"data" + struct.pack("<I", data)
 
 
+def recorder(outside: bool = False) -> bytes:
+    """Two channels of a recorder that tells their unit; or a channel that stands in another file."""
+    file = io.BytesIO()
+    with h5py.File(file, "w") as made:
+        made.attrs["sampling_rate_hz"] = 22050.0
+        for name in ("x", "y"):
+            made.create_dataset(name, data=samples().astype(np.float32)).attrs["unit"] = "m/s^2"
+        if outside:
+            made["z"] = h5py.ExternalLink("/etc/passwd", "x")
+    return file.getvalue()
+
+
+def test_a_recorders_file_tells_itself(http):
+    answer = http.post("/v1/listen", params={"name": "cut.h5"}, content=recorder(), headers={"Content-Type": "application/octet-stream"})
+    assert answer.status_code == 200
+    said = answer.json()
+    assert (said["quantity"], said["channels"], said["verdict"]) == ("acceleration", ["x", "y"], "chatter")
+
+
 HOSTILE = {
     "nothing": (b"", ".wav"),
     "no samples": (header(), ".wav"),
@@ -136,6 +156,9 @@ HOSTILE = {
     "no sound": (b"\x00\xff" * 5000, ".flac"),
     "text that is none": (b"time (s),a (m/s^2)\n" + b"x,y\n" * 1000, ".csv"),
     "a sound as text": (wav(), ".csv"),
+    "a sound as HDF5": (wav(), ".h5"),
+    "HDF5 that is cut off": (recorder()[:-5000], ".h5"),
+    "HDF5 whose links lead out": (recorder(outside=True), ".h5"),
 }
 
 

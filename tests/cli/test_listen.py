@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 
+import h5py
 import numpy as np
 import pytest
 from scipy.io import wavfile
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
+from rcsa_ident.io.hdf5 import write_hdf5
 
 KEYS = {
     "spindle_speed_rpm", "spindle_speed_std_rpm", "speed_wander_percent", "ramp", "teeth", "explained_share", "verdict", "reasons",
@@ -68,3 +70,20 @@ def test_what_is_wrong_is_said(sound, options, words):
     found = run(sound, *options)
     assert found.exit_code == 2
     assert words in found.stderr
+
+
+def test_a_recorders_file_with_units_needs_no_setting(tmp_path):
+    """Channels, quantity and rate as the file tells them; without a unit what is measured is asked for by its option."""
+    time, rng = np.arange(12000) / 6000.0, np.random.default_rng(1)
+    signal = sum(a * np.cos(2.0 * np.pi * 100.0 * m * time) for m, a in {1: 0.1, 4: 0.5, 8: 0.3}.items())
+    path = tmp_path / "record.h5"
+    write_hdf5(path, 6000.0, {name: signal + 0.05 * rng.standard_normal(time.size) for name in ("x", "y")})
+    refused = run(path)
+    assert refused.exit_code == 2
+    assert "--quantity" in refused.output
+    with h5py.File(path, "r+") as file:
+        for name in ("x", "y"):
+            file[name].attrs["unit"] = "g"
+    answer = json.loads(run(path, "--json").stdout)
+    assert (answer["quantity"], answer["channels"], answer["verdict"]) == ("acceleration", ["x", "y"], "stable")
+    assert answer["spindle_speed_rpm"] == pytest.approx(6000.0, abs=0.5)
