@@ -18,7 +18,9 @@ from rcsa_ident.io.frf_files import FORCES, MOTIONS
 from rcsa_ident.io.text_columns import DELIMITERS, LARGEST_TEXT, decoded
 from rcsa_ident.io.time_base import Irregular, uniform
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.remarks import Remark
 from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.signals.verdict import RecordCode
 
 #: A time column, and its unit in seconds.
 _TIME = re.compile(r"^\s*(?:time|t|timestamp|zeit|abscissa)\b", re.IGNORECASE)
@@ -28,6 +30,9 @@ _NAME_AND_UNIT = re.compile(r"^(?P<name>.*?)\s*[(\[](?P<unit>[^()\[\]]*(?:\([^()
 _DERIVATIVES = {0: Quantity.DISPLACEMENT, 2: Quantity.ACCELERATION}
 #: A sampling rate in the lines above a table.
 _RATE_WORDS = re.compile(r"(?:sampl\w*[ _]?(?:rate|freq\w*)|abtastrate)\D*(?P<value>\d+(?:[.,]\d+)?)", re.IGNORECASE)
+#: A line that begins a further measuring cycle, below the numbers of the one before.
+_CYCLE = re.compile(r"\s*cycle (no|number)\b", re.IGNORECASE)
+_FIRST_CYCLE = "only the first of {} measuring cycles was read"
 #: Lines of remarks in front of the names, at most.
 _MOST_HEADER = 200
 #: Bytes of a file in which its first numbers stand.
@@ -114,7 +119,8 @@ def read_channels(path: Path, names: Sequence[str], default_rate: float | None) 
     opened = told_table(path, default_rate, names)
     present = [each.name for each in opened.channels]
     channels = [opened.channels[the_only(name, present, "")] for name in names]
-    return opened.rate, Signals([each.samples for each in channels], units=tuple((each.unit, each.quantity) for each in channels))
+    notes = tuple(Remark(RecordCode.ASSUMED, each) for each in opened.remarks)
+    return opened.rate, Signals([each.samples for each in channels], notes, tuple((each.unit, each.quantity) for each in channels))
 
 
 def _has_preamble(path: Path) -> bool:
@@ -152,8 +158,9 @@ def told_table(path: Path, default_rate: float | None, wanted: Sequence[str] = (
     start, delimiter, comma = _first_numbers(lines, where)
     width = len(_cells(lines[start], delimiter))
     names, units, rate = _header(lines[:start], delimiter, width, wanted)
-    values = _numbers(lines, start, delimiter, comma, width, where)
-    remarks = []
+    cycles = [i for i in range(start, len(lines)) if _CYCLE.match(lines[i])]
+    values = _numbers(lines[: cycles[0] if cycles else None], start, delimiter, comma, width, where)
+    remarks = [_FIRST_CYCLE.format(len(cycles) + 1)] if cycles else []
     time = [i for i, name in enumerate(names) if _TIME.match(name)]
     if not time and default_rate is None and rate is None and np.all(np.diff(values[:, 0]) > 0.0):
         time = [0]

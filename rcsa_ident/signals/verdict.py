@@ -33,7 +33,7 @@ MOST_WANDER = 0.003
 
 
 class RecordCode(StrEnum):
-    """What may be said of a record; the last eight speak of one that may be used."""
+    """What may be said of a record; the last nine speak of one that may be used."""
 
     UNREADABLE = "unreadable"
     NOT_FINITE = "not-finite"
@@ -56,6 +56,7 @@ class RecordCode(StrEnum):
     NO_AIR_CUT = "no-air-cut"
     LOSSY = "lossy"
     CUT_OFF = "cut-off"
+    ASSUMED = "assumed"
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -5,8 +5,10 @@ import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
+from rcsa_ident.io.open_recording import open_recording
 from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.signals.recording import Quantity, Sensor
+from rcsa_ident.signals.verdict import RecordCode
 
 SENSORS = tuple(Sensor(f"F{a}", Quantity.FORCE, a_) for a, a_ in (("x", Dof.X), ("y", Dof.Y), ("z", Dof.Z)))
 N, RATE = 3000, 10000.0
@@ -42,6 +44,24 @@ def test_a_preamble_and_units_are_read(tmp_path, shape, encoding):
     recording = read_recording(tmp_path / "cut.csv", SENSORS)
     assert recording.rate == pytest.approx(RATE, rel=1e-6)
     np.testing.assert_allclose(recording.samples, FORCE, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("time", [True, False])
+def test_of_several_measuring_cycles_the_first_is_read(tmp_path, time):
+    """As DynoWare exports them, one below the other, their times beginning anew; said, on a campaign's recording as well."""
+    first = table(time=time)
+    head, rows = first.split("\n", 5)[:5], "\n".join(first.split("\n")[5:])
+    second = "\n".join(line.replace("1", "2") if i > 1 else line for i, line in enumerate(rows.split("\n")))
+    text = "\n".join([*head[:-1], "Cycles:,2", "Cycle No:,1", rows + "Cycle No:,2", second])
+    (tmp_path / "cut.csv").write_text(text)
+    recording = read_recording(tmp_path / "cut.csv", SENSORS)
+    np.testing.assert_allclose(recording.samples, FORCE, rtol=1e-6, atol=1e-6)
+    assert [(note.code, str(note)) for note in recording.notes] == [(RecordCode.ASSUMED, "only the first of 2 measuring cycles was read")]
+    opened = open_recording(tmp_path / "cut.csv")
+    assert opened.channels[0].samples.size == N
+    assert opened.remarks == ("only the first of 2 measuring cycles was read",)
+    (tmp_path / "cut.csv").write_text(first)
+    assert read_recording(tmp_path / "cut.csv", SENSORS).notes == ()
 
 
 def test_a_plain_table_stays_what_it_was(tmp_path):
