@@ -13,7 +13,7 @@ from itertools import permutations, product
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.cutting.calibration import ForceCalibration, calibrate_mean_force
 from rcsa_ident.cutting.force_record import ForceRecord
 from rcsa_ident.errors import InputError
@@ -43,6 +43,9 @@ class AxesChoice:
     axes: FloatArray
     forces: ForceCalibration
     unexplained: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axes", frozen(self.axes))
 
     @property
     def as_told(self) -> bool:

@@ -18,7 +18,7 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.signals._kernels import order_sums
-from rcsa_ident.signals.recording import Quantity, Recording
+from rcsa_ident.signals.recording import Quantity, Recording, Sensor
 from rcsa_ident.signals.spectra import line_spectrum, refine_speed
 from rcsa_ident.signals.steady_part import hann, steady_part
 from rcsa_ident.signals.verdict import chatter
@@ -61,7 +61,7 @@ class MeasuredForce:
 
     @property
     def once_per_revolution(self) -> FloatArray:
-        """Amplitude at the spindle's own order, shape (c,) [N]: run-out, or a workpiece that turns with nothing else."""
+        """Amplitude at the spindle's own order, shape (c,) [N]: of a cutter with several teeth its run-out."""
         return np.abs(self.record.lines[1])
 
 
@@ -263,12 +263,12 @@ def calibrate(
     choices = axes_choices([measured.record for measured in used]) if any_axes else ()
     if choices:
         used = [replace(measured, record=_turned(measured.record, choices[0].axes)) for measured in used]
-        notes += _on_axes(choices, [sensor.name for sensor in campaign.sensors if sensor.quantity is Quantity.FORCE])
-    whole = (tuple(used), tuple(left_out), tuple(notes))
-    if not signal:
-        return Calibrated(_mean(used), None, choices, *whole)
-    found = calibrate_signal([m.record for m in used], dynamometer, free_helix, _start(used))
-    return Calibrated(_with_axial(found, used), found, choices, *whole)
+        notes += _on_axes(choices, campaign.sensors)
+    found = calibrate_signal([m.record for m in used], dynamometer, free_helix, _start(used)) if signal else None
+    forces = _mean(used) if found is None else _with_axial(found, used)
+    if len(choices) > 1 and choices[1].unexplained < CLEAR * choices[0].unexplained:
+        forces = replace(forces, reasons=(*forces.reasons, "two choices of the sensors' axes explain the force over time nearly alike"))
+    return Calibrated(forces, found, choices, tuple(used), tuple(left_out), tuple(notes))
 
 
 def _turned(record: ForceRecord, axes: FloatArray) -> ForceRecord:
@@ -276,8 +276,10 @@ def _turned(record: ForceRecord, axes: FloatArray) -> ForceRecord:
     return (record if record.lines.shape[1] == axes.shape[0] else record.transverse).seen_through(axes)
 
 
-def _on_axes(choices: Sequence[AxesChoice], names: Sequence[str]) -> list[str]:
-    """What was chosen in words, and how far the next choice is behind."""
+def _on_axes(choices: Sequence[AxesChoice], sensors: Sequence[Sensor]) -> list[str]:
+    """What was chosen in words, and the next choice."""
+    told = {sensor.axis: sensor.name for sensor in reversed(sensors) if sensor.quantity is Quantity.FORCE}
+    names = [told[axis] for axis in (Dof.X, Dof.Y, Dof.Z) if axis in told]
 
     def words(choice: AxesChoice) -> str:
         return ", ".join(f"{name} shows {axis}" for name, axis in zip(names, choice.shown(), strict=False))
@@ -286,9 +288,7 @@ def _on_axes(choices: Sequence[AxesChoice], names: Sequence[str]) -> list[str]:
     left = f"{100.0 * first.unexplained:.0f} % of the force over time unexplained"
     notes = [f"axes of the force on the tool: {words(first)} ({left}){', as told' if first.as_told else ''}"]
     if len(choices) > 1:
-        close = choices[1].unexplained < CLEAR * first.unexplained
-        behind = f"{words(choices[1])} ({100.0 * choices[1].unexplained:.0f} %)"
-        notes.append(f"the next choice of axes explains nearly as much: {behind}" if close else f"next choice of axes: {behind}")
+        notes.append(f"next choice of axes: {words(choices[1])} ({100.0 * choices[1].unexplained:.0f} %)")
     return notes
 
 

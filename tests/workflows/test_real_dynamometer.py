@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -32,9 +33,21 @@ def test_mean_forces_of_three_feeds(slots):
     assert found.forces.of("K_tc")[0] == pytest.approx(959e6, rel=0.05)
     assert not found.forces.reasons
     assert any("Fx shows +Y, Fy shows +X, Fz shows +Z" in note for note in found.notes)
+    # also of sensors that the campaign tells in another order
+    setup = slots[0]
+    turned = calibrate(
+        replace(setup, sensors=setup.sensors[::-1]), partial(read_cut, setup.sensors[::-1], setup.sampling_rate), any_axes=True
+    )
+    assert turned.notes == found.notes
     # whatever the feed: run-out
     once = np.array([m.once_per_revolution[1] for m in found.used])
     assert np.all((once > 76.0) & (once < 93.0))
+
+
+def test_a_choice_that_is_not_clear_is_doubted(slots, monkeypatch):
+    """Were the second choice as near as that, the answer would not pass for settled."""
+    monkeypatch.setattr("rcsa_ident.workflows.calibrate.CLEAR", 10.0)
+    assert "two choices" in calibrate(*slots, any_axes=True).forces.reasons[-1]
 
 
 @pytest.mark.slow
