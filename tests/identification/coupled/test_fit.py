@@ -248,8 +248,11 @@ def test_it_takes_energy_at_every_speed(kind, request):
 
 @pytest.mark.slow(20)
 def test_a_spindle_that_turns_the_other_way_is_told(start):
-    """A left-hand cutter, or X and Y exchanged. So few cuts gain less than `OTHER_SENSE`: here any gain counts."""
-    mirrored = Campaign(12, gyroscopic, -1.0, start, other_sense=20.0)
+    """A left-hand cutter, or X and Y exchanged. So few cuts gain less than `OTHER_SENSE`: here any gain counts.
+
+    With 24 cuts it hung on the last bit.
+    """
+    mirrored = Campaign(20, gyroscopic, -1.0, start, other_sense=20.0)
     found = mirrored.found
     assert found.whole.best.layout.turning == -1
     note = next(str(note) for note in found.notes if note.code is IdentificationCode.PLANES_COUPLED)
