@@ -1,8 +1,8 @@
 """Which channel of a dynamometer shows which force on the tool: every assignment of axes and signs, tried on the cuts themselves.
 
 Mean forces alone tie: turned axes exchange K_tc and K_rc. The force over time alone ties, too: a slot cut by two teeth looks the
-same from four sides. Together they leave one: a cutting force has K_tc > K_rc > 0 and pulls along the axis as it should, and its
-waveform with just these coefficients is the one that was recorded.
+same from four sides. Together they leave one: a cutting force has K_tc above K_rc, which is hardly below zero, and pulls along the
+axis as it should; and its waveform with just these coefficients is the one that was recorded.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ _LISTING = {
 
 
 def open_recording(path: str | Path, names: Sequence[str] = (), default_rate: float | None = None, suffix: str = "") -> OpenRecording:
-    """Return a recording as its file tells it: text tables with names and units above them, and sound, without settings.
+    """Return a recording as its file tells it, without settings: channels, their units and the rate.
 
     Parameters
     ----------
