@@ -8,6 +8,7 @@ from itertools import pairwise
 from playwright.sync_api import Page, expect
 
 from api.client import Client
+from tests.fixtures import by_hand
 from tests.fixtures.service import Served
 
 #: Labels of the chart that lie over each other.
@@ -19,7 +20,8 @@ _OVERPRINTS = """() => {
 
 
 def test_from_an_empty_page_to_a_best_speed(opened, client: Client, served: Served):
-    """Three clicks; each view says the next one."""
+    """Three clicks; each view says the next one, and a tooling of before, last by its name, is not the one that is asked for."""
+    client.write_tooling("VHM of before", by_hand.TOOLING)
     page: Page = opened()
     clicks = 0
 

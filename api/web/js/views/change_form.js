@@ -6,6 +6,8 @@ import { plain, q, quantityListInput, text, unit } from "../units.js";
 import { bodyOf, checked, NUMBERS, QUICK, runoutOf } from "./change_question.js";
 
 const MOST = 12;
+/** The tooling that was written last is what somebody is working on. */
+const newest = (toolings) => toolings.reduce((last, each) => (each.changed >= last.changed ? each : last));
 /** What is folded away until an address says something of it. */
 const FURTHER = ["method", "material", "deep", "ktc", "krc", "runout", "land", "dent", "mu", "power", "torque"];
 
@@ -15,7 +17,7 @@ const FURTHER = ["method", "material", "deep", "ktc", "krc", "runout", "land", "
  */
 export function changeForm({ machine, toolings, materials, kinds, query, onchange }) {
   const named = query.getAll("tooling").filter((name) => toolings.some((tooling) => tooling.name === name));
-  const chosen = new Set(named.length ? named.slice(0, MOST) : [toolings.at(-1).name]);
+  const chosen = new Set(named.length ? named.slice(0, MOST) : [newest(toolings).name]);
   const fields = Object.fromEntries(
     NUMBERS.map(([key, kind, usual, name, , , label]) => {
       const given = query.get(key);
