@@ -72,8 +72,8 @@ def passive(
     residual = np.array([[3e-5, 0.0], [1e-5, 2e-5], [1e-10, -2e-10]])
     softening = 0.01 * rng.standard_normal((m, m)) if outputs == 2 else np.zeros((0, 0))
     softening = softening + softening.T
-    points = np.column_stack([omega, rng.uniform(-1.0, 1.0, n)])
-    holder = np.concatenate([flange, tip], axis=1)
+    points = np.column_stack([omega, rng.uniform(-1.0, 1.0, n), np.ones(n), np.zeros(n)])
+    holder = np.concatenate([flange, tip, np.zeros((n, 3))], axis=1)
     columns = 3 * m + pairs + 7 + (outputs == 2) * (m + 2 + pairs)
     values, gradient = np.empty((n, outputs), dtype=complex), np.empty((n, outputs, columns), dtype=complex)
 

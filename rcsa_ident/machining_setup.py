@@ -13,6 +13,7 @@ from rcsa_ident.cutting.conditions import CuttingConditions, Engagement, feed_di
 from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.materials import material
 from rcsa_ident.cutting.process import MillingProcess, ProcessDamping, SpeedVariation
+from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, IMMERSION, SPINDLE_SPEED, remarks_of
 from rcsa_ident.remarks import Remark
@@ -180,13 +181,63 @@ class Cut(Shown):
 
 
 @dataclass(frozen=True, slots=True, repr=False)
+class HammerTest(Shown):
+    """A receptance that a hammer has shown: of two points of a clamped tool, or of one and the machine's side of the flange.
+
+    Parameters
+    ----------
+    id : str
+    tooling : str
+        Key of the campaign's toolings.
+    axis : Dof
+        X or Y, of response and force.
+    response, force : float or None [m]
+        Distance of the point from the tip; None is the machine's side of the flange, where the cuts' sensors look.
+    file : Path
+    record : int or None
+        Number of the FRF in the file, from 1, where it holds several.
+    units : str or None
+        Of a file that does not tell its own, as ``um/N``.
+    standstill : bool, default True
+        The spindle did not turn.
+    sensor_mass : float, default 0 [kg]
+        Fixed to the tool-holder where the response is measured.
+    band : (float, float) [Hz]
+        Lines that are used.
+    error : float [-]
+        Standard deviation of each line beside its noise, as a share.
+    """
+
+    id: str
+    tooling: str
+    axis: Dof
+    response: float | None
+    force: float | None
+    file: Path
+    record: int | None = None
+    units: str | None = None
+    standstill: bool = True
+    sensor_mass: float = 0.0
+    band: tuple[float, float] = (0.0, np.inf)
+    error: float = 0.02
+
+    def __str__(self) -> str:
+        points = (
+            "the flange" if z is None else "the tip" if z == 0.0 else f"{1e3 * z:g} mm from the tip" for z in (self.response, self.force)
+        )
+        return f"{self.id}: {self.tooling}, {self.axis.upper()}, {' for a force at '.join(points)}"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
 class Campaign(Shown):
-    """Recordings of one machine.
+    """Recordings of one machine, hammer tests beside them or in their place.
 
     Parameters
     ----------
     sampling_rate : float or None [Hz]
         For files that carry none.
+    workpiece : Workpiece or None
+        None of hammer tests alone.
     clock_error : float, default 0
         By what share the recorder's clock runs fast: it takes that many more samples in a second than its files say.
     """
@@ -194,10 +245,24 @@ class Campaign(Shown):
     name: str
     sampling_rate: float | None
     sensors: tuple[Sensor, ...]
-    workpiece: Workpiece
+    workpiece: Workpiece | None
     toolings: Mapping[str, Tooling]
     cuts: tuple[Cut, ...]
     clock_error: float = 0.0
+    tests: tuple[HammerTest, ...] = ()
+
+    @property
+    def coefficients(self) -> CuttingCoefficients:
+        """The workpiece's cutting coefficients.
+
+        Raises
+        ------
+        InputError
+            There is no workpiece.
+        """
+        if self.workpiece is None:
+            raise InputError("workpiece", "nothing", "a table [workpiece] in the campaign of cuts")
+        return self.workpiece.coefficients
 
     def clocked(self, recording: Recording) -> Recording:
         """Return a recording whose rate is that at which its samples were truly taken."""
@@ -216,7 +281,8 @@ class Campaign(Shown):
     def remarks(self) -> tuple[Remark, ...]:
         """What is unusual about its toolings, its workpiece and its cuts; of cuts that share a remark it names the first."""
         found = [remark.of(name) for name, tooling in self.toolings.items() for remark in tooling.remarks]
-        found += [remark.of(self.workpiece.name) for remark in self.workpiece.coefficients.remarks]
+        if self.workpiece is not None:
+            found += [remark.of(self.workpiece.name) for remark in self.workpiece.coefficients.remarks]
         cuts: dict[Remark, list[str]] = {}
         for cut in self.cuts:
             for remark in cut.remarks:
@@ -227,5 +293,8 @@ class Campaign(Shown):
 
     def __str__(self) -> str:
         speeds = to_rpm(np.array([cut.conditions.spindle_speed for cut in self.cuts]))
-        made = f"{self.name}: {len(self.cuts)} cuts with {', '.join(self.toolings)}"
-        return f"{made}, {speeds.min():.0f} to {speeds.max():.0f} rev/min, {self.workpiece.name}" if speeds.size else made
+        counted = [f"{len(self.cuts)} cuts"] * bool(self.cuts or not self.tests) + [f"{len(self.tests)} hammer tests"] * bool(self.tests)
+        made = f"{self.name}: {' and '.join(counted)} with {', '.join(self.toolings)}"
+        if not speeds.size or self.workpiece is None:
+            return made
+        return f"{made}, {speeds.min():.0f} to {speeds.max():.0f} rev/min, {self.workpiece.name}"

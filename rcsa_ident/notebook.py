@@ -129,6 +129,8 @@ def _(result: Result, axis: str | None = None) -> Figure:
     chosen = next(iter(found.axes)) if axis is None else Dof(axis.lower())
     if chosen not in found.axes:
         raise InputError("axis", chosen, f"one of {', '.join(found.axes)}")
+    if not found.cut_ids:
+        return figures.hammer_tests(found.axes[chosen].tests, chosen.upper())
     tooling = {cut.id: cut.tooling for cut in campaign.cuts}
     return figures.cross_frf(found.axes[chosen], [tooling[cut] for cut in found.cut_ids], chosen.upper())
 

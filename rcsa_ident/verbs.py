@@ -68,7 +68,7 @@ def identify(
     processes: int | None = None,
     progress: bool | None = None,
 ) -> Result:
-    """Read and judge all recordings of a campaign, and find modes and joint of the machine that made it.
+    """Read and judge all recordings of a campaign, its hammer tests, too, and find modes and joint of the machine that made it.
 
     Parameters
     ----------
@@ -93,6 +93,7 @@ def identify(
     from functools import partial
 
     from rcsa_ident.identified import Result
+    from rcsa_ident.io.hammer_tests import read_hammer_test
     from rcsa_ident.io.recordings import read_cut
     from rcsa_ident.io.setups import read_campaign
     from rcsa_ident.processes import workers
@@ -103,9 +104,10 @@ def identify(
     with _one_thread(), workers(processes) as pool, _line(progress) as line:
         read = partial(read_cut, campaign.sensors, campaign.sampling_rate)
         readings = workflow.judge(campaign, read, pool.map_many, line.counted("recording"))
+        tests = workflow.hammer_lines(campaign, read_hammer_test)
         line("searching modes")
         with pool.listening(line.tell) as told:
-            found = workflow.identify(campaign, readings, chosen, seed, pool.map, None if line.stream is None else told)
+            found = workflow.identify(campaign, readings, chosen, seed, pool.map, None if line.stream is None else told, tests)
         result = Result.of(found, campaign, readings)
         line.last = str(result)
     return result

@@ -91,6 +91,9 @@ def declare(data: Mapping[str, Any], library: Library) -> tuple[str, str, int]:
     for key, most in (("sensors", MOST_SENSORS), ("cuts", MOST_CUTS), ("toolings", MOST_TOOLINGS)):
         if isinstance(data.get(key), Mapping | list) and len(data[key]) > most:
             raise InputError(key, f"{len(data[key])} of them", f"at most {most}")
+    if "frfs" in data:
+        allowed = "a campaign of cuts: the service does not take hammer tests yet, rcsa-ident identify and the Python package do"
+        raise InputError("frfs", "hammer tests", allowed)
     top = Table(data, "")
     cuts = _cuts(top)
     plain = {**data, "toolings": _toolings(top, cuts, library), "cuts": cuts}

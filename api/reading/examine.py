@@ -112,7 +112,7 @@ def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | 
             if role == "air":
                 reading = judge_air(cut.id, cut.tooling, recording, cut.conditions)
             else:
-                coefficients = campaign.workpiece.coefficients
+                coefficients = campaign.coefficients
                 reading = measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, coefficients)
     except InputError as error:
         reading = Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((Remark(RecordCode.UNREADABLE, str(error)),)))

@@ -87,7 +87,7 @@ def calibrate(
     if found.forces.of("K_tc")[0] <= 0.0:
         why = "; ".join([*found.forces.reasons, *([] if axes is Axes.auto else ["try --axes auto"])])
         raise InputError("K_tc", f"{found.forces.of('K_tc')[0] * 1e-6:.4g} MPa", f"a number above zero ({why})", str(campaign))
-    workpiece = Workpiece(setup.workpiece.name, found.forces.coefficients)
+    workpiece = Workpiece("" if setup.workpiece is None else setup.workpiece.name, found.forces.coefficients)
     write_workpiece(out, workpiece, _remarks(setup, found))
     if plot is not None:
         from rcsa_ident.report.comparison import mean_forces, save

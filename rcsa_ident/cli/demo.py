@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rcsa_ident.cli.common import Json, Seed, Stages, answers, emit, say, warn
-from rcsa_ident.cli.identify import Method, exit_by_status, read_and_judge, result_of, search, warn_left_out
+from rcsa_ident.cli.identify import Method, exit_by_status, read_and_judge, read_tests, result_of, search, warn_left_out
 from rcsa_ident.cli.processes import Processes
 from rcsa_ident.processes import Workers, workers
 from rcsa_ident.units import from_rpm, to_hz, to_rpm
@@ -64,7 +64,7 @@ def demo(
         data, others = _data(data, out, pool, stages)
         campaign, readings = read_and_judge(data, pool, stages)
         extra = _further_toolings(campaign, tooling or others)
-        found = search(campaign, readings, Method.default, seed, pool, stages)
+        found = search(campaign, readings, Method.default, seed, pool, stages, tests=read_tests(campaign))
         deviations = mode_deviations(found)
         result = result_of(found, campaign, readings, deviations)
         write_result(part / "RESULT.json", result)

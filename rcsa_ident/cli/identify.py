@@ -25,13 +25,14 @@ from rcsa_ident.cli.common import (
 from rcsa_ident.cli.processes import Dask, Processes, workers_or_cluster
 from rcsa_ident.errors import InputError
 from rcsa_ident.processes import Workers
-from rcsa_ident.units import to_rpm
+from rcsa_ident.units import to_hz, to_rpm
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from rcsa_ident.arrays import FloatArray
     from rcsa_ident.dynamics.coordinates import Dof
+    from rcsa_ident.identification.hammer_lines import HammerLines
     from rcsa_ident.identification.method import Method as IdentificationMethod
     from rcsa_ident.identification.posterior import PlaneUnknowns, Posterior
     from rcsa_ident.identification.result import Identification
@@ -59,26 +60,45 @@ def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask 
     stages = Stages(quiet=json_)
     with workers_or_cluster(processes, dask) as pool:
         campaign, readings = read_and_judge(campaign_dir, pool, stages)
+    tests = read_tests(campaign)
     rows, open_, remarks = recording_rows(readings), left_open(campaign, readings), campaign.remarks
     usable = sum(row.usable for row in rows)
     few = too_few(each.tooling for each in readings if each.verdict.usable)
     if json_:
         told = {"campaign": campaign.name, "cuts": len(rows), "usable": usable, "too_few": few}
         told |= {"left_open": list(open_), "warnings": list(remarks)}
+        told |= {"hammer_tests": [_about(test) for test in tests]} if tests else {}
         emit(told | {"recordings": [asdict(row) for row in rows]})
     else:
         from rcsa_ident.cli.tables import show_recordings
 
-        show_recordings(rows)
+        if rows:
+            show_recordings(rows)
+        for test in tests:
+            seen = _about(test)
+            band = "{:.0f} to {:.0f} Hz".format(*seen["band_hz"])
+            say(
+                f"hammer test {test.id}: {seen['lines']} lines from {band} are used, each known to {seen['deviation_percent']:.2g} % (median)"
+            )
         for sentence in open_:
             say(f"note: {sentence}")
         for remark in remarks:
             warn(remark)
-        say(f"{usable} of {len(rows)} recordings usable, {stages.seconds['recordings']:.1f} s")
-        if few is not None:
+        if rows:
+            say(f"{usable} of {len(rows)} recordings usable, {stages.seconds['recordings']:.1f} s")
+        if few is not None and not tests:
             warn(few)
-    if not usable:
+    if not usable and not tests:
         raise typer.Exit(BAD_INPUT)
+
+
+def _about(test: HammerLines) -> dict[str, Any]:
+    """What is said of a hammer test before anything is identified."""
+    import numpy as np
+
+    deviation = float(np.median(np.sqrt(2.0 * test.variance) / np.abs(test.value)))
+    band = [float(to_hz(w)) for w in test.omega[[0, -1]]]
+    return {"id": test.id, "lines": test.omega.size, "band_hz": band, "deviation_percent": 100.0 * deviation}
 
 
 @answers
@@ -118,11 +138,12 @@ def identify(
     with workers_or_cluster(processes, dask) as pool:
         known = None if start is None else read_start(start)
         campaign, readings = read_and_judge(campaign_dir, pool, stages)
+        tests = read_tests(campaign)
         if speed_bands > 1:
             from rcsa_ident.workflows.speed_bands import split_by_speed
 
             split_by_speed(readings, speed_bands)
-        found = search(campaign, readings, method, seed, pool, stages, known)
+        found = search(campaign, readings, method, seed, pool, stages, known, tests)
         bands = search_bands(campaign, readings, speed_bands, found, seed, pool, stages)
     from rcsa_ident.workflows.identify import mode_deviations
 
@@ -166,6 +187,14 @@ def read_and_judge(folder: Path, pool: Workers, stages: Stages) -> tuple[Campaig
     return campaign, readings
 
 
+def read_tests(campaign: Campaign) -> tuple[HammerLines, ...]:
+    """Return the lines of a campaign's hammer tests."""
+    from rcsa_ident.io.hammer_tests import read_hammer_test
+    from rcsa_ident.workflows.identify import hammer_lines
+
+    return hammer_lines(campaign, read_hammer_test)
+
+
 def read_start(path: Path) -> Mapping[Dof, Posterior | PlaneUnknowns]:
     """Return what an earlier answer gives to start from.
 
@@ -191,11 +220,14 @@ def search(
     pool: Workers,
     stages: Stages,
     start: Mapping[Dof, Posterior | PlaneUnknowns] | None = None,
+    tests: Sequence[HammerLines] = (),
 ) -> Identification:
-    """Return the identification by the method of that name; the default one may start from an earlier answer."""
+    """Return the identification by the method of that name; the default one may start from an earlier answer, and takes hammer tests."""
     from rcsa_ident.workflows import identify as workflow
 
     chosen: IdentificationMethod
+    if method is Method.paper and tests:
+        raise InputError("--method", "paper, with hammer tests", "the default method, which knows of them")
     if method is Method.paper:
         from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 
@@ -205,7 +237,7 @@ def search(
 
         chosen = EvidenceSelection(start=start)
     with stages.stage("identification") as line, pool.listening(line.tell) as progress:
-        return workflow.identify(campaign, readings, chosen, seed, pool.map, progress if stages.visible else None)
+        return workflow.identify(campaign, readings, chosen, seed, pool.map, progress if stages.visible else None, tests)
 
 
 def search_bands(

@@ -68,7 +68,9 @@ def show_identification(found: Identification, deviations: Mapping[Dof, tuple[Fl
     """Print status, modes with their standard deviations, joint, coefficients and misfit, and what the data cannot tell."""
     out = console()
     colour = _COLOURS[str(found.status)]
-    out.print(f"status [bold {colour}]{found.status}[/], method {found.method}, seed {found.seed}, {len(found.cut_ids)} cuts used")
+    tests = sum(len(part.tests) for part in found.axes.values())
+    used = f"{len(found.cut_ids)} cuts used" + (f", {tests} hammer tests" if tests else "")
+    out.print(f"status [bold {colour}]{found.status}[/], method {found.method}, seed {found.seed}, {used}")
     for reason in found.reasons:
         out.print(f"  [{colour}]{escape(reason)}[/]")
     if found.whole is not None:
@@ -82,6 +84,14 @@ def show_identification(found: Identification, deviations: Mapping[Dof, tuple[Fl
         misfit = ", ".join(f"{escape(name)} {value:.2f}" for name, value in part.per_tooling.items())
         name = "" if found.whole is None else f"{axis.upper()}: "
         out.print(f"  {name}chi²/point {part.chi2_per_point:.2f} ({misfit}), unexplained share of a line {100 * part.model_error:.2f} %")
+        for test in part.tests:
+            met = f"met within {100 * test.error:.1f} %, gain {test.gain:.3f} ± {two_digits(test.gain_std)}"
+            out.print(f"  hammer test {escape(test.lines.id)}: {test.lines.omega.size} lines, {met}")
+        if part.standstill is not None:
+            frequency, frequency_std, damping, damping_std = (100.0 * value for value in part.standstill)
+            changed = f"frequencies by {two_digits(frequency_std, frequency)} ± {two_digits(frequency_std)} %"
+            changed += f", damping by {two_digits(damping_std, damping)} ± {two_digits(damping_std)} %"
+            out.print(f"  {axis.upper()} at standstill is higher than turning: {changed}")
     if found.axes:
         joint = next(iter(found.axes.values())).joint
         out.print(

@@ -42,22 +42,27 @@ def cross_frf(omega_n, psi, factor, softening, residual, joint, points, holder, 
     B = psi^T (K - w^2 + i w factor factor^T)^-1 psi + R, K_ij = omega_i omega_j (delta_ij + x softening_ij);
     output b (a row: the flange's own, or the fixture's, or their difference) answers g = b x with
     x = (A22 + K_joint^-1 + B)^-1 A21 e0; dg = db x - y^T (dB + dK_joint^-1) x, y = (A22 + K_joint^-1 + B)^-1 b^T.
+    A point of the tool-holder answers c + b x with b = -A_p2 and c its direct receptance, the machine's motion not being its own.
 
     Parameters
     ----------
     omega_n : (m,); psi : (m, 3) flange t, flange r, fixture; factor : (m, m) lower triangular
     softening : (m, m) symmetric, or (0, 0) where nothing changes with speed
     residual : (3, 2): lower triangular factor of the flange's R; row 2: fixture to flange t and r, as it is
-    joint : (4,) k_t, k_r, c_t, c_r; points : (n, 2) omega, x; holder : (n, 5) A22 tt, tr, rr, A21 e0 t, r
+    joint : (4,) k_t, k_r, c_t, c_r, or (6,) with the shares by which natural frequencies and damping differ where the spindle stands still
+    points : (n, 4) omega, x, 1 for motions of the machine and 0 for those of the tool-holder, 1 where the spindle stands still
+    holder : (n, 8) A22 tt, tr, rr, A21 e0 t, r, c and b of a point of the tool-holder (zeros for the machine's)
 
     One output is the flange's motion; two are gap (flange less fixture) and fixture. The gradient's columns: log omega_n (m),
     psi's first two columns by rows (2 m), factor's lower triangle by rows, B's tt, tr, rr (3), with two outputs psi's third
-    column (m) and the fixture's residual (2), with softening its lower triangle by rows, joint (4).
+    column (m) and the fixture's residual (2), with six of the joint what standing still changes (2), with softening its lower triangle
+    by rows, joint (4).
     """
     m = omega_n.size
     outputs = values.shape[1]
     soft = softening.shape[0] > 0
     damping = factor @ factor.T
+    stills = joint.size == 6
     r_tt = residual[0, 0] ** 2
     r_tr = residual[0, 0] * residual[1, 0]
     r_rr = residual[1, 0] ** 2 + residual[1, 1] ** 2
@@ -69,15 +74,19 @@ def cross_frf(omega_n, psi, factor, softening, residual, joint, points, holder, 
     lp = np.empty(m, dtype=np.complex128)
     lq = np.empty(m, dtype=np.complex128)
     for f in range(points.shape[0]):
-        w, x = points[f]
+        w, x, own, still = points[f]
+        stiffer, slower = 1.0, 1.0
+        if stills:
+            stiffer, slower = (1.0 + still * joint[4]) ** 2, 1.0 + still * joint[5]
         for i in range(m):
             for j in range(i + 1):
                 k_ij = omega_n[i] ** 2 if i == j else 0.0
                 if soft:
                     k_ij += x * softening[i, j] * omega_n[i] * omega_n[j]
+                k_ij *= stiffer
                 stiffness[i, j] = k_ij
                 stiffness[j, i] = k_ij
-                dynamic[i, j] = complex(k_ij - (w * w if i == j else 0.0), w * damping[i, j])
+                dynamic[i, j] = complex(k_ij - (w * w if i == j else 0.0), w * slower * damping[i, j])
             for a in range(3):
                 u[i, a] = psi[i, a]
         _factor_solve(dynamic, u, 1 + outputs)
@@ -99,10 +108,15 @@ def cross_frf(omega_n, psi, factor, softening, residual, joint, points, holder, 
             q[i] = u[i, 0] * x0 + u[i, 1] * x1
         for o in range(outputs):
             # share of flange and fixture in the output
-            flange = 1.0 if o == 0 else 0.0
-            fixture = 0.0 if outputs == 1 else 2.0 * o - 1.0
+            flange = own if o == 0 else 0.0
+            fixture = 0.0 if outputs == 1 else own * (2.0 * o - 1.0)
             b_t, b_r = flange * b_tt + fixture * s_t, flange * b_tr + fixture * s_r
-            values[f, o] = b_t * x0 + b_r * x1
+            values[f, o] = 0.0
+            if o == 0:
+                b_t += holder[f, 6]
+                b_r += holder[f, 7]
+                values[f, o] = holder[f, 5]
+            values[f, o] += b_t * x0 + b_r * x1
             if gradient.shape[0] == 0:
                 continue
             y0 = (e_rr * b_t - e_tr * b_r) * inverse
@@ -132,7 +146,7 @@ def cross_frf(omega_n, psi, factor, softening, residual, joint, points, holder, 
                 row[m + 2 * i] = v0 * q[i] + p[i] * x0
                 row[m + 2 * i + 1] = v1 * q[i] + p[i] * x1
                 for j in range(i + 1):
-                    row[k] = complex(0.0, -w) * (p[i] * lq[j] + lp[j] * q[i])
+                    row[k] = complex(0.0, -w * slower) * (p[i] * lq[j] + lp[j] * q[i])
                     k += 1
             row[k] = v0 * x0
             row[k + 1] = v0 * x1 + v1 * x0
@@ -144,9 +158,19 @@ def cross_frf(omega_n, psi, factor, softening, residual, joint, points, holder, 
                 row[k + m] = fixture * x0
                 row[k + m + 1] = fixture * x1
                 k += m + 2
+            if stills:
+                # all natural frequencies, and all of the damping, by a share
+                elastic, lost = complex(0.0, 0.0), complex(0.0, 0.0)
+                for i in range(m):
+                    lost += lp[i] * lq[i]
+                    for j in range(m):
+                        elastic += p[i] * stiffness[i, j] * q[j]
+                row[k] = -2.0 * still / (1.0 + still * joint[4]) * elastic
+                row[k + 1] = complex(0.0, -w * still) * lost
+                k += 2
             if soft:
                 for i in range(m):
-                    scale = -x * omega_n[i]
+                    scale = -x * stiffer * omega_n[i]
                     for j in range(i):
                         row[k] = scale * omega_n[j] * (p[i] * q[j] + p[j] * q[i])
                         k += 1

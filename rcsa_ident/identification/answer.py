@@ -25,7 +25,7 @@ from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import evidence
 from rcsa_ident.identification.parameters import Layout, parameter_names, planes
 from rcsa_ident.identification.posterior import Posterior
-from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
+from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode, MetTest, Standstill
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.flange_part import JointedFlange
 from rcsa_ident.remarks import Remark
@@ -37,6 +37,7 @@ WIDER, WIDER_TOGETHER = 1.4, 1.7
 #: Share of the largest motion above which it is told how much of it the other axis' force makes.
 LARGE = 0.3
 #: Said of a campaign whose cuts push the tool in like directions.
+PLANES_NOT_ASKED = "with hammer tests X and Y are taken for planes that feel nothing of each other: that was not asked"
 ANOTHER_FEED = "all cuts push the tool in like directions: cuts fed along Y beside those along X would about halve the uncertainty"
 
 
@@ -94,15 +95,48 @@ class Fit(ABC):
             seed=seed,
             method=method,
             **self.machines(),
-            cut_ids=data.cut_ids,
-            delay=evaluation.nuisance[:, 0],
-            delay_std=evaluation.linear.delay_std(self.covariance),
-            spindle_speed=data.spindle_speed,
+            cut_ids=data.cut_ids[: data.cuts],
+            delay=evaluation.nuisance[: data.cuts, 0],
+            delay_std=evaluation.linear.delay_std(self.covariance)[: data.cuts],
+            spindle_speed=data.spindle_speed[: data.cuts],
             trace=(),
             notes=tuple(notes),
             # the smooth errors stand behind them, unnamed
             coefficients=dict(zip(data.coefficients, scales, strict=False)),
         )
+
+    def _gain(self, k: int) -> tuple[float, float]:
+        """Value and standard deviation of the gain of a hammer test, as a logarithm."""
+        place = self.solution.layout.force.start + len(self.data.coefficients) + k
+        return float(self.solution.theta[place]), float(np.sqrt(self.covariance[place, place]))
+
+    def _still(self, i: int) -> Standstill | None:
+        """What standing still changes in an axis, where cuts and tests at standstill tell it."""
+        if not self.data.stands_still:
+            return None
+        layout = planes(self.solution.layout)
+        places = layout.axis(i).start + np.arange(layout.axes[i].size)[layout.axes[i].still]
+        if not places.size:
+            return None
+        values, deviations = self.solution.theta[places].tolist(), np.sqrt(np.diag(self.covariance)[places]).tolist()
+        return Standstill(values[0], deviations[0], values[1], deviations[1])
+
+    def _tests(self, i: int) -> tuple[MetTest, ...]:
+        """How the hammer tests of an axis were met."""
+        data, misfit, evaluation = self.data, self.misfit, self.solution.evaluation
+        axis = misfit.data.axes[i]
+        rest = evaluation.residual.lines[i]
+        half = rest.size // 2
+        found = []
+        for k, test in enumerate(data.tests):
+            own = np.flatnonzero(axis.cut == data.cuts + k)
+            if not own.size:
+                continue
+            gain, std = self._gain(k)
+            squares = (rest[own] ** 2 + rest[half + own] ** 2) / misfit.cut_weight[data.cuts + k]
+            model = np.sum(evaluation.models[i], axis=1)[own] * np.exp(-1j * axis.omega[own] * evaluation.nuisance[data.cuts + k, 0])
+            found.append(MetTest(test, model, float(np.exp(gain)), float(np.exp(gain)) * std, float(squares.mean() / 2.0)))
+        return tuple(found)
 
     def _axis(self, i: int, **machine: Any) -> AxisResult:
         """The answer of one axis: its machine as it is given, and how its lines were met."""
@@ -115,18 +149,21 @@ class Fit(ABC):
         per_tooling = {name: float(squares[tooling == t].mean() / 2.0) for t, name in enumerate(data.toolings) if np.any(tooling == t)}
         measured = misfit.without_delay(i, solution.evaluation.nuisance)
         response = np.abs(measured) ** 2
+        lines = {
+            "omega": axis.omega,
+            "value": measured,
+            "model": np.sum(solution.evaluation.models[i], axis=1),
+            "tooling": tooling,
+            "cut": axis.cut,
+            "coherence": response / np.maximum(response + 2.0 * axis.noise, 1e-300),
+        }
         return AxisResult(
             chi2_per_point=float(squares.mean() / 2.0),
             per_tooling=per_tooling,
             model_error=misfit.model_error[i],
-            measured={
-                "omega": axis.omega,
-                "value": measured,
-                "model": np.sum(solution.evaluation.models[i], axis=1),
-                "tooling": tooling,
-                "cut": axis.cut,
-                "coherence": response / np.maximum(response + 2.0 * axis.noise, 1e-300),
-            },
+            measured={name: values[axis.cut < data.cuts] for name, values in lines.items()} if data.tests else lines,
+            tests=self._tests(i),
+            standstill=self._still(i),
             **machine,
         )
 
@@ -167,7 +204,7 @@ class PlaneFit(Fit):
         found = []
         for i in range(len(self.data.axes)):
             entries = _entries(layout, i)
-            own, other = replace(layout.axes[i], fixture=False), self.rival.theta[_entries(others, i)]
+            own, other = replace(layout.axes[i], fixture=False, standstill=False), self.rival.theta[_entries(others, i)]
             covariance = self.covariance[np.ix_(entries, entries)]
             found.append(Posterior(self.solution.theta[entries], covariance, own, self.data.speed_range, (other,)))
         return found
@@ -179,7 +216,10 @@ class PlaneFit(Fit):
         reasons = diagnose(data, self.solution, self.misfit, bands, two_solutions(data, self.searched))
         known = zip(data.axes, self.posteriors, strict=True)
         natural = {str(axis.axis).upper(): posterior.machine(axis.axis)[0].omega_n for axis, posterior in known}
-        return reasons, remarks(data, self.solution, self.misfit, self.covariance, natural)
+        found = remarks(data, self.solution, self.misfit, self.covariance, natural)
+        if data.tests and len(data.axes) > 1:
+            found.append(Remark(IdentificationCode.PLANES_NOT_ASKED, PLANES_NOT_ASKED))
+        return reasons, found
 
 
 def _entries(layout: Layout, i: int) -> np.ndarray:

@@ -12,6 +12,7 @@ from rcsa_ident.cutting.force import SLOPES, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement
 
@@ -31,6 +32,8 @@ Turning = Callable[[FloatArray, FloatArray], tuple[ComplexArray, ComplexArray]]
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisData:
     """Points of one axis, sorted by cut and, in a cut, by order; each with one output (the flange's motion) or two (gap, fixture).
+
+    Behind the cuts stand hammer tests (`HammerLines`), as cuts of one output without an air cut whose forces are measured.
 
     Parameters
     ----------
@@ -55,6 +58,12 @@ class AxisData:
         `force_slope` of the other axis' force, without smooth errors.
     beside : array, shape (n, o) or (0, o) [m^2/N^2]
         What is added to the lines' own power where their model error is a share of it.
+    on_holder : array of bool, shape (n,) or (0,)
+        Points whose motion is the tool-holder's, not the machine's; empty where there are none.
+    still : array of bool, shape (n,) or (0,)
+        Points at which the spindle did not turn; empty where there are none.
+    point : complex array, shape (n, 3) or (0, 3) [m/N]
+        Of those: their free receptance to the force, and minus that to the flange: t, r.
     """
 
     axis: Dof
@@ -70,12 +79,34 @@ class AxisData:
     across: ComplexArray = field(default_factory=lambda: np.zeros(0, dtype=complex))
     across_slope: ComplexArray = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     beside: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    on_holder: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    still: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    point: ComplexArray = field(default_factory=lambda: np.zeros((0, 3), dtype=complex))
 
     def __post_init__(self) -> None:
         for name in ("omega", "order", "variance", "beside"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
-        for name in ("lines", "flange", "tip", "force_slope", "force", "across", "across_slope"):
+        for name in ("lines", "flange", "tip", "force_slope", "force", "across", "across_slope", "point"):
             object.__setattr__(self, name, frozen(getattr(self, name), np.complex128))
+        for name in ("on_holder", "still"):
+            object.__setattr__(self, name, frozen(getattr(self, name), np.bool_))
+
+    def kernel_points(self, relative_speed: FloatArray) -> FloatArray:
+        """Return frequency, relative speed, whose motion it is, and whether the spindle stands, as the kernel takes them, shape (n, 4).
+
+        Parameters
+        ----------
+        relative_speed : array, shape (n,)
+        """
+        own = ~self.on_holder if self.on_holder.size else np.ones(self.omega.size)
+        still = self.still if self.still.size else np.zeros(self.omega.size)
+        return np.column_stack([self.omega, relative_speed, own, still])
+
+    @property
+    def kernel_holder(self) -> ComplexArray:
+        """The tool-holders' receptances as the kernel takes them, shape (n, 8) [m/N]."""
+        point = self.point if self.point.size else np.zeros((self.omega.size, 3))
+        return np.concatenate([self.flange, self.tip, point], axis=1)
 
     @property
     def outputs(self) -> int:
@@ -149,7 +180,7 @@ class CutPrior:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IdentificationData:
-    """All cuts of a campaign.
+    """All cuts of a campaign, and behind them its hammer tests: cuts without an air cut whose forces are measured.
 
     Parameters
     ----------
@@ -169,6 +200,8 @@ class IdentificationData:
         Their standard deviations; behind them those of smooth errors, which have no name.
     turning : mapping of tooling to Turning
         Its receptances while it turns; empty where nobody asks for them.
+    tests : tuple of HammerLines
+        The last of the cuts. Their gains have no name among the coefficients either and stand in front of the smooth errors.
     """
 
     cut_ids: tuple[str, ...]
@@ -182,6 +215,17 @@ class IdentificationData:
     coefficients: tuple[ForceCoefficient, ...] = ()
     coefficient_spread: tuple[float, ...] = ()
     turning: Mapping[str, Turning] = field(default_factory=dict)
+    tests: tuple[HammerLines, ...] = ()
+
+    @property
+    def cuts(self) -> int:
+        """Number of cuts that are none of the hammer's tests."""
+        return len(self.cut_ids) - len(self.tests)
+
+    @property
+    def stands_still(self) -> bool:
+        """Whether some of the points belong to a spindle that stands still, and others to one that turns."""
+        return self.cuts > 0 and any(test.standstill for test in self.tests)
 
     @property
     def clampings(self) -> int:
@@ -191,7 +235,10 @@ class IdentificationData:
     @property
     def speed_range(self) -> tuple[float, float]:
         """Middle of the spindle speeds and half their range [rad/s]; the latter 0 where nothing can change with speed."""
-        low, high = float(np.min(self.spindle_speed)), float(np.max(self.spindle_speed))
+        speed = self.spindle_speed[: self.cuts]
+        if speed.size == 0:
+            return 0.0, 0.0
+        low, high = float(np.min(speed)), float(np.max(speed))
         return 0.5 * (low + high), 0.5 * (high - low)
 
     @property
@@ -208,9 +255,9 @@ class IdentificationData:
 
     @property
     def relative_speed(self) -> FloatArray:
-        """Spindle speed of each cut, from -1 at the lowest to 1 at the highest, shape (k,) [-]."""
+        """Spindle speed of each cut, from -1 at the lowest (and where it stands still) to 1 at the highest, shape (k,) [-]."""
         middle, half = self.speed_range
-        return (self.spindle_speed - middle) / half if half > 0.0 else np.zeros(self.spindle_speed.size)
+        return np.maximum((self.spindle_speed - middle) / half, -1.0) if half > 0.0 else np.zeros(self.spindle_speed.size)
 
     def with_smooth_errors(self, share: float, terms: int = 4) -> IdentificationData:
         """Return the same data whose lines may be wrong by a smooth factor of their frequency, for each axis and tooling.

@@ -93,13 +93,13 @@ def diagnose(
             doubt(IdentificationCode.WEAK_SIGNAL, words)
     for axis, share in zip(data.axes, misfit.model_error, strict=True):
         if share > WORST_MODEL_ERROR:
+            causes = "cutting coefficients, toolings, tooth count or sensor signs may be wrong, or the dynamics change with speed"
             doubt(
                 IdentificationCode.UNEXPLAINED,
                 f"{str(axis.axis).upper()}: the model leaves {100 * share:.1f} % of each line unexplained "
-                f"(limit {100 * WORST_MODEL_ERROR:g} %): cutting coefficients, toolings, tooth count or sensor signs may be wrong, "
-                "or the dynamics change with speed",
+                f"(limit {100 * WORST_MODEL_ERROR:g} %): {causes if data.cuts else 'drawings of the toolings or places of the hits may be wrong'}",
             )
-    bad = misfit.cut_weight < 1.0
+    bad = _contradicting(data, misfit)
     if np.mean(bad) > MOST_BAD_CUTS:
         words = f"cuts that contradict the others: {np.sum(bad)} of {bad.size}, namely {_named(data, bad, misfit)}"
         doubt(IdentificationCode.CONTRADICTING_CUTS, words)
@@ -112,11 +112,13 @@ def diagnose(
                 f"(limit {100 * LARGEST_BAND:g} %), several times that with tools that were never cut: more or quieter cuts are needed",
             )
     if len(data.toolings) < FEWEST_TOOLINGS:
-        words = "only one tooling: translation and slope of the flange cannot be separated; cut with a second, different holder"
+        how = "cut with" if data.cuts else "hit"
+        words = f"only one tooling: translation and slope of the flange cannot be separated; {how} a second, different holder"
         doubt(IdentificationCode.ONE_TOOLING, words)
     for t, name in enumerate(data.toolings):
-        count = int(np.sum(data.cut_tooling == t))
-        if count < FEWEST_CUTS:
+        count = int(np.sum(data.cut_tooling[: data.cuts] == t))
+        # a hammer hits all frequencies at once
+        if count < FEWEST_CUTS and name not in {test.tooling for test in data.tests}:
             doubt(IdentificationCode.FEW_CUTS, f"too few cuts: {count} with {name}, at least {FEWEST_CUTS} are needed")
     return reasons
 
@@ -192,7 +194,7 @@ def remarks(
             share = 100.0 * min(std, before)
             words = f"{coefficient}: hardly determined by the cuts; its standard deviation is {share:.1f} %, close to the prior's"
             note(IdentificationCode.COEFFICIENT_UNKNOWN, words)
-    bad = misfit.cut_weight < 1.0
+    bad = _contradicting(data, misfit)
     if 0.0 < np.mean(bad) <= MOST_BAD_CUTS:
         words = f"cuts that contradict the others and were given less weight: {_named(data, bad, misfit)}"
         note(IdentificationCode.CUTS_WEIGHTED_DOWN, words)
@@ -206,6 +208,11 @@ def one_axis(axis: Dof) -> str:
         f"only {own} was recorded: whether X and Y feel each other cannot be told, and where they do, what the force in {other} "
         f"does in {own} is taken for the machine's own; nothing is known of the tool's motion in {other}: limits and FRFs take it for rigid"
     )
+
+
+def _contradicting(data: IdentificationData, misfit: Misfit) -> np.ndarray:
+    """Cuts with less weight than they would have by their noise; of hammer tests beside cuts nobody expects that."""
+    return misfit.cut_weight[: data.cuts or None] < 1.0
 
 
 def _named(data: IdentificationData, bad: np.ndarray, misfit: Misfit) -> str:

@@ -318,8 +318,7 @@ def _lines(axis: AxisData, spindle_speed: FloatArray, posterior: Posterior) -> t
     middle, half = posterior.speed_range
     # as `Posterior.machine`: outside the campaign's speeds the nearest of them answers
     x = np.clip((spindle_speed - middle) / half, -1.0, 1.0) if half > 0.0 else np.zeros(spindle_speed.size)
-    points = np.column_stack([axis.omega, x])
-    holder = np.concatenate([axis.flange, axis.tip], axis=1)
+    points, holder = axis.kernel_points(x), axis.kernel_holder
     values, slopes = _cross(posterior.theta, posterior.layout, points, holder, True)
     rivals = [_cross(r, posterior.layout_of(r.size - JOINT), points, holder, False)[0] - values for r in posterior.rivals]
     return values, np.column_stack([slopes @ _directions(posterior), *rivals])

@@ -254,7 +254,10 @@ def refine_and_learn_noise(
 def _start(data: IdentificationData, found: Candidate, softening: bool) -> tuple[FloatArray, Layout, FloatArray]:
     """Return a vector with all that the data may tell, from one with less: what is new starts at nothing."""
     old = planes(found.layout)
-    axes = tuple(replace(a, fixture=axis.outputs == 2, softening=softening) for a, axis in zip(old.axes, data.axes, strict=True))
+    axes = tuple(
+        replace(a, fixture=axis.outputs == 2, softening=softening, standstill=data.stands_still and bool(np.any(axis.still)))
+        for a, axis in zip(old.axes, data.axes, strict=True)
+    )
     layout = Layout(axes, len(data.coefficient_spread), data.clampings)
     parts = [pack(unpack(found.theta[old.axis(i)], old.axes[i]), axes[i]) for i in range(len(axes))]
     force = np.zeros(layout.coefficients)

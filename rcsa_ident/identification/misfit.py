@@ -168,7 +168,8 @@ class Misfit:
             gradient = np.empty((n if normal else 0, o, part.size + JOINT), dtype=complex)
             psi = np.column_stack([axis.psi, axis.fixture])
             residual = np.vstack([axis.residual, axis.fixture_residual])
-            cross_frf(axis.omega_n, psi, axis.factor, axis.softening, residual, joint, lines.points, lines.holder, values, gradient)
+            both = np.append(joint, axis.standstill)
+            cross_frf(axis.omega_n, psi, axis.factor, axis.softening, residual, both, lines.points, lines.holder, values, gradient)
             if layout.coefficients:
                 scale = np.exp(lines.force_slope @ theta[layout.force])[:, None]
                 values *= scale
@@ -265,8 +266,8 @@ class WeightedLines:
     def __init__(self, axis: AxisData, relative_speed: FloatArray, model_error: float, cut_weight: FloatArray) -> None:
         o = axis.outputs
         self.outputs = o
-        self.points = np.column_stack([axis.omega, relative_speed[axis.cut]])
-        self.holder = np.concatenate([axis.flange, axis.tip], axis=1)
+        self.points = axis.kernel_points(relative_speed[axis.cut])
+        self.holder = axis.kernel_holder
         self.force_slope = axis.force_slope
         self.omega, self.order, self.cut = np.repeat(axis.omega, o), np.repeat(axis.order, o), np.repeat(axis.cut, o)
         self.lines = axis.lines.reshape(-1, 2)

@@ -343,18 +343,22 @@ def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> t
     shares = []
     for i, (axis, rest) in enumerate(zip(data.axes, solution.evaluation.residual.lines, strict=True)):
         weight = misfit.weight(i).ravel()
+        # beside cuts, what hammer tests leave unexplained is theirs alone: see `cut_weights`
+        asked = np.repeat((axis.cut < data.cuts) | (data.cuts == 0), axis.outputs)
         # a cut that contradicts the others does not count against them here, either
         counted = np.repeat(misfit.cut_weight[axis.cut], axis.outputs)
         squares = counted * (rest[: weight.size] ** 2 + rest[weight.size :] ** 2) / weight
         size = axis.power.ravel()
-        shares.append(_share(squares, axis.variance.ravel(), size, 2.0 * weight.size * free, smallest))
+        freedom = 2.0 * float(np.sum(asked)) * free
+        shares.append(_share(squares[asked], axis.variance.ravel()[asked], size[asked], freedom, smallest))
     return tuple(shares)
 
 
 def cut_weights(solution: Solution, misfit: Misfit) -> FloatArray:
     """Return a factor on each cut's weights, shape (k,): 1, or less for a cut whose lines miss the model far more than most do.
 
-    A cut whose mean square is more than `OUTLYING` times the median gets as much variance as it shows.
+    A cut whose mean square is more than `OUTLYING` times the median gets as much variance as it shows, a hammer test beside cuts
+    whatever it shows: nobody else knows how well it was hit.
     """
     cuts = len(misfit.data.cut_ids)
     squares, lines = np.zeros(cuts), np.zeros(cuts)
@@ -365,8 +369,9 @@ def cut_weights(solution: Solution, misfit: Misfit) -> FloatArray:
         lines += 2.0 * axis.outputs * np.bincount(axis.cut, minlength=cuts)
     # as the cut would stand with its full weight
     mean = squares / np.maximum(lines, 1.0) / misfit.cut_weight
-    usual = float(np.median(mean[lines > 0.0])) if np.any(lines > 0.0) else 0.0
-    out = mean > OUTLYING * usual
+    own = np.arange(cuts) < misfit.data.cuts if misfit.data.cuts else np.ones(cuts, dtype=bool)
+    usual = float(np.median(mean[own & (lines > 0.0)])) if np.any(own & (lines > 0.0)) else 0.0
+    out = mean > np.where(own, OUTLYING, 1.0) * usual
     return np.where(out & (usual > 0.0), usual / np.maximum(mean, 1e-300), 1.0)
 
 

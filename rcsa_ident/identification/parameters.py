@@ -2,8 +2,8 @@
 
 One axis with m modes: log natural frequencies (m), mass-normalised shapes (2 m: translation, lever x slope), the lower
 triangle of the damping factor L by rows (diagonal as logarithm), the residual compliance's factor (3); where gap and fixture
-are two outputs the fixture's shapes (m) and its residual to the flange (2); where the machine changes with speed the lower
-triangle of its softening by rows. All axes follow each other. What they share stands at the end: the joint's four logarithms,
+are two outputs the fixture's shapes (m) and its residual to the flange (2); where hammer tests at standstill stand beside cuts what
+that changes (2); where the machine changes with speed the lower triangle of its softening by rows. All axes follow each other. What they share stands at the end: the joint's four logarithms,
 logarithms of the cutting coefficients' scales, tooth angles of the clampings. With D = L L^T and R = R_f R_f^T every vector is
 a passive machine with real modes.
 """
@@ -11,7 +11,7 @@ a passive machine with real modes.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -41,11 +41,14 @@ class AxisLayout:
         Gap and fixture are two outputs; else their sum, the flange's own motion, is the only one.
     softening : bool
         The stiffness changes with the spindle's speed.
+    standstill : bool
+        Some of the lines belong to a spindle that stands still: all natural frequencies and all damping may differ by a share there.
     """
 
     modes: int
     fixture: bool = False
     softening: bool = False
+    standstill: bool = False
 
     @property
     def core(self) -> int:
@@ -60,11 +63,17 @@ class AxisLayout:
     @property
     def size(self) -> int:
         """Length of the axis' part of the vector."""
-        return self.core + (self.modes + 2) * self.fixture + self.pairs * self.softening
+        return self.core + (self.modes + 2) * self.fixture + 2 * self.standstill + self.pairs * self.softening
+
+    @property
+    def still(self) -> slice:
+        """Places in the axis' part of what standing still changes."""
+        first = self.core + (self.modes + 2) * self.fixture
+        return slice(first, first + 2 * self.standstill)
 
     @property
     def machine(self) -> np.ndarray:
-        """Places in the axis' part of all that describes the flange: core and softening, but not the fixture."""
+        """Places in the axis' part of all that describes the flange while it turns: core and softening, but not the fixture."""
         places = np.arange(self.size)
         return np.concatenate([places[: self.core], places[self.size - self.pairs * self.softening :]])
 
@@ -175,6 +184,8 @@ class AxisParameters:
         Residual compliance between fixture and the flange's translation and slope.
     softening : array, shape (m, m) or (0, 0) [-]
         Symmetric: K_ij = omega_i omega_j (delta_ij + x softening_ij) at relative speed x.
+    standstill : array, shape (2,) or (0,) [-]
+        Shares by which natural frequencies and damping matrix differ where the spindle stands still; empty where no line tells it.
     """
 
     omega_n: FloatArray
@@ -184,6 +195,7 @@ class AxisParameters:
     fixture: FloatArray
     fixture_residual: FloatArray
     softening: FloatArray
+    standstill: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def order(self) -> int:
@@ -255,7 +267,8 @@ def unpack(part: FloatArray, layout: AxisLayout) -> AxisParameters:
         softening = np.zeros((m, m))
         softening[rows, cols] = softening[cols, rows] = part[-layout.pairs :]
     residual = np.array([[a, 0.0], [b, c]])
-    return AxisParameters(np.exp(part[:m]), part[m : 3 * m].reshape(m, 2), factor, residual, fixture, fixture_residual, softening)
+    still = part[layout.still]
+    return AxisParameters(np.exp(part[:m]), part[m : 3 * m].reshape(m, 2), factor, residual, fixture, fixture_residual, softening, still)
 
 
 def pack(axis: AxisParameters, layout: AxisLayout | None = None) -> FloatArray:
@@ -267,6 +280,8 @@ def pack(axis: AxisParameters, layout: AxisLayout | None = None) -> FloatArray:
     parts = [np.log(axis.omega_n), axis.psi.ravel(), lower, axis.residual[[0, 1, 1], [0, 0, 1]] / RESIDUAL_UNIT]
     if layout.fixture:
         parts += [axis.fixture, axis.fixture_residual / FIXTURE_UNIT]
+    if layout.standstill:
+        parts.append(axis.standstill if axis.standstill.size else np.zeros(2))
     if layout.softening:
         parts.append(axis.softening[rows, cols] if axis.softening.size else np.zeros(layout.pairs))
     return np.concatenate(parts)
@@ -280,6 +295,8 @@ def chain(axis: AxisParameters, layout: AxisLayout) -> FloatArray:
     parts = [np.ones(3 * m), factor, np.full(3, RESIDUAL_UNIT)]
     if layout.fixture:
         parts += [np.ones(m), np.full(2, FIXTURE_UNIT)]
+    if layout.standstill:
+        parts.append(np.ones(2))
     if layout.softening:
         parts.append(np.ones(layout.pairs))
     return np.concatenate(parts)
@@ -315,6 +332,7 @@ def selected(axis: AxisParameters, modes: np.ndarray) -> AxisParameters:
         axis.fixture[modes],
         axis.fixture_residual,
         softening,
+        axis.standstill,
     )
 
 
@@ -346,6 +364,7 @@ def with_mode(axis: AxisParameters, omega_n: float, psi: tuple[float, float], ze
         np.append(0.0, axis.fixture),
         axis.fixture_residual,
         softening,
+        axis.standstill,
     )
 
 

@@ -33,6 +33,8 @@ class Priors:
         Spread of the logarithms of these.
     softening : float [-]
         Spread of the stiffness' change from the middle of the campaign's speeds to its ends, as a share.
+    standstill : (float, float) [-]
+        Spreads of the shares by which natural frequencies and damping differ while the spindle stands still.
     skew : float [-]
         Spread of an entry of the gyroscopic coupling G: 0.05 splits a pair of modes at 20 000 rev/min by 8 Hz to either side.
     tooth_angle : float [rad]
@@ -49,6 +51,7 @@ class Priors:
     joint: tuple[float, float, float, float] = (2e9, 5e6, 1e3, 10.0)
     joint_spread: float = 1.5
     softening: float = 0.03
+    standstill: tuple[float, float] = (0.01, 0.2)
     skew: float = 0.05
     tooth_angle: float = 10.0
 
@@ -111,6 +114,8 @@ def prior_rows(layout: Layout, priors: Priors, coefficients: tuple[float, ...] =
         ]
         if axis.fixture:
             parts += [np.full(m, priors.shape), np.full(2, priors.residual**2)]
+        if axis.standstill:
+            parts.append(np.array(priors.standstill))
         if axis.softening:
             parts.append(np.full(axis.pairs, priors.softening))
         middle = np.zeros(axis.size)

@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
-from rcsa_ident.arrays import FloatArray
+from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.cutting.force import ForceCoefficient
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
+from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.progress import Step
@@ -47,7 +49,52 @@ class IdentificationCode(StrEnum):
     PLANES_COUPLED = "planes-coupled"
     ONE_AXIS = "one-axis"
     ONE_FEED = "one-feed-direction"
+    PLANES_NOT_ASKED = "planes-not-asked"
     CUTS_WEIGHTED_DOWN = "cuts-weighted-down"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MetTest:
+    """How the answer meets one hammer test.
+
+    Parameters
+    ----------
+    lines : HammerLines
+    model : complex array, shape (n,) [m/N]
+        At the test's lines, its gain and what standing still changes included.
+    gain, gain_std : float [-]
+        By which the test differs from the model, and its standard deviation.
+    chi2_per_point : float [-]
+        Mean squared residual in standard deviations, before the test was given less weight.
+    """
+
+    lines: HammerLines
+    model: ComplexArray
+    gain: float
+    gain_std: float
+    chi2_per_point: float
+
+    @property
+    def error(self) -> float:
+        """Norm of the model's difference from the test, over the test's."""
+        return float(np.linalg.norm(self.model - self.lines.value) / np.linalg.norm(self.lines.value))
+
+
+class Standstill(NamedTuple):
+    """By which shares a machine whose spindle stands still differs from one whose spindle turns, with their standard deviations.
+
+    Parameters
+    ----------
+    frequency, frequency_std : float [-]
+        Of all natural frequencies.
+    damping, damping_std : float [-]
+        Of all damping.
+    """
+
+    frequency: float
+    frequency_std: float
+    damping: float
+    damping_std: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +117,11 @@ class AxisResult:
     posterior : Posterior or None
         None where the method gives no covariance.
     measured : mapping with arrays omega, value, model, cut (index), coherence
-        Lines without delay beside the model's: what a plot shows.
+        Lines without delay beside the model's: what a plot shows. The cuts' alone; empty arrays without cuts.
+    tests : tuple of MetTest
+        The axis' hammer tests.
+    standstill : Standstill or None
+        Where such tests at standstill stand beside cuts.
     """
 
     modes: ModalModel
@@ -81,6 +132,8 @@ class AxisResult:
     parameters: tuple[str, ...]
     posterior: Posterior | None
     measured: Mapping[str, FloatArray]
+    tests: tuple[MetTest, ...] = ()
+    standstill: Standstill | None = None
 
     @property
     def machine(self) -> MachineAxis:
@@ -147,6 +200,8 @@ class Identification(Shown):
     def band(self) -> tuple[float, float]:
         """Lowest and highest identified line [rad/s]; all that a recording may hold where the identification carries no lines."""
         omega = [axis.measured["omega"] for axis in self.axes.values() if "omega" in axis.measured]
+        omega += [test.lines.omega for axis in self.axes.values() for test in axis.tests]
+        omega = [each for each in omega if each.size]
         if not omega:
             return 0.0, 2.0 * np.pi * MAX_FREQUENCY
         return float(min(w.min() for w in omega)), float(max(w.max() for w in omega))
@@ -180,10 +235,11 @@ class Identification(Shown):
 
     def __str__(self) -> str:
         modes = {str(axis): part.modes.omega_n.size for axis, part in self.axes.items()}
-        return in_words(str(self.status), len(self.cut_ids), modes, self.reasons)
+        tests = sum(len(part.tests) for part in self.axes.values())
+        return in_words(str(self.status), len(self.cut_ids), modes, self.reasons, tests)
 
 
-def in_words(status: str, cuts: int, modes: Mapping[str, int], reasons: Sequence[str]) -> str:
+def in_words(status: str, cuts: int, modes: Mapping[str, int], reasons: Sequence[str], tests: int = 0) -> str:
     """Return what an identification has come to: a line, and a second one where something speaks against it.
 
     Parameters
@@ -195,7 +251,10 @@ def in_words(status: str, cuts: int, modes: Mapping[str, int], reasons: Sequence
         How many each has.
     reasons : sequence of str
         Why it is not simply converged.
+    tests : int
+        Hammer tests that were used.
     """
-    line = ", ".join([status, f"{cuts} cuts", *(f"{axis.upper()} {count} mode{'s'[: count != 1]}" for axis, count in modes.items())])
+    used = [f"{cuts} cuts"] * bool(cuts or not tests) + [f"{tests} hammer test{'s'[: tests != 1]}"] * bool(tests)
+    line = ", ".join([status, *used, *(f"{axis.upper()} {count} mode{'s'[: count != 1]}" for axis, count in modes.items())])
     further = f" (and {len(reasons) - 1} more)" if len(reasons) > 1 else ""
     return f"{line}\n{reasons[0]}{further}" if reasons else line

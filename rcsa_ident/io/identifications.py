@@ -67,9 +67,10 @@ def identification_to_json(
             "name": campaign.name,
             "cuts_used": len(identification.cut_ids),
             "cuts_left_out": [{"id": cut, "reason": reason} for cut, reason in left_out],
+            **({"hammer_tests": [test.id for test in campaign.tests]} if campaign.tests else {}),
         },
         "sensors": {sensor.name: _sensor_to_json(sensor) for sensor in campaign.sensors},
-        "workpiece": workpiece_keys(campaign.workpiece, all_spreads=True),
+        **({} if campaign.workpiece is None else {"workpiece": workpiece_keys(campaign.workpiece, all_spreads=True)}),
         "coefficients": {str(each): _coefficient(each, *found) for each, found in identification.coefficients.items()},
         "band_hz": [to_hz(w) for w in identification.band],
         "axes": _axes_to_json(identification, deviations or {}),
@@ -131,6 +132,20 @@ def _axis_to_json(axis: AxisResult, deviation: tuple[FloatArray, FloatArray] | N
         data["covariance"] = {"parameters": list(axis.parameters), "matrix": posterior.covariance.tolist()}
     data["misfit"] = {"chi2_per_point": axis.chi2_per_point, "per_tooling": dict(axis.per_tooling)}
     data["model_error"] = axis.model_error
+    if axis.standstill is not None:
+        names = ("frequency_percent", "frequency_std_percent", "damping_percent", "damping_std_percent")
+        data["standstill"] = dict(zip(names, (100.0 * value for value in axis.standstill), strict=True))
+    if axis.tests:
+        data["hammer_tests"] = {
+            test.lines.id: {
+                "lines": test.lines.omega.size,
+                "error": test.error,
+                "gain": test.gain,
+                "gain_std": test.gain_std,
+                "chi2_per_point": test.chi2_per_point,
+            }
+            for test in axis.tests
+        }
     return data
 
 

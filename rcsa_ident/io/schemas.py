@@ -81,6 +81,27 @@ _CAMPAIGNS = (
         "toolings": {"S1": "toolings/S1.toml"},
         "cuts": [{"id": "1", "tooling": "S1", "spindle_speed_rpm": 8000.0, **_ANGLES, "cut": "recordings/1.h5"}],
     },
+    {
+        "toolings": {"S1": "toolings/S1.toml"},
+        "frfs": [
+            {"id": "1", "tooling": "S1", "axis": "X", "response": "tip", "force": 80.0, "file": "frfs/1.frf"},
+            {
+                "id": "2",
+                "tooling": "S1",
+                "axis": "X",
+                "response": "tip",
+                "force": "tip",
+                "file": "frfs/1.uff",
+                "record": 2,
+                "units": "um/N",
+                "standstill": True,
+                "sensor_mass_g": 4.0,
+                "from_hz": 200.0,
+                "to_hz": 4000.0,
+                "error_percent": 3.0,
+            },
+        ],
+    },
 )
 _BEARING = {"position_mm": 48.0, "stiffness": [3.6e8, 3.3e8], "damping": [8.5e3, 7.6e3]}
 _HOUSING = {
@@ -126,7 +147,7 @@ def _read_campaign(data: Mapping[str, Any]) -> object:
 #: missing from one of them.
 _FILES: dict[str, tuple[str, Callable[[Mapping[str, Any]], object], Iterable[Mapping[str, Any]]]] = {
     "tooling": ("A holder, a tool clamped in it, and the cutter", lambda data: tooling_of(data, "", "tooling"), _TOOLINGS),
-    "campaign": ("campaign.toml: sensors, workpiece, toolings and cuts", _read_campaign, _CAMPAIGNS),
+    "campaign": ("campaign.toml: sensors, workpiece, toolings, cuts and hammer tests", _read_campaign, _CAMPAIGNS),
     "machine": ("MACHINE.toml: a virtual machine", lambda data: machine_of(data, "", "machine", Path()), _MACHINES),
     "modes": ("MODES.toml: modes of the tip", lambda data: modes_of(data, ""), _MODES),
 }

@@ -14,6 +14,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
+from rcsa_ident.io.hammer_tests import HAMMER_TEST_KEYS, hammer_test_of
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
@@ -50,7 +51,7 @@ _SEGMENT = (
 )
 _CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
 _MATERIAL = ("youngs_modulus_gpa", "density", "poisson", "loss_factor")
-_CAMPAIGN = ("campaign", "sensors", "workpiece", "toolings", "cuts")
+_CAMPAIGN = ("campaign", "sensors", "workpiece", "toolings", "cuts", "frfs")
 _SENSOR = ("quantity", "axis", "sensitivity", "delay_s", "bandwidth_hz", "role", "mount_resonance_hz")
 _TRIGGER = ("quantity", "sensitivity", "delay_s", "bandwidth_hz", "pulses_per_revolution", "tooth_angle_deg")
 _CUT = (
@@ -218,28 +219,31 @@ def campaign_of(
     tooling : callable
         Given the table ``[toolings]`` and one of its keys, returns that tooling.
     locate : callable
-        Given the table of a cut and its key ``cut`` or ``air``, returns the recording's file.
+        Given the table of a cut and its key ``cut`` or ``air``, or that of a hammer test and ``file``, returns the file.
     """
     top = Table(data, where, known=_CAMPAIGN)
     head = top.table("campaign", ("name", "sampling_rate_hz", "clock_error_percent"), {})
     name = head.text("name", name)
     rate = head.number("sampling_rate_hz", "Hz", None, above=0.0, most=1e8)
     clock = head.number("clock_error_percent", "%", 0.0, least=-2.0, most=2.0) * 1e-2
-    channels = top.table("sensors")
+    # hammer tests alone need neither sensors nor a workpiece
+    alone = "frfs" in top and "cuts" not in top
+    channels = top.table("sensors", None, *([{}] if alone else []))
     sensors = tuple(sensor_of(key, channels.data[key], where) for key in channels)
-    if not sensors:
+    if not sensors and not alone:
         top.refuse("sensors", "an empty table", "at least one table [sensors.<channel>]")
     _check_roles(sensors, top)
-    workpiece = workpiece_of(top.table("workpiece", WORKPIECE_KEYS))
+    workpiece = None if alone and "workpiece" not in top else workpiece_of(top.table("workpiece", WORKPIECE_KEYS))
     named = top.table("toolings")
     toolings = {key: tooling(named, key) for key in named}
-    cuts = tuple(_cut(table, toolings, locate) for table in top.tables("cuts", _CUT))
-    seen: dict[str, int] = {}
-    for i, cut in enumerate(cuts):
-        if cut.id in seen:
-            raise InputError(f"cuts[{i}].id", f'"{cut.id}", the id of cuts[{seen[cut.id]}]', "an id of its own", where)
-        seen[cut.id] = i
-    return Campaign(name, rate, sensors, workpiece, toolings, cuts, clock)
+    cuts = () if alone else tuple(_cut(table, toolings, locate) for table in top.tables("cuts", _CUT))
+    tests = tuple(hammer_test_of(table, toolings, locate) for table in top.tables("frfs", HAMMER_TEST_KEYS)) if "frfs" in top else ()
+    seen: dict[str, str] = {}
+    for place, id in [*((f"cuts[{i}]", cut.id) for i, cut in enumerate(cuts)), *((f"frfs[{i}]", test.id) for i, test in enumerate(tests))]:
+        if id in seen:
+            raise InputError(f"{place}.id", f'"{id}", the id of {seen[id]}', "an id of its own", where)
+        seen[id] = place
+    return Campaign(name, rate, sensors, workpiece, toolings, cuts, clock, tests)
 
 
 def _check_roles(sensors: Sequence[Sensor], top: Table) -> None:

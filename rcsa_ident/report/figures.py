@@ -19,7 +19,7 @@ from matplotlib.ticker import MaxNLocator
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification.progress import BOTH, Stage, Step
-from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.result import AxisResult, Identification, MetTest
 from rcsa_ident.units import to_hz
 
 #: Distinct for colour-blind readers, too (Okabe & Ito), and dark enough on white.
@@ -127,6 +127,39 @@ def cross_frf(axis: AxisResult, tooling: Sequence[str], name: str) -> Figure:
             bottom.set_yticks([-180, -90, 0, 90, 180])
             bottom.set_xlabel("frequency [Hz]")
         grid[0, 0].set_ylabel("|C31|  [µm/N]")
+        grid[1, 0].set_ylabel("phase [°]")
+        grid[0, -1].legend(loc="upper right")
+    return figure
+
+
+def hammer_tests(tests: Sequence[MetTest], name: str) -> Figure:
+    """Hammer tests and the fitted receptances, magnitude and phase, a column for each test.
+
+    Parameters
+    ----------
+    tests : sequence of MetTest
+        Of one axis.
+    name : str
+        X or Y.
+    """
+    figure, grid = _grid(2, len(tests), 4.6, (1.6, 1.0))
+    with mpl.rc_context(_STYLE):
+        for column, test in enumerate(tests):
+            frequency = to_hz(test.lines.omega)
+            top, bottom = grid[:, column]
+            top.plot(frequency, 1e6 * np.abs(test.lines.value), "o", ms=2.6, mfc="none", mec=COLOURS[name], mew=0.8, label="hammer")
+            top.plot(frequency, 1e6 * np.abs(test.model), color=_TRUTH, lw=1.0, label="fitted")
+            for value, style in (
+                (test.lines.value, {"color": COLOURS[name], "lw": 2.4, "alpha": 0.5}),
+                (test.model, {"color": _TRUTH, "lw": 1.0}),
+            ):
+                bottom.plot(frequency, _without_jumps(np.degrees(np.angle(value))), **style)
+            top.set_yscale("log")
+            top.set_title(f"{name}: {test.lines.id}", parse_math=False)
+            bottom.set_ylim(-190.0, 190.0)
+            bottom.set_yticks([-180, -90, 0, 90, 180])
+            bottom.set_xlabel("frequency [Hz]")
+        grid[0, 0].set_ylabel("receptance  [µm/N]")
         grid[1, 0].set_ylabel("phase [°]")
         grid[0, -1].legend(loc="upper right")
     return figure

@@ -117,7 +117,7 @@ def report_html(
         recordings=rows,
         left_out=[row for row in rows if not row.usable],
         noted=sum(bool(row.notes) for row in rows),
-        coefficients=campaign.workpiece.coefficients,
+        coefficients=None if campaign.workpiece is None else campaign.workpiece.coefficients,
         axes=[
             _axis(axis.upper(), part, [tooling_of[c] for c in found.cut_ids], (deviations or {}).get(axis))
             for axis, part in found.axes.items()
@@ -248,6 +248,7 @@ def _axis(name: str, part: AxisResult, tooling: Sequence[str], deviation: tuple[
         "band": (float(to_hz(omega.min())), float(to_hz(omega.max()))) if omega.size else None,
         "points": omega.size,
         "figure": figures.svg(figures.cross_frf(part, tooling, name), f"cross{name}") if omega.size else "",
+        "hammer": figures.svg(figures.hammer_tests(part.tests, name), f"hammer{name}") if part.tests else "",
     }
 
 

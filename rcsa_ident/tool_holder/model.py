@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +13,7 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import PoleModel
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.structure import Structure, poles
+from rcsa_ident.errors import InputError
 from rcsa_ident.tool_holder.geometry import BeamSegment, Contact, ToolAssembly
 from rcsa_ident.tool_holder.timoshenko import (
     Section,
@@ -95,10 +97,23 @@ def free_body(
     axis: Dof = Dof.X,
     shear_coefficient: ShearCoefficient = cowper,
     refinement: int = 1,
+    points: Sequence[float] = (),
 ) -> FreeBody:
-    """Return what `tool_holder_structure` does, with the rotary inertia apart and the rigid-body motions."""
+    """Return what `tool_holder_structure` does, with the rotary inertia apart and the rigid-body motions.
+
+    Parameters
+    ----------
+    assembly : ToolAssembly
+    max_frequency : float [Hz]
+    axis : Dof
+    shear_coefficient : callable
+    refinement : int
+    points : sequence of float [m]
+        Further points that the structure has coordinates at, behind tip and flange: distances from the tip, of the tool in front of the
+        holder's nose and of the holder from there on.
+    """
     layered = assembly.contact is not None and assembly.insertion > 0.0
-    stations, elements = _mesh(assembly, max_frequency, shear_coefficient, refinement, merged=not layered)
+    stations, elements = _mesh(assembly, max_frequency, shear_coefficient, refinement, not layered, points)
     length = np.diff(stations)
     first_freedom, d = _number(elements, stations.size, layered)
     mass, damping, stiffness, loss, rotary = (np.zeros((d, d)) for _ in range(5))
@@ -112,13 +127,65 @@ def free_body(
         assert assembly.contact is not None
         _tie(elements, freedoms, length, assembly.contact, stiffness, damping)
     tip, flange = (first_freedom[_node(e.body, e.first + end)] for e, end in ((elements[0], 0), (elements[-1], 1)))
-    index = np.array([tip, tip + 1, flange, flange + 1])
+    outer = [_node(int(_key(z) >= _key(assembly.stickout)), int(np.argmin(np.abs(stations - z)))) for z in points]
+    # where both are one beam, its nodes are the tool's
+    further = [first_freedom[node if node in first_freedom else (node[0], 0)] for node in outer]
+    index = np.array([i + own for i in (tip, flange, *further) for own in (0, 1)])
     rigid = np.zeros((d, 2))
     for (station, kind), number in first_freedom.items():
         if kind < 2:
             rigid[number], rigid[number + 1] = (1.0, stations[station]), (0.0, 1.0)
-    structure = Structure(mass, damping, stiffness, loss, (*plane("tip", axis), *plane("flange", axis)), index)
+    coordinates = (*plane("tip", axis), *plane("flange", axis), *(each for z in points for each in plane(point_name(z), axis)))
+    structure = Structure(mass, damping, stiffness, loss, coordinates, index)
     return FreeBody(structure, rotary, rigid)
+
+
+def point_name(z: float) -> str:
+    """Return what a point of a tool-holder is called, from its distance to the tip [m]."""
+    return f"{1e3 * z:g} mm"
+
+
+def receptance_at_points(
+    assembly: ToolAssembly, omega: FloatArray, points: Sequence[float], sensor: tuple[float, float] | None = None, axis: Dof = Dof.X
+) -> Receptance:
+    """Return the free-free receptances between tip, flange and further points, shape (n, 4 + 2 k, 4 + 2 k).
+
+    Parameters
+    ----------
+    assembly : ToolAssembly
+    omega : array, shape (n,) [rad/s]
+    points : sequence of float [m]
+        Distances from the tip, as `free_body` takes them; `point_name` tells what they are called.
+    sensor : (float, float) or None [m], [kg]
+        Where a sensor is fixed to the assembly, one of the points, and its mass.
+    axis : Dof
+        The bending plane.
+
+    Raises
+    ------
+    InputError
+        If a point lies outside the assembly.
+
+    Examples
+    --------
+    >>> from rcsa_ident.tool_holder.geometry import MATERIALS
+    >>> steel = MATERIALS["steel"]
+    >>> bar = ToolAssembly((BeamSegment(0.1, 0.02, steel),), (BeamSegment(0.1, 0.05, steel),), insertion=0.02)
+    >>> receptance_at_points(bar, np.array([6e3]), [0.05]).values.shape
+    (1, 6, 6)
+    """
+    length = assembly.stickout + assembly.holder_length
+    for z in points:
+        if not 0.0 <= z <= length:
+            raise InputError("points", f"{1e3 * z:g} mm from the tip", f"0 to {1e3 * length:g} mm, the assembly's length")
+    omega = np.asarray(omega, dtype=float)
+    structure = free_body(assembly, float(omega.max()) / (2.0 * np.pi), axis, points=points).structure
+    if sensor is not None:
+        place = structure.index[4 + 2 * list(points).index(sensor[0])]
+        mass = structure.mass.copy()
+        mass[place, place] += sensor[1]
+        structure = replace(structure, mass=mass)
+    return poles(structure, float(omega.max())).receptance(omega)
 
 
 def tool_holder_receptance(
@@ -174,11 +241,16 @@ def mesh_error(assembly: ToolAssembly, omega: FloatArray, shear_coefficient: She
 
 
 def _mesh(
-    assembly: ToolAssembly, max_frequency: float, shear_coefficient: ShearCoefficient, refinement: int, merged: bool
+    assembly: ToolAssembly,
+    max_frequency: float,
+    shear_coefficient: ShearCoefficient,
+    refinement: int,
+    merged: bool,
+    points: Sequence[float] = (),
 ) -> tuple[FloatArray, list[_Element]]:
     """Stations along z and the elements between them, from the tip to the flange."""
     pieces = _pieces(assembly)
-    steps = sorted({_key(z) for _, first, last, _ in pieces for z in (first, last)})
+    steps = sorted({_key(z) for _, first, last, _ in pieces for z in (first, last)} | {_key(z) for z in points})
     stations, elements = [0.0], []
     for a, b in ((a * 1e-9, b * 1e-9) for a, b in pairwise(steps)):
         middle = 0.5 * (a + b)

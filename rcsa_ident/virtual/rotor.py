@@ -5,6 +5,7 @@ Own assembly and own solution; shared with the identification's model are only t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.virtual.machine import PerAxis, VirtualSpindle
-from rcsa_ident.virtual.mesh import SHAFT, TOOL, Mesh, add_tooling, element_edges, nanometres
+from rcsa_ident.virtual.mesh import HOLDER, SHAFT, TOOL, Mesh, add_tooling, element_edges, nanometres
 
 _AXES = (Dof.X, Dof.Y)
 _SLOPES = (Dof.SLOPE_X, Dof.SLOPE_Y)
@@ -54,7 +55,7 @@ class Rotor:
         return np.array([known.index(name) for name in names])
 
 
-def rotor(spindle: VirtualSpindle, tooling: ToolAssembly | None, refinement: int = 1) -> Rotor:
+def rotor(spindle: VirtualSpindle, tooling: ToolAssembly | None, refinement: int = 1, points: Mapping[str, float] | None = None) -> Rotor:
     """Return the assembled rotor; without a tooling, the spindle alone with its flange free.
 
     Parameters
@@ -64,6 +65,8 @@ def rotor(spindle: VirtualSpindle, tooling: ToolAssembly | None, refinement: int
         None is the bare spindle.
     refinement : int
         Divides every element further: for convergence studies.
+    points : mapping of str to float [m], optional
+        Further ports on the holder, by their distance from the tip: the nearest node's.
     """
     mesh = Mesh()
     if tooling is not None:
@@ -82,10 +85,14 @@ def rotor(spindle: VirtualSpindle, tooling: ToolAssembly | None, refinement: int
     gyroscopic = scipy.sparse.csc_array(scipy.sparse.block_array([[None, -2.0 * turning], [2.0 * turning, None]], format="csc"))
     ports, coordinates = [], []
     arm = spindle.housing.position - spindle.fixture_position
-    points = {"flange": ((2 * nodes[0], 1.0),), "fixture": ((2 * housing, 1.0), (2 * housing + 1, -arm))}
+    places = {"flange": ((2 * nodes[0], 1.0),), "fixture": ((2 * housing, 1.0), (2 * housing + 1, -arm))}
     if tooling is not None:
-        points = {"tip": ((2 * mesh.nodes[TOOL, 0], 1.0),), **points}
-    for point, terms in points.items():
+        places = {"tip": ((2 * mesh.nodes[TOOL, 0], 1.0),), **places}
+        on_holder = [z for body, z in mesh.nodes if body == HOLDER]
+        for name, distance in ({} if points is None else points).items():
+            nearest = min(on_holder, key=lambda z: abs(z - nanometres(distance)))
+            places[name] = ((2 * mesh.nodes[HOLDER, nearest], 1.0),)
+    for point, terms in places.items():
         for axis in (0, 1):
             row = np.zeros(2 * freedoms)
             for index, weight in terms:

@@ -246,6 +246,8 @@ def calibrate(
     any_axes : bool
         Find which channel shows which axis and sign; else they are as told.
     """
+    if not campaign.cuts:
+        raise InputError("cuts", "none", "recordings of the cutting force")
     used, left_out = [], []
     for done, cut in enumerate(campaign.cuts, start=1):
         cutter = campaign.toolings[cut.tooling].cutter

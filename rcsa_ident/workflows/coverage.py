@@ -27,7 +27,7 @@ def left_open(campaign: Campaign, readings: Sequence[Reading]) -> tuple[str, ...
     if len(axes) == 1:
         return (one_axis(Dof(next(iter(axes)))),)
     lines = [
-        lines_of(campaign.toolings[cut.tooling].cutter, cut.conditions, campaign.workpiece.coefficients, from_hz(MAX_FREQUENCY))
+        lines_of(campaign.toolings[cut.tooling].cutter, cut.conditions, campaign.coefficients, from_hz(MAX_FREQUENCY))
         for cut in campaign.cuts
         if cut.id in usable
     ]

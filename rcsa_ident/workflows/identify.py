@@ -13,18 +13,21 @@ from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.data import IdentificationData, prepare
+from rcsa_ident.identification.hammer_data import with_tests
+from rcsa_ident.identification.hammer_lines import FEWEST_LINES, HammerLines, noise_of, thinned
 from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import Progress
 from rcsa_ident.identification.result import Identification
-from rcsa_ident.machining_setup import Campaign, Cut
+from rcsa_ident.machining_setup import Campaign, Cut, HammerTest
 from rcsa_ident.remarks import Remark
 from rcsa_ident.scaleout import Map
 from rcsa_ident.signals.measurement import Reading, among_fellows, measure_cut
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.verdict import RecordCode, Verdict
-from rcsa_ident.tool_holder.model import tool_holder_receptance
+from rcsa_ident.tool_holder.model import receptance_at_points, tool_holder_receptance
 from rcsa_ident.tool_holder.turning import turning_pair
+from rcsa_ident.units import from_hz
 
 #: Change of an unknown (all are logarithms or of order one) from which a slope is taken.
 _STEP = 1e-5
@@ -32,6 +35,8 @@ _STEP = 1e-5
 _FEW_SPEEDS, _LEAST_CLOCK_ERROR = 5, 2e-4
 #: Reads the recordings of a cut: the cut itself, and its air cut where there is one.
 ReadCut = Callable[[Cut], tuple[Recording, Recording | None]]
+#: Reads a hammer test's frequencies [Hz] and receptance [m/N].
+ReadTest = Callable[[HammerTest], tuple[FloatArray, ComplexArray]]
 
 
 def judge(campaign: Campaign, read: ReadCut, map: Map = map, progress: Callable[[int, int], None] | None = None) -> list[Reading]:
@@ -60,7 +65,7 @@ def judge_cut(campaign: Campaign, read: ReadCut, cut: Cut) -> Reading:
         recording, air = (None if each is None else campaign.clocked(each) for each in read(cut))
         assert recording is not None
         cutter = campaign.toolings[cut.tooling].cutter
-        return measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, campaign.workpiece.coefficients)
+        return measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, campaign.coefficients)
     except InputError as error:
         return Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((Remark(RecordCode.UNREADABLE, f"unreadable: {error}"),)))
 
@@ -70,10 +75,57 @@ def left_out(readings: Iterable[Reading]) -> list[tuple[str, str]]:
     return [(each.cut_id, "; ".join(each.verdict.reasons)) for each in readings if not each.verdict.usable]
 
 
+def hammer_lines(campaign: Campaign, read: ReadTest) -> tuple[HammerLines, ...]:
+    """Return the lines of a campaign's hammer tests, in its order.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    read : callable
+
+    Raises
+    ------
+    InputError
+        If a file does not hold the FRF, or the FRF no line within the test's band.
+    """
+    return tuple(_lines_of(test, *read(test)) for test in campaign.tests)
+
+
+def _lines_of(test: HammerTest, frequency: FloatArray, value: ComplexArray) -> HammerLines:
+    """The lines of a test that are kept, with the noise that its curve shows and the share that it may be wrong by."""
+    low, high = test.band
+    # at 0 Hz a receptance from acceleration is not one, and nothing has a direction
+    used = (frequency >= low) & (frequency <= high) & (frequency > 0.0) & (value != 0.0)
+    if np.sum(used) < FEWEST_LINES:
+        told = f"{np.sum(used)} lines from {low:g} to {high:g} Hz"
+        raise InputError("frfs", f"{test.id}: {told}", f"at least {FEWEST_LINES} lines in its band", str(test.file))
+    omega, value = from_hz(frequency[used]), value[used]
+    variance = noise_of(value)
+    kept = thinned(omega, value, variance)
+    return HammerLines(
+        test.id,
+        test.tooling,
+        test.axis,
+        omega[kept],
+        value[kept],
+        variance[kept] + 0.5 * (test.error * np.abs(value[kept])) ** 2,
+        test.response,
+        test.force,
+        test.sensor_mass,
+        test.standstill,
+    )
+
+
 def identify(
-    campaign: Campaign, readings: Sequence[Reading], method: Method, seed: int, map: Map = map, progress: Progress | None = None
+    campaign: Campaign,
+    readings: Sequence[Reading],
+    method: Method,
+    seed: int,
+    map: Map = map,
+    progress: Progress | None = None,
+    tests: Sequence[HammerLines] = (),
 ) -> Identification:
-    """Return modes and joint from the usable cuts.
+    """Return modes and joint from the usable cuts, and from hammer tests beside them or in their place.
 
     Parameters
     ----------
@@ -87,13 +139,15 @@ def identify(
         The builtin, or a pool's: the method's long work goes through it.
     progress : callable, optional
         Told of every step of the search; with a pool's map it has to be picklable.
+    tests : sequence of HammerLines
+        As `hammer_lines` returns them.
 
     Raises
     ------
     InputError
-        If no cut is usable.
+        If no cut is usable, and there is no hammer test.
     """
-    found = of_campaign(method.run(data_of(campaign, readings), seed, map, progress), campaign)
+    found = of_campaign(method.run(data_of(campaign, readings, tests), seed, map, progress), campaign)
     clock = clock_remark(readings)
     return found if clock is None else replace(found, notes=(*found.notes, clock))
 
@@ -181,8 +235,16 @@ def _mode_deviation(
     return deviation(frequency), deviation(damping)
 
 
-def data_of(campaign: Campaign, readings: Sequence[Reading]) -> IdentificationData:
-    """Return the usable cuts' lines beside their tool-holders' receptances."""
+def data_of(campaign: Campaign, readings: Sequence[Reading], tests: Sequence[HammerLines] = ()) -> IdentificationData:
+    """Return the usable cuts' lines beside their tool-holders' receptances, and hammer tests behind them."""
+    if not tests:
+        return _data_of_cuts(campaign, readings)
+    at_points = {name: partial(receptance_at_points, t.assembly) for name, t in campaign.toolings.items()}
+    usable = any(each.measurement is not None for each in readings)
+    return with_tests(_data_of_cuts(campaign, readings) if usable else None, tests, at_points)
+
+
+def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> IdentificationData:
     measurements = [each.measurement for each in readings if each.measurement is not None]
     if not measurements:
         reasons = "; ".join(dict.fromkeys(reason for each in readings for reason in each.verdict.reasons))
@@ -192,7 +254,7 @@ def data_of(campaign: Campaign, readings: Sequence[Reading]) -> IdentificationDa
         raise InputError("sensors", told, "a displacement sensor at the flange: the housing's motion does not tell the flange's receptance")
     receptances = {name: partial(_receptance, campaign, name) for name in campaign.toolings}
     teeth = {name: t.cutter.teeth for name, t in campaign.toolings.items()}
-    known = campaign.workpiece.coefficients
+    known = campaign.coefficients
     edges = [known.edge_spread if edge > 0.0 else 0.0 for edge in (known.tangential_edge, known.radial_edge)]
     turning = {name: partial(_turning, campaign, name) for name in campaign.toolings}
     return prepare(measurements, receptances, teeth, (known.tangential_spread, known.ratio_spread, *edges), turning)

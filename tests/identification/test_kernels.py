@@ -48,15 +48,23 @@ def relative_speed(omega):
     return np.cos(np.arange(omega.size))
 
 
-def cross(function, candidate, omega, flange, tip, outputs=1, gradient=False, x=None):
-    omega_n, _, _, softening, _, _ = candidate
+def hit(omega):
+    """Rows of points as a hammer makes them: every other one on the tool-holder, and all but every third at standstill."""
+    place = np.arange(omega.size)
+    return (place % 2).astype(float), (place % 3 > 0).astype(float)
+
+
+def cross(function, candidate, omega, flange, tip, outputs=1, gradient=False, x=None, hammer=None):
+    omega_n, _, _, softening, _, joint = candidate
     m = omega_n.size
-    points = np.column_stack([omega, relative_speed(omega) if x is None else np.full(omega.size, x)])
+    own, still = (np.ones(omega.size), np.zeros(omega.size)) if hammer is None else hit(omega)
+    points = np.column_stack([omega, relative_speed(omega) if x is None else np.full(omega.size, x), own, still])
+    of_point = np.zeros((omega.size, 3)) if hammer is None else hammer * (1.0 - own)[:, None]
     values = np.empty((omega.size, outputs), dtype=complex)
     pairs = m * (m + 1) // 2
-    size = 3 * m + pairs + 7 + (m + 2) * (outputs == 2) + pairs * (softening.size > 0)
+    size = 3 * m + pairs + 3 + joint.size + (m + 2) * (outputs == 2) + pairs * (softening.size > 0)
     rows = np.empty((omega.size if gradient else 0, outputs, size), dtype=complex)
-    function(*candidate, points, np.concatenate([flange, tip], axis=1), values, rows)
+    function(*candidate, points, np.concatenate([flange, tip, of_point], axis=1), values, rows)
     return (values, rows) if gradient else values
 
 
@@ -114,20 +122,26 @@ def test_nothing_softens_at_the_middle_speed():
     np.testing.assert_allclose(kept, found[1][1], rtol=1e-9, atol=1e-14 * np.abs(kept).max())
 
 
+@pytest.mark.parametrize("stands", [False, True])
 @pytest.mark.parametrize("soft", [False, True])
 @pytest.mark.parametrize("outputs", [1, 2])
-def test_cross_frf_gradient_against_differences(outputs, soft):
+def test_cross_frf_gradient_against_differences(outputs, soft, stands):
     rng = np.random.default_rng(5)
     m = 3
     omega = 2.0 * np.pi * rng.uniform(200.0, 4500.0, 11)
     _, flange, tip = substructure(rng, omega)
     omega_n, psi, factor, softening, residual, joint = chosen = candidate(rng, m, soft)
-    values, gradient = cross(kernels.cross_frf, chosen, omega, flange, tip, outputs, gradient=True)
-    np.testing.assert_array_equal(values, cross(kernels.cross_frf, chosen, omega, flange, tip, outputs))
+    hammer, still = None, []
+    if stands:
+        hammer, still = 1e-8 * (rng.standard_normal((11, 3)) + 1j * rng.standard_normal((11, 3))), [np.array([0.03, -0.2])]
+        chosen = (*chosen[:-1], np.concatenate([joint, *still]))
+    values, gradient = cross(kernels.cross_frf, chosen, omega, flange, tip, outputs, gradient=True, hammer=hammer)
+    np.testing.assert_array_equal(values, cross(kernels.cross_frf, chosen, omega, flange, tip, outputs, hammer=hammer))
     lower = np.tril_indices(m)
     compliance = (residual[:2] @ residual[:2].T)[np.tril_indices(2)]
     parts = [np.log(omega_n), psi[:, :2].ravel(), factor[lower], compliance]
     parts += [psi[:, 2], residual[2]] if outputs == 2 else []
+    parts += still
     parts += [softening[lower]] if soft else []
     flat = np.concatenate([*parts, joint])
     bounds = np.cumsum([0, *(p.size for p in parts), 4])
@@ -146,8 +160,9 @@ def test_cross_frf_gradient_against_differences(outputs, soft):
         if soft:
             symmetric[lower] = each[-2]
             symmetric.T[lower] = each[-2]
-        changed = np.exp(each[0]), changed_psi, changed_factor, symmetric, changed_residual, each[-1]
-        return cross(kernels.cross_frf, changed, omega, flange, tip, outputs)
+        last = np.concatenate([each[-1], *([each[-2 - soft]] if stands else [])])
+        changed = np.exp(each[0]), changed_psi, changed_factor, symmetric, changed_residual, last
+        return cross(kernels.cross_frf, changed, omega, flange, tip, outputs, hammer=hammer)
 
     np.testing.assert_allclose(at(flat), values, rtol=1e-10)
     assert gradient.shape == (11, outputs, flat.size)

@@ -212,12 +212,13 @@ def test_planes_that_feel_nothing_of_each_other_are_those_of_the_kernel_of_one(o
         own = own[np.argsort(at.place[own, i])]
         d = 2 * i
         block = at.flange[own, d : d + 2, d : d + 2]
-        holder = np.stack([block[:, 0, 0], block[:, 0, 1], block[:, 1, 1], at.tip[own, d, i], at.tip[own, d + 1, i]], axis=1)
+        holder = np.zeros((own.size, 8), dtype=complex)
+        holder[:, :5] = np.stack([block[:, 0, 0], block[:, 0, 1], block[:, 1, 1], at.tip[own, d, i], at.tip[own, d + 1, i]], axis=1)
         values = np.empty((own.size, outputs), dtype=complex)
         size = layout.axes[i].size + 4
         gradient = np.empty((own.size, outputs, size), dtype=complex)
         psi, residual = np.column_stack([plane_of.psi, plane_of.fixture]), np.vstack([plane_of.residual, plane_of.fixture_residual])
-        points_of = np.stack([at.omega[own], at.x[own]], axis=1)
+        points_of = np.stack([at.omega[own], at.x[own], np.ones(own.size), np.zeros(own.size)], axis=1)
         machine = plane_of.omega_n, psi, plane_of.factor, plane_of.softening, residual, joint
         cross_frf(*machine, points_of, holder, values, gradient)
         force = at.force[own, i, None]
