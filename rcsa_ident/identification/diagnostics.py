@@ -93,11 +93,13 @@ def diagnose(
             doubt(IdentificationCode.WEAK_SIGNAL, words)
     for axis, share in zip(data.axes, misfit.model_error, strict=True):
         if share > WORST_MODEL_ERROR:
-            causes = "cutting coefficients, toolings, tooth count or sensor signs may be wrong, or the dynamics change with speed"
+            causes = "drawings of the toolings or places of the hits may be wrong"
+            if data.cuts:
+                causes = "cutting coefficients, toolings, tooth count or sensor signs may be wrong, or the dynamics change with speed"
             doubt(
                 IdentificationCode.UNEXPLAINED,
                 f"{str(axis.axis).upper()}: the model leaves {100 * share:.1f} % of each line unexplained "
-                f"(limit {100 * WORST_MODEL_ERROR:g} %): {causes if data.cuts else 'drawings of the toolings or places of the hits may be wrong'}",
+                f"(limit {100 * WORST_MODEL_ERROR:g} %): {causes}",
             )
     bad = _contradicting(data, misfit)
     if np.mean(bad) > MOST_BAD_CUTS:

@@ -34,7 +34,8 @@ def test_points_of_a_bar_are_those_of_two_bars_joined_there():
     halves = ToolAssembly((BeamSegment(0.07, 0.03, STEEL),), (BeamSegment(0.14, 0.03, STEEL),), 0.0)
     one, two = (receptance_at_points(each, OMEGA, [0.07, 0.15]) for each in (whole, halves))
     scale = np.abs(one.values).max(axis=0)
-    assert np.all(np.abs(one.values - two.values) < 1e-5 * scale)
+    # each to the error of its own mesh
+    assert np.all(np.abs(one.values - two.values) < 1e-4 * scale)
 
 
 def test_every_pair_of_points_is_reciprocal(assembly):
@@ -57,5 +58,5 @@ def test_a_sensor_adds_its_mass_where_it_is_fixed(assembly):
 
 @pytest.mark.parametrize("z", [-0.001, 0.2])
 def test_a_point_beside_the_assembly_is_refused(assembly, z):
-    with pytest.raises(InputError, match="0 to 168.5 mm, the assembly's length"):
+    with pytest.raises(InputError, match=r"0 to 168\.5 mm, the assembly's length"):
         receptance_at_points(assembly, OMEGA, [z])
