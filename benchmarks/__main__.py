@@ -32,6 +32,7 @@ STUDIES = (
     "dependencies",
     "recordings",
     "dynamometer",
+    "real_machine",
 )
 
 

@@ -76,10 +76,8 @@ def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask 
             show_recordings(rows)
         for test in tests:
             seen = _about(test)
-            band = "{:.0f} to {:.0f} Hz".format(*seen["band_hz"])
-            say(
-                f"hammer test {test.id}: {seen['lines']} lines from {band} are used, each known to {seen['deviation_percent']:.2g} % (median)"
-            )
+            lines = "{} lines from {:.0f} to {:.0f} Hz".format(seen["lines"], *seen["band_hz"])
+            say(f"hammer test {test.id}: {lines} are used, each known to {seen['deviation_percent']:.2g} % (median)")
         for sentence in open_:
             say(f"note: {sentence}")
         for remark in remarks:

@@ -2,10 +2,10 @@
 
 One axis with m modes: log natural frequencies (m), mass-normalised shapes (2 m: translation, lever x slope), the lower
 triangle of the damping factor L by rows (diagonal as logarithm), the residual compliance's factor (3); where gap and fixture
-are two outputs the fixture's shapes (m) and its residual to the flange (2); where hammer tests at standstill stand beside cuts what
-that changes (2); where the machine changes with speed the lower triangle of its softening by rows. All axes follow each other. What they share stands at the end: the joint's four logarithms,
-logarithms of the cutting coefficients' scales, tooth angles of the clampings. With D = L L^T and R = R_f R_f^T every vector is
-a passive machine with real modes.
+are two outputs the fixture's shapes (m) and its residual to the flange (2); where hammer tests at standstill stand beside cuts
+what that changes (2); where the machine changes with speed the lower triangle of its softening by rows. All axes follow each
+other. What they share stands at the end: the joint's four logarithms, logarithms of the cutting coefficients' scales, tooth
+angles of the clampings. With D = L L^T and R = R_f R_f^T every vector is a passive machine with real modes.
 """
 
 from __future__ import annotations

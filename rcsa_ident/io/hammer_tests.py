@@ -57,10 +57,12 @@ def hammer_test_of(table: Table, toolings: Mapping[str, Tooling], locate: Callab
         allowed = "a point of the tool-holder, tip or mm from it, where the response is measured at the flange"
         table.refuse("force", "flange", allowed)
     low = table.number("from_hz", "Hz", 0.0, least=0.0, most=1e6)
-    high = table.number("to_hz", "Hz", np.inf, above=low, most=1e6)
+    high = table.number("to_hz", "Hz", np.inf, above=0.0, most=1e6)
+    if high <= low:
+        table.refuse("to_hz", f"{high:g}", f"above from_hz, {low:g} [Hz]")
     units = table.text("units", None)
     if units is not None:
-        parse_units(units, "units", table.where)
+        parse_units(units, table.name("units"), table.where)
     return HammerTest(
         name,
         tooling,

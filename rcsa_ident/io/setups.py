@@ -228,15 +228,21 @@ def campaign_of(
     clock = head.number("clock_error_percent", "%", 0.0, least=-2.0, most=2.0) * 1e-2
     # hammer tests alone need neither sensors nor a workpiece
     alone = "frfs" in top and "cuts" not in top
-    channels = top.table("sensors", None, *([{}] if alone else []))
+    channels = top.table("sensors", None, {})
     sensors = tuple(sensor_of(key, channels.data[key], where) for key in channels)
     if not sensors and not alone:
-        top.refuse("sensors", "an empty table", "at least one table [sensors.<channel>]")
+        top.refuse("sensors", "none", "at least one table [sensors.<channel>], where there are cuts")
     _check_roles(sensors, top)
-    workpiece = None if alone and "workpiece" not in top else workpiece_of(top.table("workpiece", WORKPIECE_KEYS))
+    if "workpiece" not in top and not alone:
+        top.refuse("workpiece", "nothing", "a table [workpiece], where there are cuts")
+    workpiece = workpiece_of(top.table("workpiece", WORKPIECE_KEYS)) if "workpiece" in top else None
     named = top.table("toolings")
+    if not named.data:
+        top.refuse("toolings", "none", "at least one tooling by its name")
     toolings = {key: tooling(named, key) for key in named}
-    cuts = () if alone else tuple(_cut(table, toolings, locate) for table in top.tables("cuts", _CUT))
+    if "cuts" not in top and not alone:
+        top.refuse("cuts", "nothing", "tables [[cuts]], hammer tests [[frfs]], or both")
+    cuts = tuple(_cut(table, toolings, locate) for table in top.tables("cuts", _CUT)) if "cuts" in top else ()
     tests = tuple(hammer_test_of(table, toolings, locate) for table in top.tables("frfs", HAMMER_TEST_KEYS)) if "frfs" in top else ()
     seen: dict[str, str] = {}
     for place, id in [*((f"cuts[{i}]", cut.id) for i, cut in enumerate(cuts)), *((f"frfs[{i}]", test.id) for i, test in enumerate(tests))]:

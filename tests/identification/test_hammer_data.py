@@ -55,7 +55,7 @@ def stiffer(spindle, share):
 
 
 def hit(shop, name, rng, axes=AXES, points=("tip", "v"), noise=5e-10, higher=0.0):
-    """Tests of a tooling with noise and gains of a percent, and the gains; `higher` are the machine's frequencies at standstill by a share."""
+    """Tests of a tooling with noise and gains of a percent, and the gains; by the share `higher` are the machine's frequencies."""
     assembly = shop.toolings[name].assembly
     place = {"tip": 0.0, "v": v_flange(assembly), "flange": None}
     model = rotor(stiffer(shop.machine.spindle, (1.0 + higher) ** 2 - 1.0), assembly, points={"v": place["v"]})
