@@ -33,6 +33,7 @@ STUDIES = (
     "recordings",
     "dynamometer",
     "real_machine",
+    "hammer",
 )
 
 

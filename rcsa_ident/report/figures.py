@@ -188,7 +188,7 @@ def convergence(found: Identification) -> Figure:
         handles: dict[str, Artist] = {}
         for row in grid:
             handles |= {str(line.get_label()): line for line in row[0].get_lines() if not str(line.get_label()).startswith("_")}
-        figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=5)
+        figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=3)
     return figure
 
 

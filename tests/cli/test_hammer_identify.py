@@ -68,6 +68,7 @@ def test_identify_tells_a_tool_that_was_never_hit(hit, tmp_path):
     text = page.read_text(encoding="utf-8")
     assert "Hammer tests in X" in text
     assert "of 0 cuts" not in text
+    assert "All 0 recordings" not in text
     data = json.loads(out.read_text())
     assert data["campaign"]["hammer_tests"] == list(data["axes"]["X"]["hammer_tests"])
     assert all(test["error"] < 0.01 and abs(test["gain"] - 1.0) < 0.02 for test in data["axes"]["X"]["hammer_tests"].values())
