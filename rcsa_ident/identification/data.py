@@ -257,7 +257,9 @@ class IdentificationData:
     def relative_speed(self) -> FloatArray:
         """Spindle speed of each cut, from -1 at the lowest (and where it stands still) to 1 at the highest, shape (k,) [-]."""
         middle, half = self.speed_range
-        return np.maximum((self.spindle_speed - middle) / half, -1.0) if half > 0.0 else np.zeros(self.spindle_speed.size)
+        if half == 0.0:
+            return np.zeros(self.spindle_speed.size)
+        return np.where(np.arange(self.spindle_speed.size) < self.cuts, (self.spindle_speed - middle) / half, -1.0)
 
     def with_smooth_errors(self, share: float, terms: int = 4) -> IdentificationData:
         """Return the same data whose lines may be wrong by a smooth factor of their frequency, for each axis and tooling.

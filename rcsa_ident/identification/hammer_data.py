@@ -65,20 +65,17 @@ def with_tests(cuts: IdentificationData | None, tests: Sequence[HammerLines], at
     spread = (*named, *further)
     ids = tuple(test.id for test in tests)
     if cuts is None:
-        edge = np.zeros((len(tests), 2))
         return IdentificationData(
-            ids,
-            frozen(index, np.intp),
-            toolings,
-            tuple(axes),
-            frozen(still),
-            prior,
-            frozen(apart, np.intp),
-            edge,
-            (),
-            spread,
-            {},
-            tuple(tests),
+            cut_ids=ids,
+            cut_tooling=frozen(index, np.intp),
+            toolings=toolings,
+            axes=tuple(axes),
+            spindle_speed=frozen(still),
+            cut_prior=prior,
+            clamping=frozen(apart, np.intp),
+            edge=np.zeros((len(tests), 2)),
+            coefficient_spread=spread,
+            tests=tuple(tests),
         )
     return replace(
         cuts,

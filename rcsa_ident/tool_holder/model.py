@@ -142,7 +142,7 @@ def free_body(
 
 def point_name(z: float) -> str:
     """Return what a point of a tool-holder is called, from its distance to the tip [m]."""
-    return f"{1e3 * z:g} mm"
+    return f"{1e3 * z:.9g} mm"
 
 
 def receptance_at_points(
