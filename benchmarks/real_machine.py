@@ -22,7 +22,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.io.frf_files import read_frfs
-from rcsa_ident.io.hammer_tests import read_hammer_test
+from rcsa_ident.io.hammer import read_hammer_test
 from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.units import from_hz
 from rcsa_ident.workflows.identify import data_of, hammer_lines

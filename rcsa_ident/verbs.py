@@ -93,7 +93,7 @@ def identify(
     from functools import partial
 
     from rcsa_ident.identified import Result
-    from rcsa_ident.io.hammer_tests import read_hammer_test
+    from rcsa_ident.io.hammer import read_hammer_test
     from rcsa_ident.io.recordings import read_cut
     from rcsa_ident.io.setups import read_campaign
     from rcsa_ident.processes import workers

@@ -187,7 +187,7 @@ def read_and_judge(folder: Path, pool: Workers, stages: Stages) -> tuple[Campaig
 
 def read_tests(campaign: Campaign) -> tuple[HammerLines, ...]:
     """Return the lines of a campaign's hammer tests."""
-    from rcsa_ident.io.hammer_tests import read_hammer_test
+    from rcsa_ident.io.hammer import read_hammer_test
     from rcsa_ident.workflows.identify import hammer_lines
 
     return hammer_lines(campaign, read_hammer_test)

@@ -1,4 +1,4 @@
-"""Hammer tests as the commands name them, and toolings that carry a calibrated contact."""
+"""Hammer tests as the commands and campaigns name them, and toolings that carry a calibrated contact."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from rcsa_ident.io.frf_files import read_frfs
 from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.io.toml_text import LARGEST_SETUP, one_line
 from rcsa_ident.io.validated_table import listed
+from rcsa_ident.machining_setup import HammerTest
 from rcsa_ident.tool_holder.geometry import Contact
 
 #: Direction by direction of a file that names none.
@@ -122,3 +123,23 @@ def write_calibrated_tooling(source: str | Path, target: str | Path, contact: Co
         document.pop("contact", None)
         document.append("contact", table)
     write_text(target, tomlkit.dumps(document))
+
+
+def read_hammer_test(test: HammerTest) -> tuple[FloatArray, ComplexArray]:
+    """Return the frequencies [Hz] and the receptance [m/N] of a test's file, shape (n,) both.
+
+    Raises
+    ------
+    InputError
+        Names the file, and its records where the test names none of several.
+    """
+    found = read_frfs(test.file, test.units)
+    if test.record is not None:
+        found = [each for each in found if each.record == test.record]
+    elif len(found) > 1:
+        axis = test.axis.upper()
+        found = [each for each in found if (each.response, each.force) == (axis, axis)] or found
+    if len(found) != 1:
+        told = "no such record" if not found else f"{len(found)} FRFs"
+        raise InputError("record", told, "the number of one FRF of the file", str(test.file))
+    return found[0].frequency, found[0].values

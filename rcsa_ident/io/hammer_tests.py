@@ -1,4 +1,4 @@
-"""Hammer tests of a campaign: the tables ``[[frfs]]``, and the receptances that they name."""
+"""Hammer tests of a campaign: the tables ``[[frfs]]``. What their files hold is read by `hammer`."""
 
 from __future__ import annotations
 
@@ -7,10 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.errors import InputError
-from rcsa_ident.io.frf_files import parse_units, read_frfs
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.machining_setup import HammerTest, Tooling
 
@@ -57,12 +54,9 @@ def hammer_test_of(table: Table, toolings: Mapping[str, Tooling], locate: Callab
         allowed = "a point of the tool-holder, tip or mm from it, where the response is measured at the flange"
         table.refuse("force", "flange", allowed)
     low = table.number("from_hz", "Hz", 0.0, least=0.0, most=1e6)
-    high = table.number("to_hz", "Hz", np.inf, above=0.0, most=1e6)
-    if high <= low:
+    high = table.number("to_hz", "Hz", None, above=0.0, most=1e6)
+    if high is not None and high <= low:
         table.refuse("to_hz", f"{high:g}", f"above from_hz, {low:g} [Hz]")
-    units = table.text("units", None)
-    if units is not None:
-        parse_units(units, table.name("units"), table.where)
     return HammerTest(
         name,
         tooling,
@@ -71,10 +65,10 @@ def hammer_test_of(table: Table, toolings: Mapping[str, Tooling], locate: Callab
         force,
         locate(table, "file"),
         table.number("record", "", None, least=1, most=100_000, whole=True),
-        units,
+        table.text("units", None),
         table.flag("standstill", True),
         table.number("sensor_mass_g", "g", 0.0, least=0.0, most=1000.0) * 1e-3,
-        (low, high),
+        (low, np.inf if high is None else high),
         table.number("error_percent", "%", 2.0, least=0.0, most=100.0) * 1e-2,
     )
 
@@ -85,23 +79,3 @@ def _point(table: Table, key: str, longest: float) -> float | None:
     if isinstance(value, str):
         return 0.0 if value == "tip" else None
     return value * 1e-3
-
-
-def read_hammer_test(test: HammerTest) -> tuple[FloatArray, ComplexArray]:
-    """Return the frequencies [Hz] and the receptance [m/N] of a test's file, shape (n,) both.
-
-    Raises
-    ------
-    InputError
-        Names the file, and its records where the test names none of several.
-    """
-    found = read_frfs(test.file, test.units)
-    if test.record is not None:
-        found = [each for each in found if each.record == test.record]
-    elif len(found) > 1:
-        axis = test.axis.upper()
-        found = [each for each in found if (each.response, each.force) == (axis, axis)] or found
-    if len(found) != 1:
-        told = "no such record" if not found else f"{len(found)} FRFs"
-        raise InputError("record", told, "the number of one FRF of the file", str(test.file))
-    return found[0].frequency, found[0].values

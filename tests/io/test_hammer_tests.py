@@ -8,7 +8,7 @@ import pytest
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.curves import write_frf_csv
-from rcsa_ident.io.hammer_tests import read_hammer_test
+from rcsa_ident.io.hammer import read_hammer_test
 from rcsa_ident.io.setups import read_campaign
 from tests.fixtures import by_hand
 
@@ -69,7 +69,6 @@ def test_all_keys(tmp_path):
         ('axis = "X"', 'axis = "Z"', r"frfs\[0\].axis"),
         ('file = "x.csv"', 'file = "z.csv"', r"frfs\[0\].file: found .*which does not exist"),
         ('file = "x.csv"', 'file = "x.csv"\nfrom_hz = 300\nto_hz = 200', r"frfs\[0\].to_hz"),
-        ('file = "x.csv"', 'file = "x.csv"\nunits = "furlong"', "units"),
         ('file = "x.csv"', 'file = "x.csv"\nstandstil = true', "standstil"),
         ('id = "nut"', "id = 3", r"frfs\[0\].id"),
     ],
@@ -92,4 +91,10 @@ def test_a_campaign_of_nothing_still_asks_for_cuts(tmp_path):
 def test_one_frf_of_several_is_asked_for_by_its_number(tmp_path):
     campaign = read_campaign(folder(tmp_path, TEST + "record = 7\n"))
     with pytest.raises(InputError, match="record: found no such record, allowed is the number of one FRF of the file"):
+        read_hammer_test(campaign.tests[0])
+
+
+def test_units_that_are_none_are_named(tmp_path):
+    campaign = read_campaign(folder(tmp_path, TEST + 'units = "furlong"\n'))
+    with pytest.raises(InputError, match=r"units: found furlong, allowed is motion over force"):
         read_hammer_test(campaign.tests[0])

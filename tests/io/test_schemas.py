@@ -17,7 +17,7 @@ _BETWEEN_KEYS = re.compile(
     r"finite numbers? \[deg\]|angles above 0 that add up|on a tool that is|above entry_angle_deg|at most half of the diameter|"
     r"below the outer diameter|at most [\d.e+]+ \[mm\^[24]\]|or neither|material: found the text|tooling: found the text|"
     r"materials\.\S+: found nothing|shaft's length|a number other than 0|one table \[sensors|"
-    r"motion over force|above from_hz|where there are cuts|at least one tooling|hammer tests \[\[frfs\]\], or both|"
+    r"above from_hz|where there are cuts|at least one tooling|hammer tests \[\[frfs\]\], or both|"
     r"a point of the tool-holder, tip or mm|one or more speeds|\[\[x\]\], \[\[y\]\] or both|"
     r"stickout|insertion|softening|settling|from.*to"
 )
