@@ -121,14 +121,7 @@ def cross_frf(axis: AxisResult, tooling: Sequence[str], name: str) -> Figure:
                     ax.plot(frequency, _without_jumps(curve(model[order])), color=_TRUTH, lw=1.0, zorder=2, label="fitted")
                 else:
                     ax.plot(frequency, curve(model[order]), color=_TRUTH, lw=1.0, zorder=2, label="fitted")
-            top.set_yscale("log")
-            top.set_title(f"{name}: {each}", parse_math=False)
-            bottom.set_ylim(-190.0, 190.0)
-            bottom.set_yticks([-180, -90, 0, 90, 180])
-            bottom.set_xlabel("frequency [Hz]")
-        grid[0, 0].set_ylabel("|C31|  [µm/N]")
-        grid[1, 0].set_ylabel("phase [°]")
-        grid[0, -1].legend(loc="upper right")
+        _size_over_phase(grid, "|C31|  [µm/N]", [f"{name}: {each}" for each in names])
     return figure
 
 
@@ -154,15 +147,21 @@ def hammer_tests(tests: Sequence[MetTest], name: str) -> Figure:
                 (test.model, {"color": _TRUTH, "lw": 1.0}),
             ):
                 bottom.plot(frequency, _without_jumps(np.degrees(np.angle(value))), **style)
-            top.set_yscale("log")
-            top.set_title(f"{name}: {test.lines.id}", parse_math=False)
-            bottom.set_ylim(-190.0, 190.0)
-            bottom.set_yticks([-180, -90, 0, 90, 180])
-            bottom.set_xlabel("frequency [Hz]")
-        grid[0, 0].set_ylabel("receptance  [µm/N]")
-        grid[1, 0].set_ylabel("phase [°]")
-        grid[0, -1].legend(loc="upper right")
+        _size_over_phase(grid, "receptance  [µm/N]", [f"{name}: {test.lines.id}" for test in tests])
     return figure
+
+
+def _size_over_phase(grid: np.ndarray, size: str, titles: Sequence[str]) -> None:
+    """Scales, titles and words of a grid with a size above its phase in every column."""
+    for (top, bottom), title in zip(grid.T, titles, strict=True):
+        top.set_yscale("log")
+        top.set_title(title, parse_math=False)
+        bottom.set_ylim(-190.0, 190.0)
+        bottom.set_yticks([-180, -90, 0, 90, 180])
+        bottom.set_xlabel("frequency [Hz]")
+    grid[0, 0].set_ylabel(size)
+    grid[1, 0].set_ylabel("phase [°]")
+    grid[0, -1].legend(loc="upper right")
 
 
 def _without_jumps(degrees: FloatArray) -> FloatArray:
