@@ -220,12 +220,10 @@ def search(
     start: Mapping[Dof, Posterior | PlaneUnknowns] | None = None,
     tests: Sequence[HammerLines] = (),
 ) -> Identification:
-    """Return the identification by the method of that name; the default one may start from an earlier answer, and takes hammer tests."""
+    """Return the identification by the method of that name; the default one may start from an earlier answer and takes tests."""
     from rcsa_ident.workflows import identify as workflow
 
     chosen: IdentificationMethod
-    if method is Method.paper and tests:
-        raise InputError("--method", "paper, with hammer tests", "the default method, which knows of them")
     if method is Method.paper:
         from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 

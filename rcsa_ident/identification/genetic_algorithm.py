@@ -16,6 +16,7 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.receptance import dissipation
+from rcsa_ident.errors import InputError
 from rcsa_ident.identification._kernels import best_grid_misfit, modal_cross_frf
 from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.diagnostics import failed, not_finite
@@ -151,7 +152,14 @@ class PaperGeneticAlgorithm:
             The builtin, or a pool's.
         progress : callable, optional
             Told of every step; with a pool's map it has to be picklable.
+
+        Raises
+        ------
+        InputError
+            If hammer tests are among the data: its candidates know the flange's motion alone.
         """
+        if data.tests:
+            raise InputError("method", f"{self.name}, with hammer tests", "the default method, which knows of them")
         if not_finite(data):
             return failed(data, seed, self.name)
         sequences = np.random.SeedSequence(seed).spawn(len(data.axes))

@@ -26,10 +26,10 @@ _SCALE = np.array([1.0, LEVER])
 def with_tests(cuts: IdentificationData | None, tests: Sequence[HammerLines], at_points: Mapping[str, AtPoints]) -> IdentificationData:
     """Return the data of cuts with hammer tests behind them, or of the tests alone.
 
-    A test is a cut of one output without an air cut, whose force was measured: between two points of the tool-holder
-    H_pq = A_pq - A_p2 (A_22 + K^-1 + B)^-1 A_2q, where p is the machine's side of the flange B (A_22 + K^-1 + B)^-1 A_2q. What is
-    unknown of it: its gain, a delay between its channels, and where cuts tell of a spindle that turns, by how much the machine's
-    natural frequencies and damping differ at standstill.
+    A test is a cut of one output without an air cut, whose force was measured. By receptance coupling [schmitz2000] it is, between
+    two points of the tool-holder, H_pq = A_pq - A_p2 Z A_2q, where p is the machine's side of the flange B Z A_2q, with
+    Z = (A_22 + K^-1 + B)^-1 [m/N]. What is unknown of it: its gain, a delay between its channels, and where cuts tell of a spindle
+    that turns, by how much the machine's natural frequencies and damping differ at standstill.
 
     Parameters
     ----------

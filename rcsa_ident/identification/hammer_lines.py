@@ -95,7 +95,9 @@ def thinned(omega: FloatArray, value: ComplexArray, variance: FloatArray, most: 
         return np.arange(omega.size)
     # way along log H between every tenth line, less what noise walks: a line must not be chosen for its own noise
     coarse = np.unique(np.append(np.arange(0, omega.size, _STRIDE), omega.size - 1))
-    at = np.convolve(value, np.ones(_STRIDE) / _STRIDE, mode="same")[coarse]
+    # mirrored at both ends: against nothing it would bend there
+    beyond = np.pad(value, (_STRIDE // 2, _STRIDE - 1 - _STRIDE // 2), mode="symmetric")
+    at = np.convolve(beyond, np.ones(_STRIDE) / _STRIDE, mode="valid")[coarse]
     noise = np.sqrt(2.0 * variance[coarse] / _STRIDE)
     step = np.maximum(np.abs(np.diff(at)) - 2.0 * np.hypot(noise[1:], noise[:-1]), 0.0)
     way = step / np.maximum(0.5 * np.abs(at[1:] + at[:-1]), noise[1:] + 1e-300)

@@ -83,7 +83,7 @@ def test_identify_tells_a_tool_that_was_never_hit(hit, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("identify", "--out", "R.json", "--method", "paper"), "--method: found paper, with hammer tests"),
+        (("identify", "--out", "R.json", "--method", "paper"), "method: found paper, with hammer tests"),
         (("identify", "--out", "R.json", "--speed-bands", "2"), "cuts: found none of 0 usable"),
         (("calibrate", "--out", "W.toml"), "cuts: found none"),
     ],

@@ -10,6 +10,7 @@ from rcsa_ident.coupling.rcsa import couple
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.evidence import EvidenceSelection
+from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.hammer_data import GAIN_SPREAD, with_tests
 from rcsa_ident.identification.hammer_lines import HammerLines, noise_of, thinned
 from rcsa_ident.identification.misfit import Misfit
@@ -24,7 +25,7 @@ from tests.fixtures.virtual_shop import AXES, TIP_OMEGA
 from tests.identification.models import vector_of
 
 OMEGA = 2.0 * np.pi * np.arange(150.0, 4001.0, 2.0)
-#: Seeds of noise and gains were fixed before anything was tuned.
+#: Of noise and gains; not changed since these tests were first run.
 SEED = 7
 SMALL = EvidenceSelection(search=SearchSettings(modes=8, population=4, generations=2, steps=6), candidates=2)
 
@@ -136,6 +137,12 @@ def test_tests_stand_behind_the_cuts_and_change_nothing_about_them(shop, rich, f
 def test_without_tests_there_is_nothing_to_stand_behind(shop, few):
     with pytest.raises(InputError, match="at least one hammer test"):
         with_tests(few, [], at_points(shop))
+
+
+def test_the_published_method_refuses_them(shop, first):
+    tests, _ = hit(shop, first, np.random.default_rng(SEED), axes=(Dof.X,))
+    with pytest.raises(InputError, match="method: found paper, with hammer tests"):
+        PaperGeneticAlgorithm().run(with_tests(None, tests, at_points(shop)), seed=1)
 
 
 def test_a_sensors_mass_belongs_to_the_test_and_not_to_the_machine(shop, first):

@@ -43,6 +43,8 @@ def test_lines_are_kept_where_the_curve_bends_and_everywhere_some():
     near = hertz[np.abs(hertz - 1060.0) < 20.0]
     assert np.diff(near).max() <= 3.0
     assert np.diff(hertz).max() < 5.0 * 3900.0 / MOST_LINES / 0.3
+    # both ends are flat here: no more lines than the even share asks for
+    assert np.sum((hertz < 130.0) | (hertz > 3970.0)) < 8
     np.testing.assert_array_equal(thinned(OMEGA[:50], value[:50], noise_of(value[:50])), np.arange(50))
 
 

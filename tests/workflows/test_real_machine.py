@@ -11,7 +11,7 @@ pytestmark = pytest.mark.skipif(not HAMMER.is_dir(), reason="the real hammer tes
 
 @pytest.mark.slow
 def test_the_tips_largest_mode_follows_from_hits_on_the_holder():
-    """With the drawing that explains these hits best: what others make of them is in docs/real_machine.md."""
+    """With the carbide tool's drawing that explains these hits best: what others make of them is in docs/real_machine.md."""
     frequency, measured = measured_tip()
     assert abs(measured).max() == pytest.approx(6.78e-7, rel=0.01)
     found = answer(Drawing("carbide", 61.0, 6e6))
