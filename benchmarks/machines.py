@@ -8,6 +8,7 @@ identification of the development machines: docs/study.md says what changed then
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -60,6 +61,8 @@ class Condition(NamedTuple):
         What is told of the recorder's clock: ``exactly``, ``from the speeds`` (what the identification's remark proposes) or ``nothing``.
     campaign : str
         The condition whose records are taken, where they are the same.
+    passes : int
+        Of four seconds each that take the place of a tooling's 40 cuts, from 8000 to 20000 rev/min one after the other; 0 for none.
     """
 
     trigger: bool = False
@@ -67,6 +70,7 @@ class Condition(NamedTuple):
     disturbances: Disturbances | None = None
     clock: str = "nothing"
     campaign: str = ""
+    passes: int = 0
 
 
 CONDITIONS = {
@@ -77,6 +81,10 @@ CONDITIONS = {
     "workshop-speeds": Condition(disturbances=WORKSHOP, clock="from the speeds", campaign="workshop"),
     "workshop-clock": Condition(disturbances=WORKSHOP, campaign="workshop"),
     "workshop-trigger": Condition(trigger=True, disturbances=WORKSHOP, clock="exactly"),
+    "passes": Condition(passes=12),
+    "passes-trigger": Condition(trigger=True, passes=12),
+    "passes-few": Condition(passes=6),
+    "passes-workshop": Condition(disturbances=WORKSHOP, clock="exactly", passes=12),
     "workshop-loud": Condition(disturbances=replace(WORKSHOP, machine_noise=3.4), clock="exactly"),
 }
 #: Those of the study; the others are asked for by name.
@@ -220,11 +228,15 @@ def under(machine: MachineFile, condition: str) -> MachineFile:
     trigger, noise, disturbances = CONDITIONS[condition][:3]
     sensors, plan = machine.sensors, machine.plan
     gap, acceleration = noise * sensors.gap_noise, noise * sensors.acceleration_noise
-    machine = replace(machine, sensors=replace(sensors, trigger=trigger, gap_noise=gap, acceleration_noise=acceleration))
+    if CONDITIONS[condition].passes:
+        ends = np.linspace(plan.spindle_speeds[0], plan.spindle_speeds[-1], CONDITIONS[condition].passes + 1)
+        plan = replace(plan, spindle_speeds=(), passes=tuple(itertools.pairwise(ends.tolist())))
+    sensors = replace(sensors, trigger=trigger, gap_noise=gap, acceleration_noise=acceleration)
     if disturbances is None:
-        return machine
-    plan = replace(plan, duration=plan.duration + 2.0 * ENTRY, entry=ENTRY, leave=ENTRY)
-    return replace(machine, disturbances=disturbances, plan=plan)
+        return replace(machine, sensors=sensors, plan=plan)
+    more = 2.0 * ENTRY
+    plan = replace(plan, duration=plan.duration + more, pass_duration=plan.pass_duration + more, entry=ENTRY, leave=ENTRY)
+    return replace(machine, sensors=sensors, disturbances=disturbances, plan=plan)
 
 
 def least_limit(machine: MachineFile) -> float:

@@ -153,6 +153,9 @@ class Cut(Shown):
     recording : Path
     air : Path or None
         The same speed without cutting.
+    last_speed : float or None [rad/s]
+        At which a pass ends whose speed changes evenly in time from that of `conditions`; None where the speed is kept. The feed per
+        tooth is kept in either case.
     """
 
     id: str
@@ -160,6 +163,13 @@ class Cut(Shown):
     conditions: CuttingConditions
     recording: Path
     air: Path | None = None
+    last_speed: float | None = None
+
+    @property
+    def speeds(self) -> tuple[float, float]:
+        """First and last programmed speed [rad/s]."""
+        first = self.conditions.spindle_speed
+        return first, first if self.last_speed is None else self.last_speed
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
@@ -177,7 +187,8 @@ class Cut(Shown):
         )
 
     def __str__(self) -> str:
-        return f"{self.id}: {self.tooling}, {self.conditions}{'' if self.air else ', no air cut'}"
+        last = "" if self.last_speed is None else f", to {to_rpm(self.last_speed):.0f} rev/min"
+        return f"{self.id}: {self.tooling}, {self.conditions}{last}{'' if self.air else ', no air cut'}"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -292,7 +303,7 @@ class Campaign(Shown):
         return tuple(found)
 
     def __str__(self) -> str:
-        speeds = to_rpm(np.array([cut.conditions.spindle_speed for cut in self.cuts]))
+        speeds = to_rpm(np.array([cut.speeds for cut in self.cuts]))
         counted = [f"{len(self.cuts)} cuts"] * bool(self.cuts or not self.tests) + [f"{len(self.tests)} hammer tests"] * bool(self.tests)
         made = f"{self.name}: {' and '.join(counted)} with {', '.join(self.toolings)}"
         if not speeds.size or self.workpiece is None:

@@ -188,4 +188,6 @@ EDGE = Range("N/mm", 1e3, (0.0, 200.0), (0.0, 1000.0), (("was it given in N/m ({
 FEED_PER_TOOTH = Range("mm", 1e-3, (0.001, 2.0), (1e-5, 10.0), (("was it given in metres ({})?", 1e3), ("was it given in µm ({})?", 1e-3)))
 IMMERSION = Range("%", 1e-2, (1.5, 100.0), (0.0, 100.0), (("was {} meant?", 1e2),))
 SPINDLE_SPEED = Range("rev/min", from_rpm(1.0), (150.0, 80_000.0), (1.0, 500_000.0))
+#: Least and largest change of the speed within a pass, as a share of its first.
+LEAST_SWEEP, LARGEST_SWEEP = 0.005, 2.0
 AXIAL_DEPTH = _length((0.01, 60.0), (1e-4, 500.0))

@@ -17,8 +17,10 @@ from rcsa_ident.report.summaries import recording_rows
 from rcsa_ident.signals.measurement import Reading, fits_by_chance, judge_air, measure_cut
 from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.signals.steady import measured_axes
+from rcsa_ident.signals.sweep import judge_pass_air
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.units import to_rpm
+from rcsa_ident.workflows.identify import read_of
 
 
 def read_upload(upload: Upload, sensors: tuple[Sensor, ...], rate: float | None) -> Recording:
@@ -105,15 +107,15 @@ def described(recording: Recording) -> dict[str, Any]:
 
 def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | None, role: str) -> tuple[dict[str, Any], Reading]:
     """Return the verdict on a cut (with its air cut, where there is one) or on an air cut, and the reading it is based on."""
-    cutter = campaign.toolings[cut.tooling].cutter
     recording, air = campaign.clocked(recording), None if air is None else campaign.clocked(air)
     try:
         with np.errstate(all="ignore"):
-            if role == "air":
+            if role == "cut":
+                reading = read_of(campaign, cut, recording, air)
+            elif cut.last_speed is None:
                 reading = judge_air(cut.id, cut.tooling, recording, cut.conditions)
             else:
-                coefficients = campaign.coefficients
-                reading = measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, coefficients)
+                reading = judge_pass_air(cut.id, cut.tooling, recording, cut.speeds)
     except InputError as error:
         reading = Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((Remark(RecordCode.UNREADABLE, str(error)),)))
     except (ArithmeticError, np.linalg.LinAlgError):

@@ -108,6 +108,7 @@ class CutKeys(Body):
     id: Text
     tooling: Text
     spindle_speed_rpm: float
+    spindle_speed_to_rpm: float | None = Field(None, description="At which a pass ends whose speed changes evenly; null keeps the speed.")
     axial_depth_mm: float
     feed_per_tooth_mm: float
     entry_angle_deg: float

@@ -207,8 +207,7 @@ def _noise_of(folder: Path) -> float:
     known = read_campaign(folder)
     read = partial(read_cut, known.sensors, known.sampling_rate)
     some = known.cuts[:: max(1, math.ceil(len(known.cuts) / MOST_READ))]
-    found = [judge_cut(known, read, cut).measurement for cut in some]
-    return line_noise([m for m in found if m is not None])
+    return line_noise([measurement for cut in some for measurement in judge_cut(known, read, cut).measurements])
 
 
 def _direction(angle: float) -> str | float:

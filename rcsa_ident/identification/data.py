@@ -20,6 +20,8 @@ from rcsa_ident.signals.measurement import CutMeasurement
 LEVER = 0.1
 #: Standard deviation of a clamping's run-out, in units of the cutting model's reference.
 RUNOUT_SPREAD = 3.0
+#: Where within the half of a frequency range a line sweeps its tool-holder is asked beside the middle: Gauss's node.
+NODE = float(np.sqrt(0.6))
 #: Half the range of the spindle speeds, over their middle, below which nothing is asked about a change with speed.
 LEAST_SPEED_RANGE = 0.05
 
@@ -64,6 +66,10 @@ class AxisData:
         Points at which the spindle did not turn; empty where there are none.
     point : complex array, shape (n, 3) or (0, 3) [m/N]
         Of those: their free receptance to the force, and minus that to the flange: t, r.
+    sweep : array, shape (n, 2) or (0, 2) [rad/s^2], [s]
+        By which a line's frequency changes, and for how long; empty where none does.
+    around : complex array, shape (n, 2, 5) or (0, 2, 5) [m/N]
+        `flange` and `tip` at `node` below and above each frequency.
     """
 
     axis: Dof
@@ -82,11 +88,13 @@ class AxisData:
     on_holder: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     still: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     point: ComplexArray = field(default_factory=lambda: np.zeros((0, 3), dtype=complex))
+    sweep: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    around: ComplexArray = field(default_factory=lambda: np.zeros((0, 2, 5), dtype=complex))
 
     def __post_init__(self) -> None:
-        for name in ("omega", "order", "variance", "beside"):
+        for name in ("omega", "order", "variance", "beside", "sweep"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
-        for name in ("lines", "flange", "tip", "force_slope", "force", "across", "across_slope", "point"):
+        for name in ("lines", "flange", "tip", "force_slope", "force", "across", "across_slope", "point", "around"):
             object.__setattr__(self, name, frozen(getattr(self, name), np.complex128))
         for name in ("on_holder", "still"):
             object.__setattr__(self, name, frozen(getattr(self, name), np.bool_))
@@ -107,6 +115,11 @@ class AxisData:
         """The tool-holders' receptances as the kernel takes them, shape (n, 8) [m/N]."""
         point = self.point if self.point.size else np.zeros((self.omega.size, 3))
         return np.concatenate([self.flange, self.tip, point], axis=1)
+
+    @property
+    def node(self) -> FloatArray:
+        """Distance from each frequency at which `around` is told, shape (n,) [rad/s]; 0 where it does not sweep."""
+        return nodes(self.sweep)
 
     @property
     def outputs(self) -> int:
@@ -140,6 +153,11 @@ class AxisData:
         """Return some of the points: a mask or indices, shape (n,)."""
         whole = (each.name for each in fields(self) if each.name != "axis")
         return replace(self, **{name: getattr(self, name)[keep] for name in whole if len(getattr(self, name))})
+
+
+def nodes(sweep: FloatArray) -> FloatArray:
+    """Return how far from the middle of each line's range its tool-holder is asked, shape (n,) [rad/s]; `sweep` as in `AxisData`."""
+    return NODE * 0.5 * np.abs(sweep[:, 0]) * sweep[:, 1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -223,6 +241,11 @@ class IdentificationData:
         return len(self.cut_ids) - len(self.tests)
 
     @property
+    def sweeps(self) -> bool:
+        """Whether the speed changed while some of the lines were recorded."""
+        return any(np.any(axis.sweep[:, 0]) for axis in self.axes)
+
+    @property
     def stands_still(self) -> bool:
         """Whether some of the points belong to a spindle that stands still, and others to one that turns."""
         return self.cuts > 0 and any(test.standstill for test in self.tests)
@@ -287,6 +310,22 @@ class IdentificationData:
         spread = (*self.coefficient_spread, *(share,) * count)
         return replace(self, axes=tuple(axes), coefficient_spread=spread)
 
+    def of_cuts(self, keep: np.ndarray) -> IdentificationData:
+        """Return the same data with some of the cuts: ascending indices, those of all hammer tests among them."""
+        number = np.full(len(self.cut_ids), -1)
+        number[keep] = np.arange(keep.size)
+        axes = [axis.of(number[axis.cut] >= 0) for axis in self.axes]
+        return replace(
+            self,
+            cut_ids=tuple(self.cut_ids[k] for k in keep),
+            cut_tooling=self.cut_tooling[keep],
+            axes=tuple(replace(axis, cut=number[axis.cut]) for axis in axes),
+            spindle_speed=self.spindle_speed[keep],
+            cut_prior=CutPrior(*self.cut_prior.rows[keep].T),
+            clamping=self.clamping[keep],
+            edge=self.edge[keep],
+        )
+
     def only(self, axis: Dof) -> IdentificationData:
         """Return the same data with one axis."""
         return replace(self, axes=tuple(a for a in self.axes if a.axis is axis), turning={})
@@ -327,14 +366,22 @@ def prepare(
     toolings = tuple(dict.fromkeys(m.tooling for m in measurements))
     axes = tuple(axis for axis in (Dof.X, Dof.Y) if any(axis in m.axes for m in measurements))
     holder: dict[str, FloatArray] = {}
-    table: dict[str, tuple[ComplexArray, ComplexArray]] = {}
+    table: dict[str, ComplexArray] = {}
     for name in toolings:
-        omega = np.unique(np.concatenate([m.axes[a].omega for m in measurements if m.tooling == name for a in m.axes] or [np.zeros(0)]))
+        own = [(m, m.axes[a]) for m in measurements if m.tooling == name for a in m.axes]
+        asked = [lines.omega + side * nodes(_sweep(m, lines)) for m, lines in own for side in ((-1, 0, 1) if m.acceleration else (0,))]
+        omega = np.unique(np.concatenate(asked or [np.zeros(0)]))
         response = receptances[name](omega)
         a22, a21 = response["flange", "flange"], response["flange", "tip"]
-        flange = np.stack([a22[:, 0, 0], LEVER * a22[:, 0, 1], LEVER**2 * a22[:, 1, 1]], axis=1)
-        table[name] = flange, np.stack([a21[:, 0, 0], LEVER * a21[:, 1, 0]], axis=1)
+        columns = (a22[:, 0, 0], LEVER * a22[:, 0, 1], LEVER**2 * a22[:, 1, 1], a21[:, 0, 0], LEVER * a21[:, 1, 0])
+        table[name] = np.stack(columns, axis=1)
         holder[name] = omega
+    sweeping = any(m.acceleration for m in measurements)
+
+    def at(measurement: CutMeasurement, omega: FloatArray) -> ComplexArray:
+        """Flange and tip of the tool-holder at frequencies that were asked, shape (n, 5)."""
+        return table[measurement.tooling][np.searchsorted(holder[measurement.tooling], omega)]
+
     uncertain = [c for c, spread in enumerate(coefficient_spread) if spread > 0.0]
     coefficients = [ForceCoefficient(SLOPES[c]) for c in uncertain]
     spread = [float(coefficient_spread[c]) for c in uncertain]
@@ -348,7 +395,12 @@ def prepare(
         lines = (
             [each.summed() for _, _, each in present] if len({each.outputs for _, _, each in present}) > 1 else [e for _, _, e in present]
         )
-        rows = [np.searchsorted(holder[m.tooling], each.omega) for _, m, each in present]
+        free = np.concatenate([at(m, each.omega) for _, m, each in present])
+        sweeps = [_sweep(m, each) for _, m, each in present] if sweeping else []
+        beside = [
+            np.stack([at(m, each.omega + side * nodes(own)) for side in (-1, 1)], axis=1)
+            for (_, m, each), own in zip(present, sweeps, strict=sweeping)
+        ]
         data.append(
             AxisData(
                 axis=axis,
@@ -357,11 +409,12 @@ def prepare(
                 variance=np.concatenate([each.variance for each in lines]),
                 lines=np.concatenate([np.stack([each.cut, each.air], axis=2) for each in lines]),
                 cut=np.concatenate([np.full(each.omega.size, k) for k, _, each in present]),
-                flange=np.concatenate([table[m.tooling][0][r] for (_, m, _), r in zip(present, rows, strict=True)]),
-                tip=np.concatenate([table[m.tooling][1][r] for (_, m, _), r in zip(present, rows, strict=True)]),
+                flange=free[:, :3],
+                tip=free[:, 3:],
                 force_slope=np.concatenate(
                     [_slopes(each.force_slope, uncertain, toolings.index(m.tooling), len(coefficients)) for _, m, each in present]
                 ),
+                **({"sweep": np.concatenate(sweeps), "around": np.concatenate(beside)} if sweeping else {}),
                 **_both_forces([(each, toolings.index(m.tooling)) for _, m, each in present], uncertain, len(coefficients)),
             )
         )
@@ -381,6 +434,11 @@ def prepare(
         coefficient_spread=tuple(spread),
         turning={} if turning is None else turning,
     )
+
+
+def _sweep(measurement: CutMeasurement, lines: AxisLines) -> FloatArray:
+    """By which each line's frequency changes, and for how long, shape (n, 2) [rad/s^2], [s]."""
+    return np.column_stack([lines.order * measurement.acceleration, np.full(lines.omega.size, measurement.length)])
 
 
 def _slopes(slope: ComplexArray, uncertain: Sequence[int], tooling: int, count: int) -> ComplexArray:
@@ -420,6 +478,6 @@ def _cut_priors(
         if m.tooth_angle_known:
             delay[k], delay_weight[k] = m.delay, 1.0 / m.delay_std**2
         else:
-            clamping[k] = names.setdefault(m.tooling, len(names))
+            clamping[k] = names.setdefault(m.clamping or m.tooling, len(names))
             edge[k] = m.delay, 1.0 / m.delay_std**2
     return CutPrior(delay, delay_weight, angle_weight, tooth_period), clamping, edge

@@ -28,6 +28,7 @@ from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.progress import BOTH, Progress, Stage, Step
 from rcsa_ident.identification.result import Identification
 from rcsa_ident.identification.search import SearchSettings, explore
+from rcsa_ident.identification.swept import unswept
 from rcsa_ident.identification.task import Phase, finite, perform
 from rcsa_ident.scaleout import Map
 
@@ -35,6 +36,8 @@ from rcsa_ident.scaleout import Map
 SMOOTH_ERROR = 2e-3
 #: Searches from new starts, until one axis has come to the same answer twice.
 ATTEMPTS = 3
+#: Windows of a tooling's passes that are enough to find its modes; the polish takes all.
+ENOUGH = 40
 #: Score beyond which planes plainly feel each other once a stiffness that changes with speed is in the fit: 0 to 36 where they do not,
 #: 55 and more where they do (no benchmark prints scores); and by how much the fit of both together has to be better to need no other:
 #: exchanging and adding modes gains a few hundred, planes that feel each other thousands.
@@ -94,7 +97,8 @@ class EvidenceSelection:
     def _search(self, data: IdentificationData, seed: int, map: Map, progress: Progress | None) -> list[AxisSearch]:
         """Return the search of each axis, again from new starts until one has come to the same answer twice."""
         sequence = np.random.SeedSequence(seed)
-        summed = data.summed()
+        asked = _searched_cuts(data)
+        summed = data.of_cuts(asked).summed() if asked.size < len(data.cut_ids) else data.summed()
         parts = [summed.only(a.axis).with_smooth_errors(SMOOTH_ERROR) for a in data.axes]
         searched: list[AxisSearch] = []
         for _ in range(ATTEMPTS):
@@ -106,7 +110,7 @@ class EvidenceSelection:
             searched = [a.joined(b) for a, b in zip(searched, found, strict=True)] if searched else found
             if self.start is not None or any(s.confirmed for s in searched):
                 break
-        return searched
+        return searched if asked.size == len(data.cut_ids) else [_of_all(search, asked, len(data.cut_ids)) for search in searched]
 
     def _fit(self, data: IdentificationData, searched: list[AxisSearch], map: Map, report: Report) -> Fit:
         """Return the fit of both axes: apart, or together where they feel each other.
@@ -116,7 +120,9 @@ class EvidenceSelection:
         """
         smooth = data.with_smooth_errors(SMOOTH_ERROR)
         first = first_starts(smooth, self.priors, searched, map)
-        points = coupled_data(smooth) if couplable(data) else None
+        # the lines of the searches were those of windows that sweep
+        measured, smooth = smooth, unswept(smooth, self.priors, first[0].theta, first[0].layout)
+        points = coupled_data(smooth) if couplable(smooth) else None
         together: CoupledFit | None = None
         if points is not None and self._felt(points, first[0], *learned_noise(searched)).score > PLAIN:
             apart, misfit = fit_roughly(smooth, self.priors, searched, first[0], report)
@@ -126,6 +132,7 @@ class EvidenceSelection:
                 if together.evidence < evidence(apart, misfit) - PLAIN_GAIN:
                     return together
         apart, misfit = fit_jointly(smooth, self.priors, searched, first, report)
+        smooth = unswept(measured, self.priors, apart.theta, apart.layout)
         grown = grow_jointly(smooth, self.priors, apart, misfit, report)
         if points is not None and together is None:
             felt = self._felt(points, apart.candidate, misfit.model_error, misfit.cut_weight)
@@ -154,6 +161,29 @@ class EvidenceSelection:
         """Return the fit of both planes as one machine."""
         starts = coupled_starts(points, self.priors, searched, apart, misfit.cut_weight, map)
         return CoupledFit(data, points, felt, *fit_coupled(points, self.priors, starts[0], report))
+
+
+def _searched_cuts(data: IdentificationData) -> np.ndarray:
+    """Indices of the cuts that searches look at: of many windows of passes every second, third, ... of each tooling."""
+    keep = np.ones(len(data.cut_ids), dtype=bool)
+    if data.sweeps:
+        for tooling in range(len(data.toolings)):
+            own = np.flatnonzero(data.cut_tooling[: data.cuts] == tooling)
+            step = max(own.size // ENOUGH, 1)
+            keep[own[np.arange(own.size) % step != step // 2]] = False
+    return np.flatnonzero(keep)
+
+
+def _of_all(search: AxisSearch, asked: np.ndarray, count: int) -> AxisSearch:
+    """The search of some cuts as one of all: what was not asked starts where nothing is known of its delay and counts fully."""
+    candidates = []
+    for each in search.candidates:
+        nuisance = np.zeros((count, 2))
+        nuisance[asked] = each.nuisance
+        candidates.append(replace(each, nuisance=nuisance))
+    weight = np.ones(count)
+    weight[asked] = search.cut_weight
+    return replace(search, candidates=candidates, cut_weight=weight)
 
 
 def _report_to(axis: str, trace: list[Step], progress: Progress | None) -> Report:

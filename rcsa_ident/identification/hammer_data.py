@@ -142,6 +142,19 @@ def _wider(axis: AxisData, count: int, hit: bool) -> AxisData:
     return own.summed() if hit else own
 
 
+def _swept(parts: Sequence[AxisData]) -> dict[str, np.ndarray]:
+    """How the lines sweep, where some do; a hammer's do not."""
+    if not any(part.sweep.size for part in parts):
+        return {}
+    still = [
+        (part.sweep, part.around)
+        if part.sweep.size
+        else (np.zeros((part.omega.size, 2)), np.repeat(np.concatenate([part.flange, part.tip], axis=1)[:, None], 2, axis=1))
+        for part in parts
+    ]
+    return {"sweep": np.concatenate([each for each, _ in still]), "around": np.concatenate([each for _, each in still])}
+
+
 def _joined(parts: Sequence[AxisData]) -> AxisData:
     """All lines of an axis; both forces and both planes are a matter of cuts alone."""
 
@@ -161,4 +174,5 @@ def _joined(parts: Sequence[AxisData]) -> AxisData:
         on_holder=whole(lambda p: p.on_holder if p.on_holder.size else np.zeros(p.omega.size, dtype=bool)),
         still=whole(lambda p: p.still if p.still.size else np.zeros(p.omega.size, dtype=bool)),
         point=whole(lambda p: p.point if p.point.size else np.zeros((p.omega.size, 3))),
+        **_swept(parts),
     )

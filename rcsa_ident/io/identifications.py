@@ -178,10 +178,13 @@ def _sensor_to_json(sensor: Sensor) -> dict[str, Any]:
 
 
 def _delays(identification: Identification, campaign: Campaign) -> dict[str, dict[str, float]]:
-    tooling = {cut.id: cut.tooling for cut in campaign.cuts}
+    # the windows of a pass have no delay in common
+    tooling = {cut.id: cut.tooling for cut in campaign.cuts if cut.last_speed is None}
     delays = {}
     rows = (identification.delay, identification.delay_std, identification.spindle_speed)
     for cut, delay, std, speed in zip(identification.cut_ids, *(row.tolist() for row in rows), strict=True):
+        if cut not in tooling:
+            continue
         pitch = 2.0 * np.pi / campaign.toolings[tooling[cut]].cutter.teeth
         delays[cut] = {"angle_deg": float(np.degrees(speed * delay % pitch)), "std_deg": float(np.degrees(speed * std))}
     return delays

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
 from rcsa_ident.machining_setup import Workpiece
-from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH
+from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, LARGEST_SWEEP, LEAST_SWEEP
 from rcsa_ident.units import from_rpm, to_rpm
 from rcsa_ident.virtual.disturbances import Disturbances
 from rcsa_ident.virtual.machine import Bearing, CutPlan, FlangeJoint, Housing, PerAxis, VirtualSpindle
@@ -32,7 +33,7 @@ _SENSORS = (
 )  # fmt: skip
 _CUTS = (
     "toolings", "truth_toolings", "spindle_speeds_rpm", "axial_depth_mm", "feed_per_tooth_mm", "entry_angle_deg", "exit_angle_deg",
-    "feed_direction", "duration_s", "settling_s", "entry_s", "exit_s",
+    "feed_direction", "duration_s", "settling_s", "entry_s", "exit_s", "passes_rpm", "pass_duration_s",
 )  # fmt: skip
 _DISTURBANCES = (
     "speed_wander_percent", "wander_time_s", "clock_error_percent", "hum_um", "mains_hz", "machine_noise", "knocks_per_s", "knock_um",
@@ -107,7 +108,7 @@ def machine_of(data: Mapping[str, Any], where: str, name: str, folder: Path) -> 
             gyroscopic=head.flag("gyroscopic", True),
             fixture_position=sensors.number("fixture_position_mm", "mm", 0.0, least=-1000.0, most=5000.0) * 1e-3,
         )
-        fastest = max(plan.spindle_speeds)
+        fastest = max(plan.programmed)
         for i, bearing in enumerate(spindle.bearings):
             if bearing.softening * fastest >= 1.0:
                 allowed = f"below {1.0 / to_rpm(fastest):.3g} at {to_rpm(fastest):g} rev/min, so that some stiffness is left"
@@ -208,11 +209,15 @@ def _plan(table: Table) -> CutPlan:
         settling=table.number("settling_s", "s", 0.15, least=0.0, most=60.0),
         entry=table.number("entry_s", "s", 0.0, least=0.0, most=60.0),
         leave=table.number("exit_s", "s", 0.0, least=0.0, most=60.0),
+        passes=_passes(table),
+        pass_duration=table.number("pass_duration_s", "s", 4.0, above=0.0, most=60.0),
     )
 
 
 def _speeds(table: Table) -> list[float]:
-    """A list of speeds, or from, to and count."""
+    """A list of speeds, or from, to and count; none where there are passes."""
+    if "spindle_speeds_rpm" not in table and "passes_rpm" in table:
+        return []
     value = table.value("spindle_speeds_rpm", "a list of speeds, or { from, to, count } [rev/min]")
     if not isinstance(value, dict):
         speeds = table.numbers("spindle_speeds_rpm", None, "rev/min", above=0.0)
@@ -222,6 +227,21 @@ def _speeds(table: Table) -> list[float]:
     limits = table.table("spindle_speeds_rpm", ("from", "to", "count"))
     first, last = (limits.number(key, "rev/min", above=0.0, most=500000.0) for key in ("from", "to"))
     return np.linspace(first, last, limits.number("count", "", least=1, most=10000, whole=True)).tolist()
+
+
+def _passes(table: Table) -> tuple[tuple[float, float], ...]:
+    """Passes one after the other, [rad/s]: from, to and count."""
+    if "passes_rpm" not in table:
+        return ()
+    limits = table.table("passes_rpm", ("from", "to", "count"))
+    first, last = (limits.number(key, "rev/min", above=0.0, most=500000.0) for key in ("from", "to"))
+    ends = np.linspace(first, last, limits.number("count", "", least=1, most=1000, whole=True) + 1)
+    least = 100.0 * LEAST_SWEEP
+    for low, high in itertools.pairwise(ends.tolist()):
+        if not LEAST_SWEEP <= abs(high / low - 1.0) <= LARGEST_SWEEP:
+            allowed = f"{least:g} % to {100 * LARGEST_SWEEP:g} % of change in each pass"
+            table.refuse("passes_rpm", f"a pass from {low:g} to {high:g}", allowed)
+    return tuple((from_rpm(low), from_rpm(high)) for low, high in itertools.pairwise(ends.tolist()))
 
 
 def _pair(table: Table, key: str, unit: str, *, above: float | None = None, least: float | None = None) -> PerAxis:

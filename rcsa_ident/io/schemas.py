@@ -79,7 +79,9 @@ _CAMPAIGNS = (
         "sensors": {"flange_y": {"quantity": "displacement", "axis": "Y", "sensitivity": 1e4}},
         "workpiece": dict(_WORKPIECE),
         "toolings": {"S1": "toolings/S1.toml"},
-        "cuts": [{"id": "1", "tooling": "S1", "spindle_speed_rpm": 8000.0, **_ANGLES, "cut": "recordings/1.h5"}],
+        "cuts": [
+            {"id": "1", "tooling": "S1", "spindle_speed_rpm": 8000.0, "spindle_speed_to_rpm": 9e3, **_ANGLES, "cut": "recordings/1.h5"}
+        ],
     },
     {
         "toolings": {"S1": "toolings/S1.toml"},
@@ -123,6 +125,13 @@ _MACHINES = (
         "shaft": {"segments": [*_SEGMENTS, {"length_mm": 500.0, "outer_diameter_mm": 88.0, "material": "steel"}]},
         "materials": _MATERIALS,
         "cuts": {**_MACHINE["cuts"], "spindle_speeds_rpm": {"from": 8000.0, "to": 20_000.0, "count": 4}},
+    },
+    _MACHINE
+    | {
+        "cuts": {
+            **{key: value for key, value in _MACHINE["cuts"].items() if key != "spindle_speeds_rpm"},
+            "passes_rpm": {"from": 8000.0, "to": 20_000.0, "count": 12},
+        }
     },
 )
 _MODE = {"natural_frequency_hz": 500.0, "damping_ratio": 0.03}

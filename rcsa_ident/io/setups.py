@@ -25,6 +25,8 @@ from rcsa_ident.plausibility import (
     DENSITY,
     DIAMETER,
     FEED_PER_TOOTH,
+    LARGEST_SWEEP,
+    LEAST_SWEEP,
     LOSS_FACTOR,
     MODULUS,
     SEGMENT_DIAMETER,
@@ -58,6 +60,7 @@ _CUT = (
     "id",
     "tooling",
     "spindle_speed_rpm",
+    "spindle_speed_to_rpm",
     "axial_depth_mm",
     "feed_per_tooth_mm",
     "entry_angle_deg",
@@ -313,7 +316,19 @@ def _cut(table: Table, toolings: Mapping[str, Tooling], locate: Callable[[Table,
     )
     name = table.text("id")
     tooling = table.text("tooling", choices=tuple(toolings), names_of="toolings")
-    return Cut(name, tooling, conditions, locate(table, "cut"), locate(table, "air") if "air" in table else None)
+    air = locate(table, "air") if "air" in table else None
+    return Cut(name, tooling, conditions, locate(table, "cut"), air, _last_speed(table, conditions.spindle_speed))
+
+
+def _last_speed(table: Table, first: float) -> float | None:
+    """At which a pass ends whose speed changes, [rad/s]."""
+    if "spindle_speed_to_rpm" not in table:
+        return None
+    last = from_rpm(table.quantity("spindle_speed_to_rpm", SPINDLE_SPEED))
+    if not LEAST_SWEEP <= abs(last / first - 1.0) <= LARGEST_SWEEP:
+        allowed = f"{100 * LEAST_SWEEP:g} % to {100 * LARGEST_SWEEP:g} % beside spindle_speed_rpm, {to_rpm(first):g}"
+        table.refuse("spindle_speed_to_rpm", f"{to_rpm(last):g}", f"{allowed}; without it the cut keeps its speed")
+    return last
 
 
 def feed_angle_of(table: Table) -> float:
@@ -326,18 +341,21 @@ def feed_direction_of(angle: float) -> str | float:
     return next((axis for axis, known in FEED_DIRECTIONS.items() if abs(angle - known) < 1e-12), float(np.degrees(angle)))
 
 
-def cut_keys(name: str, tooling: str, conditions: CuttingConditions) -> dict[str, Any]:
+def cut_keys(name: str, tooling: str, conditions: CuttingConditions, last_speed: float | None = None) -> dict[str, Any]:
     """Return an entry of ``[[cuts]]``; its recordings are named after it.
 
     Parameters
     ----------
     name, tooling : str
     conditions : CuttingConditions
+    last_speed : float or None [rad/s]
+        Of a pass whose speed changes.
     """
     return {
         "id": name,
         "tooling": tooling,
         "spindle_speed_rpm": to_rpm(conditions.spindle_speed),
+        **({} if last_speed is None else {"spindle_speed_to_rpm": to_rpm(last_speed)}),
         "axial_depth_mm": conditions.axial_depth * 1e3,
         "feed_per_tooth_mm": conditions.feed_per_tooth * 1e3,
         "entry_angle_deg": float(np.degrees(conditions.engagement.entry)),

@@ -75,7 +75,7 @@ def write_simulation(
     for folder in (out, truth):
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError("out", str(folder), "a folder that does not exist or is empty")
-    total = len(toolings) * len(setup.plan.spindle_speeds)
+    total = len(toolings) * len(setup.plan.cuts)
     with filling(out, "out") as runs, filling(truth, "out") as known:
         for folder in (runs / "recordings", runs / "toolings", known / "tip", known / "cross", known / "forces"):
             folder.mkdir()
@@ -93,7 +93,7 @@ def write_simulation(
             if progress is not None:
                 progress(done, total)
         write_text(known / "records.csv", "\n".join(rows) + "\n")
-        mean = float(np.mean(setup.plan.spindle_speeds))
+        mean = float(np.mean(setup.plan.programmed))
         for true in receptances:
             speed = None if true.spindle_speed == mean else true.spindle_speed
             for place, values in (("tip", true.tip), ("cross", true.cross)):
@@ -148,12 +148,13 @@ def campaign_text(setup: MachineFile, toolings: Sequence[Tooling]) -> str:
         sensors["trigger"] = {"quantity": "trigger", "pulses_per_revolution": 1, "tooth_angle_deg": angle}
     cuts = [
         cut_keys(
-            f"{tooling.name}-{i:02d}",
+            f"{tooling.name}-{name}",
             tooling.name,
             CuttingConditions(speed, plan.axial_depth, plan.feed_per_tooth, plan.engagement, plan.feed_angle),
+            last,
         )
         for tooling in toolings
-        for i, speed in enumerate(plan.spindle_speeds)
+        for name, speed, last, _ in plan.cuts
     ]
     exact = {"campaign": {"name": setup.name, "sampling_rate_hz": suite.rate}, "sensors": sensors}
     rest = {"workpiece": workpiece_keys(setup.workpiece), "toolings": {t.name: f"toolings/{t.name}.toml" for t in toolings}, "cuts": cuts}

@@ -53,18 +53,19 @@ def recording_rows(readings: Iterable[Reading]) -> list[RecordingRow]:
     """Return a row for each reading, in their order."""
     rows = []
     for reading in readings:
-        verdict, found = reading.verdict, reading.measurement
+        verdict = reading.verdict
         common = (reading.cut_id, reading.tooling, verdict.usable, verdict.reasons, verdict.notes, to_rpm(reading.programmed_speed))
-        if found is None:
+        if not reading.measurements:
             rows.append(RecordingRow(*common))
             continue
-        ratios = {
-            axis.upper(): float(10.0 * np.log10(np.median(np.abs(lines.receptance) ** 2 / (2.0 * np.sum(lines.variance, axis=1)))))
-            for axis, lines in found.axes.items()
-            if lines.omega.size
-        }
-        count = sum(lines.omega.size for lines in found.axes.values())
-        rows.append(RecordingRow(*common, to_rpm(found.spindle_speed), count, ratios))
+        of_axis: dict[str, list[FloatArray]] = {}
+        for axis, lines in (each for found in reading.measurements for each in found.axes.items() if each[1].omega.size):
+            power = np.abs(lines.receptance) ** 2 / (2.0 * np.sum(lines.variance, axis=1))
+            of_axis.setdefault(axis.upper(), []).append(power)
+        ratios = {axis: float(10.0 * np.log10(np.median(np.concatenate(each)))) for axis, each in of_axis.items()}
+        count = sum(part.size for each in of_axis.values() for part in each)
+        speed = float(np.mean([found.spindle_speed for found in reading.measurements]))
+        rows.append(RecordingRow(*common, to_rpm(speed), count, ratios))
     return rows
 
 

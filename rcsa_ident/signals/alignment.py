@@ -87,7 +87,7 @@ def trigger_edge(
     if found is None:
         return None
     sensor, x = found
-    edges = _rising(x).astype(float)
+    edges = rising(x).astype(float)
     if edges.size < 2:
         return None
     if deviation is not None:
@@ -170,8 +170,8 @@ def _trigger(recording: Recording) -> Sensor:
     return next(sensor for sensor in recording.sensors if sensor.quantity is Quantity.TRIGGER)
 
 
-def _rising(x: FloatArray) -> np.ndarray:
-    """Samples at which a signal has just passed the middle between its extremes upwards; lost samples hide edges."""
+def rising(x: FloatArray) -> np.ndarray:
+    """Return the samples at which a signal has just passed the middle between its extremes upwards; lost samples hide edges."""
     if np.all(np.isnan(x)) or np.nanmax(x) == np.nanmin(x):
         return np.zeros(0, dtype=int)
     middle = 0.5 * (np.nanmax(x) + np.nanmin(x))

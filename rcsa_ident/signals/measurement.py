@@ -60,6 +60,12 @@ class CutMeasurement:
     tooth_angle_known : bool
     housing : bool
         Whether the lines are those of the spindle's housing, from accelerometers, and not the flange's.
+    clamping : str
+        Cuts of one such name share the unknown angle between the time that `delay` tells and immersion 0; by default the tooling's.
+    acceleration : float [rad/s^2]
+        By which the spindle speed changes, in the window of a pass: the lines are means over the frequencies that it sweeps.
+    length : float [s]
+        Of that window; 0 of a whole record.
     """
 
     cut_id: str
@@ -71,6 +77,9 @@ class CutMeasurement:
     delay_std: float | None = None
     tooth_angle_known: bool = True
     housing: bool = False
+    clamping: str = ""
+    acceleration: float = 0.0
+    length: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -81,8 +90,10 @@ class Reading(Shown):
     ----------
     cut_id, tooling : str
     programmed_speed : float [rad/s]
+        In the middle of a pass.
     verdict : Verdict
-    measurement : CutMeasurement or None
+    measurements : tuple of CutMeasurement
+        One of a cut that keeps its speed, one for each window of a pass, none of a cut that is not usable.
     spindle_speed : float or None [rad/s]
         As found in the record, also in one that is not usable, unless nothing can be told of it.
     harmonics : mapping of Dof to int
@@ -93,13 +104,19 @@ class Reading(Shown):
     tooling: str
     programmed_speed: float
     verdict: Verdict
-    measurement: CutMeasurement | None = None
+    measurements: tuple[CutMeasurement, ...] = ()
     spindle_speed: float | None = None
     harmonics: Mapping[Dof, int] = field(default_factory=dict)
 
+    @property
+    def measurement(self) -> CutMeasurement | None:
+        """That of a usable cut that keeps its speed; None of others."""
+        return self.measurements[0] if len(self.measurements) == 1 else None
+
     def __str__(self) -> str:
-        lines = 0 if self.measurement is None else sum(each.omega.size for each in self.measurement.axes.values())
-        return f"{self.cut_id}: {self.verdict}" + (f", {lines} lines" if self.verdict.usable else "")
+        lines = sum(each.omega.size for measurement in self.measurements for each in measurement.axes.values())
+        windows = f" in {len(self.measurements)} windows" if len(self.measurements) > 1 else ""
+        return f"{self.cut_id}: {self.verdict}" + (f", {lines} lines{windows}" if self.verdict.usable else "")
 
 
 def measure_cut(
@@ -147,7 +164,7 @@ def measure_cut(
     notes = looked_at.notes
 
     def left_out(reasons: tuple[Remark, ...], speed: float | None = None, harmonics: Mapping[Dof, int] | None = None) -> Reading:
-        return Reading(cut_id, tooling, programmed, Verdict(reasons, notes), None, speed, harmonics or {})
+        return Reading(cut_id, tooling, programmed, Verdict(reasons, notes), (), speed, harmonics or {})
 
     faults = looked_at.reasons + tuple(fault.of("air cut") for fault in (raw_faults(air) if air is not None else ()))
     if faults:
@@ -157,7 +174,7 @@ def measure_cut(
     except Unsteady as error:
         return left_out((_not_steady(error),))
     notes += _remarkable(steady)
-    found = steady.spindle_speed, _harmonics(steady)
+    found = steady.spindle_speed, visible_harmonics(steady)
     harmonic = np.arange(cutter.teeth, steady.highest_order + 1, cutter.teeth)
     faults = _speed_faults(steady, programmed)
     if faults:
@@ -180,10 +197,46 @@ def measure_cut(
         still = None
     if still is not None:
         angle, alignment_std = angle_to_air(steady, still, cutter.teeth)
-    reasons = _cut_faults(steady, still, angle, harmonic, cutter, max_frequency)
+    reasons = cut_faults(steady, still, angle, harmonic, cutter, max_frequency)
     if reasons:
         return left_out(reasons, *found)
+    kept = cross_lines(steady, still, angle, harmonic, cutter, conditions, coefficients, estimator)
     speed = steady.spindle_speed
+    measurement = CutMeasurement(
+        cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth, *followed(steady)), steady.housing
+    )
+    verdict = Verdict((), (*notes, HOUSING) if steady.housing else notes if air is not None else (*notes, NO_AIR))
+    return Reading(cut_id, tooling, programmed, verdict, (measurement,), *found)
+
+
+def cross_lines(
+    steady: SteadyRecord,
+    still: SteadyRecord | None,
+    angle: float,
+    harmonic: np.ndarray,
+    cutter: Cutter,
+    conditions: CuttingConditions,
+    coefficients: CuttingCoefficients,
+    estimator: Estimator = DEFAULT_ESTIMATOR,
+) -> dict[Dof, AxisLines]:
+    """Return the lines of each axis over the simulated force, without those at which the force says nothing.
+
+    Parameters
+    ----------
+    steady : SteadyRecord
+    still : SteadyRecord or None
+        Of the air cut.
+    angle : float [rad]
+        By which that must be turned to lie under the cut.
+    harmonic : array of int, shape (n,)
+        Orders of the lines.
+    cutter : Cutter
+    conditions : CuttingConditions
+        As programmed; the speed is that of the record.
+    coefficients : CuttingCoefficients
+    estimator : Estimator
+    """
+    axes, speed = steady.axes, steady.spindle_speed
     force, slope = force_and_slope(cutter, replace(conditions, spindle_speed=speed), coefficients, harmonic)
     weakest = WEAKEST_FORCE * np.abs(force).max()
     measured = [0 if axis is Dof.X else 1 for axis in axes]
@@ -192,12 +245,7 @@ def measure_cut(
     own = np.where(strong, force[:, measured], max(weakest, 1e-300))
     lines = estimator.lines(steady, still, angle, harmonic, own, slope[:, measured])
     both = {a: replace(lines[a], across=force[:, o], across_slope=slope[:, o]) for a, o in zip(axes, other, strict=True)}
-    kept = {axis: both[axis].of(k) for axis, k in zip(axes, strong.T, strict=True) if k.any()}
-    measurement = CutMeasurement(
-        cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth, *followed(steady)), steady.housing
-    )
-    verdict = Verdict((), (*notes, HOUSING) if steady.housing else notes if air is not None else (*notes, NO_AIR))
-    return Reading(cut_id, tooling, programmed, verdict, measurement, *found)
+    return {axis: both[axis].of(k) for axis, k in zip(axes, strong.T, strict=True) if k.any()}
 
 
 def judge_air(cut_id: str, tooling: str, air: Recording, conditions: CuttingConditions, max_frequency: float = MAX_FREQUENCY) -> Reading:
@@ -227,7 +275,7 @@ def judge_air(cut_id: str, tooling: str, air: Recording, conditions: CuttingCond
     except Unsteady as error:
         return Reading(cut_id, tooling, programmed, Verdict((_not_steady(error),), looked_at.notes))
     verdict = Verdict(_speed_faults(still, programmed), (*looked_at.notes, *_remarkable(still)))
-    return Reading(cut_id, tooling, programmed, verdict, None, still.spindle_speed, _harmonics(still))
+    return Reading(cut_id, tooling, programmed, verdict, (), still.spindle_speed, visible_harmonics(still))
 
 
 def _remarkable(steady: SteadyRecord) -> tuple[Remark, ...]:
@@ -258,8 +306,8 @@ def _speed_faults(steady: SteadyRecord, programmed: float) -> tuple[Remark, ...]
     return (*faults, *((smear,) if smear else ()))[:1]
 
 
-def _harmonics(steady: SteadyRecord) -> dict[Dof, int]:
-    """Multiples of the tooth-passing frequency that are no noise, for each axis."""
+def visible_harmonics(steady: SteadyRecord) -> dict[Dof, int]:
+    """Return how many multiples of the tooth-passing frequency are no noise, for each axis."""
     order = np.arange(steady.teeth, steady.highest_order + 1, steady.teeth)
     ratio = np.abs(steady.flange[order]) ** 2 / np.maximum(2.0 * steady.variance[order], 1e-300)
     # pure noise has a mean of 1, and its largest of n is rarely above log(n) + 7
@@ -267,10 +315,10 @@ def _harmonics(steady: SteadyRecord) -> dict[Dof, int]:
     return {axis: int(n) for axis, n in zip(steady.axes, count, strict=True)}
 
 
-def _cut_faults(
+def cut_faults(
     cut: SteadyRecord, air: SteadyRecord | None, angle: float, harmonic: np.ndarray, cutter: Cutter, max_frequency: float
 ) -> tuple[Remark, ...]:
-    """Reasons against a cut that only show beside its air cut."""
+    """Return the reasons against a cut that only show beside its air cut; parameters as in `cross_lines`."""
     difference, noise = cut.flange, cut.variance
     if air is not None:
         turned, more = turned_air(air, angle, cut.highest_order)
@@ -323,6 +371,6 @@ def among_fellows(readings: Sequence[Reading]) -> list[Reading]:
 
     reasons = fits_by_chance([(each.tooling, fits(each.verdict)) for each in readings])
     return [
-        each if reason is None else replace(each, verdict=replace(each.verdict, reasons=(reason,)), measurement=None)
+        each if reason is None else replace(each, verdict=replace(each.verdict, reasons=(reason,)), measurements=())
         for each, reason in zip(readings, reasons, strict=True)
     ]

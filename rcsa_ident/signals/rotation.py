@@ -117,8 +117,8 @@ class Pace:
         return min(round(max(self.window, _BLOCK_TURNS / lowest) * rate), samples)
 
 
-#: Of a speed that wanders, and of one that changes on purpose.
-WANDER, RAMP = Pace(), Pace(0.25, 8e-3, 1e-3)
+#: Of a speed that wanders, of one that changes on purpose, and of one of which it is known how.
+WANDER, RAMP, PASS = Pace(), Pace(0.25, 8e-3, 1e-3), Pace(0.25, 4e-3, 2.5e-4)
 
 
 def speed_path(samples: FloatArray, rate: float, lowest: float, highest: float, pace: Pace = WANDER) -> tuple[FloatArray, FloatArray]:
@@ -148,7 +148,7 @@ def speed_path(samples: FloatArray, rate: float, lowest: float, highest: float, 
     return middles, trial[path]
 
 
-def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: FloatArray) -> Rotation:
+def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: FloatArray, teeth: int = 0) -> Rotation:
     """Return the spindle's angle at each sample: the phase that the strong orders have in common.
 
     In each block of a few revolutions the lines' phases tell the angle; how fast it may change is what makes them most likely.
@@ -162,6 +162,8 @@ def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: Flo
         Samples from the first one to the middles of the windows in which the speed is known.
     frequency : array, shape (w,) [Hz]
         The spindle's in each, to within a few hundredths of a turn over the window.
+    teeth : int
+        Of a cutter whose orders do not take part: while the speed changes they carry the structure's phase. 0 for none.
     """
     at, mean = np.arange(samples.shape[0]), float(frequency.mean())
     speed = np.full(at.size, mean)
@@ -169,12 +171,24 @@ def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: Flo
         speed = PchipInterpolator(middles, frequency)(np.clip(at, middles[0], middles[-1]))
     angle = 2.0 * np.pi / rate * np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))])
     highest = max(min(int(0.45 * rate / float(frequency.max())), ORDERS), 1)
+    centred = samples - samples.mean(axis=0)
+    # where the speed runs away from what windows tell, low orders say where the high ones' turns begin
+    for orders in (2, 8) if teeth else ():
+        angle = _followed(centred, rate, angle, mean, min(orders, highest), teeth).angle
+    return _followed(centred, rate, angle, mean, highest, teeth)
+
+
+def _followed(samples: FloatArray, rate: float, angle: FloatArray, mean: float, highest: int, teeth: int) -> Rotation:
+    """The rotation that a spindle's orders tell beyond an angle that is about right; its mean frequency [Hz] sets the blocks."""
+    at = np.arange(samples.shape[0])
     length = min(round(max(_BLOCK_TURNS / mean, _SHORTEST_BLOCK) * rate), at.size)
     hop = max(length // 2, 1)
     starts = np.arange(0, at.size - length + 1, hop)
     window = hann(length)
-    lines = angle_sums(samples - samples.mean(axis=0), angle, starts, 2.0 / window.sum() * window, highest)[:, 1:]
-    phase, information, evidence = _common_phase(lines, np.arange(1, highest + 1)[None, :, None], hop / rate)
+    lines = angle_sums(samples, angle, starts, 2.0 / window.sum() * window, highest)[:, 1:]
+    order = np.arange(1, highest + 1)
+    own = order % teeth != 0 if teeth > 1 else order > 0
+    phase, information, evidence = _common_phase(lines[:, own], order[own][None, :, None], hop / rate)
     time = (starts + 0.5 * (length - 1)) / rate
     if starts.size < 4:
         # no more is told than was known

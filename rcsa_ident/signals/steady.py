@@ -155,7 +155,7 @@ def steady_record(
     least = LEAST_REVOLUTIONS * 2.0 * np.pi / programmed * rate
     if n < least:
         raise _no_steady_part(f"too short: {n / rate:.3g} s hold fewer than {LEAST_REVOLUTIONS:.0f} revolutions")
-    columns = _columns(recording, axes)
+    columns = motion_columns(recording, axes)
     window = slice(0, n) if whole else steady_window(recording, columns[: len(axes)], programmed, teeth)
     samples = recording.samples[window][:, columns]
     displacement = samples[:, : len(axes)]
@@ -179,7 +179,22 @@ def steady_record(
     if part.start:
         shift = np.exp(-1j * np.arange(lines.amplitude.shape[0]) * speed * part.start / rate)
         lines = replace(lines, amplitude=lines.amplitude * shift[:, None])
-    weight = _weights(recording, axes, columns, np.arange(lines.amplitude.shape[0]) * speed)
+    return record_of_lines(recording, axes, columns, window, part, teeth, lines, deviation, rotation)
+
+
+def record_of_lines(
+    recording: Recording,
+    axes: Sequence[Dof],
+    columns: tuple[int, ...],
+    window: slice,
+    part: slice,
+    teeth: int,
+    lines: LineSpectrum,
+    deviation: FloatArray | None,
+    rotation: Rotation | None = None,
+) -> SteadyRecord:
+    """Return the steady record with these lines of its channels; parameters as those of `SteadyRecord`."""
+    weight = _weights(recording, axes, columns, np.arange(lines.amplitude.shape[0]) * lines.spindle_speed)
     noise = np.stack([_line_variance(lines, c, teeth) for c in range(len(columns))], axis=1)
     kinds = [slice(0, len(axes)), slice(len(axes), None)][: 1 if len(columns) == len(axes) else 2]
     outputs = np.stack([np.einsum("mc,mca->ma", lines.amplitude[:, k], weight[:, k]) for k in kinds], axis=2)
@@ -197,7 +212,8 @@ def _no_steady_part(found: str) -> Unsteady:
     return Unsteady("recording", found, "a steady record of the programmed speed")
 
 
-def _columns(recording: Recording, axes: Sequence[Dof]) -> tuple[int, ...]:
+def motion_columns(recording: Recording, axes: Sequence[Dof]) -> tuple[int, ...]:
+    """Return the channels of the axes' motion, then those of the displacement sensors' fixture."""
     shown = [recording.sensor(Quantity.DISPLACEMENT, axis) for axis in axes]
     fixed = [recording.accelerometer(axis, Role.FIXTURE) for axis in axes]
     if all(sensor is None for sensor in shown):

@@ -81,15 +81,16 @@ def cut_force(position, tooth, places, cut, slices, before, path, force):
 def mill(decay, gain, shape, state, tooth, ahead, cut, turn, course, force):
     """March the spindle through a cut and return its outputs, shape (n, o).
 
-    decay: e^{pole dt}, shape (m,); gain: of the old and the new force, shape (2, m, 2); shape: outputs of the poles, shape
-    (o, m), the first two the tip's X and Y, doubled for the conjugate poles; state: of the poles at the start, shape (m,);
+    decay: e^{pole dt}, shape (p, m), in p equal parts of the cut one after the other; gain: of the old and the new force, shape
+    (p, 2, m, 2); shape: outputs of the poles, shape (p, o, m), the first two the tip's X and Y, doubled for the conjugate poles; state: of
+    the poles at the start, shape (m,);
     ahead: angles as in `passed`; cut: as in `cut_force`, then the number of slices; turn: feed axes in machine axes, shape (2, 2);
     course: angle of tooth 1, way of the feed and share of the width that is cut, shape (n, 3); force: shape (n, 2), is filled, in
     machine axes. The force between two instants is linear, so the march is exact in it.
     """
     n, slices = force.shape[0], int(cut[9])
-    m = decay.size
-    outputs = shape.shape[0]
+    parts, m = decay.shape
+    outputs = shape.shape[1]
     result = np.zeros((n, outputs))
     # the tool's place along feed and normal, and its way without vibration
     path = np.zeros((n, 3))
@@ -100,22 +101,24 @@ def mill(decay, gain, shape, state, tooth, ahead, cut, turn, course, force):
     now = cut.copy()
     local = np.zeros(2)
     position = np.zeros(2)
-    instant = np.zeros((2, 2))
-    for k in range(m):
-        for a in range(2):
-            for b in range(2):
-                instant[a, b] += (shape[a, k] * gain[1, k, b]).real
+    instant = np.zeros((parts, 2, 2))
+    for p in range(parts):
+        for k in range(m):
+            for a in range(2):
+                for b in range(2):
+                    instant[p, a, b] += (shape[p, a, k] * gain[p, 1, k, b]).real
     free = np.zeros(2)
     for i in range(n):
+        p = i * parts // n
         if i > 0:
             fx, fy = force[i - 1, 0], force[i - 1, 1]
             for k in range(m):
-                state[k] = decay[k] * state[k] + gain[0, k, 0] * fx + gain[0, k, 1] * fy
+                state[k] = decay[p, k] * state[k] + gain[p, 0, k, 0] * fx + gain[p, 0, k, 1] * fy
         free[0] = 0.0
         free[1] = 0.0
         for k in range(m):
-            free[0] += shape[0, k].real * state[k].real - shape[0, k].imag * state[k].imag
-            free[1] += shape[1, k].real * state[k].real - shape[1, k].imag * state[k].imag
+            free[0] += shape[p, 0, k].real * state[k].real - shape[p, 0, k].imag * state[k].imag
+            free[1] += shape[p, 1, k].real * state[k].real - shape[p, 1, k].imag * state[k].imag
         gx, gy = 0.0, 0.0
         if i > 0:
             gx, gy = force[i - 1, 0], force[i - 1, 1]
@@ -127,8 +130,8 @@ def mill(decay, gain, shape, state, tooth, ahead, cut, turn, course, force):
             x = free[0]
             y = free[1]
             if i > 0:
-                x += instant[0, 0] * gx + instant[0, 1] * gy
-                y += instant[1, 0] * gx + instant[1, 1] * gy
+                x += instant[p, 0, 0] * gx + instant[p, 0, 1] * gy
+                y += instant[p, 1, 0] * gx + instant[p, 1, 1] * gy
             position[0] = turn[0, 0] * x + turn[1, 0] * y + course[i, 1]
             position[1] = turn[0, 1] * x + turn[1, 1] * y
             cut_force(position, tooth, places, now, slices, before, path, local)
@@ -140,10 +143,10 @@ def mill(decay, gain, shape, state, tooth, ahead, cut, turn, course, force):
         path[i, 1] = position[1]
         if i > 0:
             for k in range(m):
-                state[k] += gain[1, k, 0] * gx + gain[1, k, 1] * gy
+                state[k] += gain[p, 1, k, 0] * gx + gain[p, 1, k, 1] * gy
         for a in range(outputs):
             value = 0.0
             for k in range(m):
-                value += shape[a, k].real * state[k].real - shape[a, k].imag * state[k].imag
+                value += shape[p, a, k].real * state[k].real - shape[p, a, k].imag * state[k].imag
             result[i, a] = value
     return result

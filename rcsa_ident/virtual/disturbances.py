@@ -64,7 +64,14 @@ class Disturbances:
 
 
 def turning(
-    disturbances: Disturbances, speed: float, angle: float, step: float, count: int, first: int, rng: np.random.Generator
+    disturbances: Disturbances,
+    speed: float,
+    angle: float,
+    step: float,
+    count: int,
+    first: int,
+    rng: np.random.Generator,
+    acceleration: float = 0.0,
 ) -> FloatArray:
     """Return the spindle's angle at instants `step` apart, shape (count,) [rad].
 
@@ -78,11 +85,14 @@ def turning(
     step : float [s]
     count, first : int
     rng : numpy.random.Generator
-        Not used by a spindle that turns evenly.
+        Not used by a spindle that does not wander.
+    acceleration : float [rad/s^2]
+        By which the speed changes from instant number `first` on.
     """
     from scipy.signal import lfilter  # slow to import, and files are read without it
 
-    even = np.asarray(angle + speed * step * (np.arange(count) - first), dtype=np.float64)
+    since = np.maximum(step * (np.arange(count) - first), 0.0)
+    even = np.asarray(angle + speed * step * (np.arange(count) - first) + 0.5 * acceleration * since**2, dtype=np.float64)
     if disturbances.speed_wander == 0.0:
         return even
     decay, quick = np.exp(-step / disturbances.wander_time), np.exp(-step / (_SMOOTH * disturbances.wander_time))
@@ -93,6 +103,9 @@ def turning(
     # the second low-pass takes a tenth of the variance
     deviation = disturbances.speed_wander * np.sqrt(1.0 + _SMOOTH) * wander
     lead = np.concatenate([[0.0], np.cumsum(0.5 * (deviation[1:] + deviation[:-1]))]) * speed * step
+    if acceleration != 0.0:
+        wandering = deviation * (speed + acceleration * since)
+        lead = np.concatenate([[0.0], np.cumsum(0.5 * (wandering[1:] + wandering[:-1]))]) * step
     return even + lead - lead[first]
 
 

@@ -173,12 +173,12 @@ def _angle(field: str, value: float) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CutPlan:
-    """The cuts of a simulated campaign: every tooling at every speed.
+    """The cuts of a simulated campaign: every tooling at every speed, and in every pass.
 
     Parameters
     ----------
     spindle_speeds : tuple of float [rad/s]
-        Programmed speeds.
+        Programmed speeds of the cuts at one speed; none where there are passes.
     axial_depth, feed_per_tooth : float [m]
     engagement : Engagement
     feed_angle : float [rad]
@@ -189,6 +189,10 @@ class CutPlan:
         Time that is simulated before it and dropped.
     entry, leave : float [s]
         Of the record, in the air and while the depth rises and falls again, half each; 0 where all of it is in the material.
+    passes : tuple of (float, float) [rad/s]
+        Programmed first and last speed of passes whose speed changes evenly in time.
+    pass_duration : float [s]
+        Length of the record of each.
     """
 
     spindle_speeds: tuple[float, ...]
@@ -200,18 +204,32 @@ class CutPlan:
     settling: float = 0.15
     entry: float = 0.0
     leave: float = 0.0
+    passes: tuple[tuple[float, float], ...] = ()
+    pass_duration: float = 4.0
 
     def __post_init__(self) -> None:
-        if not self.spindle_speeds:
-            raise InputError("cuts.spindle_speeds_rpm", "none", "at least one speed")
+        if not self.spindle_speeds and not self.passes:
+            raise InputError("cuts.spindle_speeds_rpm", "none", "at least one speed, or passes_rpm")
         positive("cuts.duration_s", self.duration, "s")
+        positive("cuts.pass_duration_s", self.pass_duration, "s")
         non_negative("cuts.settling_s", self.settling, "s")
         non_negative("cuts.entry_s", self.entry, "s")
         non_negative("cuts.exit_s", self.leave, "s")
         if self.entry + self.leave >= self.duration:
             raise InputError("cuts.duration_s", self.duration, f"above entry_s and exit_s together, {self.entry + self.leave:g} s")
-        for speed in self.spindle_speeds:
+        for speed in self.programmed:
             self.conditions(speed)
+
+    @property
+    def programmed(self) -> tuple[float, ...]:
+        """All speeds that are programmed, those at which passes begin and end among them [rad/s]."""
+        return (*self.spindle_speeds, *(speed for both in self.passes for speed in both))
+
+    @property
+    def cuts(self) -> tuple[tuple[str, float, float | None, float], ...]:
+        """What tells the cuts of a tooling apart: end of their names, first and last speed [rad/s] (None: as the first), length [s]."""
+        constant = [(f"{i:02d}", speed, None, self.duration) for i, speed in enumerate(self.spindle_speeds)]
+        return (*constant, *((f"p{i:02d}", first, last, self.pass_duration) for i, (first, last) in enumerate(self.passes)))
 
     def conditions(self, spindle_speed: float) -> CuttingConditions:
         """Return the conditions of one cut at this speed."""

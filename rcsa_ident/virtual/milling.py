@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,7 +71,7 @@ class CutHistory:
 
 
 def mill_cut(
-    dynamics: Poles,
+    dynamics: Poles | Sequence[Poles],
     cutter: Cutter,
     conditions: CuttingConditions,
     coefficients: CuttingCoefficients,
@@ -87,8 +88,9 @@ def mill_cut(
 
     Parameters
     ----------
-    dynamics : Poles
-        The machine with inputs ``tip.x``, ``tip.y`` and outputs at ``tip``, ``flange``, ``fixture``.
+    dynamics : Poles, or a sequence of them
+        The machine with inputs ``tip.x``, ``tip.y`` and outputs at ``tip``, ``flange``, ``fixture``; of one that changes while it cuts, one
+        for each of equal parts of the cut, in the same order and scale (`reduction.alike`).
     cutter : Cutter
     conditions : CuttingConditions
         The cut, with the true spindle speed.
@@ -110,6 +112,8 @@ def mill_cut(
     The first state answers the force of a tool that does not vibrate; what regeneration adds has to settle.
     """
     speed = conditions.spindle_speed
+    parts = (dynamics,) if isinstance(dynamics, Poles) else tuple(dynamics)
+    dynamics = parts[0]
     if dynamics.inputs.shape[1] != 2:
         raise InputError("inputs", dynamics.inputs.shape[1], "two: tip.x and tip.y")
     lines = rigid_force_lines(cutter, conditions, coefficients, slices)
@@ -122,14 +126,12 @@ def mill_cut(
     state = (dynamics.inputs * ((1.0 / (iw[:, None] - dynamics.pole)).T @ positive)).sum(axis=1)
     state += (dynamics.inputs * ((1.0 / (-iw[1:, None] - dynamics.pole)).T @ positive[1:].conj())).sum(axis=1)
 
-    x = dynamics.pole * step
+    x = np.stack([part.pole for part in parts]) * step
     first = np.expm1(x) / x
     second = (first - 1.0) / x
-    gain = step * np.stack([first - second, second])[:, :, None] * dynamics.inputs
+    gain = step * np.stack([first - second, second], axis=1)[:, :, :, None] * np.stack([part.inputs for part in parts])[:, None]
     rows = [[str(c) for c in dynamics.coordinates].index(f"{point}.{axis}") for point in ("tip", "flange", "fixture") for axis in "xy"]
-    seen = dynamics.outputs[rows]
-    bend = dynamics.outputs[rows[4:]] * dynamics.pole**2
-    shape = 2.0 * np.concatenate([seen, bend])
+    shape = 2.0 * np.stack([np.concatenate([part.outputs[rows], part.outputs[rows[4:]] * part.pole**2]) for part in parts])
     # a force at the tip accelerates the housing at once only through what the basis leaves out
     through = 2.0 * (dynamics.outputs[rows[4:]] * dynamics.pole) @ dynamics.inputs
 
@@ -170,8 +172,8 @@ def rigid_force_lines(
     course = _even(conditions, cutter.teeth, step, samples, 0.0)
     columns = np.column_stack([course.angle, course.way, course.width])
     force = np.zeros((samples, 2))
-    none = np.zeros((2, 1), dtype=complex)
-    mill(none[0], none[:, :, None] * np.ones(2), none, none[1].copy(), tooth, ahead, cut, turn, columns, force)
+    none = np.zeros((1, 2, 1), dtype=complex)
+    mill(none[:, 0], none[..., None] * np.ones(2), none, none[0, 1].copy(), tooth, ahead, cut, turn, columns, force)
     lines = np.fft.rfft(force, axis=0)[:_START_ORDERS] / samples
     lines[1:] *= 2.0
     return lines

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
+import scipy.optimize
 import scipy.sparse
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
@@ -151,6 +152,25 @@ def poles(model: ReducedRotor, speed: float = 0.0, inputs: tuple[str, ...] = ("t
     if np.any(value[keep].real >= 0.0):
         raise InputError("spindle", "a mode that grows by itself", "bearings and dampers that leave every mode stable")
     return Poles(value[keep], left[keep], shape[:, keep], model.coordinates)
+
+
+def alike(first: Poles, other: Poles) -> Poles:
+    """Return poles of nearly the same machine in the order and scale of the first ones.
+
+    The state of a march may then go on from one to the other: what the slow change of the shapes themselves would add to it is of the
+    order of that change within one period of a mode.
+
+    Raises
+    ------
+    InputError
+        If the machine does not have as many poles of its own.
+    """
+    if other.pole.size != first.pole.size:
+        raise InputError("dynamics", f"{other.pole.size} poles", f"{first.pole.size}, as many as before")
+    order = scipy.optimize.linear_sum_assignment(np.abs(first.pole[:, None] - other.pole[None, :]))[1]
+    outputs = other.outputs[:, order]
+    scale = np.sum(outputs.conj() * first.outputs, axis=0) / np.sum(np.abs(outputs) ** 2, axis=0)
+    return Poles(other.pole[order], other.inputs[order] / scale[:, None], outputs * scale, other.coordinates)
 
 
 def _rows(coordinates: tuple[Coordinate, ...], names: tuple[str, ...]) -> np.ndarray:

@@ -129,10 +129,11 @@ def out_of_round(suite: SensorSuite, clamping: Clamping, angle: FloatArray, spee
     omega = order * speed
     taps = decimator(factor)
     place = np.arange(taps.size) - taps.size // 2
-    response = np.cos(np.outer(omega / (suite.rate * factor), place)) @ taps * np.exp(-1j * omega * suite.gap_delay)
+    response = (np.cos(np.outer(omega / (suite.rate * factor), place)) @ taps).astype(complex)
     if suite.gap_bandwidth is not None:
         response = response / (1.0 + 1j * omega / (2.0 * np.pi * suite.gap_bandwidth))
-    turning = np.exp(1j * angle)
+    # what is seen now has passed the sensor before
+    turning = np.exp(1j * (angle if suite.gap_delay == 0.0 else angle - suite.gap_delay * suite.rate * np.gradient(angle)))
     seen = np.zeros((angle.size, 2))
     for i, position in enumerate((0.5 * np.pi, 0.0)):
         # the surface point under the sensor lies at position - angle ahead of tooth 1: it runs backwards

@@ -22,8 +22,8 @@ def left_open(campaign: Campaign, readings: Sequence[Reading]) -> tuple[str, ...
     readings : sequence of Reading
         Of its cuts, with their verdicts.
     """
-    usable = {each.cut_id: each.measurement for each in readings if each.measurement is not None}
-    axes = {axis for measurement in usable.values() for axis in measurement.axes}
+    usable = {each.cut_id for each in readings if each.measurements}
+    axes = {axis for each in readings for measurement in each.measurements for axis in measurement.axes}
     if len(axes) == 1:
         return (one_axis(Dof(next(iter(axes)))),)
     lines = [

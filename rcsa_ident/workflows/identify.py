@@ -24,6 +24,7 @@ from rcsa_ident.remarks import Remark
 from rcsa_ident.scaleout import Map
 from rcsa_ident.signals.measurement import Reading, among_fellows, measure_cut
 from rcsa_ident.signals.recording import Recording
+from rcsa_ident.signals.sweep import measure_pass
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.tool_holder.model import receptance_at_points, tool_holder_receptance
 from rcsa_ident.tool_holder.turning import turning_pair
@@ -64,10 +65,23 @@ def judge_cut(campaign: Campaign, read: ReadCut, cut: Cut) -> Reading:
     try:
         recording, air = (None if each is None else campaign.clocked(each) for each in read(cut))
         assert recording is not None
-        cutter = campaign.toolings[cut.tooling].cutter
-        return measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, campaign.coefficients)
+        return read_of(campaign, cut, recording, air)
     except InputError as error:
         return Reading(cut.id, cut.tooling, cut.conditions.spindle_speed, Verdict((Remark(RecordCode.UNREADABLE, f"unreadable: {error}"),)))
+
+
+def read_of(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | None) -> Reading:
+    """Return what the recordings of a cut or of a pass say, their clock already set right.
+
+    Raises
+    ------
+    InputError
+        As `measure_cut` and `measure_pass`.
+    """
+    cutter = campaign.toolings[cut.tooling].cutter
+    if cut.last_speed is None:
+        return measure_cut(cut.id, cut.tooling, recording, air, cutter, cut.conditions, campaign.coefficients)
+    return measure_pass(cut.id, cut.tooling, recording, air, cutter, cut.conditions, cut.last_speed, campaign.coefficients)
 
 
 def left_out(readings: Iterable[Reading]) -> list[tuple[str, str]]:
@@ -159,7 +173,9 @@ def clock_error(readings: Sequence[Reading]) -> float | None:
     ----------
     readings : sequence of Reading
     """
-    off = np.array([each.measurement.spindle_speed / each.programmed_speed - 1.0 for each in readings if each.measurement is not None])
+    # of a pass nobody knows when its programmed speeds were reached
+    single = [(each, each.measurements[0]) for each in readings if len(each.measurements) == 1]
+    off = np.array([measurement.spindle_speed / each.programmed_speed - 1.0 for each, measurement in single])
     if off.size < _FEW_SPEEDS:
         return None
     # a record whose speed was not found rightly is not asked
@@ -240,12 +256,12 @@ def data_of(campaign: Campaign, readings: Sequence[Reading], tests: Sequence[Ham
     if not tests:
         return _data_of_cuts(campaign, readings)
     at_points = {name: partial(receptance_at_points, t.assembly) for name, t in campaign.toolings.items()}
-    usable = any(each.measurement is not None for each in readings)
+    usable = any(bool(each.measurements) for each in readings)
     return with_tests(_data_of_cuts(campaign, readings) if usable else None, tests, at_points)
 
 
 def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> IdentificationData:
-    measurements = [each.measurement for each in readings if each.measurement is not None]
+    measurements = [measurement for each in readings for measurement in each.measurements]
     if not measurements:
         reasons = "; ".join(dict.fromkeys(reason for each in readings for reason in each.verdict.reasons))
         raise InputError("cuts", f"none of {len(readings)} usable ({reasons})", "at least one usable cut")

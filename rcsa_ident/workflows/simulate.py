@@ -16,12 +16,14 @@ from rcsa_ident.virtual.campaign import SimulatedCut, SimulatedRecord, TrueFlang
 from rcsa_ident.virtual.disturbances import Disturbances, turning
 from rcsa_ident.virtual.machine import CutPlan, VirtualSpindle
 from rcsa_ident.virtual.milling import Course, CutHistory, mill_cut, synchronous_lines
-from rcsa_ident.virtual.reduction import Poles, poles, reduced
+from rcsa_ident.virtual.reduction import Poles, ReducedRotor, alike, poles, reduced
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from rcsa_ident.virtual.sensors import Clamping, SensorSuite, clamp, padding, record
 
 #: Instants of the time march per sample of the records.
 OVERSAMPLING = 8
+#: Parts of a pass in each of which a machine that changes with the speed is taken for constant.
+PARTS = 24
 #: Frequencies of the true receptances [Hz]: first, last, step.
 TRUTH_FREQUENCIES = (5.0, 4500.0, 5.0)
 
@@ -51,9 +53,11 @@ class _Job:
 
     id: str
     tooling: Tooling
-    dynamics: Poles
+    dynamics: Poles | tuple[Poles, ...]
     clamping: Clamping
     conditions: CuttingConditions
+    last_speed: float | None
+    duration: float
     rng: np.random.Generator
 
 
@@ -82,7 +86,7 @@ def true_receptances(setup: VirtualSetup, tooling: Tooling, speed: float | None 
     speed : float [rad/s], optional
         Of the spindle; by default the mean of the programmed speeds.
     """
-    frequency, speed = _truth_frequency(), float(np.mean(setup.plan.spindle_speeds)) if speed is None else speed
+    frequency, speed = _truth_frequency(), float(np.mean(setup.plan.programmed)) if speed is None else speed
     outputs = ("tip.x", "tip.y", "flange.x", "flange.y")
     values = frequency_response(rotor(setup.spindle, tooling.assembly), 2.0 * np.pi * frequency, speed, outputs=outputs)
     return TrueReceptances(tooling.name, speed, frequency, values[:, :2], values[:, 2:])
@@ -90,14 +94,14 @@ def true_receptances(setup: VirtualSetup, tooling: Tooling, speed: float | None 
 
 def truth_speeds(setup: VirtualSetup) -> tuple[float, ...]:
     """Return the spindle speeds [rad/s] at which the truth is wanted: the mean of the plan's, then, where it matters, its ends."""
-    programmed = setup.plan.spindle_speeds
+    programmed = setup.plan.programmed
     ends = (min(programmed), max(programmed)) if setup.spindle.speed_dependent else ()
     return tuple(dict.fromkeys((float(np.mean(programmed)), *ends)))
 
 
 def true_flange(setup: VirtualSetup) -> TrueFlange:
     """Return the flange receptances without a tooling, from the full equations at the mean of the programmed speeds."""
-    frequency, speed = _truth_frequency(), float(np.mean(setup.plan.spindle_speeds))
+    frequency, speed = _truth_frequency(), float(np.mean(setup.plan.programmed))
     planes = ("flange.x", "flange.x'", "flange.y", "flange.y'")
     values = frequency_response(rotor(setup.spindle, None), 2.0 * np.pi * frequency, speed, inputs=planes, outputs=planes)
     return TrueFlange(frequency, values)
@@ -115,9 +119,20 @@ def _jobs(setup: VirtualSetup, toolings: Sequence[Tooling], rng: np.random.Gener
         clamping = clamp(setup.sensors, tooling.cutter.tooth_angle, chance)
         small = reduced(rotor(setup.spindle, tooling.assembly))
         dynamics = None if setup.spindle.speed_dependent else poles(small)
-        for i, speed in enumerate(setup.plan.spindle_speeds):
-            own = poles(small, speed) if dynamics is None else dynamics
-            yield _Job(f"{tooling.name}-{i:02d}", tooling, own, clamping, setup.plan.conditions(speed), chance.spawn(1)[0])
+        for name, speed, last, duration in setup.plan.cuts:
+            own = _along(small, speed, last) if dynamics is None else dynamics
+            conditions = setup.plan.conditions(speed)
+            yield _Job(f"{tooling.name}-{name}", tooling, own, clamping, conditions, last, duration, chance.spawn(1)[0])
+
+
+def _along(small: ReducedRotor, speed: float, last: float | None) -> Poles | tuple[Poles, ...]:
+    """The machine at a speed, or part by part between the first and the last one of a pass."""
+    if last is None:
+        return poles(small, speed)
+    found = [poles(small, speed)]
+    for part in range(1, PARTS):
+        found.append(alike(found[-1], poles(small, speed + (part + 0.5) / PARTS * (last - speed))))
+    return tuple(found)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,7 +143,7 @@ class _Worker:
 
     def __call__(self, job: _Job) -> SimulatedCut:
         suite, plan, disturbances = self.setup.sensors, self.setup.plan, self.setup.disturbances
-        count = round(plan.duration * suite.rate)
+        count = round(job.duration * suite.rate)
         # the clock of the recorder may be off: nobody who reads the record knows
         suite = replace(suite, rate=suite.rate * (1.0 + disturbances.clock_error))
         lines = np.zeros((0, 2), dtype=complex)
@@ -140,26 +155,29 @@ class _Worker:
         for kind in ("cut", "air"):
             speed = job.conditions.spindle_speed * (1.0 + suite.speed_error * job.rng.normal())
             start = 2.0 * np.pi * job.rng.random()
-            angle = turning(disturbances, speed, start, step, total, first, job.rng)
+            change = 0.0 if job.last_speed is None else speed * (job.last_speed / job.conditions.spindle_speed - 1.0) / job.duration
+            angle = turning(disturbances, speed, start, step, total, first, job.rng, change)
             history = None
             if kind == "cut":
                 conditions = replace(job.conditions, spindle_speed=speed)
                 cutter = replace(job.tooling.cutter, runout=job.clamping.runout)
-                feed = conditions.feed_per_tooth * cutter.teeth * speed / (2.0 * np.pi)
-                course = Course(angle, feed * step * np.arange(total), _width(plan, step, total, first))
+                feed = conditions.feed_per_tooth * cutter.teeth / (2.0 * np.pi)
+                # the feed follows a speed that is programmed to change, not one that wanders
+                way = speed * step * np.arange(total) + 0.5 * change * np.maximum(step * (np.arange(total) - first), 0.0) ** 2
+                course = Course(angle, feed * way, _width(plan, job.duration, step, total, first))
                 coefficients = self.setup.workpiece.coefficients
                 history = mill_cut(job.dynamics, cutter, conditions, coefficients, step, total, course=course).after(settling)
                 highest = int(2.0 * np.pi * TRUTH_FREQUENCIES[1] / speed)
                 lines = _lines(plan, history, lead, highest + 1)
             channels = record(suite, job.clamping, angle[inside], job.conditions.feed_angle, OVERSAMPLING, history, job.rng, disturbances)
-            speed = float(np.mean(np.diff(angle[inside]))) * suite.rate if disturbances.speed_wander > 0.0 else speed
+            speed = float(np.mean(np.diff(angle[inside]))) * suite.rate if disturbances.speed_wander > 0.0 or change != 0.0 else speed
             records[kind] = SimulatedRecord(speed, start, channels)
         return SimulatedCut(job.id, job.tooling.name, records, lines)
 
 
-def _width(plan: CutPlan, step: float, count: int, first: int) -> FloatArray:
-    """Share of the axial depth that is in the material at each instant; the record begins at instant number `first`."""
-    time, last = (np.arange(count) - first) * step, plan.duration
+def _width(plan: CutPlan, last: float, step: float, count: int, first: int) -> FloatArray:
+    """Share of the axial depth that is in the material at each instant; the record begins at instant number `first`, and ends at `last`."""
+    time = (np.arange(count) - first) * step
     # instants, in case one of the two has no length
     entry, leave = max(0.5 * plan.entry, step), max(0.5 * plan.leave, step)
     rising = np.clip((time - plan.entry) / entry + 1.0, 0.0, 1.0) if plan.entry > 0.0 else np.ones(count)

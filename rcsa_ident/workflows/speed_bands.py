@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -62,7 +62,8 @@ def split_by_speed(readings: Sequence[Reading], count: int) -> list[tuple[tuple[
     InputError
         If a range has too few cuts with one of the toolings.
     """
-    usable = [(each, each.measurement.spindle_speed) for each in readings if each.measurement is not None]
+    # each window of a pass for itself
+    usable = [(replace(each, measurements=(one,)), one.spindle_speed) for each in readings for one in each.measurements]
     if not usable:
         raise InputError("cuts", f"none of {len(readings)} usable", "at least one usable cut")
     speeds = [speed for _, speed in usable]

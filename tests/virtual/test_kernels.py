@@ -36,7 +36,7 @@ def test_march_is_exact_for_a_force_that_is_linear_in_each_step():
     course = np.column_stack([1.4 + speed * STEP * instants, 2e-7 * instants, np.ones(1200)])
     force = np.zeros((1200, 2))
     turn = np.array([[0.8, -0.6], [0.6, 0.8]])
-    seen = mill(np.exp(x), gain, 2.0 * OUTPUTS[:2], np.zeros(2, dtype=complex), tooth, ahead, cut, turn, course, force)
+    seen = mill(np.exp(x)[None], gain[None], 2.0 * OUTPUTS[None, :2], np.zeros(2, dtype=complex), tooth, ahead, cut, turn, course, force)
     state = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.diag(OMEGA**2), -np.diag(2.0 * ZETA * OMEGA)]])
     system = (state, np.vstack([np.zeros((2, 2)), WAY]), np.hstack([WAY.T, np.zeros((2, 2))]), np.zeros((2, 2)))
     _, expected, _ = scipy.signal.lsim(system, force, STEP * np.arange(1200))
