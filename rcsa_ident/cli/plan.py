@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rcsa_ident.identification.experiment_design import Goal
     from rcsa_ident.identification.machine import IdentifiedMachine
     from rcsa_ident.workflows.plan import PlannedCut, PlannedCuts
+    from rcsa_ident.workflows.plan_passes import PlannedPasses
 
 #: Recordings of a campaign that its noise is learned from.
 MOST_READ = 8
@@ -77,6 +78,16 @@ def plan(
     ] = None,
     to: Annotated[float | None, typer.Option("--to", help="Highest frequency, Hz.", show_default=False)] = None,
     noise_nm: Annotated[float, typer.Option(help="Standard deviation of a displacement line's real and imaginary part, nm.")] = 0.1,
+    passes: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            max=100,
+            help="Passes whose speed changes, so many with each tooling, in place of cuts at one speed each: they cross all speeds.",
+            show_default=False,
+        ),
+    ] = None,
+    pass_seconds: Annotated[float, typer.Option(help="Length of each pass, s.")] = 4.0,
     campaign: Annotated[
         Path | None, typer.Option(help="Campaign whose recordings give the noise, instead of --noise-nm.", show_default=False)
     ] = None,
@@ -87,6 +98,7 @@ def plan(
     from rcsa_ident.io.files import write_text
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.workflows.plan import CutConstraints, alternating, plan_cuts
+    from rcsa_ident.workflows.plan_passes import plan_passes
 
     writable(out)
     machine, data = read_identified(result)
@@ -105,21 +117,18 @@ def plan(
     with stages.stage("plan"):
         noise = positive("--noise-nm", noise_nm, "nm") * 1e-9 if campaign is None else _noise_of(campaign)
         cut_with = [read_tooling(path) for path in toolings]
-        if feed_direction is None:
-            allowed = alternating(allowed, cut_with, _coefficients(data, str(result)))
-        planned = plan_cuts(
-            machine,
-            cut_with,
-            [read_tooling(path) for path in target],
-            allowed,
-            _coefficients(data, str(result)),
-            noise,
-            _model_errors(machine, data),
-            (low if from_ is None else from_, high if to is None else to),
-            cuts,
-            wanted,
-            _goal(goal),
-        )
+        wanted_tips = [read_tooling(path) for path in target]
+        within = (low if from_ is None else from_, high if to is None else to)
+        known, errors = _coefficients(data, str(result)), _model_errors(machine, data)
+        if passes is not None:
+            planned_passes = plan_passes(machine, cut_with, wanted_tips, allowed, known, noise, errors, within, passes, pass_seconds)
+        else:
+            if feed_direction is None:
+                allowed = alternating(allowed, cut_with, known)
+            planned = plan_cuts(machine, cut_with, wanted_tips, allowed, known, noise, errors, within, cuts, wanted, _goal(goal))
+    if passes is not None:
+        _tell_passes(planned_passes, out, noise, json_, stages.seconds)
+        return
     write_text(out, plan_text(planned))
     if json_:
         emit(_summary(planned, wanted) | {"noise_nm": noise * 1e9, "seconds": stages.seconds, "out": str(out)})
@@ -128,6 +137,44 @@ def plan(
     for doubt in planned.warnings:
         warn(doubt)
     say(f"written: {out} ({len(planned.cuts)} cuts, {stages.seconds['plan']:.2f} s)")
+
+
+def _tell_passes(planned: PlannedPasses, out: Path, noise: float, json_: bool, seconds: dict[str, float]) -> None:
+    """Write passes as a campaign file has them, and print them with what they are expected to leave open."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    from rcsa_ident.cli.tables import show
+    from rcsa_ident.io.files import write_text
+    from rcsa_ident.io.setups import cut_keys
+    from rcsa_ident.io.toml_text import toml_of
+
+    names = [f"{each.tooling}-pass-{i:02d}" for i, each in enumerate(planned.passes, start=1)]
+    keys = [cut_keys(name, each.tooling, each.conditions, each.last_speed) for name, each in zip(names, planned.passes, strict=True)]
+    write_text(out, toml_of({"cuts": keys}, digits=9))
+    bands = [dict(zip(planned.targets, (100.0 * row).tolist(), strict=True)) for row in planned.band]
+    if json_:
+        rows = [
+            key | {"seconds": each.seconds, "path_mm": 1e3 * each.path, "limit_depth_mm": 1e3 * each.limit_depth, "band_percent": after}
+            for key, each, after in zip(keys, planned.passes, bands[1:], strict=True)
+        ]
+        summary = {"passes": rows, "band_percent": bands[0], "warnings": list(planned.warnings), "noise_nm": noise * 1e9}
+        emit(summary | {"seconds": seconds, "out": str(out)})
+        return
+    heads = [f"{escape(name)}\n± %" for name in planned.targets]
+    columns = ("tooling", "from\nrev/min", "to\nrev/min", "depth\nmm", "path\nm", "stable up to\nmm", *heads)
+    table = Table(*columns, title=f"passes of {planned.passes[0].seconds:g} s", title_justify="left")
+    for column in table.columns[1:]:
+        column.justify = "right"
+    table.add_row("before", "", "", "", "", "", *(f"{band:.3f}" for band in bands[0].values()))
+    for each, after in zip(planned.passes, bands[1:], strict=True):
+        c, limit = each.conditions, f"{each.limit_depth * 1e3:.2f}" if math.isfinite(each.limit_depth) else "more"
+        numbers = f"{to_rpm(c.spindle_speed):.0f}", f"{to_rpm(each.last_speed):.0f}", f"{c.axial_depth * 1e3:g}", f"{each.path:.2f}", limit
+        table.add_row(escape(each.tooling), *numbers, *(f"{band:.3f}" for band in after.values()))
+    show(table)
+    for doubt in planned.warnings:
+        warn(doubt)
+    say(f"written: {out} ({len(planned.passes)} passes, {sum(each.seconds for each in planned.passes):g} s of cutting)")
 
 
 def plan_text(planned: PlannedCuts) -> str:

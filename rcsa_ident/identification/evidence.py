@@ -21,7 +21,16 @@ from rcsa_ident.identification.diagnostics import failed, not_finite
 from rcsa_ident.identification.joint_fit import AxisSearch, axis_search, first_starts, fit_jointly, fit_roughly, grow_jointly, learned_noise
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.model_order import GIVE_UP_SOON, Report, cut_weights, drop_modes, evidence, exchange_modes, model_error
+from rcsa_ident.identification.model_order import (
+    EVERY,
+    GIVE_UP_SOON,
+    Report,
+    cut_weights,
+    drop_modes,
+    evidence,
+    exchange_modes,
+    model_error,
+)
 from rcsa_ident.identification.parameters import JOINT, AxisLayout, Layout, pack, planes, unpack
 from rcsa_ident.identification.posterior import PlaneUnknowns, Posterior
 from rcsa_ident.identification.priors import Priors
@@ -36,8 +45,6 @@ from rcsa_ident.scaleout import Map
 SMOOTH_ERROR = 2e-3
 #: Searches from new starts, until one axis has come to the same answer twice.
 ATTEMPTS = 3
-#: Windows of a tooling's passes that are enough to find its modes; the polish takes all.
-ENOUGH = 40
 #: Score beyond which planes plainly feel each other once a stiffness that changes with speed is in the fit: 0 to 36 where they do not,
 #: 55 and more where they do (no benchmark prints scores); and by how much the fit of both together has to be better to need no other:
 #: exchanging and adding modes gains a few hundred, planes that feel each other thousands.
@@ -169,7 +176,7 @@ def _searched_cuts(data: IdentificationData) -> np.ndarray:
     if data.sweeps:
         for tooling in range(len(data.toolings)):
             own = np.flatnonzero(data.cut_tooling[: data.cuts] == tooling)
-            step = max(own.size // ENOUGH, 1)
+            step = max(own.size // EVERY, 1)
             keep[own[np.arange(own.size) % step != step // 2]] = False
     return np.flatnonzero(keep)
 

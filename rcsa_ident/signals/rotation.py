@@ -117,8 +117,8 @@ class Pace:
         return min(round(max(self.window, _BLOCK_TURNS / lowest) * rate), samples)
 
 
-#: Of a speed that wanders, of one that changes on purpose, and of one of which it is known how.
-WANDER, RAMP, PASS = Pace(), Pace(0.25, 8e-3, 1e-3), Pace(0.25, 4e-3, 2.5e-4)
+#: Of a speed that wanders, and of one that changes on purpose.
+WANDER, RAMP = Pace(), Pace(0.25, 8e-3, 1e-3)
 
 
 def speed_path(samples: FloatArray, rate: float, lowest: float, highest: float, pace: Pace = WANDER) -> tuple[FloatArray, FloatArray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,20 +27,28 @@ from rcsa_ident.signals.measurement import (
     visible_harmonics,
 )
 from rcsa_ident.signals.recording import Quantity, Recording
-from rcsa_ident.signals.rotation import PASS, follow, speed_path
+from rcsa_ident.signals.rotation import Pace, follow, speed_path
 from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum
 from rcsa_ident.signals.steady import SteadyRecord, motion_columns, record_of_lines
 from rcsa_ident.signals.verdict import RecordCode, Verdict, examined, raw_faults
-from rcsa_ident.units import to_hz
+from rcsa_ident.units import to_hz, to_rpm
 
 #: Length of a window [s], and the revolutions that it holds at least.
 WINDOW, _TURNS = 0.28, 20.0
+#: Shortest and longest window in which the speed is looked for [s], the order that stays within a window's resolution there, least
+#: standard deviation of its change between windows, and distance of trial speeds, as shares.
+_SHORT, _SPREAD, _LEAST_CHANGE, _STEP = (0.05, 0.25), 4.0, 4e-3, 2.5e-4
 #: The speed is looked for so far beyond the programmed ends, as a share.
 _BEYOND = 0.03
+#: A pass's first and last speed may lie so far beside the programmed ones, as a share.
+_BESIDE = 0.01
 #: Standard deviation of an angle that was followed, where no air cut tells what a cutter's run-out adds to the flange's [rad].
 _ANGLE_STD = 5e-3
 #: Standard deviation of a block's angle from which on a flange is too round to tell it [rad].
 _ROUND = 0.02
+#: Change of the lines of the teeth from quarter to quarter above which a window is no even cut: a resonance does less; and in the first
+#: and the last window, as so many times its neighbour's and more: there the tool enters and leaves.
+_UNEVEN, _ENTERS = 0.6, (2.0, 0.05)
 #: Share of a pass's windows that must be usable.
 _LEAST_USABLE = 0.5
 
@@ -60,8 +69,8 @@ class _Turning:
         """Over the pass [rad/s]."""
         return float(self.angle[-1] - self.angle[0]) / (self.angle.size - 1) * self.recording.rate
 
-    def window(self, part: slice, axes: tuple[Dof, ...], teeth: int, max_frequency: float) -> SteadyRecord:
-        """The lines of a window, with phases from its first sample."""
+    def window(self, part: slice, axes: tuple[Dof, ...], teeth: int, max_frequency: float) -> tuple[SteadyRecord, float]:
+        """The lines of a window, with phases from its first sample, and the share by which those of the teeth change within it."""
         recording = self.recording
         columns = motion_columns(recording, axes)
         cut = replace(recording, samples=recording.samples[part])
@@ -72,10 +81,11 @@ class _Turning:
         lines = line_spectrum(samples, rate, speed, max_frequency, deviation)
         # what the amplitudes change within the window is no noise, and must not leak into other orders
         lines = line_spectrum(samples - _changing(lines, angle - middle), rate, speed, max_frequency, deviation)
+        uneven = _unevenness(lines, teeth, len(axes))
         # neighbours differ since the speed changes, not by noise
         lines = replace(lines, scatter=np.zeros_like(lines.scatter))
         everything = slice(0, angle.size)
-        return record_of_lines(cut, axes, columns, everything, everything, teeth, lines, deviation)
+        return record_of_lines(cut, axes, columns, everything, everything, teeth, lines, deviation), uneven
 
     def line(self, part: slice) -> tuple[float, float, FloatArray]:
         """The line through a window's angles: per sample, in its middle [rad], and the samples from there, shape (n,)."""
@@ -145,20 +155,31 @@ def measure_pass(
     if faults:
         return left_out(*faults)
     turning = _turning(cut, axes, (first_speed, last_speed), cutter.teeth)
+    fault = _speed_fault(turning, (first_speed, last_speed))
+    if fault is not None:
+        return replace(left_out(fault), spindle_speed=turning.mean_speed)
     still = None if air is None else _turning(air, axes, (first_speed, last_speed), 0)
+    fault = None if still is None else _speed_fault(still, (first_speed, last_speed))
+    if fault is not None:
+        return replace(left_out(fault.of("air cut")), spindle_speed=turning.mean_speed)
+    parts = _windows(turning)
+    read = [turning.window(part, axes, cutter.teeth, max_frequency) for part in parts]
+    uneven = _entering([each for _, each in read])
     found: list[CutMeasurement] = []
     bad: list[Remark] = []
     harmonics: dict[Dof, int] = {}
-    windows = _windows(turning)
-    for part in windows:
-        steady = turning.window(part, axes, cutter.teeth, max_frequency)
+    for part, (steady, _), entering in zip(parts, read, uneven, strict=True):
         harmonic = np.arange(cutter.teeth, steady.highest_order + 1, cutter.teeth)
         if harmonic.size == 0:
             bad.append(Remark(RecordCode.NO_LINE, f"no tooth-passing line below {max_frequency:.0f} Hz"))
             continue
+        if entering:
+            bad.append(Remark(RecordCode.NOT_STEADY, "the tool enters the material, leaves it, or cuts unevenly"))
+            continue
         beside, angle, alignment_std = None, 0.0, 0.0
         if still is not None:
-            beside = still.window(_at_speed(still, steady.spindle_speed, part.stop - part.start), axes, 1, 1.02 * max_frequency)
+            place = _at_speed(still, steady.spindle_speed, part.stop - part.start)
+            beside, _ = still.window(place, axes, 1, 1.02 * max_frequency)
             angle, alignment_std = angle_to_air(steady, beside, cutter.teeth)
         reasons = cut_faults(steady, beside, angle, harmonic, cutter, max_frequency)
         if reasons:
@@ -166,6 +187,7 @@ def measure_pass(
             continue
         kept = cross_lines(steady, beside, angle, harmonic, cutter, conditions, coefficients)
         speed = steady.spindle_speed
+        std = float(np.hypot(turning.std, _ANGLE_STD if beside is None else alignment_std)) / speed
         for axis, count in visible_harmonics(steady).items():
             harmonics[axis] = max(harmonics.get(axis, 0), count)
         found.append(
@@ -176,7 +198,7 @@ def measure_pass(
                 kept,
                 alignment_std,
                 -(turning.start(part) % (2.0 * np.pi)) / speed,
-                float(np.hypot(turning.std, _ANGLE_STD if beside is None else alignment_std)) / speed,
+                std,
                 turning.absolute,
                 clamping=cut_id,
                 acceleration=turning.acceleration(part),
@@ -184,12 +206,12 @@ def measure_pass(
             )
         )
     mean = turning.mean_speed
-    if len(found) < _LEAST_USABLE * len(windows):
+    if len(found) < _LEAST_USABLE * len(parts):
         worst = max(bad, key=lambda reason: sum(other.code is reason.code for other in bad))
-        words = f"{len(bad)} of {len(windows)} windows are not usable, of most: {worst}"
+        words = f"{len(bad)} of {len(parts)} windows are not usable, of most: {worst}"
         return replace(left_out(Remark(worst.code, words)), spindle_speed=mean)
     if bad:
-        words = f"{len(bad)} of {len(windows)} windows are left out; the first: {bad[0]}"
+        words = f"{len(bad)} of {len(parts)} windows are left out; the first: {bad[0]}"
         notes = (*notes, Remark(bad[0].code, words))
     if turning.by_teeth:
         words = "the flange is too round to tell the spindle's angle: the teeth's own lines did, and what the structure turns is in it"
@@ -218,9 +240,12 @@ def judge_pass_air(cut_id: str, tooling: str, air: Recording, speeds: tuple[floa
     if not looked_at.usable:
         return Reading(cut_id, tooling, programmed, looked_at)
     turning = _turning(air, axes, speeds, 0)
+    fault = _speed_fault(turning, speeds)
+    if fault is not None:
+        return Reading(cut_id, tooling, programmed, Verdict((fault,), looked_at.notes), (), turning.mean_speed)
     harmonics: dict[Dof, int] = {}
     for part in _windows(turning):
-        for axis, count in visible_harmonics(turning.window(part, axes, 1, max_frequency)).items():
+        for axis, count in visible_harmonics(turning.window(part, axes, 1, max_frequency)[0]).items():
             harmonics[axis] = max(harmonics.get(axis, 0), count)
     return Reading(cut_id, tooling, programmed, looked_at, (), turning.mean_speed, harmonics)
 
@@ -239,7 +264,9 @@ def _turning(recording: Recording, axes: tuple[Dof, ...], speeds: tuple[float, f
     columns = motion_columns(recording, axes)[: len(axes)]
     samples, rate = np.asarray(recording.samples)[:, columns], recording.rate
     low, high = to_hz(min(speeds)), to_hz(max(speeds))
-    middles, path = speed_path(samples - samples.mean(axis=0), rate, (1.0 - _BEYOND) * low, (1.0 + _BEYOND) * high, PASS)
+    middles, path = speed_path(
+        samples - samples.mean(axis=0), rate, (1.0 - _BEYOND) * low, (1.0 + _BEYOND) * high, _pace(low, high, samples.shape[0] / rate)
+    )
     rotation = follow(samples, rate, middles, path, teeth)
     by_teeth = bool(np.median(rotation.information) < 1.0 / _ROUND**2)
     if by_teeth:
@@ -247,6 +274,35 @@ def _turning(recording: Recording, axes: tuple[Dof, ...], speeds: tuple[float, f
     found = _from_trigger(recording, rotation.angle, teeth)
     off, std = (0.0, 0.0) if found is None else found
     return _Turning(recording, rotation.angle - off, std, found is not None, by_teeth)
+
+
+def _speed_fault(turning: _Turning, speeds: tuple[float, float]) -> Remark | None:
+    """A remark if the spindle did not turn from one speed to the other."""
+    tenth = max(turning.angle.size // 10, 1)
+    ends = [float(turning.angle[a + tenth - 1] - turning.angle[a]) / (tenth - 1) * turning.recording.rate for a in (0, -tenth)]
+    # a record may begin before the speed changes and end after it, and a clock is not perfect
+    if all(abs(found / told - 1.0) < _BESIDE + 0.1 * abs(speeds[1] / speeds[0] - 1.0) for found, told in zip(ends, speeds, strict=True)):
+        return None
+    found, told = (f"from {to_rpm(first):.0f} to {to_rpm(last):.0f} rev/min" for first, last in (ends, speeds))
+    return Remark(RecordCode.WRONG_SPEED, f"speed: the spindle turned {found}, programmed is {told}")
+
+
+def _unevenness(lines: LineSpectrum, teeth: int, axes: int) -> float:
+    """Root mean square of what the teeth's lines change from quarter to quarter of a window, over themselves, as accelerations."""
+    order = np.arange(max(teeth, 1), lines.amplitude.shape[0], max(teeth, 1))
+    weight = order[:, None] ** 4
+    power = np.sum(weight * np.abs(lines.amplitude[order, :axes]) ** 2)
+    # the scatter is the variance that the mean of four quarters would have
+    return float(np.sqrt(24.0 * np.sum(weight * lines.scatter[order, :axes]) / max(power, 1e-300)))
+
+
+def _entering(uneven: Sequence[float]) -> list[bool]:
+    """Which windows of a pass are not wholly in the material, or not evenly, by how much their lines change within them."""
+    found = [each > _UNEVEN for each in uneven]
+    if len(uneven) > 2:
+        found[0] |= uneven[0] > _ENTERS[0] * uneven[1] + _ENTERS[1]
+        found[-1] |= uneven[-1] > _ENTERS[0] * uneven[-2] + _ENTERS[1]
+    return found
 
 
 def _changing(lines: LineSpectrum, angle: FloatArray) -> FloatArray:
@@ -260,6 +316,12 @@ def _changing(lines: LineSpectrum, angle: FloatArray) -> FloatArray:
         amplitude[:, 0] = 0.0
         found += polynomial[:, None] * angle_signal(amplitude, angle, n)
     return found
+
+
+def _pace(low: float, high: float, seconds: float) -> Pace:
+    """How a frequency is followed that is told to go from one to the other [Hz]: windows so short that the teeth's lines stay lines."""
+    window = float(np.clip(1.0 / np.sqrt(_SPREAD * (high - low) / seconds), *_SHORT))
+    return Pace(window, max(_LEAST_CHANGE, (high / low - 1.0) * 0.5 * window / seconds), _STEP)
 
 
 def _from_trigger(recording: Recording, angle: FloatArray, teeth: int) -> tuple[float, float] | None:

@@ -214,7 +214,7 @@ def plan_cuts(
     InputError
         If an axis has no posterior, or no cut is stable and allowed.
     """
-    _check(machine, toolings, targets, count, band_hz)
+    check(machine, toolings, targets, count, band_hz)
     goal = MeanVariance() if goal is None else goal
     candidates, unstable, deepest = _candidates(machine, toolings, allowed, coefficients)
     if not candidates:
@@ -271,9 +271,10 @@ def line_noise(measurements: Sequence[CutMeasurement]) -> float:
     return float(np.median(np.concatenate(each)))
 
 
-def _check(
+def check(
     machine: IdentifiedMachine, toolings: Sequence[Tooling], targets: Sequence[Tooling], count: int, band_hz: tuple[float, float]
 ) -> None:
+    """Raise an `InputError` if nothing can be planned so; parameters as those of `plan_cuts`."""
     for axis, part in machine.identified.items():
         if part.posterior is None and not machine.coupled_planes:
             raise InputError(f"axis {axis.upper()}", "no covariance", "an identification with a posterior")
@@ -293,7 +294,6 @@ def _candidates(
     machine: IdentifiedMachine, toolings: Sequence[Tooling], allowed: CutConstraints, coefficients: CuttingCoefficients
 ) -> tuple[list[PlannedCut], int, float]:
     """All stable cuts, tooling by tooling, speed by speed; how many may chatter; the deepest that would be stable anywhere [m]."""
-    omega = 2.0 * np.pi * np.arange(LOBE_FREQUENCIES[0], MAX_FREQUENCY, LOBE_FREQUENCIES[1])
     around = np.array([1.0 - SPACING, 1.0, 1.0 + SPACING])
     speeds = allowed.speeds
     deepest, unstable, cuts = 0.0, 0, []
@@ -308,11 +308,7 @@ def _candidates(
         for feed, own in zip(allowed.feeds, turns, strict=True):
             if not own.size:
                 continue
-            process = MillingProcess(tooling.cutter, coefficients, allowed.engagement, feed)
-            asked, deepest_asked = np.outer(around, own).ravel(), 2.0 * allowed.margin * max(allowed.depths)
-            limits = np.empty(asked.size)
-            for places, tip in tips_over_speed(machine, tooling, omega, asked, spread=False):
-                limits[places] = stability_lobes(tip, process, asked[places], deepest_asked, allowed.method).limit_depth
+            limits = limits_at(machine, tooling, allowed, coefficients, feed, np.outer(around, own).ravel())
             limits = limits.reshape(around.size, -1).min(axis=0)
             deepest = max(deepest, float(limits.max()) / allowed.margin)
             for speed, limit in zip(own.tolist(), limits.tolist(), strict=True):
@@ -323,6 +319,33 @@ def _candidates(
                     chosen = CuttingConditions(speed, depth, allowed.feed_per_tooth, allowed.engagement, feed)
                     cuts.append(PlannedCut(tooling.name, chosen, limit))
     return cuts, unstable, deepest
+
+
+def limits_at(
+    machine: IdentifiedMachine,
+    tooling: Tooling,
+    allowed: CutConstraints,
+    coefficients: CuttingCoefficients,
+    feed_angle: float,
+    speeds: FloatArray,
+) -> FloatArray:
+    """Return the stability limit at each speed, up to twice what the constraints ask for, shape (n,) [m].
+
+    Parameters
+    ----------
+    machine : IdentifiedMachine
+    tooling : Tooling
+    allowed : CutConstraints
+    coefficients : CuttingCoefficients
+    feed_angle : float [rad]
+    speeds : array, shape (n,) [rad/s]
+    """
+    omega = 2.0 * np.pi * np.arange(LOBE_FREQUENCIES[0], MAX_FREQUENCY, LOBE_FREQUENCIES[1])
+    process = MillingProcess(tooling.cutter, coefficients, allowed.engagement, feed_angle)
+    limits, deepest = np.empty(speeds.size), 2.0 * allowed.margin * max(allowed.depths)
+    for places, tip in tips_over_speed(machine, tooling, omega, speeds, spread=False):
+        limits[places] = stability_lobes(tip, process, speeds[places], deepest, allowed.method).limit_depth
+    return limits
 
 
 def _shortest(prospects: CandidateCuts, order: list[int], goal: Goal, wanted: float) -> list[int]:

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import scipy.integrate
 import scipy.signal
 
 from rcsa_ident.cutting.coefficients import CuttingCoefficients
@@ -8,7 +9,7 @@ from rcsa_ident.cutting.cutter import Cutter
 from rcsa_ident.dynamics.coordinates import Coordinate
 from rcsa_ident.virtual._kernels import mill
 from rcsa_ident.virtual.milling import Course, mill_cut
-from rcsa_ident.virtual.reduction import Poles
+from rcsa_ident.virtual.reduction import Poles, alike
 
 STEP = 1.0 / 25600.0 / 8.0
 EDGES = CuttingCoefficients(800e6, 0.3, 0.0, 8e3, 6e3)
@@ -86,3 +87,38 @@ def test_kernel_cuts_as_a_plain_search_of_the_past(growth):
                 way = np.array([-radial[1] * tangential - radial[0] * normal, radial[0] * tangential - radial[1] * normal])
                 force += way * share * width[i] * cut.axial_depth
         assert history.force[i] == pytest.approx(force, abs=1e-6)
+
+
+@pytest.mark.parametrize(("fall", "allowed"), [(0.1, 1.5e-3), (0.02, 3e-4)])
+def test_a_machine_that_changes_while_it_cuts_answers_as_its_equation_does(fall, allowed):
+    # one mode whose stiffness falls by this share over the cut, in many parts: against the equation with a stiffness that falls evenly;
+    # what is left out is the shape's own change within a period, which grows with the fall
+    count, parts = 16000, 400
+    omega, zeta = 2.0 * np.pi * 700.0, 0.03
+
+    def system(share):
+        own = omega * np.sqrt(1.0 - fall * share)
+        # the damper stays as it is
+        pole = np.array([-zeta * omega + 1j * np.sqrt(own**2 - (zeta * omega) ** 2)])
+        return Poles(pole, np.array([[0.8, -0.5]]) / (2j * pole.imag)[:, None], np.tile([[0.8], [-0.5]], (3, 1)).astype(complex), NAMES)
+
+    found = [system(0.0)]
+    for part in range(1, parts):
+        found.append(alike(found[-1], system((part + 0.5) / parts)))
+    cut = CuttingConditions(500.0 * np.pi, 0.3e-3, 1e-4, DOWN)
+    history = mill_cut(found, Cutter(4, 12e-3), cut, EDGES, STEP, count, 0.4, slices=1)
+    time, pushed = STEP * np.arange(count), history.force @ np.array([0.8, -0.5])
+
+    def right(t, state):
+        stiffness = omega**2 * (1.0 - fall * t / time[-1])
+        return [state[1], np.interp(t, time, pushed) - 2.0 * zeta * omega * state[1] - stiffness * state[0]]
+
+    begin = history.tip[0, 0] / 0.8
+    speed = (history.tip[1, 0] - history.tip[0, 0]) / 0.8 / STEP
+    exact = scipy.integrate.solve_ivp(right, (0.0, time[-1]), [begin, speed], t_eval=time, rtol=1e-8, atol=1e-14, max_step=STEP).y[0]
+    settled = slice(3 * count // 4, None)
+    # what is wrong with the first state's speed has died out by then
+    error = np.abs(history.tip[settled, 0] / 0.8 - exact[settled]).max() / np.abs(exact[settled]).max()
+    assert error < allowed
+    still = mill_cut(found[0], Cutter(4, 12e-3), cut, EDGES, STEP, count, 0.4, slices=1)
+    assert np.abs(still.tip[settled] - history.tip[settled]).max() > 0.3 * fall * np.abs(still.tip[settled]).max()

@@ -6,7 +6,7 @@ import pytest
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.virtual.reduction import poles, reduced
+from rcsa_ident.virtual.reduction import Poles, alike, poles, reduced
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 
 BAND = 2.0 * np.pi * np.arange(450.0, 4301.0, 35.0)
@@ -55,3 +55,21 @@ def test_spindle_that_shakes_itself_is_refused(hpm, tooling):
     model = rotor(dataclasses.replace(hpm.spindle, bearings=tuple(loose)), tooling.assembly)
     with pytest.raises(InputError, match="grows"):
         poles(reduced(model), speed=1000.0)
+
+
+def test_poles_of_a_machine_that_changed_a_little_come_in_the_same_order_and_scale():
+    rng = np.random.default_rng(4)
+    pole = 2.0 * np.pi * np.array([700.0, 1500.0, 900.0]) * (-0.03 + 1j)
+    inputs, outputs = (rng.standard_normal(shape) + 1j * rng.standard_normal(shape) for shape in ((3, 2), (6, 3)))
+    first = Poles(pole, inputs, outputs, ())
+    order, scale = np.array([2, 0, 1]), np.array([0.3j, -2.0, 1.0 + 1j])
+    moved = Poles(1.002 * pole[order], inputs[order] / scale[:, None], outputs[:, order] * scale, ())
+    found = alike(first, moved)
+    np.testing.assert_allclose(found.pole, 1.002 * pole, rtol=1e-14)
+    np.testing.assert_allclose(found.outputs, outputs, rtol=1e-12)
+    np.testing.assert_allclose(found.inputs, inputs, rtol=1e-12)
+    # its response is what it was
+    omega = np.array([3000.0, 6000.0])
+    np.testing.assert_allclose(found.response(omega), moved.response(omega), rtol=1e-12)
+    with pytest.raises(InputError, match="2 poles"):
+        alike(first, Poles(pole[:2], inputs[:2], outputs[:, :2], ()))
