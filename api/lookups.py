@@ -79,6 +79,8 @@ def uploaded(components: Components, group: str, campaign: str, recording: str) 
     cut = next((each for each in declared.cuts if each.recording == Path(name)), None)
     if cut is None:
         raise Problem(404, f"the campaign has no cut with a recording {recording}")
+    if cut.last_speed is not None:
+        raise InputError("recording", "a pass whose speed changes", "a recording at one speed: the forces' observer takes one")
     kept = _kept(components, group, campaign, name)
     found = found_of(kept)
     air = None if cut.air is None else components.store.recordings.get(group, campaign, cut.air.name)

@@ -227,7 +227,8 @@ def main(arguments: Sequence[str]) -> None:
     rows = run(scratch, named(given.machines), given.conditions, given.methods, given.seeds, given.processes)
     kinds = {
         "study": [row for row in rows if not is_coupled(row["machine"]) and row["condition"] in USUAL],
-        "workshop": [row for row in rows if not is_coupled(row["machine"]) and row["condition"] not in USUAL],
+        "workshop": [row for row in rows if not is_coupled(row["machine"]) and row["condition"].startswith("workshop")],
+        "passes": [row for row in rows if not is_coupled(row["machine"]) and row["condition"].startswith("passes")],
         "coupled": [row for row in rows if row["machine"] not in TURNED_SAMPLE and is_coupled(row["machine"])],
         "turned_sample": [row for row in rows if row["machine"] in TURNED_SAMPLE],
     }

@@ -158,6 +158,7 @@ class CutAnswer(Answer):
     id: str
     tooling: str
     spindle_speed_rpm: float
+    spindle_speed_to_rpm: float | None = Field(None, description="At which a pass ends whose speed changes.")
     axial_depth_mm: float
     feed_per_tooth_mm: float
     entry_angle_deg: float

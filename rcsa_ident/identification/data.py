@@ -310,6 +310,11 @@ class IdentificationData:
         spread = (*self.coefficient_spread, *(share,) * count)
         return replace(self, axes=tuple(axes), coefficient_spread=spread)
 
+    def with_forces_of(self, other: IdentificationData) -> IdentificationData:
+        """Return these lines with what other data of the same cuts hold uncertain about their forces: without smooth errors."""
+        axes = tuple(replace(axis, force_slope=own.force_slope) for axis, own in zip(self.axes, other.axes, strict=True))
+        return replace(self, axes=axes, coefficient_spread=other.coefficient_spread)
+
     def of_cuts(self, keep: np.ndarray) -> IdentificationData:
         """Return the same data with some of the cuts: ascending indices, those of all hammer tests among them."""
         number = np.full(len(self.cut_ids), -1)

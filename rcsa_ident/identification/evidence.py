@@ -22,7 +22,6 @@ from rcsa_ident.identification.joint_fit import AxisSearch, axis_search, first_s
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.model_order import (
-    EVERY,
     GIVE_UP_SOON,
     Report,
     cut_weights,
@@ -45,6 +44,8 @@ from rcsa_ident.scaleout import Map
 SMOOTH_ERROR = 2e-3
 #: Searches from new starts, until one axis has come to the same answer twice.
 ATTEMPTS = 3
+#: Windows of a tooling's passes that are enough to find its modes; the polish takes all.
+ENOUGH = 40
 #: Score beyond which planes plainly feel each other once a stiffness that changes with speed is in the fit: 0 to 36 where they do not,
 #: 55 and more where they do (no benchmark prints scores); and by how much the fit of both together has to be better to need no other:
 #: exchanging and adding modes gains a few hundred, planes that feel each other thousands.
@@ -95,6 +96,12 @@ class EvidenceSelection:
             return failed(data, seed, self.name)
         try:
             searched = self._search(data, seed, map, progress)
+            if data.sweeps:
+                # what the sweeps do looks like other modes: once about known, they are searched anew without it
+                smooth = data.with_smooth_errors(SMOOTH_ERROR)
+                first = first_starts(smooth, self.priors, searched, map)[0]
+                freed = unswept(smooth, self.priors, first.theta, first.layout)
+                searched = self._search(freed.with_forces_of(data), seed, map, progress)
             trace = [step for search in searched for step in search.trace]
             fitted = self._fit(data, searched, map, _report_to(BOTH, trace, progress))
             return replace(fitted.answer(seed, self.name), trace=tuple(trace))
@@ -176,7 +183,7 @@ def _searched_cuts(data: IdentificationData) -> np.ndarray:
     if data.sweeps:
         for tooling in range(len(data.toolings)):
             own = np.flatnonzero(data.cut_tooling[: data.cuts] == tooling)
-            step = max(own.size // EVERY, 1)
+            step = max(own.size // ENOUGH, 1)
             keep[own[np.arange(own.size) % step != step // 2]] = False
     return np.flatnonzero(keep)
 

@@ -11,7 +11,6 @@ from typing import Protocol
 import numpy as np
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import AxisParameters, Layout, Unknowns, pack, unpack, with_mode, without_mode
@@ -29,8 +28,6 @@ OUTLYING = 25.0
 #: Damping ratios with which a new mode is tried, and at how many frequencies.
 NEW_DAMPING = (0.015, 0.06, 0.25)
 PLACES = 30
-#: Least share of each line that is unexplained, and windows of a tooling's passes that err each for itself.
-LEAST_ERROR, EVERY = 5e-4, 40
 #: Modes whose frequencies lie closer than this ratio may be one.
 CLOSE = 1.2
 
@@ -323,18 +320,7 @@ def _with_axis(solution: Solution, i: int, axis: AxisParameters) -> Trial:
     return theta, replace(old, axes=axes)
 
 
-def least_error(data: IdentificationData) -> float:
-    """Return the least share of each line that is left unexplained: no simulated force is better than `LEAST_ERROR`.
-
-    Windows of passes stand so close together that neighbours share that error: more of them than `EVERY` a tooling do not average it out.
-    """
-    if not data.sweeps:
-        return LEAST_ERROR
-    most = int(np.max(np.bincount(data.cut_tooling[: data.cuts])))
-    return LEAST_ERROR * math.sqrt(max(most / EVERY, 1.0))
-
-
-def model_error(solution: Solution, misfit: Misfit) -> tuple[float, ...]:
+def model_error(solution: Solution, misfit: Misfit, smallest: float = 5e-4) -> tuple[float, ...]:
     """Return, per axis, the share of each line that the residuals show to be unexplained beyond the records' noise.
 
     The share f solves sum |rest|^2 / (variance + f^2 |h|^2 / 2) = degrees of freedom, the data's less those that parameters
@@ -345,9 +331,10 @@ def model_error(solution: Solution, misfit: Misfit) -> tuple[float, ...]:
     solution : Solution
         With normal equations.
     misfit : Misfit
+    smallest : float
+        Floor: no simulated force is better than that.
     """
     layout, data = solution.layout, misfit.data
-    smallest = least_error(data)
     jacobian = misfit.prior(layout).jacobian
     # parameters that the data have moved away from their priors
     used = solution.theta.size - float(np.trace(np.linalg.solve(solution.evaluation.hessian, jacobian.T @ jacobian)))

@@ -26,18 +26,22 @@ from rcsa_ident.signals.measurement import (
     cut_faults,
     visible_harmonics,
 )
-from rcsa_ident.signals.recording import Quantity, Recording
+from rcsa_ident.signals.recording import LONGEST, Quantity, Recording
 from rcsa_ident.signals.rotation import Pace, follow, speed_path
 from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum
 from rcsa_ident.signals.steady import SteadyRecord, motion_columns, record_of_lines
 from rcsa_ident.signals.verdict import RecordCode, Verdict, examined, raw_faults
 from rcsa_ident.units import to_hz, to_rpm
 
-#: Length of a window [s], and the revolutions that it holds at least.
-WINDOW, _TURNS = 0.28, 20.0
+#: Length of a window [s], share of its speed that it sweeps at most, and the revolutions that it holds all the same.
+WINDOW, _SWEPT, _TURNS = 0.28, 0.02, 20.0
+#: Windows that a pass holds at least.
+_FEWEST = 2
 #: Shortest and longest window in which the speed is looked for [s], the order that stays within a window's resolution there, least
 #: standard deviation of its change between windows, and distance of trial speeds, as shares.
 _SHORT, _SPREAD, _LEAST_CHANGE, _STEP = (0.05, 0.25), 4.0, 4e-3, 2.5e-4
+#: Longest pass, as so many times what is looked at of a cut.
+_LONGEST_PASSES = 2
 #: The speed is looked for so far beyond the programmed ends, as a share.
 _BEYOND = 0.03
 #: A pass's first and last speed may lie so far beside the programmed ones, as a share.
@@ -151,7 +155,9 @@ def measure_pass(
     def left_out(*reasons: Remark) -> Reading:
         return Reading(cut_id, tooling, programmed, Verdict(reasons, notes))
 
-    faults = looked_at.reasons + tuple(fault.of("air cut") for fault in (raw_faults(air) if air is not None else ()))
+    faults = looked_at.reasons + _length_faults(cut, (first_speed, last_speed))
+    if air is not None:
+        faults += tuple(fault.of("air cut") for fault in raw_faults(air) + _length_faults(air, (first_speed, last_speed)))
     if faults:
         return left_out(*faults)
     turning = _turning(cut, axes, (first_speed, last_speed), cutter.teeth)
@@ -237,8 +243,9 @@ def judge_pass_air(cut_id: str, tooling: str, air: Recording, speeds: tuple[floa
         If there is no displacement channel.
     """
     axes, programmed, looked_at = _moved_axes(air), 0.5 * sum(speeds), examined(air)
-    if not looked_at.usable:
-        return Reading(cut_id, tooling, programmed, looked_at)
+    faults = looked_at.reasons + _length_faults(air, speeds)
+    if faults:
+        return Reading(cut_id, tooling, programmed, Verdict(faults, looked_at.notes))
     turning = _turning(air, axes, speeds, 0)
     fault = _speed_fault(turning, speeds)
     if fault is not None:
@@ -264,9 +271,8 @@ def _turning(recording: Recording, axes: tuple[Dof, ...], speeds: tuple[float, f
     columns = motion_columns(recording, axes)[: len(axes)]
     samples, rate = np.asarray(recording.samples)[:, columns], recording.rate
     low, high = to_hz(min(speeds)), to_hz(max(speeds))
-    middles, path = speed_path(
-        samples - samples.mean(axis=0), rate, (1.0 - _BEYOND) * low, (1.0 + _BEYOND) * high, _pace(low, high, samples.shape[0] / rate)
-    )
+    pace = _pace(low, high, samples.shape[0] / rate)
+    middles, path = speed_path(samples - samples.mean(axis=0), rate, (1.0 - _BEYOND) * low, (1.0 + _BEYOND) * high, pace)
     rotation = follow(samples, rate, middles, path, teeth)
     by_teeth = bool(np.median(rotation.information) < 1.0 / _ROUND**2)
     if by_teeth:
@@ -274,6 +280,18 @@ def _turning(recording: Recording, axes: tuple[Dof, ...], speeds: tuple[float, f
     found = _from_trigger(recording, rotation.angle, teeth)
     off, std = (0.0, 0.0) if found is None else found
     return _Turning(recording, rotation.angle - off, std, found is not None, by_teeth)
+
+
+def _length_faults(recording: Recording, speeds: tuple[float, float]) -> tuple[Remark, ...]:
+    """A remark if a pass is too short for its windows, or so long that it is none."""
+    n, rate = recording.samples.shape[0], recording.rate
+    least = _FEWEST * _TURNS * 2.0 * np.pi / min(speeds)
+    if n / rate < least:
+        return (Remark(RecordCode.NOT_STEADY, f"too short: {n / rate:.3g} s, a pass at these speeds takes at least {least:.2g} s"),)
+    if n > _LONGEST_PASSES * LONGEST:
+        most = _LONGEST_PASSES * LONGEST / rate
+        return (Remark(RecordCode.NOT_STEADY, f"too long: {n / rate:.4g} s, a pass of this rate takes at most {most:.3g} s"),)
+    return ()
 
 
 def _speed_fault(turning: _Turning, speeds: tuple[float, float]) -> Remark | None:
@@ -347,8 +365,9 @@ def _from_trigger(recording: Recording, angle: FloatArray, teeth: int) -> tuple[
 def _windows(turning: _Turning) -> list[slice]:
     """Windows that follow each other and leave little of the pass out."""
     rate, n = turning.recording.rate, turning.angle.size
-    slowest = float(np.min(np.diff(turning.angle[:: max(n // 64, 1)]))) / max(n // 64, 1) * rate
-    length = max(WINDOW, _TURNS * 2.0 * np.pi / slowest)
+    speeds = np.diff(turning.angle[:: max(n // 64, 1)]) / max(n // 64, 1) * rate
+    change = float(np.ptp(speeds) / speeds.min()) / (n / rate)
+    length = max(min(WINDOW, _SWEPT / max(change, 1e-9)), _TURNS * 2.0 * np.pi / float(speeds.min()))
     count = max(int(n / rate / length), 1)
     ends = np.linspace(0, n, count + 1).astype(int)
     return [slice(a, b) for a, b in itertools.pairwise(ends.tolist())]

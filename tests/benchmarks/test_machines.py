@@ -175,11 +175,16 @@ def test_conditions_change_the_sensors_only(drawn):
     assert seen["noise-x3"].sensors.acceleration_noise == pytest.approx(0.15)
     assert all(s.spindle is machine.spindle for s in seen.values())
     for name, condition in CONDITIONS.items():
-        if condition.disturbances is None:
-            assert seen[name].plan is machine.plan
-        else:
-            # as long in the material as without entry and exit
-            plan = seen[name].plan
+        plan = seen[name].plan
+        if condition.passes:
+            # all speeds of the cuts, and as long in the material as without entry and exit
+            assert (plan.spindle_speeds, len(plan.passes)) == ((), condition.passes)
+            assert plan.passes[0][0] == machine.plan.spindle_speeds[0]
+            assert plan.passes[-1][1] == machine.plan.spindle_speeds[-1]
+            assert plan.pass_duration - plan.entry - plan.leave == pytest.approx(4.0)
+        elif condition.disturbances is None:
+            assert plan is machine.plan
+        if condition.disturbances is not None:
             assert plan.duration - plan.entry - plan.leave == pytest.approx(machine.plan.duration)
             assert seen[name].disturbances.speed_wander == 1e-3
     assert machine.sensors.tooth_angle != 0.0

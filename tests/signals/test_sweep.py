@@ -37,6 +37,10 @@ class Pass:
         self.constant, self.moving = simulate(self.machine, [self.tooling], seed)
         self.cut, self.air = (self.recording(self.moving.records[kind]) for kind in ("cut", "air"))
 
+    @staticmethod
+    def sensors_of():
+        return read_machine(MACHINES / "hpm.toml").sensors
+
     def recording(self, record):
         suite = self.machine.sensors
         kinds = {
@@ -209,3 +213,14 @@ def test_without_displacement_it_is_refused(plain):
         plain.measure(cut=bare)
     with pytest.raises(InputError, match="the same sensors"):
         plain.measure(air=Recording(plain.cut.rate, plain.air.samples[:, :1], plain.air.sensors[:1]))
+
+
+def test_a_pass_too_short_or_too_long_is_told(plain):
+    few = replace(plain.cut, samples=plain.cut.samples[:5000])
+    found = plain.measure(cut=few, air=None)
+    assert str(found.verdict.reasons[0]).startswith("too short: 0.195 s")
+    still = replace(plain.air, samples=plain.air.samples[:5000])
+    assert str(plain.measure(air=still).verdict.reasons[0]).startswith("air cut: too short")
+    assert not judge_pass_air("p", "S1", still, SPEEDS).verdict.usable
+    many = replace(plain.cut, samples=np.tile(plain.cut.samples, (60, 1)))
+    assert str(plain.measure(cut=many, air=None).verdict.reasons[0]).startswith("too long: 90 s")

@@ -70,6 +70,12 @@ function said(state, queue) {
   ];
 }
 
+/** A cut's speed, or those of a pass. */
+function speeds(cut) {
+  const last = cut.spindle_speed_to_rpm ?? null;
+  return last === null ? plain(cut.spindle_speed_rpm) : `${plain(cut.spindle_speed_rpm)} to ${plain(last)}`;
+}
+
 /** A row for each cut; `toggle(cut)` opens its recording. */
 export function verdictTable(shown, queue, open, toggle) {
   return table(
@@ -97,7 +103,7 @@ export function verdictTable(shown, queue, open, toggle) {
       },
       { name: "Verdict", cell: ({ state }) => mark(state.kind, state.words) },
       { name: "Tooling", cell: ({ cut }) => cut.tooling },
-      { name: "Speed", unit: "rev/min", number: true, cell: ({ cut }) => plain(cut.spindle_speed_rpm) },
+      { name: "Speed", unit: "rev/min", number: true, cell: ({ cut }) => speeds(cut) },
       { name: "Measured", unit: "rev/min", number: true, cell: ({ cut }) => plain(cut.verdict?.spindle_speed_rpm ?? null, 1, 1) },
       { name: "Depth", number: true, cell: ({ cut }) => q("depth", cut.axial_depth_mm) },
       { name: "Lines", number: true, cell: ({ cut }) => (cut.verdict ? String(cut.verdict.lines) : "–") },
