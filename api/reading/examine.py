@@ -129,6 +129,7 @@ def judged(campaign: Campaign, cut: Cut, recording: Recording, air: Recording | 
         "notes": list(row.notes),
         "spindle_speed_rpm": row.found_rpm,
         "lines": row.lines,
+        "windows": max(len(reading.measurements), 1),
         "signal_to_noise_db": {axis: value for axis, value in row.signal_to_noise_db.items() if np.isfinite(value)},
     }
     return verdict, reading

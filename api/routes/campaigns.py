@@ -154,7 +154,7 @@ def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
     data = json.loads(campaign.text)
     rows = {row.name: row for row in components.store.recordings.list(campaign.group, campaign.id, "", 1_000_000)}
     cuts = [_cut(cut, rows) for cut in data["cuts"]]
-    usable = [cut.tooling for cut in cuts if cut.verdict is not None and cut.verdict.usable]
+    usable = [(cut.tooling, cut.verdict.windows) for cut in cuts if cut.verdict is not None and cut.verdict.usable]
     return CampaignAnswer(
         id=campaign.id,
         machine=campaign.machine,
@@ -166,7 +166,7 @@ def _answer(components: Components, campaign: Campaign) -> CampaignAnswer:
         toolings=list(data["toolings"]),
         usable=len(usable),
         remarks=_remarks(campaign),
-        too_few=too_few(usable),
+        too_few=too_few(tooling for tooling, windows in usable for _ in range(windows)),
         cuts=cuts,
     )
 

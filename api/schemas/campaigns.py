@@ -142,6 +142,7 @@ class VerdictAnswer(Answer):
     notes: list[str] = Field(description="Remarks on a usable recording.")
     spindle_speed_rpm: float | None = Field(description="Measured speed of a usable cut.")
     lines: int = Field(description="Points of the cross FRF, all axes together.")
+    windows: int = Field(1, description="As how many cuts of nearly one speed a usable recording counts: more than one of a pass.")
     signal_to_noise_db: dict[str, float] = Field(description="Median over the lines, for each axis.")
 
 

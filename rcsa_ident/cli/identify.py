@@ -63,7 +63,8 @@ def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask 
     tests = read_tests(campaign)
     rows, open_, remarks = recording_rows(readings), left_open(campaign, readings), campaign.remarks
     usable = sum(row.usable for row in rows)
-    few = too_few(each.tooling for each in readings if each.verdict.usable)
+    # each window of a pass is a cut of its own
+    few = too_few(each.tooling for each in readings for _ in each.measurements)
     if json_:
         told = {"campaign": campaign.name, "cuts": len(rows), "usable": usable, "too_few": few}
         told |= {"left_open": list(open_), "warnings": list(remarks)}

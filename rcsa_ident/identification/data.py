@@ -246,6 +246,12 @@ class IdentificationData:
         return any(np.any(axis.sweep[:, 0]) for axis in self.axes)
 
     @property
+    def swept_cuts(self) -> int:
+        """Number of cuts that are windows of a pass."""
+        own = [axis.cut[axis.sweep[:, 0] != 0.0] for axis in self.axes if axis.sweep.size]
+        return int(np.unique(np.concatenate(own)).size) if own else 0
+
+    @property
     def stands_still(self) -> bool:
         """Whether some of the points belong to a spindle that stands still, and others to one that turns."""
         return self.cuts > 0 and any(test.standstill for test in self.tests)

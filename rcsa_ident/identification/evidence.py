@@ -146,7 +146,9 @@ class EvidenceSelection:
                 if together.evidence < evidence(apart, misfit) - PLAIN_GAIN:
                     return together
         apart, misfit = fit_jointly(smooth, self.priors, searched, first, report)
-        smooth = unswept(measured, self.priors, apart.theta, apart.layout)
+        if measured.sweeps:
+            smooth = unswept(measured, self.priors, apart.theta, apart.layout)
+            points = None if points is None else coupled_data(smooth)
         grown = grow_jointly(smooth, self.priors, apart, misfit, report)
         if points is not None and together is None:
             felt = self._felt(points, apart.candidate, misfit.model_error, misfit.cut_weight)

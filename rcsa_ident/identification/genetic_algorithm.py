@@ -156,10 +156,12 @@ class PaperGeneticAlgorithm:
         Raises
         ------
         InputError
-            If hammer tests are among the data: its candidates know the flange's motion alone.
+            If hammer tests or passes are among the data: its candidates know the flange's motion at one speed alone.
         """
         if data.tests:
             raise InputError("method", f"{self.name}, with hammer tests", "the default method, which knows of them")
+        if data.sweeps:
+            raise InputError("method", f"{self.name}, with passes whose speed changes", "the default method, which knows of them")
         if not_finite(data):
             return failed(data, seed, self.name)
         sequences = np.random.SeedSequence(seed).spawn(len(data.axes))

@@ -51,6 +51,7 @@ class IdentificationCode(StrEnum):
     ONE_FEED = "one-feed-direction"
     PLANES_NOT_ASKED = "planes-not-asked"
     CUTS_WEIGHTED_DOWN = "cuts-weighted-down"
+    MOSTLY_PASSES = "mostly-passes"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

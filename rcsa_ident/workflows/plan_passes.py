@@ -39,6 +39,8 @@ class PlannedPass:
     seconds : float [s]
     limit_depth : float [m]
         Up to which it is expected to be stable at every speed that it crosses; infinite beyond what was looked at.
+    teeth : int
+        Of the cutter.
     """
 
     tooling: str

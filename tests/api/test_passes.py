@@ -36,6 +36,7 @@ def test_a_pass_is_declared_read_and_judged(client, tmp_path):
     assert cut.verdict.usable
     assert cut.verdict.notes == []
     assert cut.verdict.lines > 40
+    assert cut.verdict.windows == 5
     assert cut.verdict.spindle_speed_rpm == pytest.approx(12000.0, rel=1e-3)
 
 

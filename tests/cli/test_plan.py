@@ -152,3 +152,26 @@ def test_speeds_that_nobody_knows_are_asked_for(tmp_path):
     path = result_in(tmp_path, speed_range=None)
     assert "--speed-from" in run(path, *options(tmp_path), code=2).stderr
     run(path, *options(tmp_path, "--cuts", 1, "--speed-from", 8000, "--speed-to", 10000))
+
+
+def test_passes_are_a_piece_of_a_campaign_file(tmp_path):
+    result, out = result_in(tmp_path), tmp_path / "PASSES.toml"
+    arguments = (result, *[part for name in NAMES for part in name.split("=", 1)], "--target", TOOLINGS / "S3-PG25-long.toml", "--out", out)
+    told = json.loads(run(*arguments, "--passes", 3, "--pass-seconds", 2.5, "--depths-mm", "0.05,0.1", "--json").stdout)
+    cuts = tomllib.loads(out.read_text(encoding="utf-8"))["cuts"]
+    assert len(cuts) == len(told["passes"]) == 6
+    assert [(cut["spindle_speed_rpm"], cut["spindle_speed_to_rpm"]) for cut in cuts[:3]] == [
+        (8000.0, 10667.0),
+        (10667.0, 13333.0),
+        (13333.0, 16000.0),
+    ]
+    first = told["passes"][0]
+    # 4 teeth of 0.1 mm, 2.5 s at 9333.5 rev/min in the mean
+    assert first["path_mm"] == pytest.approx(0.1 * 4 * 2.5 * 9333.5 / 60.0, rel=1e-6)
+    assert first["axial_depth_mm"] in (0.05, 0.1)
+    assert all(first["band_percent"][name] < told["band_percent"][name] for name in told["band_percent"])
+    words = run(*arguments, "--passes", 3, "--depths-mm", "0.05,0.1").output
+    assert "passes of 4 s" in words
+    assert "6 passes, 24 s of cutting" in words
+    close = run(*arguments, "--passes", 100, "--depths-mm", "0.05", "--speed-from", 8000, "--speed-to", 8100, code=2)
+    assert "passes that change the speed by 0.5 to 200 %" in str(close.exception or close.output) + close.output

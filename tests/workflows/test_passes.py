@@ -12,11 +12,16 @@ import pytest
 from typer.testing import CliRunner
 
 from rcsa_ident.cli import app
+from rcsa_ident.errors import InputError
 from rcsa_ident.identification.evidence import EvidenceSelection
+from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
+from rcsa_ident.identification.result import IdentificationCode
+from rcsa_ident.identification.status import Status
 from rcsa_ident.io.identifications import identification_to_json
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.recordings import read_cut
 from rcsa_ident.io.setups import read_campaign, read_tooling
+from rcsa_ident.remarks import says
 from rcsa_ident.samples import simulate_campaign
 from rcsa_ident.stability.tip_modes import TIP
 from rcsa_ident.workflows.identify import clock_error, data_of, identify, judge
@@ -75,6 +80,9 @@ def test_the_machine_comes_out(readings):
     known, found = readings
     answer = identify(known, found, EvidenceSelection(), 1)
     assert answer.axes
+    # what was not seen to be reliable is not called so
+    assert answer.status is Status.SUSPECT
+    assert says(answer.reasons, IdentificationCode.MOSTLY_PASSES)
     machine = identification_to_json(answer, known, [])
     # a pass has no delay of its own
     assert set(machine["delays"]) == {"S1-ER32-00", "S2-PG25-00"}
@@ -97,6 +105,14 @@ def test_the_command_line_checks_them(campaign):
     assert rows["S1-ER32-p00"]["programmed_rpm"] == pytest.approx(9500.0)
     assert rows["S1-ER32-p00"]["found_rpm"] == pytest.approx(9500.0, rel=5e-3)
     assert rows["S1-ER32-p00"]["lines"] > 80
+    # a few passes are many cuts
+    assert json.loads(answer.stdout)["too_few"] is None
+
+
+def test_the_published_method_refuses_them(readings):
+    known, found = readings
+    with pytest.raises(InputError, match="passes whose speed changes"):
+        identify(known, found, PaperGeneticAlgorithm(generations=1), 1)
 
 
 @pytest.mark.parametrize("told", [8001.0, 30000.0, -1.0])
