@@ -59,7 +59,8 @@ def readings(campaign):
     lines = AxisLines(np.array([4, 8]), np.array([4e3, 8e3]), value, 0.0 * value, variance, np.ones(2), force, slope)
     measurement = CutMeasurement("cut-0", NAME, 1001.0, {Dof.X: lines}, 0.0)
     good = [
-        Reading(cut.id, NAME, 1000.0, Verdict((), (Remark(RecordCode.NO_AIR_CUT, "no air cut"),)), measurement) for cut in campaign.cuts[:2]
+        Reading(cut.id, NAME, 1000.0, Verdict((), (Remark(RecordCode.NO_AIR_CUT, "no air cut"),)), (measurement,))
+        for cut in campaign.cuts[:2]
     ]
     return [*good, Reading(campaign.cuts[2].id, NAME, 1000.0, Verdict((Remark(RecordCode.CHATTER, "chatter: 3 µm at 1500 Hz"),)))]
 

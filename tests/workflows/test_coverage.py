@@ -25,7 +25,7 @@ def made(folder, feeds=(0.0,), axes=(Dof.X, Dof.Y), usable=True, strategies=("do
         conditions = CuttingConditions(speed, 4e-4, 1e-4, engagement, feeds[k % len(feeds)])
         cuts.append(Cut(f"{k}", "T1", conditions, folder / "none.h5"))
         measurement = CutMeasurement(f"{k}", "T1", speed, dict.fromkeys(axes), 0.0)
-        readings.append(Reading(f"{k}", "T1", speed, Verdict(()), measurement if usable else None))
+        readings.append(Reading(f"{k}", "T1", speed, Verdict(()), (measurement,) if usable else ()))
     return replace(campaign, cuts=tuple(cuts)), readings
 
 

@@ -26,7 +26,7 @@ def reading(number, speed, tooling="T1", usable=True):
     lines = AxisLines(
         order, order * speed, value, 0.0 * value, np.full((2, 1), 1e-20), np.ones(2), np.full(2, 10.0 + 0j), np.zeros((2, 5), dtype=complex)
     )
-    return Reading(id, tooling, speed, Verdict(()), CutMeasurement(id, tooling, speed, {Dof.X: lines}, 0.01))
+    return Reading(id, tooling, speed, Verdict(()), (CutMeasurement(id, tooling, speed, {Dof.X: lines}, 0.01),))
 
 
 @dataclass(frozen=True)
