@@ -202,8 +202,10 @@ async def finish(components: Components, campaign: Campaign, name: str) -> None:
 
 def _state(components: Components, campaign: Campaign, name: str) -> Partial | None:
     """State of an upload; a stored recording is complete."""
-    state = components.files.partial(campaign.group, partial_name(campaign.id, name))[1]
-    row = None if state is not None else components.store.recordings.get(campaign.group, campaign.id, name)
+    # between the two steps that store an upload it is neither a part nor a recording
+    with components.files.lock:
+        state = components.files.partial(campaign.group, partial_name(campaign.id, name))[1]
+        row = None if state is not None else components.store.recordings.get(campaign.group, campaign.id, name)
     # one that is damaged is sent again
     return state if row is None or not is_whole(components.files, row) else Partial(row.size, row.size)
 

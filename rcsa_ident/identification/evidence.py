@@ -96,14 +96,14 @@ class EvidenceSelection:
             return failed(data, seed, self.name)
         try:
             searched = self._search(data, seed, map, progress)
+            freed = data
             if data.sweeps:
                 # what the sweeps do looks like other modes: once about known, they are searched anew without it
-                smooth = data.with_smooth_errors(SMOOTH_ERROR)
-                first = first_starts(smooth, self.priors, searched, map)[0]
-                freed = unswept(smooth, self.priors, first.theta, first.layout)
-                searched = self._search(freed.with_forces_of(data), seed, map, progress)
+                first = first_starts(data.with_smooth_errors(SMOOTH_ERROR), self.priors, searched, map)[0]
+                freed = unswept(data, self.priors, first.theta, first.layout)
+                searched = self._search(freed, seed, map, progress)
             trace = [step for search in searched for step in search.trace]
-            fitted = self._fit(data, searched, map, _report_to(BOTH, trace, progress))
+            fitted = self._fit(data, freed, searched, map, _report_to(BOTH, trace, progress))
             return replace(fitted.answer(seed, self.name), trace=tuple(trace))
         except (ArithmeticError, np.linalg.LinAlgError):
             return failed(data, seed, self.name)
@@ -126,16 +126,17 @@ class EvidenceSelection:
                 break
         return searched if asked.size == len(data.cut_ids) else [_of_all(search, asked, len(data.cut_ids)) for search in searched]
 
-    def _fit(self, data: IdentificationData, searched: list[AxisSearch], map: Map, report: Report) -> Fit:
+    def _fit(self, data: IdentificationData, freed: IdentificationData, searched: list[AxisSearch], map: Map, report: Report) -> Fit:
         """Return the fit of both axes: apart, or together where they feel each other.
 
         Where that is plain from the first, both are fitted together at once. Elsewhere it is asked after the last fit of both apart,
         and the evidence has the last word: a stiffness that changes with speed, a mode in the wrong place or one too few look like it.
+        Lines of passes are freed of their sweeps ever better: as the searches took them, `freed`, then by each fit.
         """
-        smooth = data.with_smooth_errors(SMOOTH_ERROR)
+        smooth = freed.with_smooth_errors(SMOOTH_ERROR)
         first = first_starts(smooth, self.priors, searched, map)
-        # the lines of the searches were those of windows that sweep
-        measured, smooth = smooth, unswept(smooth, self.priors, first[0].theta, first[0].layout)
+        if data.sweeps:
+            smooth = unswept(data, self.priors, first[0].theta, first[0].layout).with_smooth_errors(SMOOTH_ERROR)
         points = coupled_data(smooth) if couplable(smooth) else None
         together: CoupledFit | None = None
         if points is not None and self._felt(points, first[0], *learned_noise(searched)).score > PLAIN:
@@ -146,8 +147,8 @@ class EvidenceSelection:
                 if together.evidence < evidence(apart, misfit) - PLAIN_GAIN:
                     return together
         apart, misfit = fit_jointly(smooth, self.priors, searched, first, report)
-        if measured.sweeps:
-            smooth = unswept(measured, self.priors, apart.theta, apart.layout)
+        if data.sweeps:
+            smooth = unswept(data, self.priors, apart.theta, apart.layout).with_smooth_errors(SMOOTH_ERROR)
             points = None if points is None else coupled_data(smooth)
         grown = grow_jointly(smooth, self.priors, apart, misfit, report)
         if points is not None and together is None:

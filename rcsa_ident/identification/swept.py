@@ -1,9 +1,10 @@
 """Lines of a spindle whose speed changes: what a machine answers to a force that sweeps, and to one that does not.
 
 A force F e^{i m theta} of a spindle at speed Omega that gains A moves the flange by F e^{i m theta} (H - (i/2) m A H'') to first order in
-A, both at omega = m Omega: an order that sweeps meets a structure that lags behind. A line from a window of length T is the mean of that
-over the frequencies that it sweeps, omega -+ m A T / 2. Both are small, and a machine that is roughly known tells them well: the lines are
-divided by what it says, and those of the next fit are those of a spindle that keeps its speed.
+A, both at omega = m Omega: in the response's integral over the past e^{i m (theta(t - s) - theta(t))} is e^{-i omega s} (1 + (i/2) m A
+s^2), and s^2 stands for -d^2/d omega^2. A line from a window of length T is the mean of that over the frequencies that it sweeps, omega
+-+ m A T / 2. Both are small, and a machine that is roughly known tells them well: the lines are divided by what it says, and those of the
+next fit are those of a spindle that keeps its speed.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.identification.data import AxisData, IdentificationData
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import Unknowns
+from rcsa_ident.identification.parameters import Unknowns, planes
 from rcsa_ident.identification.priors import Priors
 
 #: Weights of a mean over an interval at its middle and, together, at `data.NODE` of its half to both sides: exact to the fifth power.
@@ -33,11 +34,14 @@ def unswept(data: IdentificationData, priors: Priors, theta: FloatArray, layout:
         As measured.
     priors : Priors
     theta : array, shape (p,)
-        About the machine and its joint.
+        About the machine and its joint; what else it holds does not matter.
     layout : Unknowns
     """
     if not data.sweeps:
         return data
+    # a force that is a little larger is so with a sweep and without
+    machine = replace(planes(layout), coefficients=0, clampings=0)
+    theta, layout = theta[: machine.size], machine
     middle, low, high = (Misfit(_moved(data, side), priors, (0.0,) * len(data.axes)).models(theta, layout) for side in (0, -1, 1))
     ratios = [_ratio(axis, *each) for axis, *each in zip(data.axes, middle, low, high, strict=True)]
     return replace(data, axes=tuple(_divided(axis, ratio) for axis, ratio in zip(data.axes, ratios, strict=True)))

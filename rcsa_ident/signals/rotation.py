@@ -163,7 +163,8 @@ def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: Flo
     frequency : array, shape (w,) [Hz]
         The spindle's in each, to within a few hundredths of a turn over the window.
     teeth : int
-        Of a cutter whose orders do not take part: while the speed changes they carry the structure's phase. 0 for none.
+        Where the speed changes on purpose: of the cutter whose orders do not take part, since then they carry the structure's phase; 1
+        where all do. 0 where the speed only wanders.
     """
     at, mean = np.arange(samples.shape[0]), float(frequency.mean())
     speed = np.full(at.size, mean)

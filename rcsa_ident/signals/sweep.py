@@ -48,8 +48,8 @@ _BEYOND = 0.03
 _BESIDE = 0.01
 #: Standard deviation of an angle that was followed, where no air cut tells what a cutter's run-out adds to the flange's [rad].
 _ANGLE_STD = 5e-3
-#: Standard deviation of a block's angle from which on a flange is too round to tell it [rad].
-_ROUND = 0.02
+#: Standard deviation of a block's angle from which on a flange is too round to tell it [rad]: forty orders of noise seem to tell 0.02.
+_ROUND = 0.005
 #: Change of the lines of the teeth from quarter to quarter above which a window is no even cut: a resonance does less; and in the first
 #: and the last window, as so many times its neighbour's and more: there the tool enters and leaves.
 _UNEVEN, _ENTERS = 0.6, (2.0, 0.05)
@@ -164,8 +164,8 @@ def measure_pass(
     fault = _speed_fault(turning, (first_speed, last_speed))
     if fault is not None:
         return replace(left_out(fault), spindle_speed=turning.mean_speed)
-    still = None if air is None else _turning(air, axes, (first_speed, last_speed), 0)
-    fault = None if still is None else _speed_fault(still, (first_speed, last_speed))
+    still = None if air is None else _turning(air, axes, (first_speed, last_speed), 1)
+    fault = None if still is None else _air_fault(still, (first_speed, last_speed))
     if fault is not None:
         return replace(left_out(fault.of("air cut")), spindle_speed=turning.mean_speed)
     parts = _windows(turning)
@@ -246,8 +246,8 @@ def judge_pass_air(cut_id: str, tooling: str, air: Recording, speeds: tuple[floa
     faults = looked_at.reasons + _length_faults(air, speeds)
     if faults:
         return Reading(cut_id, tooling, programmed, Verdict(faults, looked_at.notes))
-    turning = _turning(air, axes, speeds, 0)
-    fault = _speed_fault(turning, speeds)
+    turning = _turning(air, axes, speeds, 1)
+    fault = _air_fault(turning, speeds)
     if fault is not None:
         return Reading(cut_id, tooling, programmed, Verdict((fault,), looked_at.notes), (), turning.mean_speed)
     harmonics: dict[Dof, int] = {}
@@ -267,7 +267,7 @@ def _moved_axes(recording: Recording) -> tuple[Dof, ...]:
 
 
 def _turning(recording: Recording, axes: tuple[Dof, ...], speeds: tuple[float, float], teeth: int) -> _Turning:
-    """Follow the spindle through a pass."""
+    """Follow the spindle through a pass; an air cut has 1 tooth."""
     columns = motion_columns(recording, axes)[: len(axes)]
     samples, rate = np.asarray(recording.samples)[:, columns], recording.rate
     low, high = to_hz(min(speeds)), to_hz(max(speeds))
@@ -276,7 +276,7 @@ def _turning(recording: Recording, axes: tuple[Dof, ...], speeds: tuple[float, f
     rotation = follow(samples, rate, middles, path, teeth)
     by_teeth = bool(np.median(rotation.information) < 1.0 / _ROUND**2)
     if by_teeth:
-        rotation = follow(samples, rate, middles, path)
+        rotation = follow(samples, rate, middles, path, 1)
     found = _from_trigger(recording, rotation.angle, teeth)
     off, std = (0.0, 0.0) if found is None else found
     return _Turning(recording, rotation.angle - off, std, found is not None, by_teeth)
@@ -296,7 +296,7 @@ def _length_faults(recording: Recording, speeds: tuple[float, float]) -> tuple[R
 
 def _speed_fault(turning: _Turning, speeds: tuple[float, float]) -> Remark | None:
     """A remark if the spindle did not turn from one speed to the other."""
-    tenth = max(turning.angle.size // 10, 1)
+    tenth = turning.angle.size // 10
     ends = [float(turning.angle[a + tenth - 1] - turning.angle[a]) / (tenth - 1) * turning.recording.rate for a in (0, -tenth)]
     # a record may begin before the speed changes and end after it, and a clock is not perfect
     if all(abs(found / told - 1.0) < _BESIDE + 0.1 * abs(speeds[1] / speeds[0] - 1.0) for found, told in zip(ends, speeds, strict=True)):
@@ -305,9 +305,17 @@ def _speed_fault(turning: _Turning, speeds: tuple[float, float]) -> Remark | Non
     return Remark(RecordCode.WRONG_SPEED, f"speed: the spindle turned {found}, programmed is {told}")
 
 
+def _air_fault(turning: _Turning, speeds: tuple[float, float]) -> Remark | None:
+    """A remark if the spindle was not seen to turn from one speed to the other in an air cut, in which no tooth tells it."""
+    if turning.by_teeth:
+        first, last = (to_rpm(speed) for speed in speeds)
+        return Remark(RecordCode.WRONG_SPEED, f"speed: nothing is seen to turn from {first:.0f} to {last:.0f} rev/min")
+    return _speed_fault(turning, speeds)
+
+
 def _unevenness(lines: LineSpectrum, teeth: int, axes: int) -> float:
     """Root mean square of what the teeth's lines change from quarter to quarter of a window, over themselves, as accelerations."""
-    order = np.arange(max(teeth, 1), lines.amplitude.shape[0], max(teeth, 1))
+    order = np.arange(teeth, lines.amplitude.shape[0], teeth)
     weight = order[:, None] ** 4
     power = np.sum(weight * np.abs(lines.amplitude[order, :axes]) ** 2)
     # the scatter is the variance that the mean of four quarters would have
@@ -346,7 +354,7 @@ def _from_trigger(recording: Recording, angle: FloatArray, teeth: int) -> tuple[
     """By how much a followed angle exceeds that of tooth 1 from immersion 0, and its standard deviation [rad], from all edges of a trigger
     together; None without one whose tooth angle is known. With several pulses a turn it is known up to a whole number of teeth."""
     sensor = recording.sensor(Quantity.TRIGGER)
-    if sensor is None or sensor.tooth_angle is None or max(teeth, 1) % sensor.pulses_per_revolution != 0:
+    if sensor is None or sensor.tooth_angle is None or teeth % sensor.pulses_per_revolution != 0:
         return None
     edges = rising(np.asarray(recording.samples)[:, recording.sensors.index(sensor)])
     if edges.size < _TURNS:

@@ -18,7 +18,8 @@ from rcsa_ident.dynamics.modal import normal_modes
 from rcsa_ident.dynamics.poles import PoleResidue
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.turning_modes import TurningModes
-from rcsa_ident.identification.data import IdentificationData, prepare
+from rcsa_ident.identification.cut_data import prepare
+from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.machine import IdentifiedMachine

@@ -12,7 +12,8 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.identification.data import IdentificationData, prepare
+from rcsa_ident.identification.cut_data import prepare
+from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.hammer_data import with_tests
 from rcsa_ident.identification.hammer_lines import FEWEST_LINES, HammerLines, noise_of, thinned
 from rcsa_ident.identification.method import Method

@@ -120,18 +120,20 @@ def _jobs(setup: VirtualSetup, toolings: Sequence[Tooling], rng: np.random.Gener
         small = reduced(rotor(setup.spindle, tooling.assembly))
         dynamics = None if setup.spindle.speed_dependent else poles(small)
         for name, speed, last, duration in setup.plan.cuts:
-            own = _along(small, speed, last) if dynamics is None else dynamics
+            own = _along(small, speed, last, setup.plan.settling / duration) if dynamics is None else dynamics
             conditions = setup.plan.conditions(speed)
             yield _Job(f"{tooling.name}-{name}", tooling, own, clamping, conditions, last, duration, chance.spawn(1)[0])
 
 
-def _along(small: ReducedRotor, speed: float, last: float | None) -> Poles | tuple[Poles, ...]:
-    """The machine at a speed, or part by part between the first and the last one of a pass."""
+def _along(small: ReducedRotor, speed: float, last: float | None, settling: float) -> Poles | tuple[Poles, ...]:
+    """The machine at a speed, or part by part between the first and the last one of a pass that settles before, a share of its length."""
     if last is None:
         return poles(small, speed)
-    found = [poles(small, speed)]
-    for part in range(1, PARTS):
-        found.append(alike(found[-1], poles(small, speed + (part + 0.5) / PARTS * (last - speed))))
+    # the speed changes from the record's first sample on; its padding is short beside a part
+    gone = np.maximum((np.arange(PARTS) + 0.5) / PARTS * (1.0 + settling) - settling, 0.0)
+    found = [poles(small, speed + float(gone[0]) * (last - speed))]
+    for share in gone[1:].tolist():
+        found.append(alike(found[-1], poles(small, speed + share * (last - speed))))
     return tuple(found)
 
 

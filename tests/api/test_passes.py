@@ -7,15 +7,16 @@ import pytest
 from api.reading.campaign_text import campaign_of_text, declare
 from rcsa_ident.errors import InputError
 from rcsa_ident.io.hdf5 import write_hdf5
+from rcsa_ident.io.machines import read_machine
 from tests.api.recordings import declared
-from tests.fixtures.paths import TOOLINGS
-from tests.signals.test_sweep import RPM, SPEEDS, Pass
+from tests.fixtures.paths import MACHINES, TOOLINGS
+from tests.fixtures.virtual_pass import RPM, SPEEDS, Pass
 
 
 def campaign(**changed):
     data = declared(1)
     data["toolings"] = {"T1": tomllib.loads((TOOLINGS / "S1-ER32.toml").read_text("utf-8"))}
-    suite = Pass.sensors_of()
+    suite = read_machine(MACHINES / "hpm.toml").sensors
     for name, sensor in data["sensors"].items():
         sensor["sensitivity"] = suite.gap_sensitivity if name.startswith("flange") else suite.acceleration_sensitivity
     speeds = {"spindle_speed_rpm": SPEEDS[0] / RPM, "spindle_speed_to_rpm": SPEEDS[1] / RPM}

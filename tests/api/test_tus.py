@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 
 import httpx2
 import pytest
@@ -202,6 +203,27 @@ def test_a_file_that_is_not_the_announced_one_is_refused_at_its_end(place):
     answer = sent(client, where, raw, 0)
     assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "Upload-Metadata")
     assert client.head(where, headers=SAYS).status_code == 404
+
+
+def test_an_upload_that_is_being_stored_never_seems_not_to_have_begun(store, tmp_path, monkeypatch):
+    raw, answers = content(tmp_path), []
+    with service(store, tmp_path) as http:
+        client = Client(http=http)
+        id = client.make_campaign(client.make_machine("m").id, declared(2)).id
+        where = begun(http, f"/v1/campaigns/{id}/uploads", len(raw))
+        asking = threading.Thread(target=lambda: answers.append(http.head(where, headers=SAYS)))
+        put = store.recordings.put
+
+        def asked_meanwhile(*arguments):
+            # its bytes have been moved to their place, and no row names them yet
+            asking.start()
+            asking.join(1.0)
+            return put(*arguments)
+
+        monkeypatch.setattr(store.recordings, "put", asked_meanwhile)
+        assert sent(http, where, raw, 0).status_code == 204
+        asking.join()
+    assert [(answer.status_code, answer.headers["upload-offset"]) for answer in answers] == [(204, str(len(raw)))]
 
 
 def test_what_another_group_uploads_is_not_there(guarded_http, tmp_path):

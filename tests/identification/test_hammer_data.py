@@ -18,6 +18,7 @@ from rcsa_ident.identification.parameters import AxisLayout, Layout, flange_mode
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
+from rcsa_ident.identification.swept import unswept
 from rcsa_ident.remarks import says
 from rcsa_ident.tool_holder.model import point_name, receptance_at_points, tool_holder_receptance
 from rcsa_ident.virtual.rotor import frequency_response, rotor
@@ -132,6 +133,22 @@ def test_tests_stand_behind_the_cuts_and_change_nothing_about_them(shop, rich, f
     np.testing.assert_array_equal(y.lines, rich.axes[1].lines)
     np.testing.assert_array_equal(x.lines[x.cut < both.cuts], rich.axes[0].summed().lines)
     assert not x.force_slope[x.cut < both.cuts, len(rich.coefficient_spread) :].any()
+
+
+def test_beside_passes_cuts_sweep_and_hits_do_not(shop, first):
+    cuts, _ = shop.measurements(np.random.default_rng(1), fixture=False, names=(first,))
+    passes = shop.prepare([replace(cut, acceleration=200.0, length=0.28) for cut in cuts])
+    tests, _ = hit(shop, first, np.random.default_rng(SEED), axes=(Dof.X,))
+    both = with_tests(passes, tests, at_points(shop))
+    layout = Layout((AxisLayout(3), AxisLayout(3)), len(both.coefficient_spread))
+    theta = vector_of(layout, ((600.0, 1400.0, 2500.0),) * 2)
+    freed, beside = (unswept(each, Priors(), theta, layout) for each in (passes, both))
+    for alone, measured, found in zip(freed.axes, both.axes, beside.axes, strict=True):
+        own = found.cut < both.cuts
+        np.testing.assert_allclose(found.lines[own], alone.lines, rtol=1e-9)
+        np.testing.assert_array_equal(found.lines[~own], measured.lines[~own])
+    x = beside.axes[0]
+    assert np.any(x.lines[x.cut < both.cuts] != passes.axes[0].lines)
 
 
 def test_without_tests_there_is_nothing_to_stand_behind(shop, few):

@@ -7,82 +7,13 @@ import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.io.machines import read_machine
-from rcsa_ident.io.setups import read_tooling
-from rcsa_ident.signals.measurement import measure_cut
-from rcsa_ident.signals.recording import Quantity, Recording, Sensor
-from rcsa_ident.signals.sweep import judge_pass_air, measure_pass
+from rcsa_ident.signals.recording import Quantity, Recording
+from rcsa_ident.signals.sweep import judge_pass_air
 from rcsa_ident.signals.verdict import RecordCode
-from rcsa_ident.virtual.disturbances import Disturbances
-from rcsa_ident.virtual.rotor import frequency_response, rotor
-from rcsa_ident.workflows.simulate import simulate
-from tests.fixtures.paths import MACHINES, TOOLINGS
+from tests.fixtures.virtual_pass import AXES, CONSTANT, RPM, SECONDS, SPEEDS, Pass
 
-RPM = np.pi / 30.0
-AXES = (Dof.X, Dof.Y)
-#: A pass that sweeps fast, its length [s], and the speed of a cut that does not.
-SPEEDS, SECONDS, CONSTANT = (11500.0 * RPM, 12500.0 * RPM), 1.5, 12000.0 * RPM
-TOOTH_ANGLE = 0.6
-
-
-class Pass:
-    """A simulated pass and a cut at the speed in its middle, with everything that measuring them takes."""
-
-    def __init__(self, trigger=False, wander=0.0, tooling="S1-ER32", entry=0.0, seed=1, **sensors):
-        machine = read_machine(MACHINES / "hpm.toml")
-        suite = replace(machine.sensors, speed_error=0.0, trigger=trigger, tooth_angle=TOOTH_ANGLE, **sensors)
-        plan = replace(machine.plan, spindle_speeds=(CONSTANT,), passes=(SPEEDS,), pass_duration=SECONDS, entry=entry, leave=entry)
-        self.machine = replace(machine, sensors=suite, plan=plan, disturbances=Disturbances(speed_wander=wander))
-        self.tooling = read_tooling(TOOLINGS / f"{tooling}.toml")
-        self.constant, self.moving = simulate(self.machine, [self.tooling], seed)
-        self.cut, self.air = (self.recording(self.moving.records[kind]) for kind in ("cut", "air"))
-
-    @staticmethod
-    def sensors_of():
-        return read_machine(MACHINES / "hpm.toml").sensors
-
-    def recording(self, record):
-        suite = self.machine.sensors
-        kinds = {
-            "flange": (Quantity.DISPLACEMENT, suite.gap_sensitivity),
-            "fixture": (Quantity.ACCELERATION, suite.acceleration_sensitivity),
-        }
-        sensors, columns = [], []
-        for name, values in record.channels.items():
-            if name == "trigger":
-                sensors.append(Sensor(name, Quantity.TRIGGER, tooth_angle=TOOTH_ANGLE))
-                columns.append(values)
-                continue
-            quantity, scale = kinds[name[:-2]]
-            sensors.append(Sensor(name, quantity, Dof(name[-1])))
-            columns.append(values / scale)
-        return Recording(suite.rate, np.stack(columns, axis=1), tuple(sensors))
-
-    def measure(self, cut=None, air="its own", speeds=SPEEDS):
-        conditions = self.machine.plan.conditions(speeds[0])
-        air = self.air if isinstance(air, str) else air
-        coefficients = self.machine.workpiece.coefficients
-        return measure_pass("p", "S1", self.cut if cut is None else cut, air, self.tooling.cutter, conditions, speeds[1], coefficients)
-
-    def at_constant_speed(self):
-        cut, air = (self.recording(self.constant.records[kind]) for kind in ("cut", "air"))
-        conditions = self.machine.plan.conditions(CONSTANT)
-        return measure_cut("c", "S1", cut, air, self.tooling.cutter, conditions, self.machine.workpiece.coefficients).measurement
-
-    def true_cross(self, axis, omega, speed):
-        model = rotor(self.machine.spindle, self.tooling.assembly)
-        return frequency_response(model, omega, speed, inputs=(f"tip.{axis}",), outputs=(f"flange.{axis}",))[:, 0, 0]
-
-    def swept(self, axis, measurement, lines):
-        """What the sweep makes of the true lines: mean over the range and lag, by brute force."""
-        found = []
-        for order in lines.order:
-            middle, rate = order * measurement.spindle_speed, order * measurement.acceleration
-            places = middle + np.linspace(-0.5, 0.5, 61) * rate * measurement.length
-            step = 0.02 * abs(places[-1] - places[0])
-            low, mid, high = (self.true_cross(axis, places + k * step, measurement.spindle_speed) for k in (-1, 0, 1))
-            found.append(np.mean(mid - 0.5j * rate * (high - 2.0 * mid + low) / step**2))
-        return np.array(found)
+#: Speeds in the middles of its windows [rev/min].
+MIDDLES = (11600.0, 11800.0, 12000.0, 12200.0, 12400.0)
 
 
 @pytest.fixture(scope="module")
@@ -185,11 +116,62 @@ def test_a_cut_that_keeps_its_speed_is_no_pass(plain):
 
 
 def test_an_air_cut_told_as_a_cut_is_left_out(plain):
-    found = plain.measure(cut=plain.air, air=None)
-    assert not found.verdict.usable or all(not each.axes for each in found.measurements) or found.verdict.notes
     found = plain.measure(cut=plain.air)
     assert not found.verdict.usable
     assert str(found.verdict.reasons[0]).startswith("5 of 5 windows are not usable")
+
+
+def test_a_speed_that_falls_shows_the_same_machine(plain):
+    falling = Pass(speeds=SPEEDS[::-1])
+    found = falling.measure()
+    assert found.verdict.usable
+    assert all(each.acceleration < 0.0 for each in found.measurements)
+    window = min(found.measurements, key=lambda each: abs(each.spindle_speed - CONSTANT))
+    with_sweep, without = errors(falling, window, falling.at_constant_speed())
+    # three seeds had shown 0.9 to 1.5e-3 and 3.1 to 3.3e-3
+    assert with_sweep < 2e-3
+    assert without > 1.5 * with_sweep
+
+
+def test_one_axis_is_enough(plain):
+    def along_x(recording):
+        kept = [i for i, sensor in enumerate(recording.sensors) if sensor.axis is Dof.X]
+        return Recording(recording.rate, recording.samples[:, kept], tuple(recording.sensors[i] for i in kept))
+
+    both, one = plain.measure(), plain.measure(cut=along_x(plain.cut), air=along_x(plain.air))
+    assert one.verdict.usable
+    for here, there in zip(one.measurements, both.measurements, strict=True):
+        assert set(here.axes) == {Dof.X}
+        lines, beside = here.axes[Dof.X], there.axes[Dof.X]
+        np.testing.assert_array_equal(lines.order, beside.order)
+        ratio = lines.receptance / beside.receptance * np.exp(1j * lines.omega * (here.delay - there.delay))
+        # noise, and the angle at which the air cut is taken out of the flange's own orders
+        noise = np.sqrt(2.0 * beside.variance.sum(axis=1)) / np.abs(beside.receptance)
+        assert np.all(np.abs(ratio - 1.0) < 3.0 * np.hypot(noise, here.alignment_std * lines.order))
+
+
+def test_a_flange_of_a_fifth_of_a_micrometre_is_enough():
+    found = Pass(roundness=2e-7).measure()
+    assert found.verdict.usable
+    assert not found.verdict.notes
+    assert [each.spindle_speed / RPM for each in found.measurements] == pytest.approx(
+        [11600.0, 11800.0, 12000.0, 12200.0, 12400.0], rel=1e-4
+    )
+
+
+def test_where_the_teeth_alone_tell_the_angle_it_is_said():
+    found = Pass(roundness=5e-8, cutter_runout=0.0).measure(air=None)
+    assert found.verdict.usable
+    assert [note.code for note in found.verdict.notes] == [RecordCode.FOLLOWED, RecordCode.NO_AIR_CUT]
+    assert "the teeth's own lines did" in str(found.verdict.notes[0])
+    np.testing.assert_allclose([each.spindle_speed / RPM for each in found.measurements], MIDDLES, rtol=1e-4)
+
+
+def test_an_air_cut_of_other_speeds_or_of_a_round_flange_is_no_air_cut(plain):
+    for air in (Pass(speeds=(13000.0 * RPM, 14000.0 * RPM)).air, Pass(roundness=0.0).air):
+        found = plain.measure(air=air)
+        assert not found.verdict.usable
+        assert str(found.verdict.reasons[0]) == "air cut: speed: nothing is seen to turn from 11500 to 12500 rev/min"
 
 
 def test_windows_of_entry_and_exit_are_left_out():

@@ -12,7 +12,7 @@ from rcsa_ident.cutting.conditions import CuttingConditions, Engagement
 from rcsa_ident.cutting.force import force_and_slope
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.design import coupled_information, directions_of
-from rcsa_ident.identification.data import prepare
+from rcsa_ident.identification.cut_data import prepare
 from rcsa_ident.identification.experiment_design import LEAST_MODEL_ERROR, expected_cut, harmonics
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.turning import turning_pair

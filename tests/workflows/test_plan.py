@@ -1,7 +1,6 @@
 """Plans of cuts: what is allowed, what is stable, what is gained, and what is said when a band is out of reach."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,13 +14,11 @@ from rcsa_ident.identification.experiment_design import Volume
 from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.parameters import AxisLayout, AxisParameters, pack
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
-from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.stability.lobes import stability_lobes
 from rcsa_ident.workflows.plan import CutConstraints, line_noise, plan_cuts
 from tests.fixtures.virtual_shop import open_shop
 
-TOOLINGS = Path(__file__).parents[2] / "data" / "machines" / "toolings"
 RPM = np.pi / 30.0
 COEFFICIENTS = CuttingCoefficients(902e6, 0.26, tangential_spread=0.01, ratio_spread=0.01)
 ALLOWED = CutConstraints(8000.0 * RPM, 20000.0 * RPM, (0.2e-3, 0.6e-3), 1e-4, Engagement.from_immersion(0.5, "down"))
@@ -48,16 +45,6 @@ def machine_of(deviation=0.05, seed=1):
 def with_axes(machine, **axes):
     """The same machine with some of its axes alone, or changed."""
     return replace(machine, identified={Dof(name): part for name, part in axes.items()})
-
-
-@pytest.fixture(scope="module")
-def toolings():
-    return [read_tooling(TOOLINGS / name) for name in ("S1-ER32.toml", "S2-PG25.toml")]
-
-
-@pytest.fixture(scope="module")
-def targets():
-    return [read_tooling(TOOLINGS / name) for name in ("S3-PG25-long.toml", "S4-shrink.toml")]
 
 
 def plan(toolings, targets, count=6, allowed=ALLOWED, machine=None, noise=1e-10, **more):

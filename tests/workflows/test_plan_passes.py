@@ -11,7 +11,7 @@ from rcsa_ident.errors import InputError
 from rcsa_ident.signals.sweep import WINDOW
 from rcsa_ident.workflows.plan import limits_at, plan_cuts
 from rcsa_ident.workflows.plan_passes import plan_passes
-from tests.workflows.test_plan import ALLOWED, BAND, COEFFICIENTS, RPM, machine_of, targets, toolings  # noqa: F401
+from tests.workflows.test_plan import ALLOWED, BAND, COEFFICIENTS, RPM, machine_of
 
 ERRORS = {Dof.X: 2e-3, Dof.Y: 2e-3}
 DEPTHS = replace(ALLOWED, depths=(0.1e-3, 0.2e-3, 0.4e-3, 0.6e-3))
@@ -22,11 +22,11 @@ def plan(cut_with, wanted, count=6, allowed=DEPTHS, **more):
 
 
 @pytest.fixture(scope="module")
-def planned(toolings, targets):  # noqa: F811
+def planned(toolings, targets):
     return plan(toolings, targets)
 
 
-def test_they_cross_all_speeds_one_after_the_other(planned, toolings):  # noqa: F811
+def test_they_cross_all_speeds_one_after_the_other(planned, toolings):
     for tooling in toolings:
         own = [each for each in planned.passes if each.tooling == tooling.name]
         assert len(own) == 6
@@ -38,7 +38,7 @@ def test_they_cross_all_speeds_one_after_the_other(planned, toolings):  # noqa: 
     np.testing.assert_allclose(rpm, np.round(rpm), atol=1e-6)
 
 
-def test_each_is_stable_at_every_speed_that_it_crosses(planned, toolings):  # noqa: F811
+def test_each_is_stable_at_every_speed_that_it_crosses(planned, toolings):
     by_name = {tooling.name: tooling for tooling in toolings}
     for each in planned.passes[::3]:
         # at others than the speeds that the plan has asked
@@ -49,14 +49,14 @@ def test_each_is_stable_at_every_speed_that_it_crosses(planned, toolings):  # no
         assert all(depth * ALLOWED.margin > each.limit_depth for depth in deeper)
 
 
-def test_the_path_is_feed_times_teeth(planned, toolings):  # noqa: F811
+def test_the_path_is_feed_times_teeth(planned, toolings):
     each = planned.passes[0]
     teeth = toolings[0].cutter.teeth
     turns = 0.5 * (each.conditions.spindle_speed + each.last_speed) / (2.0 * np.pi) * each.seconds
     assert each.path == pytest.approx(turns * teeth * 1e-4)
 
 
-def test_bands_fall_pass_by_pass_and_as_with_cuts_at_these_speeds(planned, toolings, targets):  # noqa: F811
+def test_bands_fall_pass_by_pass_and_as_with_cuts_at_these_speeds(planned, toolings, targets):
     assert planned.band.shape == (len(planned.passes) + 1, len(targets))
     assert np.all(np.diff(planned.band, axis=0) < 0.0)
     # as much as many chosen cuts: windows are cuts
@@ -67,7 +67,7 @@ def test_bands_fall_pass_by_pass_and_as_with_cuts_at_these_speeds(planned, tooli
     np.testing.assert_allclose(planned.band[0], cuts.band[0], rtol=1e-9)
 
 
-def test_a_pass_that_is_nowhere_deep_enough_is_named(toolings, targets):  # noqa: F811
+def test_a_pass_that_is_nowhere_deep_enough_is_named(toolings, targets):
     limits = [each.limit_depth for each in plan(toolings, targets).passes]
     depth = float(np.median(limits)) / ALLOWED.margin
     found = plan(toolings, targets, allowed=replace(ALLOWED, depths=(depth,)))
@@ -86,6 +86,6 @@ def test_a_pass_that_is_nowhere_deep_enough_is_named(toolings, targets):  # noqa
         (6, 4.0, replace(ALLOWED, depths=(0.05,)), "none stable"),
     ],
 )
-def test_bad_input_is_named(toolings, targets, count, seconds, allowed, words):  # noqa: F811
+def test_bad_input_is_named(toolings, targets, count, seconds, allowed, words):
     with pytest.raises(InputError, match=words):
         plan(toolings, targets, count, allowed, seconds=seconds)
