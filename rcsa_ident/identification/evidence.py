@@ -44,6 +44,8 @@ from rcsa_ident.scaleout import Map
 SMOOTH_ERROR = 2e-3
 #: Searches from new starts, until one axis has come to the same answer twice.
 ATTEMPTS = 3
+#: Further searches among lines that were freed of their sweeps, until two have come to evidences as near as this.
+FREED_ATTEMPTS, SAME = 3, 20.0
 #: Windows of a tooling's passes that are enough to find its modes; the polish takes all.
 ENOUGH = 40
 #: Score beyond which planes plainly feel each other once a stiffness that changes with speed is in the fit: 0 to 36 where they do not,
@@ -95,22 +97,37 @@ class EvidenceSelection:
         if not_finite(data):
             return failed(data, seed, self.name)
         try:
-            searched = self._search(data, seed, map, progress)
-            freed = data
-            if data.sweeps:
-                # what the sweeps do looks like other modes: once about known, they are searched anew without it
-                first = first_starts(data.with_smooth_errors(SMOOTH_ERROR), self.priors, searched, map)[0]
-                freed = unswept(data, self.priors, first.theta, first.layout)
-                searched = self._search(freed, seed, map, progress)
-            trace = [step for search in searched for step in search.trace]
-            fitted = self._fit(data, freed, searched, map, _report_to(BOTH, trace, progress))
-            return replace(fitted.answer(seed, self.name), trace=tuple(trace))
+            sequence, trace, freed = np.random.SeedSequence(seed), list[Step](), data
+            found = self._found(data, data, sequence, map, trace, progress)
+            for _ in range(FREED_ATTEMPTS if data.sweeps else 0):
+                # what the sweeps do looks like other modes: by an answer the lines are freed of it, and searched anew; not by one of
+                # planes that feel each other, which lines that sweep may feign
+                if isinstance(found.solution.layout, Layout):
+                    freed = unswept(data, self.priors, found.solution.theta, found.solution.layout)
+                other = self._found(data, freed, sequence, map, trace, progress)
+                found, worse = sorted((found, other), key=lambda fit: fit.evidence)
+                if worse.evidence - found.evidence < SAME:
+                    break
+            return replace(found.answer(seed, self.name), trace=tuple(trace))
         except (ArithmeticError, np.linalg.LinAlgError):
             return failed(data, seed, self.name)
 
-    def _search(self, data: IdentificationData, seed: int, map: Map, progress: Progress | None) -> list[AxisSearch]:
+    def _found(
+        self,
+        data: IdentificationData,
+        freed: IdentificationData,
+        sequence: np.random.SeedSequence,
+        map: Map,
+        trace: list[Step],
+        progress: Progress | None,
+    ) -> Fit:
+        """Return the fit of a search; its steps come behind those of `trace`."""
+        searched = self._search(freed, sequence, map, progress)
+        trace += [step for search in searched for step in search.trace]
+        return self._fit(data, freed, searched, map, _report_to(BOTH, trace, progress))
+
+    def _search(self, data: IdentificationData, sequence: np.random.SeedSequence, map: Map, progress: Progress | None) -> list[AxisSearch]:
         """Return the search of each axis, again from new starts until one has come to the same answer twice."""
-        sequence = np.random.SeedSequence(seed)
         asked = _searched_cuts(data)
         summed = data.of_cuts(asked).summed() if asked.size < len(data.cut_ids) else data.summed()
         parts = [summed.only(a.axis).with_smooth_errors(SMOOTH_ERROR) for a in data.axes]

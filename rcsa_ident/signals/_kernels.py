@@ -181,6 +181,43 @@ def angle_sums(samples, angle, starts, window, highest):
 
 
 @numba.njit(cache=True)
+def told_angles(lines, order, phase, reach):
+    """Return what lines tell of an angle beyond `phase`, weighted by its information, and that [1/rad^2].
+
+    Shapes: lines (k, b), order (k,), phase (b,) -> (b,), (b,).
+    Each row holds one order's lines in blocks that follow each other; orders do not fall from row to row. A line's mean is that of the
+    `reach` blocks to both sides of it, of all where the reach is longer than half of them; its variance is what lines differ from theirs.
+    """
+    rows, blocks = lines.shape
+    step, power = np.exp(-1j * phase), np.ones(blocks, dtype=np.complex128)
+    told, information = np.zeros(blocks), np.full(blocks, 1e-300)
+    turned, mean, total = np.empty(blocks, np.complex128), np.empty(blocks, np.complex128), np.empty(blocks + 1, np.complex128)
+    everywhere = reach > 0.5 * blocks
+    wide = 0 if everywhere else max(round(reach), 1)
+    total[0] = 0.0
+    for k in range(rows):
+        for _ in range(order[k] - (order[k - 1] if k else 0)):
+            for b in range(blocks):
+                power[b] *= step[b]
+        for b in range(blocks):
+            turned[b] = lines[k, b] * power[b]
+            total[b + 1] = total[b] + turned[b]
+        for b in range(blocks):
+            first, last = (0, blocks) if everywhere else (max(b - wide, 0), min(b + wide + 1, blocks))
+            mean[b] = (total[last] - total[first]) / (last - first)
+        square = 0.0
+        for b in range(blocks):
+            off = turned[b] - mean[b]
+            square += off.real * off.real + off.imag * off.imag
+        noise = 0.5 * square / blocks + 1e-300
+        for b in range(blocks):
+            at, about = turned[b], mean[b]
+            told[b] += order[k] / noise * (about.real * at.imag - about.imag * at.real)
+            information[b] += order[k] ** 2 / noise * (about.real * about.real + about.imag * about.imag)
+    return told, information
+
+
+@numba.njit(cache=True)
 def angle_signal(amplitude, angle, length):
     """Return Re sum_m amplitude[w, m] e^{i m angle[t]} over windows of `length` samples that follow each other.
 

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.signals._kernels import angle_sums, best_path, comb_scores
+from rcsa_ident.signals._kernels import angle_sums, best_path, comb_scores, told_angles
 from rcsa_ident.signals.line_gain import WINDOW, line_gain
 from rcsa_ident.signals.steady_part import hann
 
@@ -189,7 +189,7 @@ def _followed(samples: FloatArray, rate: float, angle: FloatArray, mean: float, 
     lines = angle_sums(samples, angle, starts, 2.0 / window.sum() * window, highest)[:, 1:]
     order = np.arange(1, highest + 1)
     own = order % teeth != 0 if teeth > 1 else order > 0
-    phase, information, evidence = _common_phase(lines[:, own], order[own][None, :, None], hop / rate)
+    phase, information, evidence = _common_phase(lines[:, own], order[own], hop / rate)
     time = (starts + 0.5 * (length - 1)) / rate
     if starts.size < 4:
         # no more is told than was known
@@ -202,43 +202,23 @@ def _followed(samples: FloatArray, rate: float, angle: FloatArray, mean: float, 
 
 
 def _common_phase(lines: ComplexArray, order: np.ndarray, step: float) -> tuple[FloatArray, FloatArray, float]:
-    """Angle [rad] that the lines of each block, shape (b, m, c), have in common beyond the expected one, its information [1/rad^2], and
-    the evidence that it is no straight line."""
-    phase = np.zeros(lines.shape[0])
+    """Angle [rad] that the lines of each block, shape (b, m, c) of orders (m,), have in common beyond the expected one, its information
+    [1/rad^2], and the evidence that it is no straight line."""
+    blocks, _, channels = lines.shape
+    rows, own = np.ascontiguousarray(lines.reshape(blocks, -1).T), np.repeat(order, channels)
+    phase = np.zeros(blocks)
     for reach in _AMPLITUDE_TIMES:
         density = None
         for _ in range(8):
-            turned = lines * np.exp(-1j * phase[:, None, None] * order)
-            mean, noise, information = _told(turned, order, reach / step)
-            change = np.sum(np.imag(np.conj(mean) * turned) * order / noise, axis=(1, 2)) / information
-            new, density, _ = _smoothed(phase + np.clip(change, -0.3, 0.3), information, step, density)
+            told, information = told_angles(rows, own, phase, reach / step)
+            new, density, _ = _smoothed(phase + np.clip(told / information, -0.3, 0.3), information, step, density)
             moved, phase = float(np.max(np.abs(new - phase))), new
             if moved < 1e-3:
                 break
-    turned = lines * np.exp(-1j * phase[:, None, None] * order)
-    mean, noise, information = _told(turned, order, np.inf)
-    told = phase + np.sum(np.imag(np.conj(mean) * turned) * order / noise, axis=(1, 2)) / information
-    evidence = _smoothed(told, information, step, None)[2]
+    told, information = told_angles(rows, own, phase, np.inf)
+    evidence = _smoothed(phase + told / information, information, step, None)[2]
     # what each block itself tells, not the record's mean in it
-    return phase, _told(turned, order, _AMPLITUDE_TIMES[0] / step)[2], evidence
-
-
-def _told(lines: ComplexArray, order: np.ndarray, reach: float) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Mean lines around each block, variance of their real parts, and information of each block's angle [1/rad^2]."""
-    mean = _local_mean(lines, reach)
-    noise = 0.5 * np.mean(np.abs(lines - mean) ** 2, axis=0) + 1e-300
-    return mean, noise, np.sum(np.abs(mean) ** 2 * order**2 / noise, axis=(1, 2)) + 1e-300
-
-
-def _local_mean(lines: ComplexArray, reach: float) -> ComplexArray:
-    """Mean of the blocks to both sides of each, shape (b, m, c); of all of them where the reach is longer than the record."""
-    blocks = lines.shape[0]
-    if reach > 0.5 * blocks:
-        return np.broadcast_to(lines.mean(axis=0), lines.shape)
-    running = np.concatenate([np.zeros((1, *lines.shape[1:]), dtype=complex), np.cumsum(lines, axis=0)])
-    first = np.maximum(np.arange(blocks) - max(round(reach), 1), 0)
-    last = np.minimum(np.arange(blocks) + max(round(reach), 1) + 1, blocks)
-    return (running[last] - running[first]) / (last - first)[:, None, None]
+    return phase, told_angles(rows, own, phase, _AMPLITUDE_TIMES[0] / step)[1], evidence
 
 
 def _smoothed(phase: FloatArray, information: FloatArray, step: float, density: float | None) -> tuple[FloatArray, float, float]:

@@ -2,6 +2,7 @@
 
 import pickle
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.receptance import dissipation
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
-from rcsa_ident.identification.parameters import AxisLayout, parameter_names
+from rcsa_ident.identification.parameters import AxisLayout, Layout, parameter_names
 from rcsa_ident.identification.preview import Preview
 from rcsa_ident.identification.progress import BOTH, Stage
 from rcsa_ident.identification.result import IdentificationCode
@@ -19,7 +20,9 @@ from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.status import Status
 from rcsa_ident.identification.task import Phase
 from rcsa_ident.remarks import says
+from tests.fixtures import by_hand
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, open_shop
+from tests.identification.models import vector_of
 
 pytestmark = pytest.mark.slow
 
@@ -415,3 +418,30 @@ def test_a_task_without_a_finite_answer_ends_the_search_wherever_it_ran(shop, ca
             return [None if task.phase is lost else function(task) for task in tasks]
 
         assert TINY.run(data, 3, forgetful).status is Status.FAILED
+
+
+@pytest.mark.parametrize(
+    ("evidences", "searches", "chosen"),
+    [((5.0, 3.0, 90.0, 1.0), 2, 3.0), ((500.0, 300.0, 400.0, 200.0), 4, 200.0), ((500.0, 900.0, 100.0, 110.0), 4, 100.0)],
+)
+def test_passes_are_searched_until_two_searches_agree_and_the_likeliest_answer_counts(shop, monkeypatch, evidences, searches, chosen):
+    cuts, _ = shop.measurements(np.random.default_rng(1), fixture=False)
+    data = shop.prepare([replace(cut, acceleration=200.0, length=0.28) for cut in cuts[::4]])
+    layout = Layout((AxisLayout(3), AxisLayout(3)), len(data.coefficient_spread))
+    solution = SimpleNamespace(theta=vector_of(layout, ((600.0, 1400.0, 2500.0),) * 2), layout=layout)
+    asked, sequences = [], set()
+
+    def found(method, data, freed, sequence, *rest):
+        asked.append(freed)
+        sequences.add(id(sequence))
+        evidence = evidences[len(asked) - 1]
+        answer = replace(by_hand.identification(), method=str(evidence))
+        return SimpleNamespace(evidence=evidence, solution=solution, answer=lambda seed, name: answer)
+
+    monkeypatch.setattr(EvidenceSelection, "_found", found)
+    assert EvidenceSelection().run(data, 1).method == str(chosen)
+    assert len(asked) == searches
+    # the first one takes the lines as they are, each later one those that an answer has freed, from starts of its own
+    assert asked[0] is data
+    assert all(np.any(freed.axes[0].lines != data.axes[0].lines) for freed in asked[1:])
+    assert len(sequences) == 1

@@ -24,6 +24,25 @@ def test_order_sums(kernel, highest):
     np.testing.assert_allclose(found, basis(highest, 0.031, 311).conj().T @ samples, atol=1e-11)
 
 
+@pytest.mark.parametrize("reach", [0.2, 3.0, 17.4, np.inf])
+@pytest.mark.parametrize("kernel", compiled_and_plain("told_angles"))
+def test_told_angles(kernel, reach):
+    rng = np.random.default_rng(4)
+    order, blocks = np.array([1, 1, 3, 7, 7]), 40
+    phase = 0.1 * rng.standard_normal(blocks)
+    lines = rng.standard_normal((5, 1)) * np.exp(1j * order[:, None] * phase) + 0.1 * rng.standard_normal((5, blocks))
+    told, information = kernel(lines, order, phase, reach)
+    turned = lines * np.exp(-1j * order[:, None] * phase)
+    near = np.abs(np.subtract.outer(np.arange(blocks), np.arange(blocks))) <= max(round(min(reach, blocks)), 1)
+    near |= reach > 0.5 * blocks
+    mean = turned @ near / near.sum(axis=0)
+    noise = 0.5 * np.mean(np.abs(turned - mean) ** 2, axis=1, keepdims=True)
+    np.testing.assert_allclose(information, np.sum(np.abs(mean) ** 2 * order[:, None] ** 2 / noise, axis=0), rtol=1e-10)
+    np.testing.assert_allclose(
+        told, np.sum(np.imag(np.conj(mean) * turned) * order[:, None] / noise, axis=0), atol=1e-9 * information.max()
+    )
+
+
 @pytest.mark.parametrize("n", [5, 128, 311])
 @pytest.mark.parametrize("kernel", compiled_and_plain("order_signal"))
 def test_order_signal(kernel, n):
