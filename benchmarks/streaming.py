@@ -146,13 +146,13 @@ def told(found: dict[str, Any], count: int, true: np.ndarray, rate: float, besid
     end, force = found["end"], found["force"]
     got = int(np.sum(np.isfinite(force[:, 0])))
     lost = (
-        f"sent {count}, with a force {end['samples']}, received {got}, lost {end['lost']}, dropped {end['dropped']}, unread {end['unread']}"
+        f"sent {count}, while the observer settled {end['settling']}, received {got}, lost {end['lost']}, dropped {end['dropped']}, "
+        f"unread {end['unread']}"
     )
     delay = found["delay"][found["caught_up"]][FRAME - 1 :: FRAME] * 1e3
     seconds = [status["delay_max_ms"] for status in found["statuses"] if status["stage"] == "live"][3:]
-    rows = [
-        row(f"stream of {count / rate:.0f} s at its pace: samples that are missing", float(count - got), None, "samples", lost + beside)
-    ]
+    missing = float(count - end["settling"] - got)
+    rows = [row(f"stream of {count / rate:.0f} s at its pace: samples that are missing", missing, None, "samples", lost + beside)]
     for name, value in (
         ("median", np.median(delay)),
         ("95 %", np.quantile(delay, 0.95)),

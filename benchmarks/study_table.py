@@ -122,8 +122,16 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
             modes, seconds = ", ".join(str(m) for m in row["modes"]), f"{sum(row['seconds'].values()):.1f}"
             cells = [row["machine"], row["condition"], str(row["seed"]), *errors, row["status"], *shares, modes, seconds]
             lines.append("| " + " | ".join(cells) + " |")
-    doubts = [f"- {r['machine']}, {r['condition']}: {reason}" for r in rows if r["method"] == "default" for reason in r["reasons"]]
-    return "\n".join([*lines, "", *doubts]).rstrip() + "\n"
+    return "\n".join([*lines, "", *_doubts([r for r in rows if r["method"] == "default"])]).rstrip() + "\n"
+
+
+def _doubts(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """The reasons for `suspect`, each with the runs that it is said of."""
+    said: dict[str, list[str]] = {}
+    for r in rows:
+        for reason in r["reasons"]:
+            said.setdefault(str(reason), []).append(f"{r['machine']}, {r['condition']}")
+    return [f"- {'; '.join(runs)}: {reason}" for reason, runs in said.items()]
 
 
 def coupled_table(rows: Sequence[dict[str, Any]]) -> str:
@@ -163,5 +171,4 @@ def coupled_table(rows: Sequence[dict[str, Any]]) -> str:
             shown += [max(found["errors"][0::2]), max(found["errors"][1::2]), max(found["cross"]), max(found["cross_own"])]
         cells = [row["machine"], row["condition"], str(row["seed"]), *(f"{e:.4f}" for e in shown), row["status"]]
         lines.append("| " + " | ".join([*cells, f"{sum(row['seconds'].values()):.1f}"]) + " |")
-    doubts = [f"- {r['machine']}, {r['condition']}: {reason}" for r in members for reason in r["reasons"]]
-    return "\n".join([*lines, "", *doubts]).rstrip() + "\n"
+    return "\n".join([*lines, "", *_doubts(members)]).rstrip() + "\n"

@@ -39,8 +39,8 @@ LARGE = 0.3
 #: Said of a campaign whose cuts push the tool in like directions.
 PLANES_NOT_ASKED = "with hammer tests X and Y are taken for planes that feel nothing of each other: that was not asked"
 MOSTLY_PASSES = (
-    "most of the lines are from passes whose speed changes: of ten virtual machines that were identified so alone, some came out wrong by "
-    "several per cent, and their lines did not show it; from cuts that keep their speed none did"
+    "most of the lines are from passes whose speed changes: how they are searched was tried on ten virtual machines alone, those on which "
+    "it was made; some cuts that keep their speed beside them would confirm the answer"
 )
 ANOTHER_FEED = "all cuts push the tool in like directions: cuts fed along Y beside those along X would about halve the uncertainty"
 

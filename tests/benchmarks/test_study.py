@@ -195,7 +195,7 @@ def test_the_table_holds_all_machines_and_says_median_and_worst():
     assert f"| drawn | trigger | paper, literal | 1 | 0.9000 | 0.9000 | 0.9000 | 0.9000 | 1 of 1 | 5.0 | {ratios} |" in text
     assert "| table2 | trigger | default | 1 |" in text
     assert all(f"| {name} | trigger | 1 |" in text for name in ("1", "2", "3", "4", "5", "table2"))
-    assert "- 5, trigger: a doubt" in text
+    assert "- 2, trigger; 5, trigger: a doubt" in text
 
 
 def coupled_row(machine, errors, cross, own, status="converged"):
