@@ -36,12 +36,12 @@ from rcsa_ident.remarks import Remark
 WIDER, WIDER_TOGETHER = 1.4, 1.7
 #: Share of the largest motion above which it is told how much of it the other axis' force makes.
 LARGE = 0.3
-#: Said of a campaign whose cuts push the tool in like directions.
 PLANES_NOT_ASKED = "with hammer tests X and Y are taken for planes that feel nothing of each other: that was not asked"
 MOSTLY_PASSES = (
-    "most of the lines are from passes whose speed changes: how they are searched was tried on ten virtual machines alone, those on which "
-    "it was made; some cuts that keep their speed beside them would confirm the answer"
+    "most of the lines are from passes whose speed changes: how they are searched was tried on eight virtual machines alone, those on "
+    "which it was made; some cuts that keep their speed beside them would confirm the answer"
 )
+#: Said of a campaign whose cuts push the tool in like directions.
 ANOTHER_FEED = "all cuts push the tool in like directions: cuts fed along Y beside those along X would about halve the uncertainty"
 
 
