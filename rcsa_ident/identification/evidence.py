@@ -100,15 +100,15 @@ class EvidenceSelection:
             sequence, trace, freed = np.random.SeedSequence(seed), list[Step](), data
             found = self._found(data, data, sequence, map, trace, progress)
             for _ in range(FREED_ATTEMPTS if data.sweeps else 0):
-                # what the sweeps do looks like other modes: by an answer the lines are freed of it, and searched anew; not by one of
-                # planes that feel each other, which lines that sweep may feign
-                if isinstance(found.solution.layout, Layout):
-                    freed = unswept(data, self.priors, found.solution.theta, found.solution.layout)
+                # what the sweeps do looks like other modes: by an answer the lines are freed of it, and searched anew
+                freed = unswept(data, self.priors, found.solution.theta, found.solution.layout)
                 other = self._found(data, freed, sequence, map, trace, progress)
                 # each on the lines that it has freed itself: on two machines wrong valleys were worse by hundreds and by thousands
                 found, worse = sorted((found, other), key=lambda fit: fit.evidence)
                 if worse.evidence - found.evidence < SAME:
                     break
+            if data.sweeps:
+                found = self._asked(data, found, map, _report_to(BOTH, trace, progress))
             return replace(found.answer(seed, self.name), trace=tuple(trace))
         except (ArithmeticError, np.linalg.LinAlgError):
             return failed(data, seed, self.name)
@@ -149,13 +149,14 @@ class EvidenceSelection:
 
         Where that is plain from the first, both are fitted together at once. Elsewhere it is asked after the last fit of both apart,
         and the evidence has the last word: a stiffness that changes with speed, a mode in the wrong place or one too few look like it.
-        Lines of passes are freed of their sweeps ever better: as the searches took them, `freed`, then by each fit.
+        Lines of passes are freed of their sweeps ever better: as the searches took them, `freed`, then by each fit; whether their planes
+        feel each other is asked of the last answer alone, as lines that still sweep may feign it.
         """
         smooth = freed.with_smooth_errors(SMOOTH_ERROR)
         first = first_starts(smooth, self.priors, searched, map)
         if data.sweeps:
             smooth = unswept(data, self.priors, first[0].theta, first[0].layout).with_smooth_errors(SMOOTH_ERROR)
-        points = coupled_data(smooth) if couplable(smooth) else None
+        points = coupled_data(smooth) if couplable(smooth) and not data.sweeps else None
         together: CoupledFit | None = None
         if points is not None and self._felt(points, first[0], *learned_noise(searched)).score > PLAIN:
             apart, misfit = fit_roughly(smooth, self.priors, searched, first[0], report)
@@ -167,7 +168,6 @@ class EvidenceSelection:
         apart, misfit = fit_jointly(smooth, self.priors, searched, first, report)
         if data.sweeps:
             smooth = unswept(data, self.priors, apart.theta, apart.layout).with_smooth_errors(SMOOTH_ERROR)
-            points = None if points is None else coupled_data(smooth)
         grown = grow_jointly(smooth, self.priors, apart, misfit, report)
         if points is not None and together is None:
             felt = self._felt(points, apart.candidate, misfit.model_error, misfit.cut_weight)
@@ -176,6 +176,20 @@ class EvidenceSelection:
         if together is not None and together.evidence < evidence(grown[0], grown[1]):
             return together
         return PlaneFit(data, searched, *grown)
+
+    def _asked(self, data: IdentificationData, found: Fit, map: Map, report: Report) -> Fit:
+        """Return the answer of passes, or that of both planes as one machine where they feel each other."""
+        assert isinstance(found, PlaneFit)
+        apart, misfit = found.solution, found.misfit
+        smooth = unswept(data, self.priors, apart.theta, apart.layout).with_smooth_errors(SMOOTH_ERROR)
+        if not couplable(smooth):
+            return found
+        points = coupled_data(smooth)
+        felt = self._felt(points, apart.candidate, misfit.model_error, misfit.cut_weight)
+        if felt.score <= STRIKES:
+            return found
+        together = self._together(data, points, felt, found.searched, apart.candidate, misfit, map, report)
+        return min(found, together, key=lambda fit: fit.evidence)
 
     def _felt(self, points: CoupledData, apart: Candidate, model_error: tuple[float, ...], weight: FloatArray) -> Coupling:
         """Return what the lines say against planes that feel nothing of each other, with the noise that was learned."""
