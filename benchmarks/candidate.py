@@ -8,6 +8,7 @@ import numpy as np
 
 from benchmarks.timing import best_of, row
 from rcsa_ident.identification._kernels import cross_frf, modal_cross_frf
+from rcsa_ident.identification.data import FLANGE_ALONE, GAP_AND_FIXTURE
 from rcsa_ident.identification.genetic_algorithm import modal_fractions
 
 LINES, TOOLINGS, MODES = 164, 2, 10
@@ -70,6 +71,8 @@ def passive(
     psi = rng.standard_normal((m, 3)) * 0.2
     factor = np.tril(rng.standard_normal((m, m))) * 3.0 + np.diag(np.full(m, 20.0))
     residual = np.array([[3e-5, 0.0], [1e-5, 2e-5], [1e-10, -2e-10]])
+    shapes = np.vstack([psi, residual.T])[:, : 1 + outputs].copy()
+    shares = FLANGE_ALONE if outputs == 1 else GAP_AND_FIXTURE
     softening = 0.01 * rng.standard_normal((m, m)) if outputs == 2 else np.zeros((0, 0))
     softening = softening + softening.T
     points = np.column_stack([omega, rng.uniform(-1.0, 1.0, n), np.ones(n), np.zeros(n)])
@@ -78,7 +81,7 @@ def passive(
     values, gradient = np.empty((n, outputs), dtype=complex), np.empty((n, outputs, columns), dtype=complex)
 
     def kernel() -> None:
-        cross_frf(omega_n, psi, factor, softening, residual, joint, points, holder, values, gradient)
+        cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder, values, gradient)
 
     def vectorised() -> np.ndarray:
         stiffness = np.broadcast_to(np.diag(omega_n**2), (n, m, m)).copy()

@@ -61,6 +61,10 @@ class Condition(NamedTuple):
         What is told of the recorder's clock: ``exactly``, ``from the speeds`` (what the identification's remark proposes) or ``nothing``.
     campaign : str
         The condition whose records are taken, where they are the same.
+    toolings : int
+        That cut: with 3 the similar one is among them.
+    housing : float or None [m]
+        Where on the spindle's housing accelerometers are the only sensors, from the flange's face; None where the flange is seen.
     passes : int
         Of four seconds each that take the place of a tooling's 40 cuts, from 8000 to 20000 rev/min one after the other; 0 for none.
     """
@@ -71,6 +75,8 @@ class Condition(NamedTuple):
     clock: str = "nothing"
     campaign: str = ""
     passes: int = 0
+    toolings: int = 2
+    housing: float | None = None
 
 
 CONDITIONS = {
@@ -81,12 +87,19 @@ CONDITIONS = {
     "workshop-speeds": Condition(disturbances=WORKSHOP, clock="from the speeds", campaign="workshop"),
     "workshop-clock": Condition(disturbances=WORKSHOP, campaign="workshop"),
     "workshop-trigger": Condition(trigger=True, disturbances=WORKSHOP, clock="exactly"),
+    "three-toolings": Condition(toolings=3),
+    "housing": Condition(toolings=3, housing=0.0, campaign="three-toolings"),
+    "housing-two": Condition(housing=0.0, campaign="no-trigger"),
+    "housing-rear": Condition(toolings=3, housing=0.35),
+    "housing-loud": Condition(toolings=3, housing=0.0, disturbances=replace(WORKSHOP, machine_noise=3.4), clock="exactly"),
     "passes": Condition(passes=12),
     "passes-trigger": Condition(trigger=True, passes=12),
     "passes-few": Condition(passes=6),
     "passes-workshop": Condition(disturbances=WORKSHOP, clock="exactly", passes=12),
     "workshop-loud": Condition(disturbances=replace(WORKSHOP, machine_noise=3.4), clock="exactly"),
 }
+#: What sensors reach, side by side: see docs/study.md.
+SENSORS = ("three-toolings", "housing", "housing-two", "housing-rear", "housing-loud")
 #: Those of the study; the others are asked for by name.
 USUAL = ("trigger", "no-trigger", "noise-x3")
 #: Toolings that cut, and those that never do: one in a holder that cut, one in another.
@@ -231,6 +244,12 @@ def under(machine: MachineFile, condition: str) -> MachineFile:
     if CONDITIONS[condition].passes:
         ends = np.linspace(plan.spindle_speeds[0], plan.spindle_speeds[-1], CONDITIONS[condition].passes + 1)
         plan = replace(plan, spindle_speeds=(), passes=tuple(itertools.pairwise(ends.tolist())))
+    if CONDITIONS[condition].toolings == len(CUT) + 1:
+        similar, *others = machine.truth_toolings
+        machine = replace(machine, toolings=(*machine.toolings, similar), truth_toolings=tuple(others))
+    place = CONDITIONS[condition].housing
+    if place is not None:
+        machine = replace(machine, spindle=replace(machine.spindle, fixture_position=place))
     sensors = replace(sensors, trigger=trigger, gap_noise=gap, acceleration_noise=acceleration)
     if disturbances is None:
         return replace(machine, sensors=sensors, plan=plan)

@@ -25,7 +25,19 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.comparison import compared, compared_at_speeds
-from benchmarks.machines import CONDITIONS, TURNED_SAMPLE, USUAL, Condition, drawn, is_coupled, named, random_machine, turned_sample, under
+from benchmarks.machines import (
+    CONDITIONS,
+    SENSORS,
+    TURNED_SAMPLE,
+    USUAL,
+    Condition,
+    drawn,
+    is_coupled,
+    named,
+    random_machine,
+    turned_sample,
+    under,
+)
 from benchmarks.page import DOCS, append_row, draw_study, read_rows, write_block, write_rows
 from benchmarks.study_table import coupled_table, line, table
 from rcsa_ident.identification.data import IdentificationData
@@ -39,7 +51,7 @@ from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.samples import simulate_campaign
 from rcsa_ident.signals.measurement import Reading
-from rcsa_ident.signals.recording import Recording
+from rcsa_ident.signals.recording import Quantity, Recording
 from rcsa_ident.workflows.compile_kernels import STEPS
 from rcsa_ident.workflows.identify import Method, clock_error, data_of, judge, left_out
 
@@ -121,6 +133,9 @@ def read_data(folder: Path, condition: Condition = CONDITIONS["no-trigger"]) -> 
     campaign = read_campaign(folder)
     if condition.clock == "exactly" and condition.disturbances is not None:
         campaign = replace(campaign, clock_error=condition.disturbances.clock_error)
+    if condition.housing is not None:
+        told = tuple(sensor for sensor in campaign.sensors if sensor.quantity is not Quantity.DISPLACEMENT)
+        campaign = replace(campaign, sensors=told)
     readings = judge(campaign, partial(read_cut, campaign))
     if condition.clock == "from the speeds":
         campaign = replace(campaign, clock_error=clock_error(readings) or 0.0)
@@ -189,7 +204,7 @@ def run(
     known = {run_of(r): r for r in read_rows(path)}
     runs = planned(machines, conditions, methods, seeds)
     todo = [r for r in runs if r not in known]
-    campaigns = dict.fromkeys((r.machine, r.condition) for r in todo)
+    campaigns = dict.fromkeys((r.machine, CONDITIONS[r.condition].campaign or r.condition) for r in todo)
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
         mapper: Callable[..., Iterable[Any]] = pool.map if processes > 1 else map
         for folder in mapper(partial(_simulated, scratch), campaigns):
@@ -226,6 +241,7 @@ def main(arguments: Sequence[str]) -> None:
     print(f"scratch folder: {scratch}", flush=True)
     rows = run(scratch, named(given.machines), given.conditions, given.methods, given.seeds, given.processes)
     kinds = {
+        "sensors": [row for row in rows if row["condition"] in SENSORS],
         "study": [row for row in rows if not is_coupled(row["machine"]) and row["condition"] in USUAL],
         "workshop": [row for row in rows if not is_coupled(row["machine"]) and row["condition"].startswith("workshop")],
         "passes": [row for row in rows if not is_coupled(row["machine"]) and row["condition"].startswith("passes")],

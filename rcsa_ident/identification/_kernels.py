@@ -36,30 +36,32 @@ def _factor_solve(matrix, right, columns):
 
 
 @numba.njit(cache=True, error_model="numpy")
-def cross_frf(omega_n, psi, factor, softening, residual, joint, points, holder, values, gradient):
+def cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder, values, gradient):
     """Fill `values` (n, o) with motion per tip force and, if it has rows, `gradient` (n, o, p).
 
     B = psi^T (K - w^2 + i w factor factor^T)^-1 psi + R, K_ij = omega_i omega_j (delta_ij + x softening_ij);
-    output b (a row: the flange's own, or the fixture's, or their difference) answers g = b x with
+    output b (a row: the flange's own, or another place's, or what `shares` makes of them) answers g = b x with
     x = (A22 + K_joint^-1 + B)^-1 A21 e0; dg = db x - y^T (dB + dK_joint^-1) x, y = (A22 + K_joint^-1 + B)^-1 b^T.
     A point of the tool-holder answers c + b x with b = -A_p2 and c its direct receptance, the machine's motion not being its own.
 
     Parameters
     ----------
-    omega_n : (m,); psi : (m, 3) flange t, flange r, fixture; factor : (m, m) lower triangular
+    omega_n : (m,); factor : (m, m) lower triangular
+    shapes : (m + 2, 2 + e) flange t, flange r, other places; psi, and behind it the residual: of the flange transposed, a lower
+        triangular factor of R, of other places to the flange's t and r, as it is
     softening : (m, m) symmetric, or (0, 0) where nothing changes with speed
-    residual : (3, 2): lower triangular factor of the flange's R; row 2: fixture to flange t and r, as it is
     joint : (4,) k_t, k_r, c_t, c_r, or (6,) with the shares by which natural frequencies and damping differ where the spindle stands still
+    shares : (o, 1 + e) what of the flange's motion and of the other places' is in each output
     points : (n, 4) omega, x, 1 for motions of the machine and 0 for those of the tool-holder, 1 where the spindle stands still
     holder : (n, 8) A22 tt, tr, rr, A21 e0 t, r, c and b of a point of the tool-holder (zeros for the machine's)
 
-    One output is the flange's motion; two are gap (flange less fixture) and fixture. The gradient's columns: log omega_n (m),
-    psi's first two columns by rows (2 m), factor's lower triangle by rows, B's tt, tr, rr (3), with two outputs psi's third
-    column (m) and the fixture's residual (2), with six of the joint what standing still changes (2), with softening its lower triangle
-    by rows, joint (4).
+    The gradient's columns: log omega_n (m), psi's first two columns by rows (2 m), factor's lower triangle by rows, B's tt, tr, rr (3),
+    of each other place psi's column (m) and its residual (2), with six of the joint what standing still changes (2), with softening
+    its lower triangle by rows, joint (4).
     """
     m = omega_n.size
-    outputs = values.shape[1]
+    outputs, places = shares.shape[0], shares.shape[1] - 1
+    psi, residual = shapes[:m], shapes[m:].T
     soft = softening.shape[0] > 0
     damping = factor @ factor.T
     stills = joint.size == 6
@@ -68,7 +70,8 @@ def cross_frf(omega_n, psi, factor, softening, residual, joint, points, holder, 
     r_rr = residual[1, 0] ** 2 + residual[1, 1] ** 2
     stiffness = np.zeros((m, m))
     dynamic = np.empty((m, m), dtype=np.complex128)
-    u = np.empty((m, 3), dtype=np.complex128)
+    u = np.empty((m, 2 + places), dtype=np.complex128)
+    s = np.empty((places, 2), dtype=np.complex128)
     p = np.empty(m, dtype=np.complex128)
     q = np.empty(m, dtype=np.complex128)
     lp = np.empty(m, dtype=np.complex128)
@@ -87,17 +90,19 @@ def cross_frf(omega_n, psi, factor, softening, residual, joint, points, holder, 
                 stiffness[i, j] = k_ij
                 stiffness[j, i] = k_ij
                 dynamic[i, j] = complex(k_ij - (w * w if i == j else 0.0), w * slower * damping[i, j])
-            for a in range(3):
+            for a in range(2 + places):
                 u[i, a] = psi[i, a]
-        _factor_solve(dynamic, u, 1 + outputs)
+        _factor_solve(dynamic, u, 2 + places)
         b_tt, b_tr, b_rr = complex(r_tt, 0.0), complex(r_tr, 0.0), complex(r_rr, 0.0)
-        s_t, s_r = complex(residual[2, 0], 0.0), complex(residual[2, 1], 0.0)
         for i in range(m):
             b_tt += psi[i, 0] * u[i, 0]
             b_tr += psi[i, 0] * u[i, 1]
             b_rr += psi[i, 1] * u[i, 1]
-            s_t += psi[i, 2] * u[i, 0]
-            s_r += psi[i, 2] * u[i, 1]
+        for e in range(places):
+            for a in range(2):
+                s[e, a] = complex(residual[2 + e, a], 0.0)
+                for i in range(m):
+                    s[e, a] += psi[i, 2 + e] * u[i, a]
         k_t = 1.0 / complex(joint[0], w * joint[2])
         k_r = 1.0 / complex(joint[1], w * joint[3])
         e_tt, e_tr, e_rr = holder[f, 0] + k_t + b_tt, holder[f, 1] + b_tr, holder[f, 2] + k_r + b_rr
@@ -107,10 +112,11 @@ def cross_frf(omega_n, psi, factor, softening, residual, joint, points, holder, 
         for i in range(m):
             q[i] = u[i, 0] * x0 + u[i, 1] * x1
         for o in range(outputs):
-            # share of flange and fixture in the output
-            flange = own if o == 0 else 0.0
-            fixture = 0.0 if outputs == 1 else own * (2.0 * o - 1.0)
-            b_t, b_r = flange * b_tt + fixture * s_t, flange * b_tr + fixture * s_r
+            flange = own * shares[o, 0]
+            b_t, b_r = flange * b_tt, flange * b_tr
+            for e in range(places):
+                b_t += own * shares[o, 1 + e] * s[e, 0]
+                b_r += own * shares[o, 1 + e] * s[e, 1]
             values[f, o] = 0.0
             if o == 0:
                 b_t += holder[f, 6]
@@ -124,8 +130,8 @@ def cross_frf(omega_n, psi, factor, softening, residual, joint, points, holder, 
             v0, v1 = flange - y0, -y1
             for i in range(m):
                 p[i] = u[i, 0] * v0 + u[i, 1] * v1
-                if outputs == 2:
-                    p[i] += fixture * u[i, 2]
+                for e in range(places):
+                    p[i] += own * shares[o, 1 + e] * u[i, 2 + e]
             for j in range(m):
                 sum_p, sum_q = complex(0.0, 0.0), complex(0.0, 0.0)
                 for i in range(j, m):
@@ -152,11 +158,12 @@ def cross_frf(omega_n, psi, factor, softening, residual, joint, points, holder, 
             row[k + 1] = v0 * x1 + v1 * x0
             row[k + 2] = v1 * x1
             k += 3
-            if outputs == 2:
+            for e in range(places):
+                share = own * shares[o, 1 + e]
                 for i in range(m):
-                    row[k + i] = fixture * q[i]
-                row[k + m] = fixture * x0
-                row[k + m + 1] = fixture * x1
+                    row[k + i] = share * q[i]
+                row[k + m] = share * x0
+                row[k + m + 1] = share * x1
                 k += m + 2
             if stills:
                 # all natural frequencies, and all of the damping, by a share

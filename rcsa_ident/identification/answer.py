@@ -36,7 +36,10 @@ from rcsa_ident.remarks import Remark
 WIDER, WIDER_TOGETHER = 1.4, 1.7
 #: Share of the largest motion above which it is told how much of it the other axis' force makes.
 LARGE = 0.3
-PLANES_NOT_ASKED = "with hammer tests X and Y are taken for planes that feel nothing of each other: that was not asked"
+PLANES_NOT_ASKED = (
+    "with hammer tests, or accelerometers on the housing alone, X and Y are taken for planes that feel nothing of each other: that was "
+    "not asked"
+)
 MOSTLY_PASSES = (
     "most of the lines are from passes whose speed changes: how they are searched was tried on eight virtual machines alone, those on "
     "which it was made; some cuts that keep their speed beside them would confirm the answer"
@@ -158,7 +161,7 @@ class Fit(ABC):
         lines = {
             "omega": axis.omega,
             "value": measured,
-            "model": np.sum(solution.evaluation.models[i], axis=1),
+            "model": np.sum(solution.evaluation.models[i][:, axis.searched], axis=1),
             "tooling": tooling,
             "cut": axis.cut,
             "coherence": response / np.maximum(response + 2.0 * axis.noise, 1e-300),
@@ -210,7 +213,7 @@ class PlaneFit(Fit):
         found = []
         for i in range(len(self.data.axes)):
             entries = _entries(layout, i)
-            own, other = replace(layout.axes[i], fixture=False, standstill=False), self.rival.theta[_entries(others, i)]
+            own, other = replace(layout.axes[i], places=0, standstill=False), self.rival.theta[_entries(others, i)]
             covariance = self.covariance[np.ix_(entries, entries)]
             found.append(Posterior(self.solution.theta[entries], covariance, own, self.data.speed_range, (other,)))
         return found
@@ -223,7 +226,7 @@ class PlaneFit(Fit):
         known = zip(data.axes, self.posteriors, strict=True)
         natural = {str(axis.axis).upper(): posterior.machine(axis.axis)[0].omega_n for axis, posterior in known}
         found = remarks(data, self.solution, self.misfit, self.covariance, natural)
-        if data.tests and len(data.axes) > 1:
+        if (data.tests or not data.of_flange) and len(data.axes) > 1:
             found.append(Remark(IdentificationCode.PLANES_NOT_ASKED, PLANES_NOT_ASKED))
         return reasons, found
 

@@ -11,7 +11,8 @@ from rcsa_ident.cutting.force import SLOPES, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.identification.data import LEVER, AxisData, CutPrior, IdentificationData, Turning, nodes
+from rcsa_ident.identification.data import LEVER, ONE_PLACE, AxisData, CutPrior, IdentificationData, Turning, nodes
+from rcsa_ident.identification.status import FEWEST_OF_HOUSING, FEWEST_TOOLINGS
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement
 
@@ -43,11 +44,12 @@ def prepare(
     Raises
     ------
     InputError
-        If there are no measurements.
+        If there are no measurements; if some are of the flange and some of the housing; or if all are of the housing, and of one tooling.
     """
     if not measurements:
         raise InputError("cuts", "none usable", "at least one usable cut")
     toolings = tuple(dict.fromkeys(m.tooling for m in measurements))
+    _sensible(measurements, toolings)
     axes = tuple(axis for axis in (Dof.X, Dof.Y) if any(axis in m.axes for m in measurements))
     holder: dict[str, FloatArray] = {}
     table: dict[str, ComplexArray] = {}
@@ -98,6 +100,7 @@ def prepare(
                 force_slope=np.concatenate(
                     [_slopes(each.force_slope, uncertain, toolings.index(m.tooling), len(coefficients)) for _, m, each in present]
                 ),
+                shares=ONE_PLACE if any(m.housing for _, m, _ in present) else np.zeros((0, 0)),
                 **({"sweep": np.concatenate(sweeps), "around": np.concatenate(beside)} if sweeping else {}),
                 **_both_forces([(each, toolings.index(m.tooling)) for _, m, each in present], uncertain, len(coefficients)),
             )
@@ -118,6 +121,17 @@ def prepare(
         coefficient_spread=tuple(spread),
         turning={} if turning is None else turning,
     )
+
+
+def _sensible(measurements: Sequence[CutMeasurement], toolings: Sequence[str]) -> None:
+    """Refuse cuts of which only some saw the flange, and what one tooling cannot tell where none did."""
+    housing = sum(m.housing for m in measurements)
+    if 0 < housing < len(measurements):
+        told = f"{housing} of {len(measurements)} cuts with accelerometers on the housing alone"
+        raise InputError("sensors", told, "a displacement sensor at the flange in all cuts or in none")
+    if housing and len(toolings) < FEWEST_TOOLINGS:
+        allowed = f"at least {FEWEST_TOOLINGS}, better {FEWEST_OF_HOUSING}: the flange shows on the housing by what changes with them"
+        raise InputError("toolings", f"{toolings[0]} alone, with accelerometers on the housing alone", allowed)
 
 
 def _sweep(measurement: CutMeasurement, lines: AxisLines) -> FloatArray:

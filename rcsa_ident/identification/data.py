@@ -16,6 +16,8 @@ from rcsa_ident.identification.hammer_lines import HammerLines
 LEVER = 0.1
 #: Where within the half of a frequency range a line sweeps its tool-holder is asked beside the middle: Gauss's node.
 NODE = float(np.sqrt(0.6))
+#: Shares of `AxisData` where the flange's motion, gap and fixture, or the motion of one other place is all that was measured.
+FLANGE_ALONE, GAP_AND_FIXTURE, ONE_PLACE = frozen([[1.0]]), frozen([[1.0, -1.0], [0.0, 1.0]]), frozen([[0.0, 1.0]])
 #: Half the range of the spindle speeds, over their middle, below which nothing is asked about a change with speed.
 LEAST_SPEED_RANGE = 0.05
 
@@ -27,7 +29,9 @@ Turning = Callable[[FloatArray, FloatArray], tuple[ComplexArray, ComplexArray]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisData:
-    """Points of one axis, sorted by cut and, in a cut, by order; each with one output (the flange's motion) or two (gap, fixture).
+    """Points of one axis, sorted by cut and, in a cut, by order; each with one output or more.
+
+    One is the flange's motion and two are gap and fixture, where `shares` does not tell otherwise.
 
     Behind the cuts stand hammer tests (`HammerLines`), as cuts of one output without an air cut whose forces are measured.
 
@@ -64,6 +68,9 @@ class AxisData:
         By which a line's frequency changes, and for how long; empty where none does.
     around : complex array, shape (n, 2, 5) or (0, 2, 5) [m/N]
         `flange` and `tip` at `node` below and above each frequency.
+    shares : array, shape (o, 1 + e) or (0, 0) [-]
+        What of the flange's motion, and of that of other places of the machine, is in each output. The first output, or the first two, is
+        what a search looks for: the flange's motion, or where no sensor sees that, another place's.
     """
 
     axis: Dof
@@ -84,9 +91,10 @@ class AxisData:
     point: ComplexArray = field(default_factory=lambda: np.zeros((0, 3), dtype=complex))
     sweep: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     around: ComplexArray = field(default_factory=lambda: np.zeros((0, 2, 5), dtype=complex))
+    shares: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
-        for name in ("omega", "order", "variance", "beside", "sweep"):
+        for name in ("omega", "order", "variance", "beside", "sweep", "shares"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
         for name in ("lines", "flange", "tip", "force_slope", "force", "across", "across_slope", "point", "around"):
             object.__setattr__(self, name, frozen(getattr(self, name), np.complex128))
@@ -117,18 +125,41 @@ class AxisData:
 
     @property
     def outputs(self) -> int:
-        """Number of outputs of each point: 1 or 2."""
+        """Number of outputs of each point."""
         return self.variance.shape[1]
 
     @property
+    def output_shares(self) -> FloatArray:
+        """What of the flange's motion and of that of other places is in each output, shape (o, 1 + e) [-]."""
+        if self.shares.size:
+            return self.shares
+        return FLANGE_ALONE if self.outputs == 1 else GAP_AND_FIXTURE
+
+    @property
+    def places(self) -> int:
+        """Number of places beside the flange whose motion is in the outputs."""
+        return self.output_shares.shape[1] - 1
+
+    @property
+    def of_flange(self) -> bool:
+        """Whether the flange's motion is among what was measured."""
+        return bool(self.output_shares[0, 0])
+
+    @property
+    def searched(self) -> slice:
+        """The outputs whose sum a search looks for: those that are the flange's motion together, or the first one."""
+        first, *others = self.output_shares[:2].sum(axis=0)
+        return slice(0, 2 if self.outputs > 1 and first == 1.0 and not any(others) else 1)
+
+    @property
     def measured(self) -> ComplexArray:
-        """The flange's motion, cut less air cut, shape (n,) [m/N]."""
-        return np.sum(self.lines[:, :, 0] - self.lines[:, :, 1], axis=1)
+        """The motion that a search looks for, cut less air cut, shape (n,) [m/N]."""
+        return np.sum(self.lines[:, self.searched, 0] - self.lines[:, self.searched, 1], axis=1)
 
     @property
     def noise(self) -> FloatArray:
-        """Variance of the flange's motion, of the real and the imaginary part each, shape (n,) [m^2/N^2]."""
-        return np.sum(self.variance, axis=1)
+        """Variance of it, of the real and the imaginary part each, shape (n,) [m^2/N^2]."""
+        return np.sum(self.variance[:, self.searched], axis=1)
 
     @property
     def power(self) -> FloatArray:
@@ -137,15 +168,17 @@ class AxisData:
         return size + self.beside if self.beside.size else size
 
     def summed(self) -> AxisData:
-        """Return the same points with the flange's motion as the only output."""
+        """Return the same points with the motion that a search looks for as the only output."""
         if self.outputs == 1:
             return self
-        lines, beside = np.sum(self.lines, axis=1, keepdims=True), np.sum(self.beside, axis=1, keepdims=True)
-        return replace(self, variance=self.noise[:, None], lines=lines, beside=beside if self.beside.size else self.beside)
+        lines = np.sum(self.lines[:, self.searched], axis=1, keepdims=True)
+        beside = np.sum(self.beside[:, self.searched], axis=1, keepdims=True) if self.beside.size else self.beside
+        shares = FLANGE_ALONE if self.of_flange else ONE_PLACE
+        return replace(self, variance=self.noise[:, None], lines=lines, beside=beside, shares=shares)
 
     def of(self, keep: np.ndarray) -> AxisData:
         """Return some of the points: a mask or indices, shape (n,)."""
-        whole = (each.name for each in fields(self) if each.name != "axis")
+        whole = (each.name for each in fields(self) if each.name not in ("axis", "shares"))
         return replace(self, **{name: getattr(self, name)[keep] for name in whole if len(getattr(self, name))})
 
 
@@ -233,6 +266,11 @@ class IdentificationData:
     def cuts(self) -> int:
         """Number of cuts that are none of the hammer's tests."""
         return len(self.cut_ids) - len(self.tests)
+
+    @property
+    def of_flange(self) -> bool:
+        """Whether the flange's motion was measured, along each axis."""
+        return all(axis.of_flange for axis in self.axes)
 
     @property
     def sweeps(self) -> bool:

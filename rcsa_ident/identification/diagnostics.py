@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,10 +15,10 @@ from rcsa_ident.identification.data import LEVER, AxisData, IdentificationData
 from rcsa_ident.identification.joint_fit import AxisSearch
 from rcsa_ident.identification.levenberg_marquardt import Solution
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import JOINT, planes
+from rcsa_ident.identification.parameters import planes
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.result import Identification, IdentificationCode
-from rcsa_ident.identification.status import FEWEST_CUTS, FEWEST_TOOLINGS, Status
+from rcsa_ident.identification.status import FEWEST_CUTS, FEWEST_OF_HOUSING, FEWEST_TOOLINGS, Status
 from rcsa_ident.machine.flange_part import JointedFlange
 from rcsa_ident.remarks import Remark
 
@@ -33,6 +34,10 @@ MOST_BAD_CUTS = 0.1
 LEAST_SIGNAL = 3.0
 #: A posterior narrower than this share of its prior was told by the data.
 INFORMED = 0.5
+HOUSING_ALONE = (
+    "no sensor sees the flange: its receptance follows from how poles and zeros on the housing move from tooling to tooling; how strongly "
+    "the housing answers is unknown with it, so that an error of the accelerometers' sensitivity hardly matters"
+)
 _JOINT = ("translational stiffness", "rotational stiffness", "translational damping", "rotational damping")
 
 
@@ -117,6 +122,12 @@ def diagnose(
         how = "cut with" if data.cuts else "hit"
         words = f"only one tooling: translation and slope of the flange cannot be separated; {how} a second, different holder"
         doubt(IdentificationCode.ONE_TOOLING, words)
+    elif len(data.toolings) < FEWEST_OF_HOUSING and not data.of_flange:
+        words = (
+            f"only {len(data.toolings)} toolings, and no sensor sees the flange: what it does is told by what changes on the housing from "
+            f"tooling to tooling; cut with a third, different one"
+        )
+        doubt(IdentificationCode.FEW_TOOLINGS, words)
     for t, name in enumerate(data.toolings):
         count = int(np.sum(data.cut_tooling[: data.cuts] == t))
         # a hammer hits all frequencies at once
@@ -167,6 +178,8 @@ def remarks(
     def note(code: IdentificationCode, sentence: str) -> None:
         notes.append(Remark(code, sentence))
 
+    if not data.of_flange:
+        note(IdentificationCode.HOUSING_ALONE, HOUSING_ALONE)
     if len(data.axes) == 1:
         note(IdentificationCode.ONE_AXIS, one_axis(data.axes[0].axis))
     layout, priors = solution.layout, misfit.priors
@@ -254,6 +267,7 @@ def _difference(axis: AxisData, one: Candidate, two: Candidate) -> tuple[float, 
 
 
 def _flange_posterior(candidate: Candidate) -> Posterior:
-    size = candidate.layout.tail + JOINT
-    covariance = np.linalg.inv(candidate.information)[:size, :size]
-    return Posterior(candidate.theta[:size], covariance, planes(candidate.layout).axes[0])
+    layout = planes(candidate.layout)
+    entries = np.r_[layout.axes[0].machine, layout.joint]
+    covariance = np.linalg.inv(candidate.information)[np.ix_(entries, entries)]
+    return Posterior(candidate.theta[entries], covariance, replace(layout.axes[0], places=0))

@@ -304,8 +304,10 @@ class SearchAxis:
             population = explore(Misfit(data, method.priors, (method.coarse[0],)), method.search, band, rng, report)
             return [(s.theta, planes(s.layout).axes[0], s.evaluation.nuisance) for s in population[: method.candidates]]
         # the last polish asks again whether the machine changes with speed
-        plain = pack(unpack(known.theta[:-JOINT], known.layout))
-        return [(np.concatenate([plain, known.theta[-JOINT:]]), AxisLayout(known.layout.modes), np.zeros((len(data.cut_ids), 2)))]
+        machine, layout = unpack(known.theta[:-JOINT], known.layout), AxisLayout(known.layout.modes, data.axes[0].places)
+        # a place that the earlier answer does not know moves about as the flange does
+        like = replace(machine, places=machine.psi[:, :1], place_residual=np.zeros((1, 2)))
+        return [(np.concatenate([pack(like, layout), known.theta[-JOINT:]]), layout, np.zeros((len(data.cut_ids), 2)))]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -328,14 +328,13 @@ def _cross(
     theta: FloatArray, layout: AxisLayout, points: FloatArray, holder: ComplexArray, slopes: bool
 ) -> tuple[ComplexArray, ComplexArray]:
     """Cross FRF of an axis and a joint, shape (n,), and its change with the vector where asked for, shape (n, p)."""
-    if layout.fixture:
-        raise InputError("layout", "a layout with the fixture's motion", "one of the flange's motion alone, as a posterior has")
+    if layout.places:
+        raise InputError("layout", "a layout with other places' motion", "one of the flange's motion alone, as a posterior has")
     axis, joint = unpack(theta[:-JOINT], layout), scaled_joint(theta[-JOINT:])
     n = points.shape[0]
     values = np.empty((n, 1), dtype=complex)
     gradient = np.empty((n if slopes else 0, 1, theta.size), dtype=complex)
-    psi, residual = np.column_stack([axis.psi, axis.fixture]), np.vstack([axis.residual, axis.fixture_residual])
-    cross_frf(axis.omega_n, psi, axis.factor, axis.softening, residual, joint, points, holder, values, gradient)
+    cross_frf(axis.omega_n, axis.shapes, axis.factor, axis.softening, joint, np.ones((1, 1)), points, holder, values, gradient)
     columns, core = gradient[:, 0], layout.core
     columns[:, core - 3 : core] = columns[:, core - 3 : core] @ residual_turn(axis.residual)
     # the kernel's joint is in units of itself, its logarithm is the unknown

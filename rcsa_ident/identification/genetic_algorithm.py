@@ -156,10 +156,12 @@ class PaperGeneticAlgorithm:
         Raises
         ------
         InputError
-            If hammer tests or passes are among the data: its candidates know the flange's motion at one speed alone.
+            If hammer tests or passes are among the data, or no displacement of the flange: its candidates know that at one speed alone.
         """
         if data.tests:
             raise InputError("method", f"{self.name}, with hammer tests", "the default method, which knows of them")
+        if not data.of_flange:
+            raise InputError("method", f"{self.name}, with accelerometers on the housing alone", "the default method, which knows of them")
         if data.sweeps:
             raise InputError("method", f"{self.name}, with passes whose speed changes", "the default method, which knows of them")
         if not_finite(data):

@@ -45,6 +45,8 @@ def with_tests(cuts: IdentificationData | None, tests: Sequence[HammerLines], at
     """
     if not tests:
         raise InputError("frfs", "none", "at least one hammer test")
+    if cuts is not None and not cuts.of_flange:
+        raise InputError("frfs", "hammer tests beside cuts with accelerometers on the housing alone", "one of both")
     toolings = tuple(dict.fromkeys([*(() if cuts is None else cuts.toolings), *(test.tooling for test in tests)]))
     named = () if cuts is None else cuts.coefficient_spread
     further = [GAIN_SPREAD] * len(tests)

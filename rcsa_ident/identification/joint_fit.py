@@ -255,7 +255,7 @@ def _start(data: IdentificationData, found: Candidate, softening: bool) -> tuple
     """Return a vector with all that the data may tell, from one with less: what is new starts at nothing."""
     old = planes(found.layout)
     axes = tuple(
-        replace(a, fixture=axis.outputs == 2, softening=softening, standstill=data.stands_still and bool(np.any(axis.still)))
+        replace(a, places=axis.places, softening=softening, standstill=data.stands_still and bool(np.any(axis.still)))
         for a, axis in zip(old.axes, data.axes, strict=True)
     )
     layout = Layout(axes, len(data.coefficient_spread), data.clampings)

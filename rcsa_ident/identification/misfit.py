@@ -147,9 +147,9 @@ class Misfit:
         return prior_rows(layout, self.priors, self.data.coefficient_spread[: layout.coefficients])
 
     def without_delay(self, i: int, nuisance: FloatArray) -> ComplexArray:
-        """Return the measured flange motion of an axis with tooth 1 at immersion 0 at the start, shape (n,) [m/N]."""
+        """Return the measured motion of an axis (see `AxisData.measured`) with tooth 1 at immersion 0 at the start, shape (n,) [m/N]."""
         lines = self._axes[i]
-        return np.sum(lines.turned(nuisance)[0].reshape(-1, lines.outputs), axis=1)
+        return np.sum(lines.turned(nuisance)[0].reshape(-1, lines.outputs)[:, self.data.axes[i].searched], axis=1)
 
     def weight(self, i: int) -> FloatArray:
         """Return the weights of an axis' lines, shape (n, o) [N^2/m^2]."""
@@ -166,10 +166,10 @@ class Misfit:
             n, o = lines.points.shape[0], lines.outputs
             values = np.empty((n, o), dtype=complex)
             gradient = np.empty((n if normal else 0, o, part.size + JOINT), dtype=complex)
-            psi = np.column_stack([axis.psi, axis.fixture])
-            residual = np.vstack([axis.residual, axis.fixture_residual])
             both = np.append(joint, axis.standstill)
-            cross_frf(axis.omega_n, psi, axis.factor, axis.softening, residual, both, lines.points, lines.holder, values, gradient)
+            cross_frf(
+                axis.omega_n, axis.shapes, axis.factor, axis.softening, both, lines.shares, lines.points, lines.holder, values, gradient
+            )
             if layout.coefficients:
                 scale = np.exp(lines.force_slope @ theta[layout.force])[:, None]
                 values *= scale
@@ -266,6 +266,7 @@ class WeightedLines:
     def __init__(self, axis: AxisData, relative_speed: FloatArray, model_error: float, cut_weight: FloatArray) -> None:
         o = axis.outputs
         self.outputs = o
+        self.shares = axis.output_shares
         self.points = axis.kernel_points(relative_speed[axis.cut])
         self.holder = axis.kernel_holder
         self.force_slope = axis.force_slope

@@ -283,13 +283,13 @@ def merged(axis: AxisParameters) -> list[AxisParameters]:
     for low, high in pairwise(order.tolist()):
         if axis.omega_n[high] < CLOSE * axis.omega_n[low]:
             both = axis.psi[[low, high]]
-            psi, omega_n, fixture = axis.psi.copy(), axis.omega_n.copy(), axis.fixture.copy()
+            psi, omega_n, places = axis.psi.copy(), axis.omega_n.copy(), axis.places.copy()
             psi[low] = rank_one(np.array([both[:, 0] @ both[:, 0], both[:, 0] @ both[:, 1], both[:, 1] @ both[:, 1]]))
-            # both modes' motion of the fixture, and whichever sign the new shape has
-            fixture[low] = psi[low] @ (axis.fixture[[low, high]] @ both) / (psi[low] @ psi[low])
+            # both modes' motion of the other places, and whichever sign the new shape has
+            places[low] = (axis.places[[low, high]].T @ both) @ psi[low] / (psi[low] @ psi[low])
             share = np.sum(both**2, axis=1) / max(float(np.sum(both**2)), 1e-300)
             omega_n[low] = np.exp(share @ np.log(axis.omega_n[[low, high]]))
-            found.append(without_mode(replace(axis, psi=psi, omega_n=omega_n, fixture=fixture), high))
+            found.append(without_mode(replace(axis, psi=psi, omega_n=omega_n, places=places), high))
     return found
 
 

@@ -1,11 +1,12 @@
 """The unknowns as one vector, and the vector as physics.
 
 One axis with m modes: log natural frequencies (m), mass-normalised shapes (2 m: translation, lever x slope), the lower
-triangle of the damping factor L by rows (diagonal as logarithm), the residual compliance's factor (3); where gap and fixture
-are two outputs the fixture's shapes (m) and its residual to the flange (2); where hammer tests at standstill stand beside cuts
-what that changes (2); where the machine changes with speed the lower triangle of its softening by rows. All axes follow each
-other. What they share stands at the end: the joint's four logarithms, logarithms of the cutting coefficients' scales, tooth
-angles of the clampings. With D = L L^T and R = R_f R_f^T every vector is a passive machine with real modes.
+triangle of the damping factor L by rows (diagonal as logarithm), the residual compliance's factor (3); for each other place
+whose motion is in an output (a gap sensor's fixture, the housing) its shapes (m) and its residual to the flange (2); where
+hammer tests at standstill stand beside cuts what that changes (2); where the machine changes with speed the lower triangle of
+its softening by rows. All axes follow each other. What they share stands at the end: the joint's four logarithms, logarithms of
+the cutting coefficients' scales, tooth angles of the clampings. With D = L L^T and R = R_f R_f^T every vector is a passive
+machine with real modes.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel, damped_modes
 from rcsa_ident.identification.data import LEVER
 
-#: Units of the damping factor [sqrt(rad/s)], of the residual compliance's factor [sqrt(m/N)] and of the fixture's residual [m/N].
+#: Units of the damping factor [sqrt(rad/s)], of the residual compliance's factor [sqrt(m/N)] and of another place's residual [m/N].
 DAMPING_UNIT = 30.0
 RESIDUAL_UNIT = np.sqrt(1e-9)
-FIXTURE_UNIT = 1e-9
+PLACE_UNIT = 1e-9
 #: Unknowns of the joint.
 JOINT = 4
 
@@ -37,8 +38,8 @@ class AxisLayout:
     Parameters
     ----------
     modes : int
-    fixture : bool
-        Gap and fixture are two outputs; else their sum, the flange's own motion, is the only one.
+    places : int
+        Other places of the machine whose motion is in the outputs: the displacement sensor's fixture, the spindle's housing.
     softening : bool
         The stiffness changes with the spindle's speed.
     standstill : bool
@@ -46,7 +47,7 @@ class AxisLayout:
     """
 
     modes: int
-    fixture: bool = False
+    places: int = 0
     softening: bool = False
     standstill: bool = False
 
@@ -63,17 +64,17 @@ class AxisLayout:
     @property
     def size(self) -> int:
         """Length of the axis' part of the vector."""
-        return self.core + (self.modes + 2) * self.fixture + 2 * self.standstill + self.pairs * self.softening
+        return self.core + (self.modes + 2) * self.places + 2 * self.standstill + self.pairs * self.softening
 
     @property
     def still(self) -> slice:
         """Places in the axis' part of what standing still changes."""
-        first = self.core + (self.modes + 2) * self.fixture
+        first = self.core + (self.modes + 2) * self.places
         return slice(first, first + 2 * self.standstill)
 
     @property
     def machine(self) -> np.ndarray:
-        """Places in the axis' part of all that describes the flange while it turns: core and softening, but not the fixture."""
+        """Places in the axis' part of all that describes the flange while it turns: core and softening, but not the other places."""
         places = np.arange(self.size)
         return np.concatenate([places[: self.core], places[self.size - self.pairs * self.softening :]])
 
@@ -160,9 +161,9 @@ def planes(layout: Unknowns) -> Layout:
     return layout
 
 
-def flange_layout(*modes: int) -> Layout:
-    """Return the layout of axes with so many modes each, and a joint."""
-    return Layout(tuple(AxisLayout(m) for m in modes))
+def flange_layout(*modes: int, places: int = 0) -> Layout:
+    """Return the layout of axes with so many modes each, as many other places, and a joint."""
+    return Layout(tuple(AxisLayout(m, places) for m in modes))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,10 +179,10 @@ class AxisParameters:
         L of the damping matrix D = L L^T in modal coordinates.
     residual : array, shape (2, 2) [sqrt(m/N)]
         Factor R_f of the residual compliance R_f R_f^T, the modes above the band.
-    fixture : array, shape (m,) [1/sqrt(kg)]
-        The modes' shapes at the fixture; zeros where the flange's motion is the only output.
-    fixture_residual : array, shape (2,) [m/N]
-        Residual compliance between fixture and the flange's translation and slope.
+    places : array, shape (m, e) [1/sqrt(kg)]
+        The modes' shapes at other places of the machine.
+    place_residual : array, shape (e, 2) [m/N]
+        Residual compliance between each of them and the flange's translation and slope.
     softening : array, shape (m, m) or (0, 0) [-]
         Symmetric: K_ij = omega_i omega_j (delta_ij + x softening_ij) at relative speed x.
     standstill : array, shape (2,) or (0,) [-]
@@ -192,8 +193,8 @@ class AxisParameters:
     psi: FloatArray
     factor: FloatArray
     residual: FloatArray
-    fixture: FloatArray
-    fixture_residual: FloatArray
+    places: FloatArray
+    place_residual: FloatArray
     softening: FloatArray
     standstill: FloatArray = field(default_factory=lambda: np.zeros(0))
 
@@ -201,6 +202,12 @@ class AxisParameters:
     def order(self) -> int:
         """Number of modes."""
         return self.omega_n.size
+
+    @property
+    def shapes(self) -> FloatArray:
+        """Shapes at the flange and at other places, and the residual behind them, as the kernel takes them, shape (m + 2, 2 + e)."""
+        residual = np.vstack([self.residual, self.place_residual])
+        return np.ascontiguousarray(np.vstack([np.hstack([self.psi, self.places]), residual.T]))
 
     def at(self, x: float) -> AxisParameters:
         """Return the machine at relative speed x (-1 and 1 are the campaign's lowest and highest), in its own modes there."""
@@ -212,7 +219,7 @@ class AxisParameters:
         omega_n = np.sqrt(np.maximum(squares, 1e-6 * np.min(self.omega_n) ** 2))
         factor = lower_factor(turn.T @ self.factor)
         return AxisParameters(
-            omega_n, turn.T @ self.psi, factor, self.residual, turn.T @ self.fixture, self.fixture_residual, np.zeros((0, 0))
+            omega_n, turn.T @ self.psi, factor, self.residual, turn.T @ self.places, self.place_residual, np.zeros((0, 0))
         )
 
 
@@ -224,7 +231,7 @@ def simple_axis(omega_n: FloatArray, psi: FloatArray, factor: FloatArray, residu
     omega_n, psi, factor, residual : arrays, shapes (m,), (m, 2), (m, m), (2, 2)
         As in `AxisParameters`.
     """
-    return AxisParameters(omega_n, psi, factor, residual, np.zeros(omega_n.size), np.zeros(2), np.zeros((0, 0)))
+    return AxisParameters(omega_n, psi, factor, residual, np.zeros((omega_n.size, 0)), np.zeros((0, 2)), np.zeros((0, 0)))
 
 
 @lru_cache
@@ -260,26 +267,30 @@ def unpack(part: FloatArray, layout: AxisLayout) -> AxisParameters:
     factor = np.zeros((m, m))
     factor[rows, cols] = lower
     a, b, c = RESIDUAL_UNIT * part[core - 3 : core]
-    fixture, fixture_residual, softening = np.zeros(m), np.zeros(2), np.zeros((0, 0))
-    if layout.fixture:
-        fixture, fixture_residual = part[core : core + m], FIXTURE_UNIT * part[core + m : core + m + 2]
+    beside = part[core : core + (m + 2) * layout.places].reshape(layout.places, m + 2)
+    places, place_residual, softening = beside[:, :m].T, PLACE_UNIT * beside[:, m:], np.zeros((0, 0))
     if layout.softening:
         softening = np.zeros((m, m))
         softening[rows, cols] = softening[cols, rows] = part[-layout.pairs :]
     residual = np.array([[a, 0.0], [b, c]])
     still = part[layout.still]
-    return AxisParameters(np.exp(part[:m]), part[m : 3 * m].reshape(m, 2), factor, residual, fixture, fixture_residual, softening, still)
+    return AxisParameters(np.exp(part[:m]), part[m : 3 * m].reshape(m, 2), factor, residual, places, place_residual, softening, still)
 
 
 def pack(axis: AxisParameters, layout: AxisLayout | None = None) -> FloatArray:
-    """Return the vector of an axis; the inverse of `unpack`. By default of its flange alone, at the middle speed."""
+    """Return the vector of an axis; the inverse of `unpack`. By default of its flange alone, at the middle speed.
+
+    Of other places the layout's first ones are told, and those that the axis does not know rest.
+    """
     layout = AxisLayout(axis.order) if layout is None else layout
     rows, cols, diagonal = lower_triangle(axis.order)
     lower = axis.factor[rows, cols] / DAMPING_UNIT
     lower = np.where(diagonal, np.log(np.where(diagonal, np.abs(lower), 1.0)), lower)
     parts = [np.log(axis.omega_n), axis.psi.ravel(), lower, axis.residual[[0, 1, 1], [0, 0, 1]] / RESIDUAL_UNIT]
-    if layout.fixture:
-        parts += [axis.fixture, axis.fixture_residual / FIXTURE_UNIT]
+    beside = np.zeros((layout.places, axis.order + 2))
+    told = min(layout.places, axis.places.shape[1])
+    beside[:told] = np.hstack([axis.places.T, axis.place_residual / PLACE_UNIT])[:told]
+    parts.append(beside.ravel())
     if layout.standstill:
         parts.append(axis.standstill if axis.standstill.size else np.zeros(2))
     if layout.softening:
@@ -293,8 +304,7 @@ def chain(axis: AxisParameters, layout: AxisLayout) -> FloatArray:
     rows, cols, diagonal = lower_triangle(m)
     factor = np.where(diagonal, axis.factor[rows, cols], DAMPING_UNIT)
     parts = [np.ones(3 * m), factor, np.full(3, RESIDUAL_UNIT)]
-    if layout.fixture:
-        parts += [np.ones(m), np.full(2, FIXTURE_UNIT)]
+    parts += [np.ones(m), np.full(2, PLACE_UNIT)] * layout.places
     if layout.standstill:
         parts.append(np.ones(2))
     if layout.softening:
@@ -329,8 +339,8 @@ def selected(axis: AxisParameters, modes: np.ndarray) -> AxisParameters:
         axis.psi[modes],
         lower_factor(axis.factor[modes]),
         axis.residual,
-        axis.fixture[modes],
-        axis.fixture_residual,
+        axis.places[modes],
+        axis.place_residual,
         softening,
         axis.standstill,
     )
@@ -342,7 +352,7 @@ def without_mode(axis: AxisParameters, mode: int) -> AxisParameters:
 
 
 def with_mode(axis: AxisParameters, omega_n: float, psi: tuple[float, float], zeta: float = 0.05) -> AxisParameters:
-    """Return the axis with one more mode in front, uncoupled to the others, which the fixture does not feel.
+    """Return the axis with one more mode in front, uncoupled to the others, which other places do not feel.
 
     Parameters
     ----------
@@ -361,8 +371,8 @@ def with_mode(axis: AxisParameters, omega_n: float, psi: tuple[float, float], ze
         np.concatenate([[psi], axis.psi]),
         factor,
         axis.residual,
-        np.append(0.0, axis.fixture),
-        axis.fixture_residual,
+        np.concatenate([np.zeros((1, axis.places.shape[1])), axis.places]),
+        axis.place_residual,
         softening,
         axis.standstill,
     )

@@ -112,8 +112,7 @@ def prior_rows(layout: Layout, priors: Priors, coefficients: tuple[float, ...] =
             np.where(diagonal, 0.5 * priors.damping_spread, priors.damping_coupling),
             np.full(3, priors.residual),
         ]
-        if axis.fixture:
-            parts += [np.full(m, priors.shape), np.full(2, priors.residual**2)]
+        parts += [np.full(m, priors.shape), np.full(2, priors.residual**2)] * axis.places
         if axis.standstill:
             parts.append(np.array(priors.standstill))
         if axis.softening:

@@ -12,7 +12,8 @@ from rcsa_ident.identification.levenberg_marquardt import Solution, refine
 from rcsa_ident.identification.misfit import Misfit
 from rcsa_ident.identification.parameters import (
     DAMPING_UNIT,
-    AxisLayout,
+    JOINT,
+    Layout,
     flange_layout,
     lower_triangle,
     pack,
@@ -45,6 +46,8 @@ class SearchSettings:
 def starts(count: int, modes: int, band_hz: tuple[float, float], misfit: Misfit, rng: np.random.Generator) -> FloatArray:
     """Return random vectors, shape (count, p): a mode below the band, one above it, the others in it, light or heavy damping, uncoupled.
 
+    Where it is not the flange's motion that was measured, the place moves about as the flange does.
+
     Every machine has modes below and above what is excited; a search that starts without them ends without them.
 
     Parameters
@@ -54,11 +57,12 @@ def starts(count: int, modes: int, band_hz: tuple[float, float], misfit: Misfit,
     band_hz : (float, float) [Hz]
         Lowest and highest line.
     misfit : Misfit
-        Its priors give the joint's centre.
+        Of one output; its priors give the joint's centre.
     rng : numpy.random.Generator
     """
     low, high = band_hz
-    theta = np.zeros((count, flange_layout(modes).size))
+    layout = flange_layout(modes, places=misfit.data.axes[0].places).axes[0]
+    theta = np.zeros((count, layout.size + JOINT))
     frequency = rng.uniform(low, 1.08 * high, (count, modes))
     frequency[:, 0] = rng.uniform(0.2, 0.6, count) * low
     frequency[:, 1] = rng.uniform(1.3, 2.0, count) * high
@@ -69,8 +73,10 @@ def starts(count: int, modes: int, band_hz: tuple[float, float], misfit: Misfit,
     own = 3 * modes + np.flatnonzero(lower_triangle(modes)[2])
     damping = np.exp(rng.uniform(np.log(0.03), np.log(0.15), (count, modes)))
     theta[:, own] = 0.5 * np.log(2.0 * damping * 2.0 * np.pi * frequency) - np.log(DAMPING_UNIT)
-    theta[:, -7:-4] = [1.0, 0.1, 1.0]
-    theta[:, -4:] = np.log(misfit.priors.joint)
+    theta[:, layout.core - 3 : layout.core] = [1.0, 0.1, 1.0]
+    if layout.places:
+        theta[:, layout.core : layout.core + modes] = theta[:, modes : 3 * modes : 2]
+    theta[:, -JOINT:] = np.log(misfit.priors.joint)
     return theta
 
 
@@ -99,7 +105,7 @@ def explore(
     from pymoo.operators.mutation.pm import PM
 
     first = starts(settings.population, settings.modes, band_hz, misfit, rng)
-    layout = flange_layout(settings.modes)
+    layout = flange_layout(settings.modes, places=misfit.data.axes[0].places)
     centre, reach = first.mean(axis=0), np.full(first.shape[1], 6.0)
     problem = Problem(n_var=first.shape[1], n_obj=1, xl=np.minimum(centre - reach, -reach), xu=np.maximum(centre + reach, reach))
     algorithm = GA(
@@ -117,7 +123,7 @@ def explore(
             break
         improved = []
         for individual in offspring:
-            theta = _by_frequency(np.asarray(individual.X, dtype=float), settings.modes)
+            theta = _by_frequency(np.asarray(individual.X, dtype=float), layout)
             solution = refine(misfit, theta, layout, np.zeros((len(misfit.data.cut_ids), 2)), settings.steps, grid=32)
             inside = np.clip(solution.theta, problem.xl, problem.xu)
             reached[inside.tobytes()] = solution
@@ -132,10 +138,11 @@ def explore(
     return sorted((reached[key] for key in last), key=lambda s: s.cost)
 
 
-def _by_frequency(theta: FloatArray, modes: int) -> FloatArray:
+def _by_frequency(theta: FloatArray, layout: Layout) -> FloatArray:
     """Sort the modes by frequency, so that crossover mixes like with like."""
-    (part,), joint = split(theta, flange_layout(modes))
-    order = np.argsort(part[:modes], kind="stable")
-    if np.array_equal(order, np.arange(modes)):
+    (part,), joint = split(theta, layout)
+    axis = layout.axes[0]
+    order = np.argsort(part[: axis.modes], kind="stable")
+    if np.array_equal(order, np.arange(axis.modes)):
         return theta
-    return np.concatenate([pack(selected(unpack(part, AxisLayout(modes)), order)), joint])
+    return np.concatenate([pack(selected(unpack(part, axis), order), axis), joint])

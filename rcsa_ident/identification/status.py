@@ -8,6 +8,8 @@ from enum import StrEnum
 
 #: Toolings, and usable cuts of each, with fewer of which every identification is suspect.
 FEWEST_TOOLINGS, FEWEST_CUTS = 2, 8
+#: The same where accelerometers on the spindle's housing are the only sensors.
+FEWEST_OF_HOUSING = 3
 
 
 class Status(StrEnum):

@@ -16,8 +16,9 @@ from rcsa_ident.cutting.conditions import Engagement
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.coupled.posterior import CoupledPosterior
 from rcsa_ident.identification.parameters import JOINT
-from rcsa_ident.identification.result import AxisResult, Identification
+from rcsa_ident.identification.result import AxisResult, Identification, IdentificationCode
 from rcsa_ident.machining_setup import Campaign, CutSpec, Tooling
+from rcsa_ident.remarks import says
 from rcsa_ident.report import figures
 from rcsa_ident.report.drawing import tooling_svg
 from rcsa_ident.report.lobes import stability_figure
@@ -124,6 +125,7 @@ def report_html(
         ],
         both=None if found.whole is None else _both(found, deviations),
         notes=[note for note in found.notes if note != found.coupling],
+        moved="housing" if says(found.notes, IdentificationCode.HOUSING_ALONE) else "flange",
         scales=coefficient_rows(found.coefficients),
         has_std=bool(deviations),
         softening=any(part.posterior is not None and part.posterior.layout.softening for part in found.axes.values())

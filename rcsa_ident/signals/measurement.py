@@ -38,7 +38,7 @@ NO_AIR = Remark(RecordCode.NO_AIR_CUT, "no air cut: run-out and roundness of the
 #: Note on a cut without a displacement sensor.
 HOUSING = Remark(
     RecordCode.HOUSING,
-    "the motion of the spindle's housing, from its acceleration: it tells speed, chatter and lines, but not the flange's motion",
+    "the motion of the spindle's housing, from its acceleration: the flange's own motion follows from several toolings",
 )
 
 

@@ -266,9 +266,6 @@ def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> Identifica
     if not measurements:
         reasons = "; ".join(dict.fromkeys(reason for each in readings for reason in each.verdict.reasons))
         raise InputError("cuts", f"none of {len(readings)} usable ({reasons})", "at least one usable cut")
-    if any(each.housing for each in measurements):
-        told = f"{sum(each.housing for each in measurements)} of {len(measurements)} cuts with accelerometers alone"
-        raise InputError("sensors", told, "a displacement sensor at the flange: the housing's motion does not tell the flange's receptance")
     receptances = {name: partial(_receptance, campaign, name) for name in campaign.toolings}
     teeth = {name: t.cutter.teeth for name, t in campaign.toolings.items()}
     known = campaign.coefficients

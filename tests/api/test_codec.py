@@ -97,7 +97,7 @@ def test_what_is_told_comes_back(value):
 
 def test_what_a_search_has_come_to():
     rng = np.random.default_rng(1)
-    layout = Layout((AxisLayout(3, fixture=True), AxisLayout(2, softening=True)), 4, 1)
+    layout = Layout((AxisLayout(3, places=2), AxisLayout(2, softening=True)), 4, 1)
     turned = np.asfortranarray(rng.standard_normal((layout.size, layout.size)))
     candidate = Candidate(rng.standard_normal(layout.size), layout, rng.standard_normal((5, 2)), 1.0 / 3.0, turned)
     steps = [Step("x", Stage.SEARCH, np.inf, 5), Step("both", Stage.MODES, -1.0, 4)]

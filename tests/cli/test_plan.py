@@ -37,7 +37,7 @@ def axis_of(axis, shift, speed_range):
     natural = 2.0 * np.pi * shift * np.array([950.0, 1750.0, 3300.0])
     shapes = np.array([[0.14, 0.12], [0.18, -0.2], [0.15, 0.4]])
     factor = np.diag(np.sqrt(2.0 * 0.05 * natural))
-    physics = AxisParameters(natural, shapes, factor, np.diag([2e-5, 3e-5]), np.zeros(3), np.zeros(2), np.zeros((0, 0)))
+    physics = AxisParameters(natural, shapes, factor, np.diag([2e-5, 3e-5]), np.zeros((3, 0)), np.zeros((0, 2)), np.zeros((0, 0)))
     theta = np.concatenate([pack(physics), np.log([3e9, 6e6, 2e3, 10.0])])
     layout = AxisLayout(3)
     data = spindle_to_json(*Posterior(theta, 4e-4 * np.eye(theta.size), layout).machine(axis))

@@ -41,9 +41,9 @@ def vector_of(layout, frequency_hz, seed=1):
         own = np.log(2.0 * 0.05 * np.exp(part[:m])) / 2.0 - np.log(DAMPING_UNIT)
         part[3 * m : axis.core - 3] = np.where(rows == cols, own[rows], 0.3 * rng.standard_normal(rows.size))
         part[axis.core - 3 : axis.core] = [1.0, 0.2, 0.8]
-        if axis.fixture:
-            part[axis.core : axis.core + m] = 0.1 * rng.standard_normal(m)
-            part[axis.core + m : axis.core + m + 2] = [0.3, -0.2]
+        for first in range(axis.core, axis.core + axis.places * (m + 2), m + 2):
+            part[first : first + m] = 0.1 * rng.standard_normal(m)
+            part[first + m : first + m + 2] = [0.3, -0.2]
         if axis.softening:
             part[axis.size - axis.pairs :] = 0.03 * rng.standard_normal(axis.pairs)
     theta[layout.joint] = np.log([2e9, 5e6, 1e3, 10.0])

@@ -28,13 +28,22 @@ def substructure(rng, omega):
     return response, flange, np.stack([a21[:, 0, 0], LEVER * a21[:, 1, 0]], axis=1)
 
 
-def candidate(rng, m, soft=False):
-    """Natural frequencies, shapes, damping factor, softening, residual, joint as the kernel takes them."""
+#: What is measured, as shares of the flange's motion and of other places': see `AxisData.shares`.
+MEASURED = {
+    "flange": np.array([[1.0]]),
+    "gap and fixture": np.array([[1.0, -1.0], [0.0, 1.0]]),
+    "housing": np.array([[0.0, 1.0]]),
+    "gap, fixture, housing": np.array([[1.0, -1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+}
+
+
+def candidate(rng, m, soft=False, places=1):
+    """Natural frequencies, shapes, damping factor, softening, residual, joint."""
     omega_n = 2.0 * np.pi * rng.uniform(300.0, 4000.0, m)
-    psi = rng.standard_normal((m, 3))
+    psi = rng.standard_normal((m, 2 + places))
     factor = np.tril(10.0 * rng.standard_normal((m, m)))
     softening = 0.1 * rng.standard_normal((m, m)) if soft else np.zeros((0, 0))
-    residual = np.array([[4e-5, 0.0], [1e-5, 3e-5], [2e-10, -3e-10]])
+    residual = np.array([[4e-5, 0.0], [1e-5, 3e-5], *[[2e-10, -3e-10], [1e-10, 4e-10]][:places]])
     joint = np.array([2e8, 3e8, 900.0, 700.0]) * rng.uniform(0.5, 2.0, 4)  # scaled: rotational ones per lever squared
     return omega_n, psi, factor, softening + softening.T, residual, joint
 
@@ -54,17 +63,20 @@ def hit(omega):
     return (place % 2).astype(float), (place % 3 > 0).astype(float)
 
 
-def cross(function, candidate, omega, flange, tip, outputs=1, gradient=False, x=None, hammer=None):
-    omega_n, _, _, softening, _, joint = candidate
+def cross(function, candidate, omega, flange, tip, measured="flange", gradient=False, x=None, hammer=None):
+    omega_n, psi, factor, softening, residual, joint = candidate
+    shares = MEASURED[measured]
+    outputs, places = shares.shape[0], shares.shape[1] - 1
+    shapes = np.vstack([psi, residual.T])[:, : 2 + places].copy()
     m = omega_n.size
     own, still = (np.ones(omega.size), np.zeros(omega.size)) if hammer is None else hit(omega)
     points = np.column_stack([omega, relative_speed(omega) if x is None else np.full(omega.size, x), own, still])
     of_point = np.zeros((omega.size, 3)) if hammer is None else hammer * (1.0 - own)[:, None]
     values = np.empty((omega.size, outputs), dtype=complex)
     pairs = m * (m + 1) // 2
-    size = 3 * m + pairs + 3 + joint.size + (m + 2) * (outputs == 2) + pairs * (softening.size > 0)
+    size = 3 * m + pairs + 3 + joint.size + (m + 2) * places + pairs * (softening.size > 0)
     rows = np.empty((omega.size if gradient else 0, outputs, size), dtype=complex)
-    function(*candidate, points, np.concatenate([flange, tip, of_point], axis=1), values, rows)
+    function(omega_n, shapes, factor, softening, joint, shares, points, np.concatenate([flange, tip, of_point], axis=1), values, rows)
     return (values, rows) if gradient else values
 
 
@@ -101,11 +113,14 @@ def test_cross_frf_is_that_of_coupled_complex_modes(m, soft):
     chosen = candidate(rng, m, soft)
     for x in (-1.0, 0.0, 0.7):
         expected = coupled(chosen, holder, x)
-        both = cross(kernels.cross_frf, chosen, omega, flange, tip, outputs=2, x=x)
+        both = cross(kernels.cross_frf, chosen, omega, flange, tip, "gap and fixture", x=x)
         np.testing.assert_allclose(both, expected, rtol=1e-7, atol=1e-11 * np.abs(expected).max())
         # one output is what two of them add up to
-        one = cross(kernels.cross_frf, chosen, omega, flange, tip, outputs=1, x=x)
+        one = cross(kernels.cross_frf, chosen, omega, flange, tip, x=x)
         np.testing.assert_allclose(one[:, 0], both.sum(axis=1), rtol=1e-10, atol=1e-12 * np.abs(one).max())
+        # a place is the same, whether anything else is measured or not
+        alone = cross(kernels.cross_frf, chosen, omega, flange, tip, "housing", x=x)
+        np.testing.assert_allclose(alone[:, 0], both[:, 1], rtol=1e-10, atol=1e-12 * np.abs(alone).max())
 
 
 def test_nothing_softens_at_the_middle_speed():
@@ -114,7 +129,7 @@ def test_nothing_softens_at_the_middle_speed():
     _, flange, tip = substructure(rng, omega)
     soft = candidate(rng, 3, True)
     plain = (*soft[:3], np.zeros((0, 0)), *soft[4:])
-    found = [cross(kernels.cross_frf, each, omega, flange, tip, outputs=2, gradient=True, x=0.0) for each in (soft, plain)]
+    found = [cross(kernels.cross_frf, each, omega, flange, tip, "gap and fixture", gradient=True, x=0.0) for each in (soft, plain)]
     np.testing.assert_allclose(found[0][0], found[1][0], rtol=1e-12)
     first = 3 * 3 + 6 + 3 + 5
     np.testing.assert_array_equal(found[0][1][:, :, first : first + 6], 0.0)
@@ -124,23 +139,25 @@ def test_nothing_softens_at_the_middle_speed():
 
 @pytest.mark.parametrize("stands", [False, True])
 @pytest.mark.parametrize("soft", [False, True])
-@pytest.mark.parametrize("outputs", [1, 2])
-def test_cross_frf_gradient_against_differences(outputs, soft, stands):
+@pytest.mark.parametrize("measured", MEASURED)
+def test_cross_frf_gradient_against_differences(measured, soft, stands):
+    outputs, places = MEASURED[measured].shape[0], MEASURED[measured].shape[1] - 1
     rng = np.random.default_rng(5)
     m = 3
     omega = 2.0 * np.pi * rng.uniform(200.0, 4500.0, 11)
     _, flange, tip = substructure(rng, omega)
-    omega_n, psi, factor, softening, residual, joint = chosen = candidate(rng, m, soft)
+    omega_n, psi, factor, softening, residual, joint = chosen = candidate(rng, m, soft, max(places, 1))
     hammer, still = None, []
     if stands:
         hammer, still = 1e-8 * (rng.standard_normal((11, 3)) + 1j * rng.standard_normal((11, 3))), [np.array([0.03, -0.2])]
         chosen = (*chosen[:-1], np.concatenate([joint, *still]))
-    values, gradient = cross(kernels.cross_frf, chosen, omega, flange, tip, outputs, gradient=True, hammer=hammer)
-    np.testing.assert_array_equal(values, cross(kernels.cross_frf, chosen, omega, flange, tip, outputs, hammer=hammer))
+    values, gradient = cross(kernels.cross_frf, chosen, omega, flange, tip, measured, gradient=True, hammer=hammer)
+    np.testing.assert_array_equal(values, cross(kernels.cross_frf, chosen, omega, flange, tip, measured, hammer=hammer))
     lower = np.tril_indices(m)
     compliance = (residual[:2] @ residual[:2].T)[np.tril_indices(2)]
     parts = [np.log(omega_n), psi[:, :2].ravel(), factor[lower], compliance]
-    parts += [psi[:, 2], residual[2]] if outputs == 2 else []
+    for e in range(places):
+        parts += [psi[:, 2 + e], residual[2 + e]]
     parts += still
     parts += [softening[lower]] if soft else []
     flat = np.concatenate([*parts, joint])
@@ -154,15 +171,15 @@ def test_cross_frf_gradient_against_differences(outputs, soft, stands):
         # the columns are those of the compliance itself, not of its factor
         tt, tr, rr = each[3]
         changed_residual[:2] = np.linalg.cholesky([[tt, tr], [tr, rr]])
-        if outputs == 2:
-            changed_psi[:, 2], changed_residual[2] = each[4], each[5]
+        for e in range(places):
+            changed_psi[:, 2 + e], changed_residual[2 + e] = each[4 + 2 * e], each[5 + 2 * e]
         symmetric = np.zeros_like(softening)
         if soft:
             symmetric[lower] = each[-2]
             symmetric.T[lower] = each[-2]
         last = np.concatenate([each[-1], *([each[-2 - soft]] if stands else [])])
         changed = np.exp(each[0]), changed_psi, changed_factor, symmetric, changed_residual, last
-        return cross(kernels.cross_frf, changed, omega, flange, tip, outputs, hammer=hammer)
+        return cross(kernels.cross_frf, changed, omega, flange, tip, measured, hammer=hammer)
 
     np.testing.assert_allclose(at(flat), values, rtol=1e-10)
     assert gradient.shape == (11, outputs, flat.size)
@@ -357,8 +374,8 @@ def test_compiled_and_plain_agree(name, monkeypatch):
         rng = np.random.default_rng(13)
         if name == "cross_frf":
             both = [
-                cross(function, each, omega, flange, tip, o, gradient=True)
-                for o in (1, 2)
+                cross(function, each, omega, flange, tip, measured, gradient=True)
+                for measured in ("flange", "gap and fixture", "housing")
                 for each in (chosen, (*chosen[:3], np.zeros((0, 0)), *chosen[4:]))
             ]
             results.append(np.concatenate([r.ravel() for pair in both for r in pair]))

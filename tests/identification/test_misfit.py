@@ -54,7 +54,7 @@ def dense(misfit, theta, layout, nuisance):
 def case(request, few, rich):
     if request.param == "plain":
         return Case(few, flange_layout(3, 2), "plain")
-    layout = Layout((AxisLayout(3, True, True), AxisLayout(2, True, True)), len(rich.coefficient_spread), rich.clampings)
+    layout = Layout((AxisLayout(3, 1, True), AxisLayout(2, 1, True)), len(rich.coefficient_spread), rich.clampings)
     return Case(rich, layout, "all")
 
 
@@ -243,7 +243,7 @@ def test_without_delay_is_the_model_plus_its_residual(case):
 
 
 def test_two_outputs_add_up_to_the_model_of_one(rich):
-    layout = Layout((AxisLayout(3, True), AxisLayout(2, True)))
+    layout = Layout((AxisLayout(3, 1), AxisLayout(2, 1)))
     theta = vector_of(layout, FREQUENCIES)
     nuisance = np.zeros((len(rich.cut_ids), 2))
     both = Misfit(rich, Priors(), SHARES).evaluate(theta, layout, nuisance).models

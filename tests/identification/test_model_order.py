@@ -119,7 +119,7 @@ def test_promise_of_a_weak_mode_is_kept(known, theta, place):
 
 def test_promising_with_everything_unknown(rich):
     """Two outputs, softening, uncertain forces, tooth angles: the missing mode is found in the axis that lacks it."""
-    axes = (AxisLayout(3, True, True), AxisLayout(2, True, True))
+    axes = (AxisLayout(3, 1, True), AxisLayout(2, 1, True))
     layout = Layout(axes, len(rich.coefficient_spread), rich.clampings)
     theta = vector_of(layout, ((600.0, 1400.0, 2600.0), (900.0, 2100.0)))
     theta[layout.force] *= 0.02
@@ -137,7 +137,7 @@ def test_promising_with_everything_unknown(rich):
     found = promising(poor, misfit, 0, BAND)
     assert abs(np.log(found[0].omega_n[0] / (2.0 * np.pi * 1400.0))) < 0.15
     assert found[0].softening.shape == (3, 3)
-    assert found[0].fixture.shape == (3,)
+    assert found[0].places.shape == (3, 1)
 
 
 def test_exchange_brings_back_a_mode_that_the_search_has_missed(known, poor):
@@ -203,7 +203,9 @@ def test_merged_identical_modes_are_the_same_machine():
     omega_n = np.array([axis.omega_n[0], axis.omega_n[1], axis.omega_n[1]])
     psi = np.array([axis.psi[0], axis.psi[1], -0.6 * axis.psi[1]])
     factor = np.diag(np.sqrt(2.0 * 0.05 * omega_n))
-    double = replace(axis, omega_n=omega_n, psi=psi, factor=factor, fixture=np.array([0.05, 0.1, 0.2]))
+    double = replace(
+        axis, omega_n=omega_n, psi=psi, factor=factor, places=np.array([[0.05], [0.1], [0.2]]), place_residual=np.zeros((1, 2))
+    )
     found = merged(double)
     assert len(found) == 1
     assert found[0].order == 2

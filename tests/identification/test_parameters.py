@@ -31,7 +31,7 @@ from rcsa_ident.identification.parameters import (
 @st.composite
 def vectors(draw, softening=None):
     """Any machine that the priors do not find absurd, and many that they do; softening as small as machines have it."""
-    layout = AxisLayout(draw(st.integers(1, 6)), draw(st.booleans()), draw(st.booleans()) if softening is None else softening)
+    layout = AxisLayout(draw(st.integers(1, 6)), draw(st.integers(0, 2)), draw(st.booleans()) if softening is None else softening)
     m = layout.modes
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     part = rng.standard_normal(layout.size) * draw(st.sampled_from([0.1, 1.0, 2.0]))
@@ -42,12 +42,13 @@ def vectors(draw, softening=None):
 
 
 def receptance(axis, omega, x=0.0):
-    """Straight from the equations of motion at relative speed x: flange translation, flange slope, fixture."""
-    lever = np.array([1.0, 1.0 / LEVER, 1.0])
-    psi, damping = np.column_stack([axis.psi, axis.fixture]) * lever, axis.factor @ axis.factor.T
-    residual = np.zeros((3, 3))
+    """Straight from the equations of motion at relative speed x: flange translation, flange slope, other places."""
+    count = 2 + axis.places.shape[1]
+    lever = np.array([1.0, 1.0 / LEVER, *[1.0] * (count - 2)])
+    psi, damping = np.column_stack([axis.psi, axis.places]) * lever, axis.factor @ axis.factor.T
+    residual = np.zeros((count, count))
     residual[:2, :2] = axis.residual @ axis.residual.T
-    residual[2, :2] = residual[:2, 2] = axis.fixture_residual
+    residual[2:, :2], residual[:2, 2:] = axis.place_residual, axis.place_residual.T
     residual *= np.outer(lever, lever)
     stiffness = np.diag(axis.omega_n**2)
     if axis.softening.size:
@@ -67,9 +68,11 @@ def test_vector_and_physics_belong_together(drawn):
     # the flange at the middle speed is a vector of its own: the first entries
     np.testing.assert_allclose(pack(axis), part[: layout.core], rtol=1e-12, atol=1e-12)
     # what is asked for and was not there starts at nothing
-    more = AxisLayout(layout.modes, True, True)
-    padded = unpack(pack(unpack(part[: layout.core], AxisLayout(layout.modes)), more), more)
-    assert np.all(padded.fixture == 0.0)
+    more = replace(layout, places=layout.places + 1, softening=True)
+    padded = unpack(pack(replace(axis, softening=np.zeros((0, 0))), more), more)
+    np.testing.assert_allclose(padded.places[:, :-1], axis.places, rtol=1e-12)
+    assert np.all(padded.places[:, -1] == 0.0)
+    assert np.all(padded.place_residual[-1] == 0.0)
     assert np.all(padded.softening == 0.0)
     assert axis.order == layout.modes
     assert np.all(np.diag(axis.factor) > 0.0)
@@ -94,7 +97,7 @@ def test_every_vector_is_a_passive_reciprocal_machine(drawn, x):
 @settings(max_examples=40, deadline=None)
 @given(vectors(softening=True), st.floats(-1.0, 1.0))
 def test_another_speed_is_the_same_equations(drawn, x):
-    """Modes at a speed, the fixture's among them; what they are made of no longer changes."""
+    """Modes at a speed, those of other places among them; what they are made of no longer changes."""
     layout, part = drawn
     axis = unpack(part, layout)
     moved = axis.at(x)
@@ -128,7 +131,7 @@ def test_overdamped_modes_are_real_poles():
     assert dissipation(omega, modes.receptance(omega).values).min() > -1e-9
 
 
-@pytest.mark.parametrize("layout", [AxisLayout(3), AxisLayout(3, True), AxisLayout(2, True, True)])
+@pytest.mark.parametrize("layout", [AxisLayout(3), AxisLayout(3, 1), AxisLayout(2, 2, True)])
 def test_chain_is_the_derivative(layout):
     rng = np.random.default_rng(2)
     m = layout.modes
@@ -140,7 +143,8 @@ def test_chain_is_the_derivative(layout):
         axis = unpack(vector, layout)
         lower = np.tril_indices(m)
         parts = [np.log(axis.omega_n), axis.psi.ravel(), axis.factor[lower], axis.residual[np.tril_indices(2)]]
-        parts += [axis.fixture, axis.fixture_residual] if layout.fixture else []
+        for e in range(layout.places):
+            parts += [axis.places[:, e], axis.place_residual[e]]
         return np.concatenate([*parts, axis.softening[lower]] if layout.softening else parts)
 
     for k in range(part.size):
@@ -162,8 +166,8 @@ def test_without_mode_keeps_the_others(drawn, which):
     left = without_mode(axis, which % m)
     np.testing.assert_array_equal(left.omega_n, axis.omega_n[kept])
     np.testing.assert_array_equal(left.psi, axis.psi[kept])
-    np.testing.assert_array_equal(left.fixture, axis.fixture[kept])
-    np.testing.assert_array_equal(left.fixture_residual, axis.fixture_residual)
+    np.testing.assert_array_equal(left.places, axis.places[kept])
+    np.testing.assert_array_equal(left.place_residual, axis.place_residual)
     if layout.softening:
         np.testing.assert_array_equal(left.softening, axis.softening[np.ix_(kept, kept)])
     damping = (axis.factor @ axis.factor.T)[np.ix_(kept, kept)]
@@ -229,9 +233,9 @@ def test_every_unknown_has_one_place(axes, coefficients, clampings):
     found, joint = split(theta, layout)
     np.testing.assert_array_equal(np.concatenate([*found, joint]), theta[: layout.tail + JOINT])
     for axis, part in zip(axes, found, strict=True):
-        # the flange with its softening, without the fixture: what a posterior keeps
+        # the flange with its softening, without other places: what a posterior keeps
         own = part[axis.machine]
-        assert own.size + JOINT == len(parameter_names(axis)) == replace(axis, fixture=False).size + JOINT
+        assert own.size + JOINT == len(parameter_names(axis)) == replace(axis, places=0).size + JOINT
         np.testing.assert_array_equal(own[: axis.core], part[: axis.core])
         if axis.softening:
             np.testing.assert_array_equal(own[axis.core :], part[axis.size - axis.pairs :])
@@ -253,7 +257,7 @@ def test_joint():
 
 
 def test_names_follow_the_vector():
-    layout = AxisLayout(2, fixture=True, softening=True)
+    layout = AxisLayout(2, places=1, softening=True)
     names = parameter_names(layout)
     assert names[:6] == (
         "log natural_frequency_rad_s[0]",
@@ -264,4 +268,4 @@ def test_names_follow_the_vector():
         "psi_lever*r[1]",
     )
     assert names[-7:-4] == ("softening[0,0]", "softening[1,0]", "softening[1,1]")
-    assert not any("fixture" in name for name in names)
+    assert not any("place" in name for name in names)

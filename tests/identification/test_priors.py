@@ -20,8 +20,8 @@ UNIT = 30.0  # of the damping factor [sqrt(rad/s)]
 LAYOUTS = {
     "one mode": flange_layout(1),
     "two axes": flange_layout(2, 4),
-    "fixture": Layout((AxisLayout(3, fixture=True),), coefficients=2),
-    "everything": Layout((AxisLayout(2, True, True), AxisLayout(3, True, True)), coefficients=3, clampings=2),
+    "fixture": Layout((AxisLayout(3, places=1),), coefficients=2),
+    "everything": Layout((AxisLayout(2, 1, True), AxisLayout(3, 1, True)), coefficients=3, clampings=2),
 }
 SPREADS = (0.05, 0.1, 3.0)
 
@@ -47,7 +47,7 @@ def naive(theta, layout, priors, coefficients):
                 k += 1
         total += sum((r / priors.residual) ** 2 for r in theta[k : k + 3])
         k += 3
-        if axis.fixture:
+        for _ in range(axis.places):
             total += sum((p / priors.shape) ** 2 for p in theta[k : k + m])
             # a product of two factors, not a factor
             total += sum((r / priors.residual**2) ** 2 for r in theta[k + m : k + m + 2])
@@ -116,5 +116,5 @@ def test_wider_priors_fill_more():
     assert prior_rows(flange_layout(3), narrow).log_volume - prior_rows(flange_layout(3), wide).log_volume == pytest.approx(
         2.0 * 6 * np.log(10.0)
     )
-    fixture = Layout((AxisLayout(3, fixture=True),))
+    fixture = Layout((AxisLayout(3, places=1),))
     assert prior_rows(fixture, narrow).log_volume - prior_rows(fixture, wide).log_volume == pytest.approx(2.0 * 9 * np.log(10.0))

@@ -71,15 +71,15 @@ def test_starts_spread_over_the_band(misfit):
 
 def test_sorting_by_frequency_is_the_same_machine(misfit):
     theta = machine_vector((2600.0, 600.0, 1400.0), seed=3)
-    turned = _by_frequency(theta, 3)
+    turned = _by_frequency(theta, flange_layout(3))
     nuisance = np.zeros((len(misfit.data.cut_ids), 2))
     models = [misfit.evaluate(v, flange_layout(3), nuisance).models[0] for v in (theta, turned)]
     np.testing.assert_allclose(models[0], models[1], rtol=1e-9)
     assert np.all(np.diff(turned[:3]) > 0.0)
-    np.testing.assert_array_equal(_by_frequency(turned, 3), turned)
+    np.testing.assert_array_equal(_by_frequency(turned, flange_layout(3)), turned)
 
 
 def test_damping_lost_to_rounding_stops_nothing(misfit):
     theta = machine_vector((2600.0, 600.0, 1400.0), seed=3)
     theta[9:15] = [-30.0, 2.0, -40.0, 2.0, 0.0, -50.0]
-    assert np.all(np.isfinite(_by_frequency(theta, 3)))
+    assert np.all(np.isfinite(_by_frequency(theta, flange_layout(3))))

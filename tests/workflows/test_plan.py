@@ -33,7 +33,7 @@ def machine_of(deviation=0.05, seed=1):
         natural = 2.0 * np.pi * shift * np.array([150.0, 950.0, 1750.0, 3300.0])
         shapes = np.array([[0.08, 0.05], [0.14, 0.12], [0.18, -0.2], [0.15, 0.4]])
         factor = np.diag(np.sqrt(2.0 * 0.05 * natural))
-        physics = AxisParameters(natural, shapes, factor, np.diag([2e-5, 3e-5]), np.zeros(4), np.zeros(2), np.zeros((0, 0)))
+        physics = AxisParameters(natural, shapes, factor, np.diag([2e-5, 3e-5]), np.zeros((4, 0)), np.zeros((0, 2)), np.zeros((0, 0)))
         theta = np.concatenate([pack(physics), np.log([3e9, 6e6, 2e3, 10.0])])
         own = deviation * np.exp(rng.uniform(-2.0, 0.0, theta.size))
         posterior = Posterior(theta, np.diag(own**2), AxisLayout(4))

@@ -56,8 +56,8 @@ class CoupledData:
 
 
 def couplable(data: IdentificationData) -> bool:
-    """Whether both planes can be fitted together: lines of X and Y with as many outputs, and both forces in each."""
-    if tuple(a.axis for a in data.axes) != (Dof.X, Dof.Y) or len({a.outputs for a in data.axes}) > 1:
+    """Whether both planes can be fitted together: the flange's lines in X and Y with as many outputs, and both forces in each."""
+    if tuple(a.axis for a in data.axes) != (Dof.X, Dof.Y) or len({a.outputs for a in data.axes}) > 1 or not data.of_flange:
         return False
     return all(a.across.size == a.omega.size for a in data.axes)
 

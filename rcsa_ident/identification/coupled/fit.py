@@ -214,7 +214,7 @@ def _side_by_side(data: CoupledData, searched: list[AxisSearch]) -> Apart:
 def _flange_alone(apart: Candidate) -> Apart:
     """The fit of both planes without fixture and tooth angles."""
     old, theta = planes(apart.layout), apart.theta
-    layout = Layout(tuple(replace(axis, fixture=False) for axis in old.axes), old.coefficients)
+    layout = Layout(tuple(replace(axis, places=0) for axis in old.axes), old.coefficients)
     parts = [plane_pack(plane_unpack(theta[old.axis(i)], old.axes[i]), axis) for i, axis in enumerate(layout.axes)]
     return np.concatenate([*parts, theta[old.joint], theta[old.force]]), layout, apart.nuisance
 

@@ -20,7 +20,7 @@ import numpy as np
 from rcsa_ident.arrays import FloatArray, frozen
 from rcsa_ident.identification.parameters import (
     DAMPING_UNIT,
-    FIXTURE_UNIT,
+    PLACE_UNIT,
     RESIDUAL_UNIT,
     AxisParameters,
     Unknowns,
@@ -237,7 +237,7 @@ def unpack(part: FloatArray, layout: CoupledLayout) -> CoupledParameters:
     fixture, fixture_residual, softening = np.zeros((m, 2)), np.zeros((2, DIRECTIONS)), np.zeros((0, 0))
     if layout.fixture:
         fixture = part[layout.fixture_shapes].reshape(m, 2)
-        fixture_residual = FIXTURE_UNIT * part[layout.fixture_residual].reshape(2, DIRECTIONS)
+        fixture_residual = PLACE_UNIT * part[layout.fixture_residual].reshape(2, DIRECTIONS)
     if layout.softening:
         softening = np.zeros((m, m))
         softening[rows, cols] = softening[cols, rows] = part[layout.softenings]
@@ -275,7 +275,7 @@ def pack(machine: CoupledParameters, layout: CoupledLayout, discs: FloatArray | 
     residual = machine.residual[np.tril_indices(DIRECTIONS)] / RESIDUAL_UNIT
     parts = [np.log(machine.omega_n), machine.psi.ravel(), lower, residual]
     if layout.fixture:
-        parts += [machine.fixture.ravel(), machine.fixture_residual.ravel() / FIXTURE_UNIT]
+        parts += [machine.fixture.ravel(), machine.fixture_residual.ravel() / PLACE_UNIT]
     if layout.softening:
         parts.append(machine.softening[rows, cols] if machine.softening.size else np.zeros(layout.pairs))
     if layout.skew == EVERY_PAIR:
@@ -291,7 +291,7 @@ def chain(machine: CoupledParameters, layout: CoupledLayout) -> FloatArray:
     factor = np.where(diagonal, machine.factor[rows, cols], DAMPING_UNIT)
     parts = [np.ones((1 + DIRECTIONS) * machine.order), factor, np.full(_RESIDUAL, RESIDUAL_UNIT)]
     if layout.fixture:
-        parts += [np.ones(2 * machine.order), np.full(2 * DIRECTIONS, FIXTURE_UNIT)]
+        parts += [np.ones(2 * machine.order), np.full(2 * DIRECTIONS, PLACE_UNIT)]
     return np.concatenate([*parts, np.ones(layout.tail - layout.softenings.start)])
 
 
@@ -318,11 +318,12 @@ def side_by_side(x: AxisParameters, y: AxisParameters) -> CoupledParameters:
     m, first = x.order + y.order, x.order
     psi, fixture = np.zeros((m, DIRECTIONS)), np.zeros((m, 2))
     psi[:first, :2], psi[first:, 2:] = x.psi, y.psi
-    fixture[:first, 0], fixture[first:, 1] = x.fixture, y.fixture
     factor, residual, fixture_residual = np.zeros((m, m)), np.zeros((DIRECTIONS, DIRECTIONS)), np.zeros((2, DIRECTIONS))
     factor[:first, :first], factor[first:, first:] = x.factor, y.factor
     residual[:2, :2], residual[2:, 2:] = x.residual, y.residual
-    fixture_residual[0, :2], fixture_residual[1, 2:] = x.fixture_residual, y.fixture_residual
+    if x.places.size and y.places.size:
+        fixture[:first, 0], fixture[first:, 1] = x.places[:, 0], y.places[:, 0]
+        fixture_residual[0, :2], fixture_residual[1, 2:] = x.place_residual[0], y.place_residual[0]
     softening = np.zeros((0, 0))
     if x.softening.size:
         softening = np.zeros((m, m))

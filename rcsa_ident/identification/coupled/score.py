@@ -54,7 +54,7 @@ def coupled_start(theta: FloatArray, layout: Layout, skew: int = 0, turning: int
         As in `CoupledLayout`.
     """
     axes = [unpack(theta[layout.axis(i)], part) for i, part in enumerate(layout.axes)]
-    fixture, softening = (all(getattr(part, name) for part in layout.axes) for name in ("fixture", "softening"))
+    fixture, softening = (all(getattr(part, name) for part in layout.axes) for name in ("places", "softening"))
     modes = sum(layout.modes_of_axes)
     coupled = CoupledLayout(modes, fixture, softening, skew, turning, layout.coefficients, layout.clampings)
     return np.concatenate([pack(side_by_side(*axes), coupled), theta[layout.tail :]]), coupled

@@ -19,7 +19,7 @@ from rcsa_ident.identification.coupled.parameters import (
     unpack,
 )
 from rcsa_ident.identification.coupled.posterior import CoupledUnknowns
-from rcsa_ident.identification.data import LEVER
+from rcsa_ident.identification.data import FLANGE_ALONE, GAP_AND_FIXTURE, LEVER
 from rcsa_ident.identification.parameters import AxisLayout, Layout, joint_of, scaled_joint
 from rcsa_ident.identification.parameters import unpack as unpack_axis
 from rcsa_ident.machine.mode_synthesis import FLANGE
@@ -197,7 +197,7 @@ def test_a_change_of_the_flange_moves_a_line_by_what_it_feels(outputs):
 @pytest.mark.parametrize("softening", [False, True])
 @pytest.mark.parametrize("outputs", [1, 2])
 def test_planes_that_feel_nothing_of_each_other_are_those_of_the_kernel_of_one(outputs, softening):
-    layout = Layout((AxisLayout(3, outputs == 2, softening), AxisLayout(2, outputs == 2, softening)))
+    layout = Layout((AxisLayout(3, outputs - 1, softening), AxisLayout(2, outputs - 1, softening)))
     theta = vector_of(layout, ((600.0, 1400.0, 2500.0), (900.0, 2100.0)))
     joint = scaled_joint(theta[layout.joint])
     at = points(9, symmetric=True)
@@ -217,9 +217,9 @@ def test_planes_that_feel_nothing_of_each_other_are_those_of_the_kernel_of_one(o
         values = np.empty((own.size, outputs), dtype=complex)
         size = layout.axes[i].size + 4
         gradient = np.empty((own.size, outputs, size), dtype=complex)
-        psi, residual = np.column_stack([plane_of.psi, plane_of.fixture]), np.vstack([plane_of.residual, plane_of.fixture_residual])
         points_of = np.stack([at.omega[own], at.x[own], np.ones(own.size), np.zeros(own.size)], axis=1)
-        machine = plane_of.omega_n, psi, plane_of.factor, plane_of.softening, residual, joint
+        shares = FLANGE_ALONE if outputs == 1 else GAP_AND_FIXTURE
+        machine = plane_of.omega_n, plane_of.shapes, plane_of.factor, plane_of.softening, joint, shares
         cross_frf(*machine, points_of, holder, values, gradient)
         force = at.force[own, i, None]
         np.testing.assert_allclose(lines.parts[:, :, i], values * force, rtol=1e-12, atol=1e-13 * np.abs(values * force).max())

@@ -113,7 +113,7 @@ def test_two_planes_side_by_side_are_what_each_is_alone(tables, fixture):
     """Where nothing is felt across, and tool-holders are asked as if they stood, the model is that of `Misfit`."""
     points = tables[2 if fixture else 1]
     data = points.base
-    layout = Layout((AxisLayout(3, fixture, True), AxisLayout(2, fixture, True)), len(data.coefficient_spread), data.clampings)
+    layout = Layout((AxisLayout(3, int(fixture), True), AxisLayout(2, int(fixture), True)), len(data.coefficient_spread), data.clampings)
     theta = vector_of(layout, ((600.0, 1400.0, 2500.0), (900.0, 2100.0)))
     apart = Misfit(data, Priors(), SHARES).models(theta, layout)
     for skew in (0, EVERY_PAIR):

@@ -25,7 +25,7 @@ def test_jacobian_against_differences(layout):
 
 def test_planes_that_feel_nothing_are_as_probable_as_apart():
     """Each plane's own unknowns have the priors that they had; what is felt across stands at its centre, and costs nothing."""
-    layout = Layout((AxisLayout(3, True, True), AxisLayout(2, True, True)), 2, 1)
+    layout = Layout((AxisLayout(3, 1, True), AxisLayout(2, 1, True)), 2, 1)
     theta = vector_of(layout, ((600.0, 1400.0, 2500.0), (900.0, 2100.0)))
     vector, whole = coupled_start(theta, layout, EVERY_PAIR)
     apart = prior_rows(layout, Priors(), (0.05, 3.0)).residual(theta)

@@ -118,7 +118,7 @@ def test_gain_is_that_of_one_step_of_least_squares(all_cuts):
 
 
 def test_the_start_is_the_same_machine():
-    layout = Layout((AxisLayout(3, True, True), AxisLayout(2, True, True)), 3, 2)
+    layout = Layout((AxisLayout(3, 1, True), AxisLayout(2, 1, True)), 3, 2)
     theta = vector_of(layout, FREQUENCIES)
     vector, whole, oblique, turning = across(theta, layout)
     # everything that is not felt across is there once, in some place
@@ -126,7 +126,7 @@ def test_the_start_is_the_same_machine():
     assert (whole.modes, whole.fixture, whole.softening, whole.coefficients, whole.clampings) == (5, True, True, 3, 2)
     np.testing.assert_array_equal(vector[whole.tail :], theta[layout.tail :])
     # one axis that does not change with speed, or has no fixture, leaves the whole without
-    fewer = replace(layout, axes=(AxisLayout(3, True), AxisLayout(2, False, True)))
+    fewer = replace(layout, axes=(AxisLayout(3, 1), AxisLayout(2, 0, True)))
     _, whole = coupled_start(vector_of(fewer, FREQUENCIES), fewer)
     assert not whole.fixture
     assert not whole.softening
