@@ -39,7 +39,7 @@ from benchmarks.machines import (
     under,
 )
 from benchmarks.page import DOCS, append_row, draw_study, read_rows, write_block, write_rows
-from benchmarks.study_table import coupled_table, line, table
+from benchmarks.study_table import coupled_table, line, sensors_table, table
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import WIDE, NoiseWeightedCost, PaperGeneticAlgorithm
@@ -251,7 +251,8 @@ def main(arguments: Sequence[str]) -> None:
     for name, members in kinds.items():
         if not members:
             continue
-        text = coupled_table(members) if is_coupled(members[0]["machine"]) else table(members)
+        kind = sensors_table if name == "sensors" else coupled_table if is_coupled(members[0]["machine"]) else table
+        text = kind(members)
         print(f"\n{text}")
         if given.page:
             write_rows(DOCS / ("study.jsonl" if name == "study" else f"study_{name}.jsonl"), members)

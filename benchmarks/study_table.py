@@ -112,17 +112,24 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
             f"{number['good']} are good (at most {AIMS['similar']} similar and {AIMS['different']} different holder); "
             f"{number['good but suspect']} of these are called suspect.",
             "",
-            "| machine | condition | seed | similar X | Y | different X | Y | status | model error X | Y | modes | seconds |",
-            "|---|---|---|---|---|---|---|---|---|---|---|---|",
         ]
-    for row in rows:
-        if row["method"] == "default":
-            errors = [f"{e:.4f}" for kind in AIMS for e in row[kind]["errors"]]
-            shares = [f"{100 * e:.2f} %" for e in row["model_error"]]
-            modes, seconds = ", ".join(str(m) for m in row["modes"]), f"{sum(row['seconds'].values()):.1f}"
-            cells = [row["machine"], row["condition"], str(row["seed"]), *errors, row["status"], *shares, modes, seconds]
-            lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join([*lines, "", *_doubts([r for r in rows if r["method"] == "default"])]).rstrip() + "\n"
+    return "\n".join([*lines, *_every_run(rows)]).rstrip() + "\n"
+
+
+def _every_run(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Every run of the default method, and the reasons for doubt."""
+    lines = [
+        "| machine | condition | seed | similar X | Y | different X | Y | status | model error X | Y | modes | seconds |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    members = [row for row in rows if row["method"] == "default"]
+    for row in members:
+        errors = [f"{e:.4f}" for kind in AIMS for e in row[kind]["errors"]]
+        shares = [f"{100 * e:.2f} %" for e in row["model_error"]]
+        modes, seconds = ", ".join(str(m) for m in row["modes"]), f"{sum(row['seconds'].values()):.1f}"
+        cells = [row["machine"], row["condition"], str(row["seed"]), *errors, row["status"], *shares, modes, seconds]
+        lines.append("| " + " | ".join(cells) + " |")
+    return [*lines, "", *_doubts(members)] if members else []
 
 
 def _doubts(rows: Sequence[dict[str, Any]]) -> list[str]:
@@ -132,6 +139,36 @@ def _doubts(rows: Sequence[dict[str, Any]]) -> list[str]:
         for reason in r["reasons"]:
             said.setdefault(str(reason), []).append(f"{r['machine']}, {r['condition']}")
     return [f"- {'; '.join(runs)}: {reason}" for reason, runs in said.items()]
+
+
+#: What the sensors of a condition are, for people who decide what to buy.
+_SENSORS = {
+    "three-toolings": "displacement of the flange, and accelerometers on its fixture",
+    "housing": "accelerometers on the housing alone, level with the flange's face",
+    "housing-two": "the same, two toolings",
+    "housing-rear": "accelerometers on the housing alone, 350 mm behind the flange's face",
+    "housing-loud": "accelerometers on the housing alone, in a workshop and a machine as loud as a real one",
+}
+
+
+def sensors_table(rows: Sequence[dict[str, Any]]) -> str:
+    """Return what sensors reach as Markdown: errors of a tooling in a holder that never cut and of those that cut, bands and status."""
+    lines = [
+        "| sensors for X and Y | condition | machines | never cut: median | worst | cut: median | worst | in the 90 % band | converged |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for condition, words in _SENSORS.items():
+        group = [row for row in rows if row["condition"] == condition]
+        if not group:
+            continue
+        cells = [words, f"`{condition}`", str(len(group))]
+        for kind in ("different", "cut"):
+            errors = np.array([e for row in group for e in row[kind]["errors"]])
+            cells += [f"{np.median(errors):.4f}", f"{errors.max():.4f}"]
+        bands = [row["different"]["bands"]["90"] for row in group if row["different"]["bands"]]
+        converged = sum(row["status"] == "converged" for row in group)
+        lines.append("| " + " | ".join([*cells, f"{100 * np.mean(bands):.0f} %", f"{converged} of {len(group)}"]) + " |")
+    return "\n".join([*lines, "", *_every_run(rows)]).rstrip() + "\n"
 
 
 def coupled_table(rows: Sequence[dict[str, Any]]) -> str:

@@ -64,7 +64,8 @@ def check(campaign_dir: CampaignFolder, processes: Processes = None, dask: Dask 
     rows, open_, remarks = recording_rows(readings), left_open(campaign, readings), campaign.remarks
     usable = sum(row.usable for row in rows)
     # each window of a pass is a cut of its own
-    few = too_few(each.tooling for each in readings for _ in each.measurements)
+    of_flange = not any(measurement.housing for each in readings for measurement in each.measurements)
+    few = too_few((each.tooling for each in readings for _ in each.measurements), of_flange)
     if json_:
         told = {"campaign": campaign.name, "cuts": len(rows), "usable": usable, "too_few": few}
         told |= {"left_open": list(open_), "warnings": list(remarks)}

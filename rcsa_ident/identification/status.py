@@ -20,9 +20,17 @@ class Status(StrEnum):
     FAILED = "failed"
 
 
-def too_few(toolings: Iterable[str]) -> str | None:
-    """Return a sentence where the usable cuts, each told by its tooling, are too few for an answer without doubts, else None."""
-    enough = sum(count >= FEWEST_CUTS for count in Counter(toolings).values())
-    if enough >= FEWEST_TOOLINGS:
+def too_few(toolings: Iterable[str], of_flange: bool = True) -> str | None:
+    """Return a sentence where the usable cuts are too few for an answer without doubts, else None.
+
+    Parameters
+    ----------
+    toolings : iterable of str
+        Of each usable cut.
+    of_flange : bool
+        Whether sensors see the flange; accelerometers on the housing alone do not.
+    """
+    needed, words = (FEWEST_TOOLINGS, "two toolings") if of_flange else (FEWEST_OF_HOUSING, "three toolings, as no sensor sees the flange,")
+    if sum(count >= FEWEST_CUTS for count in Counter(toolings).values()) >= needed:
         return None
-    return f"Too few for an identification that can be relied on: it needs two toolings with {FEWEST_CUTS} usable cuts each, better 20."
+    return f"Too few for an identification that can be relied on: it needs {words} with {FEWEST_CUTS} usable cuts each, better 20."

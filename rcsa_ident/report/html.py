@@ -125,7 +125,7 @@ def report_html(
         ],
         both=None if found.whole is None else _both(found, deviations),
         notes=[note for note in found.notes if note != found.coupling],
-        moved="housing" if says(found.notes, IdentificationCode.HOUSING_ALONE) else "flange",
+        moved="housing" if says(found.reasons, IdentificationCode.HOUSING_ALONE) else "flange",
         scales=coefficient_rows(found.coefficients),
         has_std=bool(deviations),
         softening=any(part.posterior is not None and part.posterior.layout.softening for part in found.axes.values())

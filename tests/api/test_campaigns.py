@@ -39,6 +39,12 @@ def test_formats_are_those_of_the_readers():
     assert set(FORMATS) == set(READERS)
 
 
+def test_without_a_sensor_at_the_flange_three_toolings_are_wanted(client, machine):
+    keys = declared(2)
+    keys["sensors"] = {name: sensor for name, sensor in keys["sensors"].items() if sensor["quantity"] == "acceleration"}
+    assert client.make_campaign(machine, keys).too_few == too_few([], of_flange=False)
+
+
 def test_a_campaign_from_making_to_forgetting(client, machine):
     made = client.make_campaign(machine, declared(2))
     assert (made.name, made.machine, made.usable, made.toolings) == ("by hand", machine, 0, ["T1"])

@@ -438,10 +438,19 @@ def test_passes_are_searched_until_two_searches_agree_and_the_likeliest_answer_c
         answer = replace(by_hand.identification(), method=str(evidence))
         return SimpleNamespace(evidence=evidence, solution=solution, answer=lambda seed, name: answer)
 
+    coupled = []
+
+    def felt(method, data, fit, *rest):
+        coupled.append(fit)
+        return fit
+
     monkeypatch.setattr(EvidenceSelection, "_found", found)
+    monkeypatch.setattr(EvidenceSelection, "_asked", felt)
     assert EvidenceSelection().run(data, 1).method == str(chosen)
     assert len(asked) == searches
     # the first one takes the lines as they are, each later one those that an answer has freed, from starts of its own
     assert asked[0] is data
     assert all(np.any(freed.axes[0].lines != data.axes[0].lines) for freed in asked[1:])
     assert len(sequences) == 1
+    # whether planes feel each other is asked once, of the answer that counts
+    assert [fit.evidence for fit in coupled] == [chosen]

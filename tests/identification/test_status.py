@@ -15,3 +15,8 @@ def test_two_toolings_with_enough_cuts_each(first, second, enough):
     found = too_few(["A"] * first + ["B"] * second)
     assert (found is None) is enough
     assert enough or "two toolings with 8 usable cuts each" in found
+
+
+def test_where_no_sensor_sees_the_flange_three():
+    assert "three toolings" in too_few(["A", "B"] * FEWEST_CUTS, of_flange=False)
+    assert too_few(["A", "B", "C"] * FEWEST_CUTS, of_flange=False) is None

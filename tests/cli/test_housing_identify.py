@@ -1,0 +1,66 @@
+"""The sample runs as accelerometers alone have recorded them, from files to a tool that was never cut."""
+
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import rcsa_ident as ri
+from rcsa_ident.cli import app
+from rcsa_ident.io.machines import read_machine
+from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.virtual.rotor import frequency_response, rotor
+from tests.fixtures.paths import MACHINES, SAMPLES
+
+OMEGA = 2.0 * np.pi * np.arange(600.0, 4001.0, 5.0)
+AXES = ("x", "y")
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(each) for each in arguments])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The sample runs whose displacement sensors nobody told of: the accelerometers of their fixture stand on the housing."""
+    folder = tmp_path_factory.mktemp("housing") / "campaign"
+    shutil.copytree(SAMPLES, folder)
+    path = folder / "campaign.toml"
+    text, count = re.subn(r"\[sensors\.flange_[xy]\]\n(?:\w.*\n)+", "", path.read_text())
+    assert count == 2
+    path.write_text(text)
+    return folder
+
+
+@pytest.mark.slow(seconds=25)
+def test_from_accelerometers_to_a_tool_that_was_never_cut(folder, tmp_path):
+    found = run("identify", folder, "--out", tmp_path / "R.json", "--report", tmp_path / "R.html")
+    assert found.exit_code == 0, found.output
+    assert "suspect: no sensor sees the flange" in found.output
+    assert "only 2 toolings" in found.output
+    told = json.loads((tmp_path / "R.json").read_text())
+    assert told["status"] == "suspect"
+    assert "flange over tip force" not in (tmp_path / "R.html").read_text()
+    assert "housing over tip force" in (tmp_path / "R.html").read_text()
+    machine, true = ri.read_result(tmp_path / "R.json").machine, read_machine(MACHINES / "hpm.toml")
+    # those that cut, and one in a holder that never did
+    for path, most in ((true.toolings[0], 0.02), (true.toolings[1], 0.02), (true.truth_toolings[1], 0.1)):
+        tooling = read_tooling(path)
+        tip = machine.tip(tooling, OMEGA)
+        values = frequency_response(rotor(true.spindle, tooling.assembly), OMEGA, 14000.0 * np.pi / 30.0, ("tip.x", "tip.y"))
+        for i, axis in enumerate(AXES):
+            error = tip.between(f"tip.{axis}", f"tip.{axis}") - values[:, i, i]
+            assert np.linalg.norm(error) < most * np.linalg.norm(values[:, i, i]), (tooling.name, axis)
+
+
+def test_check_says_what_such_a_cut_tells(folder):
+    found = run("check", folder, "--json")
+    assert found.exit_code == 0, found.output
+    told = json.loads(found.stdout)
+    assert told["usable"] == told["cuts"] == len(told["recordings"]) == 80
+    notes = {note for recording in told["recordings"] for note in recording["notes"]}
+    assert notes == {"the motion of the spindle's housing, from its acceleration: the flange's own motion follows from several toolings"}
+    assert "it needs three toolings" in told["too_few"]
