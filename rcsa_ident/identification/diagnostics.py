@@ -34,8 +34,8 @@ MOST_BAD_CUTS = 0.1
 LEAST_SIGNAL = 3.0
 #: A posterior narrower than this share of its prior was told by the data.
 INFORMED = 0.5
-#: Said where nothing sees the flange: with three toolings a holder that never cut came out wrong by about 2 % on ten virtual machines, but on
-#: four of them by 4 to 22 %, and their lines did not show it.
+#: Said where nothing sees the flange: with three toolings a holder that never cut came out wrong by about 2 % on ten virtual machines, but
+#: on four of them by 4 to 22 %, and their lines did not show it.
 HOUSING_ALONE = (
     "no sensor sees the flange: its receptance follows from how poles and zeros on the housing move from tooling to tooling, and tools in "
     "holders unlike those that cut may come out wrong by ten per cent and more; a displacement sensor at the flange settles it"
