@@ -99,7 +99,7 @@ CONDITIONS = {
     "workshop-loud": Condition(disturbances=replace(WORKSHOP, machine_noise=3.4), clock="exactly"),
 }
 #: What sensors reach, side by side: see docs/study.md.
-SENSORS = ("three-toolings", "housing", "housing-two", "housing-rear", "housing-loud")
+SENSOR_TESTS = ("three-toolings", "housing", "housing-two", "housing-rear", "housing-loud")
 #: Those of the study; the others are asked for by name.
 USUAL = ("trigger", "no-trigger", "noise-x3")
 #: Toolings that cut, and those that never do: one in a holder that cut, one in another.

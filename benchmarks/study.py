@@ -27,7 +27,7 @@ from typing import Any
 from benchmarks.comparison import compared, compared_at_speeds
 from benchmarks.machines import (
     CONDITIONS,
-    SENSORS,
+    SENSOR_TESTS,
     TURNED_SAMPLE,
     USUAL,
     Condition,
@@ -241,7 +241,7 @@ def main(arguments: Sequence[str]) -> None:
     print(f"scratch folder: {scratch}", flush=True)
     rows = run(scratch, named(given.machines), given.conditions, given.methods, given.seeds, given.processes)
     kinds = {
-        "sensors": [row for row in rows if row["condition"] in SENSORS],
+        "sensors": [row for row in rows if row["condition"] in SENSOR_TESTS],
         "study": [row for row in rows if not is_coupled(row["machine"]) and row["condition"] in USUAL],
         "workshop": [row for row in rows if not is_coupled(row["machine"]) and row["condition"].startswith("workshop")],
         "passes": [row for row in rows if not is_coupled(row["machine"]) and row["condition"].startswith("passes")],

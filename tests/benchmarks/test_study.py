@@ -7,9 +7,10 @@ import pytest
 
 from benchmarks import comparison, search_trace, study, yardstick
 from benchmarks.comparison import BANDS, FREQUENCY, compared, compared_at_speeds, coverage, in_deviations, relative_error
+from benchmarks.machines import CONDITIONS, SENSOR_TESTS
 from benchmarks.page import read_rows
 from benchmarks.study import INSIDE, Run, planned
-from benchmarks.study_table import counts, coupled_table, line, table
+from benchmarks.study_table import counts, coupled_table, line, sensors_table, table
 from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
@@ -213,6 +214,20 @@ def test_the_table_of_coupled_machines_holds_their_cross_terms():
     assert "Of 2 runs, 0 are `converged` with an error above 0.05" in text
     assert "- coupled-202, no-trigger: a doubt" in text
     assert "XY over direct, over own 0.0020  0.0400" in line(rows[0])
+
+
+def test_every_set_of_sensors_has_its_row():
+    errors = {name: 0.001 * (k + 1) for k, name in enumerate(SENSOR_TESTS)}
+    rows = [row("1", [0.001], [value], "suspect", condition=name) for name, value in errors.items()]
+    rows = [{**each, "cut": {"errors": [0.002, 0.004], "bands": None}} for each in rows]
+    for each in rows:
+        each["different"]["bands"] = {"50": 0.5, "90": 0.75, "rms": 1.0}
+    found = sensors_table(rows).splitlines()
+    for name, value in errors.items():
+        assert name in CONDITIONS
+        (line_of,) = [text for text in found if f"`{name}`" in text]
+        cells = [cell.strip() for cell in line_of.split("|")[3:-1]]
+        assert cells == ["1", f"{value:.4f}", f"{value:.4f}", "0.0030", "0.0040", "75 %", "0 of 1"]
 
 
 def test_the_published_method_is_not_run_on_coupled_machines():
