@@ -40,6 +40,7 @@ from benchmarks.machines import (
 )
 from benchmarks.page import DOCS, append_row, draw_study, read_rows, write_block, write_rows
 from benchmarks.study_table import coupled_table, line, sensors_table, table
+from rcsa_ident.errors import InputError
 from rcsa_ident.identification.data import IdentificationData
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import WIDE, NoiseWeightedCost, PaperGeneticAlgorithm
@@ -150,13 +151,17 @@ def warm() -> None:
         step()
 
 
-def perform(scratch: Path, run: Run) -> dict[str, Any]:
-    """Identify a campaign from its files and compare the result with the truth."""
+def perform(scratch: Path, run: Run) -> dict[str, Any] | None:
+    """Identify a campaign from its files and compare the result with the truth; None where what is usable of it is refused."""
     warm()
     folder = campaign_folder(scratch, run.machine, run.condition)
     setup = machine_of(scratch, run.machine)
     begin = time.perf_counter()
-    campaign, readings, data = read_data(folder, CONDITIONS[run.condition])
+    try:
+        campaign, readings, data = read_data(folder, CONDITIONS[run.condition])
+    except InputError as error:
+        print(f"{run.name}: refused: {error}", flush=True)
+        return None
     read = time.perf_counter()
     found = METHODS[run.method].run(data, run.seed, map)
     done = time.perf_counter()
@@ -198,7 +203,7 @@ def run(
     seeds: Sequence[int] = (1,),
     processes: int = 1,
 ) -> list[dict[str, Any]]:
-    """Return a row for every run, in order; rows that ``results.jsonl`` in `scratch` holds are not computed again."""
+    """Return a row for every run that is not refused, in order; rows that ``results.jsonl`` in `scratch` holds are not computed again."""
     scratch.mkdir(parents=True, exist_ok=True)
     path = scratch / "results.jsonl"
     known = {run_of(r): r for r in read_rows(path)}
@@ -210,10 +215,12 @@ def run(
         for folder in mapper(partial(_simulated, scratch), campaigns):
             print(f"campaign: {folder}", flush=True)
         for row in mapper(partial(perform, scratch), todo):
+            if row is None:
+                continue
             append_row(path, row)
             known[run_of(row)] = row
             print(line(row), flush=True)
-    return [known[r] for r in runs]
+    return [known[r] for r in runs if r in known]
 
 
 def _simulated(scratch: Path, campaign: tuple[str, str]) -> str:

@@ -15,6 +15,7 @@ from rcsa_ident.coupling.joint import LumpedJoint
 from rcsa_ident.dynamics.coordinates import Dof, plane
 from rcsa_ident.dynamics.modal import ModalModel
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
+from rcsa_ident.errors import InputError
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.search import SearchSettings
@@ -241,6 +242,19 @@ def test_every_run_is_planned_once():
     assert Run("1", "trigger", "paper, literal", 1) not in runs
     assert Run(INSIDE, "no-trigger", "paper, literal", 2) in runs
     assert all(r.condition == "no-trigger" for r in runs if r.machine == INSIDE)
+
+
+def test_a_study_goes_on_behind_a_campaign_that_is_refused(tmp_path, monkeypatch, capsys):
+    def read_data(folder, condition):
+        raise InputError("toolings", "one alone", "two")
+
+    monkeypatch.setattr(study, "warm", lambda: None)
+    monkeypatch.setattr(study, "machine_of", lambda scratch, name: None)
+    monkeypatch.setattr(study, "read_data", read_data)
+    monkeypatch.setattr(study, "campaign_folder", lambda scratch, *campaign: scratch / campaign[0])
+    assert study.run(tmp_path, ["1", "2"], ["trigger"], ["default"]) == []
+    assert capsys.readouterr().out.count("refused: toolings: found one alone") == 2
+    assert not (tmp_path / "results.jsonl").exists()
 
 
 def test_an_interrupted_study_goes_on(tmp_path, monkeypatch):
