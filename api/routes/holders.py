@@ -7,11 +7,11 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Query
 
 from api.conventions import guard, problems
-from api.schemas.holders import CatalogueAnswer, ChuckAnswer, Holders
-from api.schemas.toolings import HolderKeys
+from api.schemas.holders import CatalogueAnswer, ChuckAnswer, Holders, TypicalContactAnswer
+from api.schemas.toolings import ContactKeys, HolderKeys
 from api.security import Guarded
-from rcsa_ident.io.toolings import holder_keys
-from rcsa_ident.tool_holder.catalogue import bores, chucks, holder, tapers
+from rcsa_ident.io.toolings import contact_keys, holder_keys
+from rcsa_ident.tool_holder.catalogue import TypicalContact, bores, chucks, holder, tapers
 
 router = APIRouter(prefix="/holders", tags=["toolings"], route_class=Guarded)
 Named = Annotated[str, Path(pattern=r"^[A-Za-z0-9-]{1,20}$", description="As the catalogue lists it.")]
@@ -35,4 +35,18 @@ def get(
 ) -> CatalogueAnswer:
     found = holder(taper, chuck, bore_mm * 1e-3, None if length_mm is None else length_mm * 1e-3)
     keys = HolderKeys.model_validate(holder_keys(found))
-    return CatalogueAnswer(name=f"{taper} {chuck}", mass_kg=found.mass, sources=list(found.sources), holder=keys)
+    return CatalogueAnswer(
+        name=f"{taper} {chuck}", mass_kg=found.mass, sources=list(found.sources), holder=keys, contact=_typical(found.contact)
+    )
+
+
+def _typical(found: TypicalContact | None) -> TypicalContactAnswer | None:
+    if found is None:
+        return None
+    return TypicalContactAnswer(
+        kind=found.kind,
+        keys=ContactKeys.model_validate(contact_keys(found.contact)),
+        stiffness_spread_percent=100.0 * found.stiffness_spread,
+        damping_spread_percent=100.0 * found.damping_spread,
+        source=found.source,
+    )

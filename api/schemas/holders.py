@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from api.schemas.common import Answer
-from api.schemas.toolings import HolderKeys
+from api.schemas.toolings import ContactKeys, HolderKeys
 
 
 class ChuckAnswer(Answer):
@@ -23,6 +23,16 @@ class Holders(Answer):
     chucks: list[ChuckAnswer]
 
 
+class TypicalContactAnswer(Answer):
+    """What the contact of tool and holder is worth before anybody has measured it."""
+
+    kind: str = Field(description="How the chuck clamps.")
+    keys: ContactKeys
+    stiffness_spread_percent: float = Field(description="Standard deviation of the logarithm.")
+    damping_spread_percent: float
+    source: str
+
+
 class CatalogueAnswer(Answer):
     """A holder of the catalogue."""
 
@@ -30,3 +40,4 @@ class CatalogueAnswer(Answer):
     mass_kg: float = Field(description="With collet and nut, without the taper behind the spindle's face.")
     sources: list[str] = Field(description="Of the dimensions; what is typical is called so.")
     holder: HolderKeys
+    contact: TypicalContactAnswer | None = Field(description="null where nothing is known of this kind of chuck.")

@@ -131,8 +131,8 @@ def holders(
     ] = None,
     json_: Json = False,
 ) -> None:
-    """Print a holder of the catalogue as [holder] of a TOOLING.toml, or what there is."""
-    from rcsa_ident.io.toolings import holder_keys, tooling_text
+    """Print a holder of the catalogue as [holder] and [contact] of a TOOLING.toml, or what there is."""
+    from rcsa_ident.io.toolings import contact_keys, holder_keys, tooling_text
     from rcsa_ident.tool_holder.catalogue import bores, chucks, tapers
     from rcsa_ident.tool_holder.catalogue import holder as made
 
@@ -148,10 +148,22 @@ def holders(
         missing = "chuck" if chuck is None else "--bore-mm"
         raise InputError(missing, "nothing", "a taper, a chuck and --bore-mm, as HSK-A63 ER32 --bore-mm 12")
     found = made(taper, chuck, bore_mm * 1e-3, None if length_mm is None else length_mm * 1e-3)
-    if json_:
-        emit({"name": f"{taper} {chuck}", "mass_kg": found.mass, "sources": list(found.sources), "holder": holder_keys(found)})
+    keys, typical, spread = {"holder": holder_keys(found)}, found.contact, None
+    if typical is None:
+        told = f"contact, {chuck}: no value is known; a hit on the tip of the clamped tool and rcsa-ident contact tell it"
     else:
-        say(tooling_text({"holder": holder_keys(found)}, (str(found), *found.sources)).rstrip())
+        keys["contact"] = contact_keys(typical.contact)
+        spread = {"stiffness_percent": 100.0 * typical.stiffness_spread, "damping_percent": 100.0 * typical.damping_spread}
+        told = (
+            f"contact, {typical.kind}: {typical.source} (standard deviation of its stiffness {spread['stiffness_percent']:g} %, "
+            f"of its damping {spread['damping_percent']:g} %)"
+        )
+    sources = (*found.sources, told)
+    if json_:
+        name = f"{taper} {chuck}"
+        emit({"name": name, "mass_kg": found.mass, "sources": list(sources), "contact": None, **keys, "contact_spread": spread})
+    else:
+        say(tooling_text(keys, (str(found), *sources)).rstrip())
 
 
 def _contact(path: Path | None) -> Contact | None:

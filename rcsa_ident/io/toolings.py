@@ -13,7 +13,7 @@ from rcsa_ident.io.files import write_text
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.catalogue import CatalogueHolder
-from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Material
+from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material
 
 _CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
 
@@ -44,7 +44,7 @@ def tooling_keys(tooling: Tooling) -> dict[str, Any]:
     if cutter.corner_radius:
         data["cutter"]["corner_radius_mm"] = 1e3 * cutter.corner_radius
     if assembly.contact is not None:
-        data["contact"] = {key: getattr(assembly.contact, key) for key in _CONTACT}
+        data["contact"] = contact_keys(assembly.contact)
     own = {name: material for name, material in materials.items() if name not in MATERIALS}
     return data | ({"materials": {name: _material(material) for name, material in own.items()}} if own else {})
 
@@ -53,6 +53,11 @@ def holder_keys(holder: CatalogueHolder) -> dict[str, Any]:
     """Return a holder of the catalogue as `holder` of a tooling file, in millimetres."""
     names = {material: name for name, material in MATERIALS.items()}
     return {"insertion_mm": 1e3 * holder.insertion, "segments": [_segment(s, names) for s in holder.segments]}
+
+
+def contact_keys(contact: Contact) -> dict[str, float]:
+    """Return a contact as `contact` of a tooling file, per metre of insertion in SI units."""
+    return {key: getattr(contact, key) for key in _CONTACT}
 
 
 def tooling_text(data: Mapping[str, Any], notes: Sequence[str] = ()) -> str:

@@ -4,19 +4,42 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib.resources import files
 from typing import Any
 
 from rcsa_ident.errors import InputError, positive
 from rcsa_ident.shown import Shown
-from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment
+from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact
 
 #: Least length of a chuck's body in front of the flange [m].
 _LEAST_BODY = 5e-3
 #: Nobody makes a chuck whose nose is wider than so many diameters of the taper's flange.
 _WIDEST = 1.4
+
+
+@dataclass(frozen=True, slots=True)
+class TypicalContact:
+    """What the contact of tool and holder is worth before anybody has measured it.
+
+    Parameters
+    ----------
+    kind : str
+        How the chuck clamps, as ``collet``.
+    contact : Contact
+        Per metre of insertion.
+    stiffness_spread, damping_spread : float [-]
+        Standard deviations of the logarithms.
+    source : str
+        Where the values come from.
+    """
+
+    kind: str
+    contact: Contact
+    stiffness_spread: float
+    damping_spread: float
+    source: str
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -32,6 +55,8 @@ class CatalogueHolder(Shown):
         How deep its bore clamps.
     sources : tuple of str
         Where the taper's dimensions and the chuck's come from, or that they are typical.
+    contact : TypicalContact or None
+        None where nothing is known of this kind of chuck; a tap test of the clamped tool tells it.
     """
 
     taper: str
@@ -39,6 +64,7 @@ class CatalogueHolder(Shown):
     segments: tuple[BeamSegment, ...]
     insertion: float
     sources: tuple[str, ...]
+    contact: TypicalContact | None
 
     @property
     def length(self) -> float:
@@ -116,7 +142,8 @@ def holder(taper: str, chuck: str, bore: float, length: float | None = None) -> 
     outer.append(BeamSegment(collar, 1e-3 * flange["flange_diameter"], MATERIALS["steel"]))
     rear = body["rear"] * bore if body["rear"] < 1.0 else min(1e-3 * body["rear"], 0.8 * nose)
     segments = tuple(_bored(outer, clamped, bore, rear))
-    return CatalogueHolder(taper, chuck, segments, clamped, (f"{taper}: {flange['source']}", f"{chuck}: {body['source']}"))
+    sources = f"{taper}: {flange['source']}", f"{chuck}: {body['source']}"
+    return CatalogueHolder(taper, chuck, segments, clamped, sources, _contact(body.get("contact")))
 
 
 @cache
@@ -130,6 +157,14 @@ def _entry(table: str, field: str, name: str) -> dict[str, Any]:
         raise InputError(field, name, f"one of {', '.join(known)}")
     found: dict[str, Any] = known[name]
     return found
+
+
+def _contact(kind: str | None) -> TypicalContact | None:
+    if kind is None:
+        return None
+    found = _entry("contacts", "contact", kind)
+    contact = Contact(**{field.name: found[field.name] for field in fields(Contact)})
+    return TypicalContact(kind, contact, 1e-2 * found["stiffness_spread_percent"], 1e-2 * found["damping_spread_percent"], found["source"])
 
 
 def _body(nose: float, behind: float, length: float, slope_deg: float | None) -> list[BeamSegment]:

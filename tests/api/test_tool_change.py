@@ -152,7 +152,11 @@ def test_a_holder_of_the_catalogue_makes_a_tooling(shop):
     assert sum(s.length_mm for s in found.holder.segments) == 100.0
     assert "ISO 12164-1" in found.sources[0]
     assert client.holder("BT40", "ER32", 12.0, 70.0).mass_kg < found.mass_kg
-    tooling = example(holder=found.holder.model_dump(exclude_none=True))
+    contact = found.contact.keys
+    assert contact.translational_stiffness == 2e10
+    assert "not measured" in found.contact.source
+    assert client.holder("HSK-A63", "hydraulic", 12.0).contact is None
+    tooling = example(holder=found.holder.model_dump(exclude_none=True), contact=contact.model_dump())
     assert client.lobes(id, tooling, speeds=SPEEDS).toolings[0].limit_depth_mm
     assert refused(422, client.holder, "HSK-A63", "ER32", 25.0).errors[0].field == "bore_mm"
     assert refused(422, client.holder, "HSK-A32", "ER32", 12.0).errors[0].field == "taper"

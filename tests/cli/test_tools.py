@@ -121,6 +121,12 @@ def test_a_holder_of_the_catalogue_is_printed_as_a_tooling_takes_it(tmp_path):
     assert "[holder]" in text
     head = TOOLING.read_text(encoding="utf-8").split("[holder]")[0]
     (tmp_path / "made.toml").write_text(head + text, encoding="utf-8")
-    assert read_tooling(tmp_path / "made.toml").assembly.holder_length == pytest.approx(0.1)
+    made = read_tooling(tmp_path / "made.toml").assembly
+    assert made.holder_length == pytest.approx(0.1)
+    assert made.contact.rotational_damping == 40.0
+    assert "# contact, collet: chosen for this project's virtual machines, not measured" in text
+    nobody_knows = run("holders", "HSK-A63", "hydraulic", "--bore-mm", 12).output
+    assert "[contact]" not in nobody_knows
+    assert "rcsa-ident contact" in nobody_knows
     assert "--bore-mm: found 25 mm" in run("holders", "HSK-A63", "ER32", "--bore-mm", 25, code=2).output
     assert "--bore-mm" in run("holders", "HSK-A63", "ER32", code=2).output

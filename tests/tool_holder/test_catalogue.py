@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
 from rcsa_ident.errors import InputError
+from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.tool_holder.catalogue import bores, chucks, holder, tapers
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 
+TOOLINGS = Path(__file__).resolve().parents[2] / "data" / "machines" / "toolings"
 #: On the smallest flanges nobody mounts the largest chucks.
 TOO_WIDE = {("HSK-A40", "ER40")}
 EVERY = [(taper, chuck) for taper in tapers() for chuck in chucks() if (taper, chuck) not in TOO_WIDE]
@@ -54,6 +57,23 @@ def test_every_holder_takes_every_bore_of_its_chuck(taper, chuck):
         assert 0.5 * bar < found.mass < block
         assert len(found.sources) == 2
         assert ToolAssembly((BeamSegment(0.1, bore, MATERIALS["carbide"]),), found.segments, found.insertion).holder_length > 0.0
+
+
+#: Toolings of the virtual machine, and the chuck that each is called after.
+CONTACTS = [("S1-ER32", "ER32", 0.012), ("S2-PG25", "power", 0.016), ("S4-shrink", "shrink", 0.012)]
+
+
+@pytest.mark.parametrize(("tooling", "chuck", "bore"), CONTACTS)
+def test_typical_contacts_are_those_that_their_source_names(tooling, chuck, bore):
+    typical = holder("HSK-A63", chuck, bore).contact
+    assert typical.contact == read_tooling(TOOLINGS / f"{tooling}.toml").assembly.contact
+    # a factor of two is one standard deviation
+    assert math.exp(typical.stiffness_spread) == pytest.approx(2.0, rel=0.01)
+
+
+def test_what_nobody_knows_of_a_contact_is_not_made_up():
+    known = {chuck for chuck in chucks() if holder("HSK-A63", chuck, 0.016 if chuck == "power" else 0.01).contact is not None}
+    assert known == set(chucks()) - {"hydraulic", "Weldon"}
 
 
 def test_mass_of_a_holder_by_hand():

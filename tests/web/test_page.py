@@ -310,12 +310,16 @@ def test_a_holder_of_the_catalogue_takes_the_place_of_the_one_there(opened, clie
     first = image.get_attribute("src")
     page.get_by_role("button", name="Take this holder").click()
     expect(page.locator(".note.good")).to_contain_text("HSK-A63 ER32 for a shank of 12 mm")
+    expect(page.locator(".note.doubt")).to_contain_text("Contact, collet: chosen for this project's virtual machines, not measured")
+    damping = page.locator('[data-field="contact.rotational_damping"] input')
+    expect(damping).to_have_value("40")
     expect(image).not_to_have_attribute("src", first)
     page.get_by_label("Name", exact=True).fill("T1-catalogue")
     page.get_by_role("button", name="Put into the library").click()
     expect(page.get_by_role("heading", name="T1-catalogue")).to_be_visible()
-    made, kept = client.holder("HSK-A63", "ER32", 12.0).holder, client.tooling("T1-catalogue").tooling.holder
-    assert kept.segments == made.segments
+    made, kept = client.holder("HSK-A63", "ER32", 12.0), client.tooling("T1-catalogue").tooling
+    assert kept.holder.segments == made.holder.segments
+    assert kept.contact == made.contact.keys
     client.forget_tooling("T1-catalogue")
     # what the chuck does not take is said in its words
     page.goto(page.url.split("#")[0] + "#/toolings/new")
@@ -324,6 +328,13 @@ def test_a_holder_of_the_catalogue_takes_the_place_of_the_one_there(opened, clie
     page.get_by_label("Chuck, and the shanks").select_option("ER16")
     page.get_by_role("button", name="Take this holder").click()
     expect(page.locator(".note.bad")).to_contain_text("bore")
+    # of what nobody knows nothing is changed
+    page.get_by_label("Taper").select_option("HSK-A63")
+    page.get_by_label("Chuck, and the shanks").select_option("hydraulic")
+    damping.fill("7")
+    page.get_by_role("button", name="Take this holder").click()
+    expect(page.locator(".note.doubt")).to_contain_text("No typical contact is known of this chuck")
+    expect(damping).to_have_value("7")
 
 
 def test_names_of_others_are_text(opened, client: Client, served: Served, result: str):

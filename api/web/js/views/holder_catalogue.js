@@ -1,10 +1,10 @@
-// Holders of the catalogue: a taper and a chuck become the segments of a holder, with where the dimensions come from.
+// Holders of the catalogue: a taper and a chuck become the segments of a holder and a typical contact, with where they come from.
 import { get, part } from "../api.js";
 import { fill, h, note } from "../dom.js";
 import { busy, field, quantity, select } from "../forms.js";
 import { plain } from "../units.js";
 
-/** Where one is chosen; `shank()` is the diameter that it has to hold [mm], `take(holder)` gets the keys of the one made. */
+/** Where one is chosen; `shank()` is the diameter that it has to hold [mm], `take(holder, contact)` gets the keys of the one made. */
 export function catalogueBox(shank, take) {
   const place = h("div", { class: "view" });
   const box = h("details", null, h("summary", null, "Take one from the catalogue"), place);
@@ -30,8 +30,9 @@ async function choices(place, shank, take) {
       if (length.input.base !== null) asked.set("length_mm", length.input.base);
       try {
         const found = await get(`holders/${part(taper.value)}/${part(chuck.value)}?${asked}`);
-        take(found.holder);
-        fill(told, note("good", `${found.name} for a shank of ${plain(shank(), 2)} mm, ${plain(found.mass_kg, 2)} kg.`, ...found.sources));
+        take(found.holder, found.contact?.keys);
+        const made = `${found.name} for a shank of ${plain(shank(), 2)} mm, ${plain(found.mass_kg, 2)} kg.`;
+        fill(told, note("good", made, ...found.sources), worth(found.contact));
       } catch (error) {
         tell(told, error);
       }
@@ -43,6 +44,15 @@ async function choices(place, shank, take) {
     h("div", { class: "row-of-buttons" }, button),
     told,
   );
+}
+
+/** What the contact is worth, in words. */
+function worth(contact) {
+  if (!contact)
+    return note("doubt", "No typical contact is known of this chuck: the one below is as it was. A hit on the tip of the clamped tool tells it.");
+  const { kind, source, stiffness_spread_percent: stiffness, damping_spread_percent: damping } = contact;
+  const spreads = `standard deviation of its stiffness ${plain(stiffness, 0)} %, of its damping ${plain(damping, 0)} %`;
+  return note("doubt", `Contact, ${kind}: ${source} (${spreads}). A hit on the tip of the clamped tool tells it better.`);
 }
 
 const tell = (place, error) =>

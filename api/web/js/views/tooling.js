@@ -58,8 +58,9 @@ export async function view({ name = "" }, query, place) {
     const last = tool.rows().at(-1);
     return last.end_diameter_mm ?? last.outer_diameter_mm;
   }
-  function takeHolder(found) {
+  function takeHolder(found, typical) {
     holder.replace(found.segments);
+    if (typical) for (const [key, box] of contact) box.input.base = typical[key];
     deep = insertion.input.base = found.insertion_mm;
     reclamp();
     changed();
