@@ -11,7 +11,8 @@ from typing import Annotated, Any
 
 from fastapi import Header, Path, Response
 from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import JSONResponse, StreamingResponse
+from fastapi.responses import JSONResponse
+from fastapi.sse import KEEPALIVE_COMMENT, EventSourceResponse, format_sse_event
 
 from api.components import Components
 from api.conventions import found_or_404, in_use
@@ -24,9 +25,10 @@ from api.stores.entities import Taken
 from api.stores.jobs import OPEN, Full, Job
 
 log = logging.getLogger("rcsa_ident.service")
-EVENTS = "text/event-stream"
 #: Retry-After [s], and interval of the heartbeat of an event stream without events [s].
 AGAIN, HEARTBEAT = "2", 15.0
+#: After how long a client whose stream broke off opens another [ms].
+REOPEN = 2000
 #: Interval between two checks of the API key [s].
 LOOK = 3.0
 #: Longest wait of a request for the end of a job [s].
@@ -59,7 +61,7 @@ STREAM: dict[str, Any] = {
     "description": "Server-sent events: `progress` and `end` with the job, `trace` with axis, stage, cost and seconds, `fit` with axis, "
     "frequency_hz, measured_abs and model_abs [m/N], `partial` with what of a tooling's lobes is known (`PartialLobes`), `note` with a "
     "text: a sentence of the job's story. It ends with `end`.",
-    "content": {EVENTS: {"schema": _EVENT}},
+    "content": {EventSourceResponse.media_type: {"schema": _EVENT}},
 }
 
 
@@ -158,7 +160,7 @@ def finished(components: Components, group: str, id: str, kind: str, name: str) 
     return found_or_404(text, "result")
 
 
-async def events(components: Components, caller: Caller, id: str, kind: str, seen: str | None) -> StreamingResponse:
+async def events(components: Components, caller: Caller, id: str, kind: str, seen: str | None) -> EventSourceResponse:
     """Return the stream of a job's events after a number; it ends when the caller's key does."""
     job = await run_in_threadpool(_followed, components, caller.group, id, kind)
     try:
@@ -167,14 +169,14 @@ async def events(components: Components, caller: Caller, id: str, kind: str, see
     except Crowded:
         raise Problem(503, "too many event streams of jobs are open, of this group or of all", headers={"Retry-After": "30"}) from None
 
-    async def stream() -> AsyncIterator[str]:
+    async def stream() -> AsyncIterator[bytes]:
         try:
             async for part in _events(components, caller, job, int(seen or 0)):
                 yield part
         finally:
             watching.__exit__(None, None, None)
 
-    return StreamingResponse(stream(), media_type=EVENTS, headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"})
+    return EventSourceResponse(stream(), headers={"Cache-Control": "no-store", "X-Accel-Buffering": "no"})
 
 
 def longest(components: Components, job: Job) -> float:
@@ -184,11 +186,11 @@ def longest(components: Components, job: Job) -> float:
     return settings.watch_seconds if job.watched is None else min(settings.watch_seconds, settings.unwatched_seconds / 2.0)
 
 
-async def _events(components: Components, caller: Caller, job: Job, after: int) -> AsyncIterator[str]:
+async def _events(components: Components, caller: Caller, job: Job, after: int) -> AsyncIterator[bytes]:
     end, beat = time.monotonic() + longest(components, job), time.monotonic() + HEARTBEAT
     # the current state first, without a number: it is not an event that could be missed
     told = await run_in_threadpool(answer, components, job)
-    yield f"retry: 2000\n{_event(None, 'progress', told.model_dump_json())}"
+    yield format_sse_event(event="progress", data_str=told.model_dump_json(), retry=REOPEN)
     while time.monotonic() < end and await run_in_threadpool(still_valid, components, caller):
         found = await components.feeds.events(job.id, after)
         for event in found:
@@ -220,8 +222,8 @@ async def _events(components: Components, caller: Caller, job: Job, after: int) 
                 yield _event(None, "progress", told.model_dump_json())
         if not await components.feeds.wait(job.id, after, min(LOOK, max(end - time.monotonic(), 0.0))) and time.monotonic() > beat:
             beat = time.monotonic() + HEARTBEAT
-            yield ": still there\n\n"
+            yield KEEPALIVE_COMMENT
 
 
-def _event(number: int | None, kind: str, data: str) -> str:
-    return ("" if number is None else f"id: {number}\n") + f"event: {kind}\ndata: {data}\n\n"
+def _event(number: int | None, kind: str, data: str) -> bytes:
+    return format_sse_event(event=kind, data_str=data, id=None if number is None else str(number))

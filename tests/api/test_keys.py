@@ -233,7 +233,7 @@ def test_an_event_stream_ends_with_its_key(guarded_http, store, machine, monkeyp
         store.keys.delete("A", caller.id)
         return [part async for part in stream]
 
-    assert "progress" in asyncio.run(followed())
+    assert b"progress" in asyncio.run(followed())
     assert asyncio.run(asyncio.wait_for(withdrawn(), PATIENCE)) == []
     assert http.app.state.components.feeds.places.total == 0
 
