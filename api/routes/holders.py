@@ -8,10 +8,10 @@ from fastapi import APIRouter, Path, Query
 
 from api.conventions import guard, problems
 from api.schemas.holders import CatalogueAnswer, ChuckAnswer, Holders, TypicalContactAnswer
-from api.schemas.toolings import ContactKeys, HolderKeys
+from api.schemas.toolings import HolderKeys
 from api.security import Guarded
-from rcsa_ident.io.toolings import contact_keys, holder_keys
-from rcsa_ident.tool_holder.catalogue import TypicalContact, bores, chucks, holder, tapers
+from rcsa_ident.io.toolings import holder_keys, typical_contact_keys
+from rcsa_ident.tool_holder.catalogue import bores, chucks, holder, tapers
 
 router = APIRouter(prefix="/holders", tags=["toolings"], route_class=Guarded)
 Named = Annotated[str, Path(pattern=r"^[A-Za-z0-9-]{1,20}$", description="As the catalogue lists it.")]
@@ -34,19 +34,10 @@ def get(
     length_mm: Annotated[float | None, Query(gt=0.0, le=5000.0, description="From the nose to the spindle's face or gauge line.")] = None,
 ) -> CatalogueAnswer:
     found = holder(taper, chuck, bore_mm * 1e-3, None if length_mm is None else length_mm * 1e-3)
-    keys = HolderKeys.model_validate(holder_keys(found))
     return CatalogueAnswer(
-        name=f"{taper} {chuck}", mass_kg=found.mass, sources=list(found.sources), holder=keys, contact=_typical(found.contact)
-    )
-
-
-def _typical(found: TypicalContact | None) -> TypicalContactAnswer | None:
-    if found is None:
-        return None
-    return TypicalContactAnswer(
-        kind=found.kind,
-        keys=ContactKeys.model_validate(contact_keys(found.contact)),
-        stiffness_spread_percent=100.0 * found.stiffness_spread,
-        damping_spread_percent=100.0 * found.damping_spread,
-        source=found.source,
+        name=f"{taper} {chuck}",
+        mass_kg=found.mass,
+        sources=list(found.sources),
+        holder=HolderKeys.model_validate(holder_keys(found)),
+        contact=TypicalContactAnswer.model_validate(typical) if (typical := typical_contact_keys(found.contact)) else None,
     )

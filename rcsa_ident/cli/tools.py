@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -132,7 +132,7 @@ def holders(
     json_: Json = False,
 ) -> None:
     """Print a holder of the catalogue as [holder] and [contact] of a TOOLING.toml, or what there is."""
-    from rcsa_ident.io.toolings import contact_keys, holder_keys, tooling_text
+    from rcsa_ident.io.toolings import holder_keys, tooling_text, typical_contact_keys
     from rcsa_ident.tool_holder.catalogue import bores, chucks, tapers
     from rcsa_ident.tool_holder.catalogue import holder as made
 
@@ -148,22 +148,19 @@ def holders(
         missing = "chuck" if chuck is None else "--bore-mm"
         raise InputError(missing, "nothing", "a taper, a chuck and --bore-mm, as HSK-A63 ER32 --bore-mm 12")
     found = made(taper, chuck, bore_mm * 1e-3, None if length_mm is None else length_mm * 1e-3)
-    keys, typical, spread = {"holder": holder_keys(found)}, found.contact, None
-    if typical is None:
-        told = f"contact, {chuck}: no value is known; a hit on the tip of the clamped tool and rcsa-ident contact tell it"
-    else:
-        keys["contact"] = contact_keys(typical.contact)
-        spread = {"stiffness_percent": 100.0 * typical.stiffness_spread, "damping_percent": 100.0 * typical.damping_spread}
-        told = (
-            f"contact, {typical.kind}: {typical.source} (standard deviation of its stiffness {spread['stiffness_percent']:g} %, "
-            f"of its damping {spread['damping_percent']:g} %)"
-        )
-    sources = (*found.sources, told)
+    keys: dict[str, Any] = {"holder": holder_keys(found)}
+    typical = typical_contact_keys(found.contact)
     if json_:
-        name = f"{taper} {chuck}"
-        emit({"name": name, "mass_kg": found.mass, "sources": list(sources), "contact": None, **keys, "contact_spread": spread})
-    else:
-        say(tooling_text(keys, (str(found), *sources)).rstrip())
+        emit({"name": f"{taper} {chuck}", "mass_kg": found.mass, "sources": list(found.sources), **keys, "contact": typical})
+        return
+    told = f"contact, {chuck}: no value is known; a hit on the tip of the clamped tool and rcsa-ident contact tell it"
+    if typical is not None:
+        keys["contact"] = typical["keys"]
+        told = (
+            f"contact, {typical['kind']}: {typical['source']} (standard deviation of its stiffness "
+            f"{typical['stiffness_spread_percent']:g} %, of its damping {typical['damping_spread_percent']:g} %)"
+        )
+    say(tooling_text(keys, (str(found), *found.sources, told)).rstrip())
 
 
 def _contact(path: Path | None) -> Contact | None:

@@ -12,7 +12,7 @@ from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.io.files import write_text
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.machining_setup import Tooling
-from rcsa_ident.tool_holder.catalogue import CatalogueHolder
+from rcsa_ident.tool_holder.catalogue import CatalogueHolder, TypicalContact
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material
 
 _CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
@@ -58,6 +58,19 @@ def holder_keys(holder: CatalogueHolder) -> dict[str, Any]:
 def contact_keys(contact: Contact) -> dict[str, float]:
     """Return a contact as `contact` of a tooling file, per metre of insertion in SI units."""
     return {key: getattr(contact, key) for key in _CONTACT}
+
+
+def typical_contact_keys(typical: TypicalContact | None) -> dict[str, Any] | None:
+    """Return what the catalogue knows of a contact as commands and service tell it: its keys, spreads in percent, source."""
+    if typical is None:
+        return None
+    return {
+        "kind": typical.kind,
+        "keys": contact_keys(typical.contact),
+        "stiffness_spread_percent": 100.0 * typical.stiffness_spread,
+        "damping_spread_percent": 100.0 * typical.damping_spread,
+        "source": typical.source,
+    }
 
 
 def tooling_text(data: Mapping[str, Any], notes: Sequence[str] = ()) -> str:

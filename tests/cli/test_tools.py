@@ -127,6 +127,10 @@ def test_a_holder_of_the_catalogue_is_printed_as_a_tooling_takes_it(tmp_path):
     assert "# contact, collet: chosen for this project's virtual machines, not measured" in text
     nobody_knows = run("holders", "HSK-A63", "hydraulic", "--bore-mm", 12).output
     assert "[contact]" not in nobody_knows
+    said = json.loads(run("holders", "HSK-A63", "ER32", "--bore-mm", 12, "--json").stdout)["contact"]
+    assert said["keys"]["translational_stiffness"] == made.contact.translational_stiffness
+    assert (said["kind"], said["stiffness_spread_percent"], said["damping_spread_percent"]) == ("collet", 70.0, 100.0)
+    assert json.loads(run("holders", "HSK-A63", "power", "--bore-mm", 20, "--json").stdout)["contact"] is None
     assert "rcsa-ident contact" in nobody_knows
     assert "--bore-mm: found 25 mm" in run("holders", "HSK-A63", "ER32", "--bore-mm", 25, code=2).output
     assert "--bore-mm" in run("holders", "HSK-A63", "ER32", code=2).output

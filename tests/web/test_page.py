@@ -310,7 +310,7 @@ def test_a_holder_of_the_catalogue_takes_the_place_of_the_one_there(opened, clie
     first = image.get_attribute("src")
     page.get_by_role("button", name="Take this holder").click()
     expect(page.locator(".note.good")).to_contain_text("HSK-A63 ER32 for a shank of 12 mm")
-    expect(page.locator(".note.doubt")).to_contain_text("Contact, collet: chosen for this project's virtual machines, not measured")
+    expect(page.locator(".note.doubt")).to_contain_text("typical one, collet: chosen for this project's virtual machines, not measured")
     damping = page.locator('[data-field="contact.rotational_damping"] input')
     expect(damping).to_have_value("40")
     expect(image).not_to_have_attribute("src", first)
