@@ -21,12 +21,25 @@ from rcsa_ident.shown import Saved, Shown
 from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.proportions import proportions
+from rcsa_ident.tool_holder.spread import EXACT, Spread
 from rcsa_ident.units import to_rpm
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Tooling(Saved):
     """A cutter, with the tool and holder that carry it.
+
+    Parameters
+    ----------
+    name : str
+    cutter : Cutter
+    assembly : ToolAssembly
+        As drawn.
+    spread : Spread
+        How well the drawing is known.
+    tool_model, holder_model : str
+        Tools of the same model share what is not known of them, wherever they are clamped; holders of the same model (and bore) share
+        their contact. Empty where nothing is shared.
 
     Raises
     ------
@@ -37,6 +50,9 @@ class Tooling(Saved):
     name: str
     cutter: Cutter
     assembly: ToolAssembly
+    spread: Spread = EXACT
+    tool_model: str = ""
+    holder_model: str = ""
 
     def __post_init__(self) -> None:
         proportions(self.assembly, self.cutter)

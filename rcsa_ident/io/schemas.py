@@ -16,7 +16,7 @@ from typing import Any
 
 from rcsa_ident.io.machines import machine_of
 from rcsa_ident.io.modes import modes_of
-from rcsa_ident.io.setups import campaign_of, tooling_of
+from rcsa_ident.io.setups import SPREADS, campaign_of, tooling_of
 from rcsa_ident.io.validated_table import Asked, Table, listening
 from rcsa_ident.machining_setup import Tooling
 
@@ -50,10 +50,11 @@ _TOOLINGS = (
     {
         "name": "all",
         "cutter": _CUTTER,
-        "tool": {"stickout_mm": 70.0, "segments": _SEGMENTS},
-        "holder": _HOLDER,
+        "tool": {"stickout_mm": 70.0, "segments": _SEGMENTS, "model": "EM12-4"},
+        "holder": _HOLDER | {"model": "PG25"},
         "contact": _STIFF,
         "materials": _MATERIALS,
+        "spread": dict.fromkeys(SPREADS, 1.0),
     },
 )
 _WORKPIECE = {

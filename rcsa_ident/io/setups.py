@@ -35,12 +35,13 @@ from rcsa_ident.plausibility import (
 )
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Role, Sensor
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, clamped
+from rcsa_ident.tool_holder.spread import EXACT, LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, SPREAD_FIELDS, Spread
 from rcsa_ident.units import from_rpm, to_rpm
 
 CAMPAIGN_FILE = "campaign.toml"
 FEED_DIRECTIONS = {"+X": 0.0, "-X": np.pi, "+Y": 0.5 * np.pi, "-Y": -0.5 * np.pi}
 
-_TOOLING = ("name", "cutter", "tool", "holder", "contact", "materials")
+_TOOLING = ("name", "cutter", "tool", "holder", "contact", "materials", "spread")
 _CUTTER = ("teeth", "diameter_mm", "helix_deg", "pitch_deg", "shape", "corner_radius_mm")
 _SEGMENT = (
     "length_mm",
@@ -53,6 +54,10 @@ _SEGMENT = (
 )
 _CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
 _MATERIAL = ("youngs_modulus_gpa", "density", "poisson", "loss_factor")
+#: Keys of a tooling's [spread]: field of `Spread` and its size in SI.
+SPREADS = {
+    f"{field}_mm" if field in LENGTHS else f"{field}_percent": (field, 1e-3 if field in LENGTHS else 1e-2) for field in SPREAD_FIELDS
+}
 _CAMPAIGN = ("campaign", "sensors", "workpiece", "toolings", "cuts", "frfs")
 _SENSOR = ("quantity", "axis", "sensitivity", "delay_s", "bandwidth_hz", "role", "mount_resonance_hz")
 _TRIGGER = ("quantity", "sensitivity", "delay_s", "bandwidth_hz", "pulses_per_revolution", "tooth_angle_deg")
@@ -96,8 +101,8 @@ def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
     """
     top = Table(data, where, known=_TOOLING)
     materials = material_library(top)
-    tool = top.table("tool", ("stickout_mm", "segments"))
-    holder = top.table("holder", ("insertion_mm", "segments"))
+    tool = top.table("tool", ("stickout_mm", "segments", "model"))
+    holder = top.table("holder", ("insertion_mm", "segments", "model"))
     name = top.text("name", name)
     cutter = _cutter(top.table("cutter", _CUTTER))
     pieces = beam_segments(tool, materials)
@@ -106,7 +111,25 @@ def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
     carriers = beam_segments(holder, materials)
     contact = _contact(top.table("contact", _CONTACT)) if "contact" in top else None
     with top.naming({"stickout + insertion": "tool.stickout_mm + holder.insertion_mm", "insertion": "holder.insertion_mm"}):
-        return Tooling(name, cutter, clamped(pieces, carriers, stickout, insertion, contact))
+        return Tooling(
+            name,
+            cutter,
+            clamped(pieces, carriers, stickout, insertion, contact),
+            spread_of(top.table("spread", tuple(SPREADS))) if "spread" in top else EXACT,
+            tool.text("model", ""),
+            holder.text("model", ""),
+        )
+
+
+def spread_of(table: Table) -> Spread:
+    """Return how well a drawing is known; what the table leaves out is what an honest drawing is good for."""
+    honest = Spread()
+    found = {}
+    for key, (field, size) in SPREADS.items():
+        most = (LARGEST_LENGTH if field in LENGTHS else LARGEST_SHARE) / size
+        unit = "mm" if field in LENGTHS else "%"
+        found[field] = size * table.number(key, unit, getattr(honest, field) / size, least=0.0, most=round(most, 9))
+    return Spread(**found)
 
 
 def material_library(top: Table) -> dict[str, Material]:

@@ -10,10 +10,12 @@ import numpy as np
 
 from rcsa_ident.cutting.shape import CutterShape
 from rcsa_ident.io.files import write_text
+from rcsa_ident.io.setups import SPREADS
 from rcsa_ident.io.toml_text import toml_of
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.tool_holder.catalogue import CatalogueHolder, TypicalContact
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material
+from rcsa_ident.tool_holder.spread import Spread
 
 _CONTACT = ("translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")
 
@@ -45,6 +47,11 @@ def tooling_keys(tooling: Tooling) -> dict[str, Any]:
         data["cutter"]["corner_radius_mm"] = 1e3 * cutter.corner_radius
     if assembly.contact is not None:
         data["contact"] = contact_keys(assembly.contact)
+    for part, model in (("tool", tooling.tool_model), ("holder", tooling.holder_model)):
+        if model:
+            data[part]["model"] = model
+    if not tooling.spread.exact:
+        data["spread"] = spread_keys(tooling.spread)
     own = {name: material for name, material in materials.items() if name not in MATERIALS}
     return data | ({"materials": {name: _material(material) for name, material in own.items()}} if own else {})
 
@@ -58,6 +65,11 @@ def holder_keys(holder: CatalogueHolder) -> dict[str, Any]:
 def contact_keys(contact: Contact) -> dict[str, float]:
     """Return a contact as `contact` of a tooling file, per metre of insertion in SI units."""
     return {key: getattr(contact, key) for key in _CONTACT}
+
+
+def spread_keys(spread: Spread) -> dict[str, float]:
+    """Return how well a drawing is known as `spread` of a tooling file, in percent and millimetres."""
+    return {key: getattr(spread, field) / size for key, (field, size) in SPREADS.items()}
 
 
 def typical_contact_keys(typical: TypicalContact | None) -> dict[str, Any] | None:

@@ -1,0 +1,71 @@
+"""How well a drawing is known: standard deviations of what it says of tool, holder, contact and clamping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from rcsa_ident.errors import InputError, non_negative
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Standard deviations of what a drawing tells; 0 is exact, and the defaults are what an honest drawing is good for.
+
+    Shares are standard deviations of logarithms. A fluted diameter that is told by its area and second moment scales the former by its
+    square and the latter by its fourth power.
+
+    Parameters
+    ----------
+    stickout : float [m]
+        A presetter's; 0.3 mm with a ruler.
+    fluted_diameter : float [-]
+        Equivalent diameter of the fluted part.
+    youngs_modulus : float [-]
+        Of the tool.
+    contact_stiffness, contact_damping : float [-]
+        Between tool and holder, translational and rotational each.
+    holder_diameter : float [-]
+        Outer diameters of the holder.
+    reclamping : float [-]
+        Of the contact in each clamping, beside what its model shares.
+    spindle_joint : float [-]
+        Of the joint in front of the flange, in each clamping.
+    segment_length : float [m]
+
+    Examples
+    --------
+    >>> Spread().exact, EXACT.exact
+    (False, True)
+    """
+
+    stickout: float = 0.05e-3
+    fluted_diameter: float = 0.03
+    youngs_modulus: float = 0.02
+    contact_stiffness: float = 0.4
+    contact_damping: float = 1.0
+    holder_diameter: float = 0.005
+    reclamping: float = 0.1
+    spindle_joint: float = 0.05
+    segment_length: float = 0.05e-3
+
+    def __post_init__(self) -> None:
+        for name in SPREAD_FIELDS:
+            value = non_negative(name, getattr(self, name))
+            length = name in LENGTHS
+            most = LARGEST_LENGTH if length else LARGEST_SHARE
+            if value > most:
+                raise InputError(name, value, f"at most {most:g}" + (" [m]" if length else ", a share"))
+
+    @property
+    def exact(self) -> bool:
+        """Whether everything is exactly as drawn."""
+        return not any(getattr(self, name) for name in SPREAD_FIELDS)
+
+
+SPREAD_FIELDS = tuple(each.name for each in fields(Spread))
+#: Those that are lengths [m]; the others are shares.
+LENGTHS = ("stickout", "segment_length")
+#: Largest standard deviations that anybody may believe in.
+LARGEST_LENGTH, LARGEST_SHARE = 5e-3, 3.0
+#: Everything as drawn.
+EXACT = Spread(**dict.fromkeys(SPREAD_FIELDS, 0.0))
