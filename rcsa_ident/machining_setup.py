@@ -24,6 +24,10 @@ from rcsa_ident.tool_holder.proportions import proportions
 from rcsa_ident.tool_holder.spread import EXACT, Spread
 from rcsa_ident.units import to_rpm
 
+#: Edge forces [N/m] of a cut of which nobody told any, and the standard deviation of their logarithms: the half of a normal distribution
+#: of 10 N/mm that is positive has this median, and about this spread.
+UNTOLD_EDGE, UNTOLD_EDGE_SPREAD = 6.7e3, 0.95
+
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Tooling(Saved):
@@ -289,7 +293,15 @@ class Campaign(Shown):
         """
         if self.workpiece is None:
             raise InputError("workpiece", "nothing", "a table [workpiece] in the campaign of cuts")
-        return self.workpiece.coefficients
+        told = self.workpiece.coefficients
+        if not self.rough or told.tangential_edge or told.radial_edge:
+            return told
+        return replace(told, tangential_edge=UNTOLD_EDGE, radial_edge=UNTOLD_EDGE, edge_spread=UNTOLD_EDGE_SPREAD)
+
+    @property
+    def rough(self) -> bool:
+        """Whether some of its drawings say that they are not exact."""
+        return any(not tooling.spread.exact for tooling in self.toolings.values())
 
     def clocked(self, recording: Recording) -> Recording:
         """Return a recording whose rate is that at which its samples were truly taken."""

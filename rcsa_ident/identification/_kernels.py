@@ -57,7 +57,7 @@ def cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder,
 
     The gradient's columns: log omega_n (m), psi's first two columns by rows (2 m), factor's lower triangle by rows, B's tt, tr, rr (3),
     of each other place psi's column (m) and its residual (2), with six of the joint what standing still changes (2), with softening
-    its lower triangle by rows, joint (4).
+    its lower triangle by rows, joint (4); where it has five more, A22's tt, tr, rr and A21 e0's t, r.
     """
     m = omega_n.size
     outputs, places = shares.shape[0], shares.shape[1] - 1
@@ -187,6 +187,13 @@ def cross_frf(omega_n, shapes, factor, softening, joint, shares, points, holder,
             row[k + 1] = y1 * x1 * k_r * k_r
             row[k + 2] = complex(0.0, w) * row[k]
             row[k + 3] = complex(0.0, w) * row[k + 1]
+            k += 4
+            if k < row.size:
+                row[k] = -y0 * x0
+                row[k + 1] = -y0 * x1 - y1 * x0
+                row[k + 2] = -y1 * x1
+                row[k + 3] = y0
+                row[k + 4] = y1
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -311,10 +318,10 @@ def whiten(gradient, extra, model, weight, chain, out):
 
     Parameters
     ----------
-    gradient : (n, p) complex; extra : (n, c) complex, d log model / d unknown of the force
+    gradient : (n, p or more) complex; extra : (n, c) complex, d log model / d unknown of the force
     model : (n,) complex; weight : (n,); chain : (p,)
     """
-    n, p = gradient.shape
+    n, p = gradient.shape[0], chain.size
     for f in range(n):
         scale = -math.sqrt(weight[f])
         for k in range(p):

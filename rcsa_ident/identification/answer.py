@@ -69,6 +69,11 @@ class Fit(ABC):
     def doubts(self) -> tuple[list[Remark], list[Remark]]:
         """Return the reasons for `suspect` and the notes that belong to this kind of fit."""
 
+    @property
+    def rough_values(self) -> FloatArray:
+        """What the drawings did not tell, shape (u,), in units of its spreads."""
+        return np.asarray(self.solution.theta[self.solution.layout.force][self.data.rough_place])
+
     @cached_property
     def evidence(self) -> float:
         """Minus twice the log evidence [-]: less is better."""

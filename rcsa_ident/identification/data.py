@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -11,6 +11,8 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.cutting.force import ForceCoefficient
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.hammer_lines import HammerLines
+from rcsa_ident.identification.rough_toolings import RoughLines, RoughToolings
+from rcsa_ident.tool_holder.rough import RoughToolHolder
 
 #: Slopes are multiplied and moments divided by it, so that all receptances have one unit and size [m].
 LEVER = 0.1
@@ -247,6 +249,14 @@ class IdentificationData:
         Its receptances while it turns; empty where nobody asks for them.
     tests : tuple of HammerLines
         The last of the cuts. Their gains have no name among the coefficients either and stand in front of the smooth errors.
+    rough : RoughToolings or None
+        What drawings do not tell; unknowns in units of their spreads, behind the gains and in front of the smooth errors.
+    rough_holders : tuple of RoughToolHolder
+        One for each tooling, where there is something that drawings do not tell.
+    rough_first : int
+        Where their unknowns begin among the coefficients.
+    rough_start : array, shape (u,)
+        Values of theirs at which `flange` and `tip` of the axes stand, and from which a fit starts.
     """
 
     cut_ids: tuple[str, ...]
@@ -261,6 +271,95 @@ class IdentificationData:
     coefficient_spread: tuple[float, ...] = ()
     turning: Mapping[str, Turning] = field(default_factory=dict)
     tests: tuple[HammerLines, ...] = ()
+    rough: RoughToolings | None = None
+    rough_holders: tuple[RoughToolHolder, ...] = ()
+    rough_first: int = 0
+    rough_start: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def rough_place(self) -> slice:
+        """Where what drawings do not tell stands among the coefficients."""
+        return slice(self.rough_first, self.rough_first + (0 if self.rough is None else len(self.rough.unknowns)))
+
+    def rough_lines(self) -> RoughLines | None:
+        """Return the tool-holders at all lines as functions of what their drawings do not tell; None where all are as drawn."""
+        if self.rough is None:
+            return None
+        points = [(axis.omega, self.cut_tooling[axis.cut]) for axis in self.axes]
+        return RoughLines(self.rough, self.rough_holders, points, LEVER, self.rough_first)
+
+    def with_scales(self, depth: FloatArray, gain: FloatArray) -> IdentificationData:
+        """Return the same data whose forces may be off by a factor of each tooling, its depth, and motions by one of each axis, its gain.
+
+        Parameters
+        ----------
+        depth : array, shape (toolings,) [-]
+            Standard deviation of the logarithm of each tooling's axial depth; 0 where it is known exactly.
+        gain : array, shape (axes,) [-]
+            Of each axis' sensor.
+        """
+        axes = []
+        deep, loud = np.flatnonzero(depth), np.flatnonzero(gain)
+        for i, axis in enumerate(self.axes):
+            of_tooling = self.cut_tooling[axis.cut][:, None] == deep
+            own = np.broadcast_to(i == loud, (axis.omega.size, loud.size))
+            columns = np.hstack([of_tooling, own]).astype(complex)
+            across = axis.across_slope
+            if across.size:
+                across = np.hstack([across, np.hstack([of_tooling, own]).astype(complex)])
+            axes.append(replace(axis, force_slope=np.hstack([axis.force_slope, columns]), across_slope=across))
+        spread = (*self.coefficient_spread, *depth[deep].tolist(), *gain[loud].tolist())
+        return replace(self, axes=tuple(axes), coefficient_spread=spread)
+
+    def with_rough_toolings(self, rough: RoughToolings, holders: Sequence[RoughToolHolder]) -> IdentificationData:
+        """Return the same data whose tool-holders are known only roughly.
+
+        Parameters
+        ----------
+        rough : RoughToolings
+            Of all toolings, in the data's order.
+        holders : sequence of RoughToolHolder
+        """
+        count = len(rough.unknowns)
+        axes = []
+        for axis in self.axes:
+            slopes = np.pad(axis.force_slope, ((0, 0), (0, count)))
+            across = np.pad(axis.across_slope, ((0, 0), (0, count))) if axis.across_slope.size else axis.across_slope
+            axes.append(replace(axis, force_slope=slopes, across_slope=across))
+        return replace(
+            self,
+            axes=tuple(axes),
+            coefficient_spread=(*self.coefficient_spread, *(1.0,) * count),
+            rough=rough,
+            rough_holders=tuple(holders),
+            rough_first=len(self.coefficient_spread),
+            rough_start=np.zeros(count),
+        )
+
+    def with_toolings_at(self, values: FloatArray) -> IdentificationData:
+        """Return the same data whose tool-holders stand at other values of what their drawings do not tell, shape (u,)."""
+        lines = self.rough_lines()
+        assert lines is not None
+        axes = []
+        for axis, toolings in zip(self.axes, lines.at(values, False), strict=True):
+            flange, tip = axis.flange.copy(), axis.tip.copy()
+            for each in toolings:
+                flange[each.points], tip[each.points] = each.values[:, :3], each.values[:, 3:]
+            axes.append(replace(axis, flange=flange, tip=tip))
+        return replace(self, axes=tuple(axes), rough_start=values)
+
+    def as_drawn(self) -> IdentificationData:
+        """Return the same data whose tool-holders are taken as they were drawn."""
+        if self.rough is None:
+            return self
+        place = self.rough_place
+        drop = np.arange(place.start, place.stop)
+        axes = []
+        for axis in self.axes:
+            across = np.delete(axis.across_slope, drop, axis=1) if axis.across_slope.size else axis.across_slope
+            axes.append(replace(axis, force_slope=np.delete(axis.force_slope, drop, axis=1), across_slope=across))
+        spread = (*self.coefficient_spread[: place.start], *self.coefficient_spread[place.stop :])
+        return replace(self, axes=tuple(axes), coefficient_spread=spread, rough=None, rough_holders=())
 
     @property
     def cuts(self) -> int:

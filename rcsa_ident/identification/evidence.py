@@ -46,6 +46,8 @@ SMOOTH_ERROR = 2e-3
 ATTEMPTS = 3
 #: Further searches among lines that were freed of their sweeps, until two have come to evidences as near as this.
 FREED_ATTEMPTS, SAME = 3, 20.0
+#: Further searches at the toolings of the answer before, while the evidence gains.
+ROUGH_ATTEMPTS = 3
 #: Windows of a tooling's passes that are enough to find its modes; the polish takes all.
 ENOUGH = 40
 #: Score beyond which planes plainly feel each other once a stiffness that changes with speed is in the fit: 0 to 36 where they do not,
@@ -107,6 +109,13 @@ class EvidenceSelection:
                 found, worse = sorted((found, other), key=lambda fit: fit.evidence)
                 if worse.evidence - found.evidence < SAME:
                     break
+            for _ in range(ROUGH_ATTEMPTS if data.rough is not None else 0):
+                # modes that were found at the drawn toolings mimic what is wrong with these: they are searched anew at those of the answer
+                at_answer = data.with_toolings_at(found.rough_values)
+                other = self._found(at_answer, at_answer, sequence, map, trace, progress)
+                found, worse = sorted((found, other), key=lambda fit: fit.evidence)
+                if found is not other or worse.evidence - found.evidence < SAME:
+                    break
             if data.sweeps:
                 found = self._asked(data, found, map, _report_to(BOTH, trace, progress))
             return replace(found.answer(seed, self.name), trace=tuple(trace))
@@ -129,7 +138,7 @@ class EvidenceSelection:
 
     def _search(self, data: IdentificationData, sequence: np.random.SeedSequence, map: Map, progress: Progress | None) -> list[AxisSearch]:
         """Return the search of each axis, again from new starts until one has come to the same answer twice."""
-        asked = _searched_cuts(data)
+        asked, data = _searched_cuts(data), data.as_drawn()
         summed = data.of_cuts(asked).summed() if asked.size < len(data.cut_ids) else data.summed()
         parts = [summed.only(a.axis).with_smooth_errors(SMOOTH_ERROR) for a in data.axes]
         searched: list[AxisSearch] = []
@@ -156,7 +165,7 @@ class EvidenceSelection:
         first = first_starts(smooth, self.priors, searched, map)
         if data.sweeps:
             smooth = unswept(data, self.priors, first[0].theta, first[0].layout).with_smooth_errors(SMOOTH_ERROR)
-        points = coupled_data(smooth) if couplable(smooth) and not data.sweeps else None
+        points = coupled_data(smooth) if couplable(smooth) and not data.sweeps and data.rough is None else None
         together: CoupledFit | None = None
         if points is not None and self._felt(points, first[0], *learned_noise(searched)).score > PLAIN:
             apart, misfit = fit_roughly(smooth, self.priors, searched, first[0], report)

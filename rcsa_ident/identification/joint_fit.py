@@ -203,6 +203,7 @@ class JointStart:
         force = np.zeros(layout.coefficients)
         named = len(data.coefficients)
         force[:named] = np.mean([c.theta[c.layout.force][:named] for c in chosen], axis=0)
+        force[data.rough_place] = data.rough_start
         joint = np.mean([c.theta[c.layout.joint] for c in chosen], axis=0)
         theta = np.concatenate([*(c.theta[c.layout.axis(0)] for c in best), joint, force])
         rough = Misfit(data.summed(), priors, tuple(max(f, self.coarse) for f in shares), weight)

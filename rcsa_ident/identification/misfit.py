@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
+from rcsa_ident.cutting.force import ForceTerm
 from rcsa_ident.identification._kernels import cross_frf, fit_cuts, mix_cuts, whiten
 from rcsa_ident.identification.data import AxisData, CutPrior, IdentificationData
 from rcsa_ident.identification.linearisation import DELAY_UNIT, Linearisation, Residual
@@ -24,6 +25,10 @@ from rcsa_ident.identification.parameters import (
     unpack,
 )
 from rcsa_ident.identification.priors import PriorRows, Priors, prior_rows
+from rcsa_ident.identification.rough_toolings import ToolingAt
+
+#: Entries of a tool-holder that a line feels: the flange's tt, tr, rr, and flange over tip t, r.
+HOLDER = 5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +87,11 @@ class Misfit:
         self.priors = priors
         self.model_error = model_error
         self.cut_weight = np.ones(len(data.cut_ids)) if cut_weight is None else cut_weight
-        self._axes = tuple(WeightedLines(a, data.relative_speed, f, self.cut_weight) for a, f in zip(data.axes, model_error, strict=True))
+        # where little is told, forces are far from those that were simulated: they add up exactly
+        exact = {c.term: k for k, c in enumerate(data.coefficients) if not c.tooling} if data.rough is not None else {}
+        self._axes = tuple(
+            WeightedLines(a, data.relative_speed, f, self.cut_weight, exact) for a, f in zip(data.axes, model_error, strict=True)
+        )
         # lines of all axes, cut by cut: a cut's delay and angle are the same for both
         cut = np.concatenate([a.cut for a in self._axes])
         self._order = np.argsort(cut, kind="stable")
@@ -90,6 +99,7 @@ class Misfit:
         self._lines = np.concatenate([a.lines for a in self._axes])[self._order]
         columns = [np.stack([a.omega, a.order, a.weight], axis=1) for a in self._axes]
         self._weights = np.concatenate(columns)[self._order]
+        self._rough = data.rough_lines()
 
     @property
     def points(self) -> int:
@@ -160,22 +170,31 @@ class Misfit:
         assert isinstance(layout, Layout)
         logs = theta[layout.joint]
         joint = scaled_joint(logs)
+        toolings = self._toolings(theta, layout, normal)
         answers = []
         for i, (lines, part) in enumerate(zip(self._axes, layout.axes, strict=True)):
             axis = unpack(theta[layout.axis(i)], part)
             n, o = lines.points.shape[0], lines.outputs
             values = np.empty((n, o), dtype=complex)
-            gradient = np.empty((n if normal else 0, o, part.size + JOINT), dtype=complex)
+            gradient = np.empty((n if normal else 0, o, part.size + JOINT + (HOLDER if toolings else 0)), dtype=complex)
             both = np.append(joint, axis.standstill)
-            cross_frf(
-                axis.omega_n, axis.shapes, axis.factor, axis.softening, both, lines.shares, lines.points, lines.holder, values, gradient
-            )
+            holder = lines.with_toolings(toolings[i]) if toolings else lines.holder
+            cross_frf(axis.omega_n, axis.shapes, axis.factor, axis.softening, both, lines.shares, lines.points, holder, values, gradient)
+            slope = lines.force_slope[:, :0]
             if layout.coefficients:
-                scale = np.exp(lines.force_slope @ theta[layout.force])[:, None]
+                factor, slope = lines.force(theta[layout.force])
+                scale = factor[:, None]
                 values *= scale
                 gradient *= scale[:, :, None] if normal else 1.0
-            answers.append(_AxisAnswer(values, gradient, axis, part, np.exp(logs)))
+            answers.append(_AxisAnswer(values, gradient, slope, axis, part, np.exp(logs), toolings[i] if toolings else []))
         return answers
+
+    def _toolings(self, theta: FloatArray, layout: Unknowns, slopes: bool) -> list[list[ToolingAt]]:
+        """What each axis' lines feel of toolings whose drawing is rough; nothing where all are as drawn or the layout leaves them so."""
+        place = self.data.rough_place
+        if self._rough is None or layout.coefficients < place.stop:
+            return []
+        return self._rough.at(theta[layout.force][place], slopes)
 
     def _cut_prior(self, theta: FloatArray, layout: Unknowns) -> CutPrior:
         """What is known of each cut, with the triggers of unknown tooth angle where that is an unknown of the layout."""
@@ -263,7 +282,14 @@ class Misfit:
 class WeightedLines:
     """Lines of one axis as rows, output after output at each point, with what never changes about them."""
 
-    def __init__(self, axis: AxisData, relative_speed: FloatArray, model_error: float, cut_weight: FloatArray) -> None:
+    def __init__(
+        self,
+        axis: AxisData,
+        relative_speed: FloatArray,
+        model_error: float,
+        cut_weight: FloatArray,
+        exact: Mapping[ForceTerm, int] | None = None,
+    ) -> None:
         o = axis.outputs
         self.outputs = o
         self.shares = axis.output_shares
@@ -274,7 +300,7 @@ class WeightedLines:
         self.lines = axis.lines.reshape(-1, 2)
         self.weight = (_weight(axis, model_error) * cut_weight[axis.cut][:, None]).ravel()
         self._root = np.sqrt(self.weight)
-        self._extra = np.repeat(axis.force_slope, o, axis=0)
+        self.exact = exact or {}
 
     def turned(self, nuisance: FloatArray) -> tuple[ComplexArray, ComplexArray]:
         """Lines as they would be without delay, and the air cut's part of them, shape (n o,)."""
@@ -293,11 +319,61 @@ class WeightedLines:
         measured, air = self.turned(nuisance)
         return np.stack([1j * self.omega * DELAY_UNIT * measured, -1j * self.order * air], axis=1) * self._root[:, None]
 
-    def jacobian(self, gradient: ComplexArray, model: ComplexArray, scale: FloatArray, layout: Unknowns) -> FloatArray:
+    def with_toolings(self, toolings: Sequence[ToolingAt]) -> ComplexArray:
+        """The tool-holders' receptances with those of rough toolings in place of the drawn ones, shape (n, 8)."""
+        holder = self.holder.copy()
+        for each in toolings:
+            holder[each.points, :HOLDER] = each.values
+        return holder
+
+    def force(self, logs: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """What the forces are of those that were simulated, shape (n,), and how its logarithm changes with each unknown, shape (n, c).
+
+        Terms that are told in `exact` add up, K_tc e^t (U_1 + k_rc e^r U_2) + K_te e^p U_3 + K_re e^q U_4, with the shares of the sum that
+        their slopes are at the values that were told; the others multiply.
+        """
+        slope = self.force_slope[:, : logs.size]
+        if not self.exact:
+            return np.exp(slope @ logs), slope
+        places = {term: self.exact[term] for term in self.exact if self.exact[term] < logs.size}
+        rest = logs.copy()
+        rest[list(places.values())] = 0.0
+        nothing = np.zeros(slope.shape[0])
+        share = {term: slope[:, k] for term, k in places.items()}
+        grown = {term: np.exp(logs[k]) for term, k in places.items()}
+        edges = [term for term in (ForceTerm.TANGENTIAL_EDGE, ForceTerm.RADIAL_EDGE) if term in places]
+        chip = share.get(ForceTerm.TANGENTIAL, 1.0 - sum((share[term] for term in edges), nothing))
+        ratio, tangential = share.get(ForceTerm.RATIO, nothing), grown.get(ForceTerm.TANGENTIAL, 1.0)
+        radial = tangential * ratio * grown.get(ForceTerm.RATIO, 1.0)
+        parts = {ForceTerm.TANGENTIAL: tangential * (chip - ratio) + radial, ForceTerm.RATIO: radial}
+        parts |= {term: share[term] * grown[term] for term in edges}
+        total = parts[ForceTerm.TANGENTIAL] + sum(
+            (parts[term] for term in edges), 1.0 - chip - sum((share[term] for term in edges), nothing)
+        )
+        slope = slope.copy()
+        for term, k in places.items():
+            slope[:, k] = parts[term] / total
+        return total * np.exp(self.force_slope[:, : logs.size] @ rest), slope
+
+    def jacobian(
+        self,
+        gradient: ComplexArray,
+        model: ComplexArray,
+        slope: ComplexArray,
+        scale: FloatArray,
+        toolings: Sequence[ToolingAt] = (),
+    ) -> FloatArray:
         """The residual's change with the axis' own parameters, the joint and the coefficients, shape (2 n o, q + c)."""
         rows = gradient.reshape(-1, gradient.shape[2])
-        out = np.empty((2 * rows.shape[0], rows.shape[1] + layout.coefficients))
-        whiten(rows, self._extra[:, : layout.coefficients], model.ravel(), self.weight, scale, out)
+        out = np.empty((2 * rows.shape[0], scale.size + slope.shape[1]))
+        whiten(rows, np.repeat(slope, self.outputs, axis=0), model.ravel(), self.weight, scale, out)
+        for each in toolings:
+            change = -(gradient[each.points, :, scale.size :] @ each.slopes)
+            lines = (each.points[:, None] * self.outputs + np.arange(self.outputs)).ravel()
+            change = change.reshape(lines.size, -1) * self._root[lines, None]
+            columns = scale.size + each.unknowns
+            out[np.ix_(lines, columns)] = change.real
+            out[np.ix_(rows.shape[0] + lines, columns)] = change.imag
         return out
 
 
@@ -321,16 +397,18 @@ class _AxisAnswer:
 
     model: ComplexArray
     gradient: ComplexArray
+    slope: ComplexArray
     axis: AxisParameters
     layout: AxisLayout
     joint: FloatArray
+    toolings: Sequence[ToolingAt] = ()
 
     def jacobian(self, lines: WeightedLines, layout: Unknowns) -> tuple[FloatArray, ComplexArray]:
         core = self.layout.core
         compliance = self.gradient[:, :, core - 3 : core].copy()
         self.gradient[:, :, core - 3 : core] = compliance @ residual_turn(self.axis.residual)
         scale = np.concatenate([chain(self.axis, self.layout), scaled_joint(np.log(self.joint))])
-        return lines.jacobian(self.gradient, self.model, scale, layout), compliance
+        return lines.jacobian(self.gradient, self.model, self.slope, scale, self.toolings), compliance
 
 
 def _without_information(inner: FloatArray, period: FloatArray) -> None:

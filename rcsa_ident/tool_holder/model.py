@@ -98,6 +98,7 @@ def free_body(
     shear_coefficient: ShearCoefficient = cowper,
     refinement: int = 1,
     points: Sequence[float] = (),
+    like: ToolAssembly | None = None,
 ) -> FreeBody:
     """Return what `tool_holder_structure` does, with the rotary inertia apart and the rigid-body motions.
 
@@ -111,9 +112,11 @@ def free_body(
     points : sequence of float [m]
         Further points that the structure has coordinates at, behind tip and flange: distances from the tip, of the tool in front of the
         holder's nose and of the holder from there on.
+    like : ToolAssembly, optional
+        An assembly of the same stretches whose division into elements is taken: matrices of both then have the same freedoms.
     """
     layered = assembly.contact is not None and assembly.insertion > 0.0
-    stations, elements = _mesh(assembly, max_frequency, shear_coefficient, refinement, not layered, points)
+    stations, elements = _mesh(assembly, max_frequency, shear_coefficient, refinement, not layered, points, like)
     length = np.diff(stations)
     first_freedom, d = _number(elements, stations.size, layered)
     mass, damping, stiffness, loss, rotary = (np.zeros((d, d)) for _ in range(5))
@@ -247,15 +250,16 @@ def _mesh(
     refinement: int,
     merged: bool,
     points: Sequence[float] = (),
+    like: ToolAssembly | None = None,
 ) -> tuple[FloatArray, list[_Element]]:
     """Stations along z and the elements between them, from the tip to the flange."""
-    pieces = _pieces(assembly)
-    steps = sorted({_key(z) for _, first, last, _ in pieces for z in (first, last)} | {_key(z) for z in points})
+    stretches = _stretches(assembly, points)
+    counts = [
+        max(_division(segment, b - a, max_frequency, shear_coefficient) for _, _, segment in here) * refinement
+        for a, b, here in (stretches if like is None else _stretches(like, points))
+    ]
     stations, elements = [0.0], []
-    for a, b in ((a * 1e-9, b * 1e-9) for a, b in pairwise(steps)):
-        middle = 0.5 * (a + b)
-        here = [(body, first, segment) for body, first, last, segment in pieces if first < middle < last]
-        count = max(_division(segment, b - a, max_frequency, shear_coefficient) for _, _, segment in here) * refinement
+    for (a, b, here), count in zip(stretches, counts, strict=True):
         edges = np.linspace(a, b, count + 1)
         tapered = any(segment.end_diameter is not None for _, _, segment in here)
         for i, (start, end) in enumerate(pairwise(edges)):
@@ -266,6 +270,17 @@ def _mesh(
             elements += [_Element(body, len(stations) - 1 + i, each) for body, each in parts]
         stations += edges[1:].tolist()
     return np.array(stations), elements
+
+
+def _stretches(assembly: ToolAssembly, points: Sequence[float]) -> list[tuple[float, float, list[tuple[int, float, BeamSegment]]]]:
+    """Start and end of each stretch between two steps of either body, with body, start and segment of what is there."""
+    pieces = _pieces(assembly)
+    steps = sorted({_key(z) for _, first, last, _ in pieces for z in (first, last)} | {_key(z) for z in points})
+    found = []
+    for a, b in ((a * 1e-9, b * 1e-9) for a, b in pairwise(steps)):
+        middle = 0.5 * (a + b)
+        found.append((a, b, [(body, first, segment) for body, first, last, segment in pieces if first < middle < last]))
+    return found
 
 
 def _pieces(assembly: ToolAssembly) -> list[tuple[int, float, float, BeamSegment]]:

@@ -20,6 +20,7 @@ from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import Progress
 from rcsa_ident.identification.result import Identification
+from rcsa_ident.identification.rough_toolings import Drawing, rough_toolings
 from rcsa_ident.machining_setup import Campaign, Cut, HammerTest
 from rcsa_ident.remarks import Remark
 from rcsa_ident.scaleout import Map
@@ -28,6 +29,7 @@ from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.sweep import measure_pass
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.tool_holder.model import receptance_at_points, tool_holder_receptance
+from rcsa_ident.tool_holder.rough import rough_tool_holder
 from rcsa_ident.tool_holder.turning import turning_pair
 from rcsa_ident.units import from_hz
 
@@ -271,7 +273,21 @@ def _data_of_cuts(campaign: Campaign, readings: Sequence[Reading]) -> Identifica
     known = campaign.coefficients
     edges = [known.edge_spread if edge > 0.0 else 0.0 for edge in (known.tangential_edge, known.radial_edge)]
     turning = {name: partial(_turning, campaign, name) for name in campaign.toolings}
-    return prepare(measurements, receptances, teeth, (known.tangential_spread, known.ratio_spread, *edges), turning)
+    data = prepare(measurements, receptances, teeth, (known.tangential_spread, known.ratio_spread, *edges), turning)
+    return with_rough(data, campaign)
+
+
+def with_rough(data: IdentificationData, campaign: Campaign) -> IdentificationData:
+    """Return the data whose tool-holders, depths and sensors are known as well as drawings and campaign say."""
+    drawn = [campaign.toolings[name] for name in data.toolings]
+    rough = rough_toolings({t.name: Drawing(t.assembly, t.spread, t.tool_model, t.holder_model) for t in drawn})
+    if rough is None:
+        return data
+    depths = [[cut.conditions.axial_depth for cut in campaign.cuts if cut.tooling == name] for name in data.toolings]
+    depth = np.array([0.02e-3 / np.mean(each) for each in depths])
+    data = data.with_scales(depth, np.full(len(data.axes), 0.02))
+    highest = max(float(axis.omega.max()) for axis in data.axes) / (2.0 * np.pi)
+    return data.with_rough_toolings(rough, [rough_tool_holder(each.assembly, highest) for each in drawn])
 
 
 def _turning(campaign: Campaign, name: str, omega: FloatArray, ratio: FloatArray) -> tuple[ComplexArray, ComplexArray]:
