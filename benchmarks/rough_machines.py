@@ -1,4 +1,4 @@
-"""Campaigns whose drawings are only roughly right: tool, holder, contact, clamping, coefficients, sensors and depths differ from what is told.
+"""Campaigns whose drawings are only roughly right: toolings, clampings, coefficients, sensors and depths differ from what is told.
 
 Seeds of the machines, `ROUGH` and `ROUGH_DEVELOPMENT`, and the distributions here were fixed on 2026-11-24, before the identification
 took anything of a tooling for unknown. A machine, its drawn toolings and its plan are those of `benchmarks.machines` for the same seed;

@@ -29,6 +29,7 @@ from rcsa_ident.identification.result import AxisResult, Identification, Identif
 from rcsa_ident.identification.status import Status
 from rcsa_ident.machine.flange_part import JointedFlange
 from rcsa_ident.remarks import Remark
+from rcsa_ident.tool_holder.drawings import KnownToolings
 
 #: Factor on the posterior's standard deviations for what no model of finitely many modes can tell of itself: on three virtual
 #: machines drawn for development (`benchmarks.machines`), the errors' root mean square was that many deviations. Of both planes together,
@@ -72,7 +73,22 @@ class Fit(ABC):
     @property
     def rough_values(self) -> FloatArray:
         """What the drawings did not tell, shape (u,), in units of its spreads."""
-        return np.asarray(self.solution.theta[self.solution.layout.force][self.data.rough_place])
+        return np.asarray(self.solution.theta[self._rough_entries(self.solution)])
+
+    def _rough_entries(self, solution: Solution) -> np.ndarray:
+        """Places of that in a solution's vector."""
+        place = self.data.rough_place
+        return solution.layout.force.start + np.arange(place.start, place.stop)
+
+    def _toolings(self) -> KnownToolings | None:
+        """What is known of the toolings; None where their drawings are exact."""
+        rough = self.data.rough
+        if rough is None:
+            return None
+        own = self._rough_entries(self.solution)
+        # wider bands do not make less known than was known before
+        covariance = self.covariance[np.ix_(own, own)]
+        return KnownToolings(rough.unknowns, rough.spread, self.rough_values, covariance, self.data.toolings)
 
     @cached_property
     def evidence(self) -> float:
@@ -117,6 +133,7 @@ class Fit(ABC):
             notes=tuple(notes),
             # the smooth errors stand behind them, unnamed
             coefficients=dict(zip(data.coefficients, scales, strict=False)),
+            toolings=self._toolings(),
         )
 
     def _gain(self, k: int) -> tuple[float, float]:
@@ -220,7 +237,15 @@ class PlaneFit(Fit):
             entries = _entries(layout, i)
             own, other = replace(layout.axes[i], places=0, standstill=False), self.rival.theta[_entries(others, i)]
             covariance = self.covariance[np.ix_(entries, entries)]
-            found.append(Posterior(self.solution.theta[entries], covariance, own, self.data.speed_range, (other,)))
+            toolings = {}
+            if self.data.rough is not None:
+                rough = self._rough_entries(self.solution)
+                toolings = {
+                    "tooling_cross": self.covariance[np.ix_(entries, rough)],
+                    "tooling_covariance": self.covariance[np.ix_(rough, rough)],
+                    "rival_toolings": (self.rival.theta[self._rough_entries(self.rival)] - self.rough_values,),
+                }
+            found.append(Posterior(self.solution.theta[entries], covariance, own, self.data.speed_range, (other,), **toolings))
         return found
 
     def doubts(self) -> tuple[list[Remark], list[Remark]]:

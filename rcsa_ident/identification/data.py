@@ -11,7 +11,8 @@ from rcsa_ident.arrays import ComplexArray, FloatArray, frozen
 from rcsa_ident.cutting.force import ForceCoefficient
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.hammer_lines import HammerLines
-from rcsa_ident.identification.rough_toolings import RoughLines, RoughToolings
+from rcsa_ident.identification.rough_toolings import RoughLines
+from rcsa_ident.tool_holder.drawings import RoughToolings
 from rcsa_ident.tool_holder.rough import RoughToolHolder
 
 #: Slopes are multiplied and moments divided by it, so that all receptances have one unit and size [m].
@@ -70,6 +71,8 @@ class AxisData:
         By which a line's frequency changes, and for how long; empty where none does.
     around : complex array, shape (n, 2, 5) or (0, 2, 5) [m/N]
         `flange` and `tip` at `node` below and above each frequency.
+    talk : complex array, shape (n, o, 2) or (0, 0, 0) [m/N]
+        What `lines` would hold besides if a sensor felt as much of the other axis' motion as of its own; empty where none does.
     shares : array, shape (o, 1 + e) or (0, 0) [-]
         What of the flange's motion, and of that of other places of the machine, is in each output. The first output, or the first two, is
         what a search looks for: the flange's motion, or where no sensor sees that, another place's.
@@ -93,12 +96,13 @@ class AxisData:
     point: ComplexArray = field(default_factory=lambda: np.zeros((0, 3), dtype=complex))
     sweep: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     around: ComplexArray = field(default_factory=lambda: np.zeros((0, 2, 5), dtype=complex))
+    talk: ComplexArray = field(default_factory=lambda: np.zeros((0, 0, 0), dtype=complex))
     shares: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
         for name in ("omega", "order", "variance", "beside", "sweep", "shares"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
-        for name in ("lines", "flange", "tip", "force_slope", "force", "across", "across_slope", "point", "around"):
+        for name in ("lines", "flange", "tip", "force_slope", "force", "across", "across_slope", "point", "around", "talk"):
             object.__setattr__(self, name, frozen(getattr(self, name), np.complex128))
         for name in ("on_holder", "still"):
             object.__setattr__(self, name, frozen(getattr(self, name), np.bool_))
@@ -175,8 +179,9 @@ class AxisData:
             return self
         lines = np.sum(self.lines[:, self.searched], axis=1, keepdims=True)
         beside = np.sum(self.beside[:, self.searched], axis=1, keepdims=True) if self.beside.size else self.beside
+        talk = np.sum(self.talk[:, self.searched], axis=1, keepdims=True) if self.talk.size else self.talk
         shares = FLANGE_ALONE if self.of_flange else ONE_PLACE
-        return replace(self, variance=self.noise[:, None], lines=lines, beside=beside, shares=shares)
+        return replace(self, variance=self.noise[:, None], lines=lines, beside=beside, talk=talk, shares=shares)
 
     def of(self, keep: np.ndarray) -> AxisData:
         """Return some of the points: a mask or indices, shape (n,)."""
@@ -249,6 +254,8 @@ class IdentificationData:
         Its receptances while it turns; empty where nobody asks for them.
     tests : tuple of HammerLines
         The last of the cuts. Their gains have no name among the coefficients either and stand in front of the smooth errors.
+    talk_place : mapping of Dof to int
+        Where the share that an axis' sensor feels of the other axis' motion stands among the coefficients.
     rough : RoughToolings or None
         What drawings do not tell; unknowns in units of their spreads, behind the gains and in front of the smooth errors.
     rough_holders : tuple of RoughToolHolder
@@ -271,6 +278,7 @@ class IdentificationData:
     coefficient_spread: tuple[float, ...] = ()
     turning: Mapping[str, Turning] = field(default_factory=dict)
     tests: tuple[HammerLines, ...] = ()
+    talk_place: Mapping[Dof, int] = field(default_factory=dict)
     rough: RoughToolings | None = None
     rough_holders: tuple[RoughToolHolder, ...] = ()
     rough_first: int = 0
@@ -310,6 +318,29 @@ class IdentificationData:
             axes.append(replace(axis, force_slope=np.hstack([axis.force_slope, columns]), across_slope=across))
         spread = (*self.coefficient_spread, *depth[deep].tolist(), *gain[loud].tolist())
         return replace(self, axes=tuple(axes), coefficient_spread=spread)
+
+    def with_cross_talk(self, spread: float) -> IdentificationData:
+        """Return the same data whose displacement sensors may feel a share of the other axis' motion, of a standard deviation [-]."""
+        lines: dict[Dof, AxisData] = {axis.axis: axis for axis in self.axes}
+        if len(lines) < 2 or spread == 0.0 or not all(axis.force.size for axis in self.axes):
+            return self
+        axes, first = [], len(self.coefficient_spread)
+        for axis, other in zip(self.axes, self.axes[::-1], strict=True):
+            place = {key: k for k, key in enumerate(zip(other.cut.tolist(), other.order.tolist(), strict=True))}
+            here = [place.get(key, -1) for key in zip(axis.cut.tolist(), axis.order.tolist(), strict=True)]
+            # a line that the other axis' force does not make is not among its lines, and small
+            seen = other.lines[here, 0] * np.where(np.array(here) < 0, 0.0, other.force[here] / axis.force)[:, None]
+            talk = np.zeros_like(axis.lines)
+            talk[:, 0] = seen
+            slope = np.pad(axis.force_slope, ((0, 0), (0, 2)))
+            across = np.pad(axis.across_slope, ((0, 0), (0, 2))) if axis.across_slope.size else axis.across_slope
+            axes.append(replace(axis, talk=talk, force_slope=slope, across_slope=across))
+        return replace(
+            self,
+            axes=tuple(axes),
+            coefficient_spread=(*self.coefficient_spread, spread, spread),
+            talk_place={axis.axis: first + i for i, axis in enumerate(axes)},
+        )
 
     def with_rough_toolings(self, rough: RoughToolings, holders: Sequence[RoughToolHolder]) -> IdentificationData:
         """Return the same data whose tool-holders are known only roughly.

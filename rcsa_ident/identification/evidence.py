@@ -46,8 +46,8 @@ SMOOTH_ERROR = 2e-3
 ATTEMPTS = 3
 #: Further searches among lines that were freed of their sweeps, until two have come to evidences as near as this.
 FREED_ATTEMPTS, SAME = 3, 20.0
-#: Further searches at the toolings of the answer before, while the evidence gains.
-ROUGH_ATTEMPTS = 3
+#: Further searches where drawings are rough, at the toolings of the best answer so far.
+ROUGH_ATTEMPTS = 4
 #: Windows of a tooling's passes that are enough to find its modes; the polish takes all.
 ENOUGH = 40
 #: Score beyond which planes plainly feel each other once a stiffness that changes with speed is in the fit: 0 to 36 where they do not,
@@ -109,18 +109,35 @@ class EvidenceSelection:
                 found, worse = sorted((found, other), key=lambda fit: fit.evidence)
                 if worse.evidence - found.evidence < SAME:
                     break
-            for _ in range(ROUGH_ATTEMPTS if data.rough is not None else 0):
-                # modes that were found at the drawn toolings mimic what is wrong with these: they are searched anew at those of the answer
-                at_answer = data.with_toolings_at(found.rough_values)
-                other = self._found(at_answer, at_answer, sequence, map, trace, progress)
-                found, worse = sorted((found, other), key=lambda fit: fit.evidence)
-                if found is not other or worse.evidence - found.evidence < SAME:
-                    break
+            if data.rough is not None:
+                found = self._agreed(data, found, sequence, map, trace, progress)
             if data.sweeps:
                 found = self._asked(data, found, map, _report_to(BOTH, trace, progress))
             return replace(found.answer(seed, self.name), trace=tuple(trace))
         except (ArithmeticError, np.linalg.LinAlgError):
             return failed(data, seed, self.name)
+
+    def _agreed(
+        self,
+        data: IdentificationData,
+        first: Fit,
+        sequence: np.random.SeedSequence,
+        map: Map,
+        trace: list[Step],
+        progress: Progress | None,
+    ) -> Fit:
+        """Return the likeliest of several searches, at toolings that are ever nearer to the true ones, until two have come to one answer.
+
+        Modes that were found at the drawn toolings mimic what is wrong with these.
+        """
+        found = [first]
+        for _ in range(ROUGH_ATTEMPTS):
+            at_answer = data.with_toolings_at(found[0].rough_values)
+            found.append(self._found(at_answer, at_answer, sequence, map, trace, progress))
+            found.sort(key=lambda fit: fit.evidence)
+            if found[1].evidence - found[0].evidence < SAME:
+                break
+        return found[0]
 
     def _found(
         self,

@@ -23,6 +23,7 @@ from rcsa_ident.machine.machine import Machine
 from rcsa_ident.machine.tip import Side
 from rcsa_ident.machining_setup import Workpiece
 from rcsa_ident.signals.recording import Sensor
+from rcsa_ident.tool_holder.drawings import KnownToolings
 from rcsa_ident.units import to_hz
 
 #: Unknowns times frequencies up to which the machine's side of the coupling is kept: 100 bytes each, 512 where planes feel each other.
@@ -78,6 +79,8 @@ class IdentifiedMachine(Machine):
         The campaign's.
     whole : CoupledPosterior or None
         Of a machine whose planes feel each other; `identified` then is each plane at standstill, without the other one.
+    toolings : KnownToolings or None
+        What its cuts told of toolings whose drawings are not exact.
     """
 
     identified: Mapping[Dof, MachineAxis]
@@ -90,6 +93,7 @@ class IdentifiedMachine(Machine):
     sensors: tuple[Sensor, ...] = ()
     name: str = ""
     whole: CoupledPosterior | None = None
+    toolings: KnownToolings | None = None
     kept_sides: tuple[Side, ...] = field(default=(), repr=False)
 
     @cached_property

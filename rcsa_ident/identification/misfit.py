@@ -96,10 +96,11 @@ class Misfit:
         cut = np.concatenate([a.cut for a in self._axes])
         self._order = np.argsort(cut, kind="stable")
         self._start = np.searchsorted(cut[self._order], np.arange(len(data.cut_ids) + 1))
-        self._lines = np.concatenate([a.lines for a in self._axes])[self._order]
         columns = [np.stack([a.omega, a.order, a.weight], axis=1) for a in self._axes]
         self._weights = np.concatenate(columns)[self._order]
         self._rough = data.rough_lines()
+        self._talk = tuple(data.talk_place.get(a.axis) for a in data.axes)
+        self._lines = self._in_order(tuple(a.lines for a in self._axes))
 
     @property
     def points(self) -> int:
@@ -125,10 +126,11 @@ class Misfit:
         models = [answer.model for answer in answers]
         nuisance = nuisance.copy()
         prior = self._cut_prior(theta, layout)
-        at_lines = np.concatenate([m.ravel() for m in models])[self._order]
-        fit_cuts(self._lines, self._weights, at_lines, self._start, prior.rows, nuisance, grid)
+        at_lines = self._in_order([m.ravel() for m in models])
+        lines = self._in_order(self._seen(theta, layout)) if self.data.talk_place else self._lines
+        fit_cuts(lines, self._weights, at_lines, self._start, prior.rows, nuisance, grid)
         residual = self._residual(theta, layout, models, nuisance, prior)
-        linear = self._linearise(layout, answers, residual, nuisance, prior) if normal else None
+        linear = self._linearise(theta, layout, answers, residual, nuisance, prior) if normal else None
         return Evaluation(residual.cost, nuisance, tuple(models), residual, linear)
 
     def root_weight(self, axis: int) -> FloatArray:
@@ -159,7 +161,7 @@ class Misfit:
     def without_delay(self, i: int, nuisance: FloatArray) -> ComplexArray:
         """Return the measured motion of an axis (see `AxisData.measured`) with tooth 1 at immersion 0 at the start, shape (n,) [m/N]."""
         lines = self._axes[i]
-        return np.sum(lines.turned(nuisance)[0].reshape(-1, lines.outputs)[:, self.data.axes[i].searched], axis=1)
+        return np.sum(lines.turned(lines.lines, nuisance)[0].reshape(-1, lines.outputs)[:, self.data.axes[i].searched], axis=1)
 
     def weight(self, i: int) -> FloatArray:
         """Return the weights of an axis' lines, shape (n, o) [N^2/m^2]."""
@@ -189,6 +191,18 @@ class Misfit:
             answers.append(_AxisAnswer(values, gradient, slope, axis, part, np.exp(logs), toolings[i] if toolings else []))
         return answers
 
+    def _in_order(self, of_axes: Sequence[ComplexArray]) -> ComplexArray:
+        """Lines of all axes, cut by cut."""
+        return np.concatenate(of_axes)[self._order]
+
+    def _seen(self, theta: FloatArray, layout: Unknowns) -> tuple[ComplexArray, ...]:
+        """Lines of each axis without what its sensor feels of the other one, shape (n o, 2)."""
+        force = theta[layout.force]
+        return tuple(
+            axis.lines if place is None or place >= force.size else axis.lines - force[place] * axis.talk
+            for axis, place in zip(self._axes, self._talk, strict=True)
+        )
+
     def _toolings(self, theta: FloatArray, layout: Unknowns, slopes: bool) -> list[list[ToolingAt]]:
         """What each axis' lines feel of toolings whose drawing is rough; nothing where all are as drawn or the layout leaves them so."""
         place = self.data.rough_place
@@ -211,14 +225,15 @@ class Misfit:
     def _residual(
         self, theta: FloatArray, layout: Unknowns, models: Sequence[ComplexArray], nuisance: FloatArray, prior: CutPrior
     ) -> Residual:
-        lines = tuple(axis.rest(model, nuisance) for axis, model in zip(self._axes, models, strict=True))
+        seen = self._seen(theta, layout)
+        lines = tuple(axis.rest(each, model, nuisance) for axis, each, model in zip(self._axes, seen, models, strict=True))
         own = self.prior(layout).residual(theta)
         cuts = np.sqrt(prior.weights) * nuisance
         cuts[:, 0] -= np.sqrt(prior.delay_weight) * prior.delay
         return Residual(lines, own, cuts)
 
     def _linearise(
-        self, layout: Unknowns, answers: Sequence[Answer], residual: Residual, nuisance: FloatArray, prior: CutPrior
+        self, theta: FloatArray, layout: Unknowns, answers: Sequence[Answer], residual: Residual, nuisance: FloatArray, prior: CutPrior
     ) -> Linearisation:
         """Gauss-Newton matrices of the parameters after eliminating two unknowns per cut (Schur complement)."""
         size, cuts = layout.size, len(self.data.cut_ids)
@@ -229,14 +244,16 @@ class Misfit:
         inner = np.zeros((cuts, 2, 2))
         inner[:, 0, 0], inner[:, 1, 1] = cut_prior[:, 0] ** 2, cut_prior[:, 1] ** 2
         jacobians, all_columns, compliance = [], [], []
-        for i, (lines, answer) in enumerate(zip(self._axes, answers, strict=True)):
-            block = layout.axis(i)
+        for i, (lines, seen, answer) in enumerate(zip(self._axes, self._seen(theta, layout), answers, strict=True)):
+            block, felt = layout.axis(i), self._talk[i]
             jacobian, change = answer.jacobian(lines, layout)
+            if felt is not None and felt < layout.coefficients:
+                jacobian[:, felt - layout.coefficients] = -lines.whitened(lines.turned(lines.talk, nuisance)[0])
             compliance.append(change)
             part = block.stop - block.start
             place = np.r_[block, slice(layout.tail, layout.force.stop)]
             hessian[np.ix_(place, place)] += jacobian.T @ jacobian
-            columns = lines.columns(nuisance)
+            columns = lines.columns(seen, nuisance)
             mix_cuts(jacobian, columns, lines.cut, part, block.start, layout.tail, inner, mixed)
             jacobians.append(jacobian)
             all_columns.append(columns)
@@ -297,26 +314,30 @@ class WeightedLines:
         self.holder = axis.kernel_holder
         self.force_slope = axis.force_slope
         self.omega, self.order, self.cut = np.repeat(axis.omega, o), np.repeat(axis.order, o), np.repeat(axis.cut, o)
-        self.lines = axis.lines.reshape(-1, 2)
+        self.lines, self.talk = axis.lines.reshape(-1, 2), axis.talk.reshape(-1, 2)
         self.weight = (_weight(axis, model_error) * cut_weight[axis.cut][:, None]).ravel()
         self._root = np.sqrt(self.weight)
         self.exact = exact or {}
 
-    def turned(self, nuisance: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """Lines as they would be without delay, and the air cut's part of them, shape (n o,)."""
+    def turned(self, lines: ComplexArray, nuisance: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+        """Lines, shape (n o, 2), as they would be without delay, and the air cut's part of them, shape (n o,)."""
         delay, angle = nuisance[self.cut].T
         back = np.exp(1j * self.omega * delay)
-        air = self.lines[:, 1] * np.exp(1j * self.order * angle) * back
-        return self.lines[:, 0] * back - air, air
+        air = lines[:, 1] * np.exp(1j * self.order * angle) * back
+        return lines[:, 0] * back - air, air
 
-    def rest(self, model: ComplexArray, nuisance: FloatArray) -> FloatArray:
+    def whitened(self, values: ComplexArray) -> FloatArray:
+        """In standard deviations, real over imaginary parts, shape (2 n o,)."""
+        values = values * self._root
+        return np.concatenate([values.real, values.imag])
+
+    def rest(self, lines: ComplexArray, model: ComplexArray, nuisance: FloatArray) -> FloatArray:
         """Residual, real over imaginary parts, shape (2 n o,)."""
-        rest = (self.turned(nuisance)[0] - model.ravel()) * self._root
-        return np.concatenate([rest.real, rest.imag])
+        return self.whitened(self.turned(lines, nuisance)[0] - model.ravel())
 
-    def columns(self, nuisance: FloatArray) -> ComplexArray:
+    def columns(self, lines: ComplexArray, nuisance: FloatArray) -> ComplexArray:
         """The lines' change with delay and angle of their cut, shape (n o, 2)."""
-        measured, air = self.turned(nuisance)
+        measured, air = self.turned(lines, nuisance)
         return np.stack([1j * self.omega * DELAY_UNIT * measured, -1j * self.order * air], axis=1) * self._root[:, None]
 
     def with_toolings(self, toolings: Sequence[ToolingAt]) -> ComplexArray:

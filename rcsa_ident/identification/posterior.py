@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -57,6 +57,12 @@ class Posterior:
         Middle of the campaign's spindle speeds and half their range; only a layout with softening asks for it.
     rivals : tuple of array
         Unknowns of other models of the same data, with fewer modes or more: how far they differ belongs to what is not known.
+    tooling_cross : array, shape (p, u)
+        Covariance of the unknowns with what is known of toolings (`KnownToolings`), in its units.
+    tooling_covariance : array, shape (u, u)
+        Of that.
+    rival_toolings : tuple of array, shape (u,) each
+        How far each rival's toolings are from those.
     """
 
     theta: FloatArray
@@ -64,8 +70,13 @@ class Posterior:
     layout: AxisLayout
     speed_range: tuple[float, float] = (0.0, 0.0)
     rivals: tuple[FloatArray, ...] = ()
+    tooling_cross: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    tooling_covariance: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    rival_toolings: tuple[FloatArray, ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "tooling_cross", frozen(self.tooling_cross))
+        object.__setattr__(self, "tooling_covariance", frozen(self.tooling_covariance))
         object.__setattr__(self, "theta", frozen(self.theta))
         object.__setattr__(self, "covariance", frozen(self.covariance))
         object.__setattr__(self, "rivals", tuple(frozen(r) for r in self.rivals))
@@ -104,7 +115,13 @@ class Posterior:
     def doubt(self, axis: Dof, speed: float | None = None) -> Doubt:
         """Return the machines a step to both sides along each of the covariance's own axes, and the rivals, at a speed [rad/s]."""
         steps = steps_along(self.theta, self.covariance, lambda theta: self.candidate(axis, theta, speed))
-        return Doubt(steps, tuple(self.candidate(axis, rival, speed) for rival in self.rivals))
+        rivals = tuple(self.candidate(axis, rival, speed) for rival in self.rivals)
+        if not self.tooling_covariance.size:
+            return Doubt(steps, rivals)
+        values, vectors = np.linalg.eigh(self.covariance)
+        told = values > 0.0
+        moved = (vectors[:, told] / np.sqrt(values[told])).T @ self.tooling_cross
+        return Doubt(steps, rivals, np.vstack([moved, *self.rival_toolings]), self.tooling_covariance - moved.T @ moved)
 
     def part(self, axis: Dof, speed: float | None = None) -> FlangePart:
         """Return the axis as a part of the flange, with what is not known of it, at a spindle speed [rad/s]."""

@@ -27,6 +27,7 @@ from rcsa_ident.remarks import Remark, says
 from rcsa_ident.shown import Shown
 from rcsa_ident.signals.measurement import MAX_FREQUENCY
 from rcsa_ident.signals.recording import Sensor
+from rcsa_ident.tool_holder.drawings import KnownToolings
 
 
 class IdentificationCode(StrEnum):
@@ -175,6 +176,8 @@ class Identification(Shown):
         That recorded it.
     whole : CoupledPosterior or None
         Where both planes had to be fitted together; `axes` then hold each plane at standstill, without the other one.
+    toolings : KnownToolings or None
+        What the cuts told of toolings whose drawings are not exact.
     """
 
     status: Status
@@ -193,6 +196,7 @@ class Identification(Shown):
     workpiece: Workpiece | None = None
     sensors: tuple[Sensor, ...] = ()
     whole: CoupledPosterior | None = None
+    toolings: KnownToolings | None = None
 
     @property
     def at_minimum(self) -> bool:
@@ -234,6 +238,7 @@ class Identification(Shown):
             sensors=self.sensors,
             name=self.campaign,
             whole=self.whole,
+            toolings=self.toolings,
         )
 
     def __str__(self) -> str:

@@ -1,130 +1,16 @@
-"""What drawings do not tell of the toolings of a campaign, as unknowns with priors that toolings of the same model share."""
+"""Toolings whose drawings are rough, at the lines of a campaign: functions of what the drawings do not tell."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.tool_holder.alteration import ALTERATIONS, Alteration, fluted_segments
-from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.tool_holder.alteration import ALTERATIONS
+from rcsa_ident.tool_holder.drawings import RoughToolings
 from rcsa_ident.tool_holder.rough import RoughToolHolder
-from rcsa_ident.tool_holder.spread import Spread
-
-_STIFFNESSES = ("translational_stiffness", "rotational_stiffness")
-_DAMPINGS = ("translational_damping", "rotational_damping")
-
-
-class Drawing(NamedTuple):
-    """A tooling as drawn, and how well that is known.
-
-    Parameters
-    ----------
-    assembly : ToolAssembly
-    spread : Spread
-    tool_model, holder_model : str
-        Empty where nothing is shared.
-    """
-
-    assembly: ToolAssembly
-    spread: Spread
-    tool_model: str = ""
-    holder_model: str = ""
-
-
-class RoughUnknown(NamedTuple):
-    """One number that a drawing does not tell.
-
-    Parameters
-    ----------
-    field : str
-        Of `Alteration`.
-    owner : str
-        Name of the tooling, or of the model of tool or holder, that it belongs to.
-    kind : str
-        ``tooling``, ``tool`` or ``holder``: what the owner is.
-    """
-
-    field: str
-    owner: str
-    kind: str
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RoughToolings:
-    """Unknowns of several toolings.
-
-    Parameters
-    ----------
-    unknowns : tuple of RoughUnknown, length u
-    spread : array, shape (u,)
-        Standard deviations before any cut: of logarithms, or [m].
-    weights : array, shape (t, 9, u)
-        Which unknowns add up to each field of each tooling's alteration.
-    """
-
-    unknowns: tuple[RoughUnknown, ...]
-    spread: FloatArray
-    weights: FloatArray
-
-    def alteration(self, tooling: int, values: FloatArray) -> Alteration:
-        """Return how a tooling differs from its drawing; `values` of shape (u,), in units of their spreads."""
-        return Alteration(*(self.weights[tooling] @ (self.spread * values)).tolist())
-
-    def fields_of(self, tooling: int) -> tuple[str, ...]:
-        """Return the fields of a tooling's alteration that are unknown."""
-        return tuple(name for name, row in zip(ALTERATIONS, self.weights[tooling], strict=True) if np.any(row))
-
-
-def rough_toolings(drawings: Mapping[str, Drawing]) -> RoughToolings | None:
-    """Return what is unknown of several toolings, None where all are exact.
-
-    Tools of one model share fluted part and modulus, holders of one model their contact and diameter. A contact differs a little
-    in each clamping beside what its model shares.
-
-    Parameters
-    ----------
-    drawings : mapping of tooling to Drawing
-    """
-    spreads: dict[RoughUnknown, float] = {}
-    members: list[list[tuple[str, RoughUnknown]]] = []
-    sharing = [d.holder_model for d in drawings.values() if d.holder_model]
-    for name, drawing in drawings.items():
-        spread, own = drawing.spread, list[tuple[str, RoughUnknown]]()
-        tool = (drawing.tool_model, "tool") if drawing.tool_model else (name, "tooling")
-        holder = (drawing.holder_model, "holder") if drawing.holder_model else (name, "tooling")
-        wanted: list[tuple[str, tuple[str, str], float]] = [("stickout", (name, "tooling"), spread.stickout)]
-        if fluted_segments(drawing.assembly.tool):
-            wanted += [("fluted_length", tool, spread.segment_length), ("fluted_diameter", tool, spread.fluted_diameter)]
-        wanted += [("youngs_modulus", tool, spread.youngs_modulus), ("holder_diameter", holder, spread.holder_diameter)]
-        if drawing.assembly.contact is not None and drawing.assembly.insertion > 0.0:
-            shared = sharing.count(drawing.holder_model) > 1
-            for each in _STIFFNESSES:
-                again = spread.reclamping
-                if shared:
-                    wanted += [(each, holder, spread.contact_stiffness), (each, (name, "tooling"), again)]
-                else:
-                    wanted.append((each, holder, float(np.hypot(spread.contact_stiffness, again))))
-            contact = drawing.assembly.contact
-            wanted += [(each, holder, spread.contact_damping) for each in _DAMPINGS if getattr(contact, each) > 0.0]
-        for field, (owner, kind), size in wanted:
-            if size > 0.0:
-                unknown = RoughUnknown(field, owner, kind)
-                # models whose files disagree are known as well as the best of them says
-                spreads[unknown] = min(spreads.get(unknown, np.inf), size)
-                own.append((field, unknown))
-        members.append(own)
-    if not spreads:
-        return None
-    place = {unknown: k for k, unknown in enumerate(spreads)}
-    weights = np.zeros((len(drawings), len(ALTERATIONS), len(spreads)))
-    for t, own in enumerate(members):
-        for field, unknown in own:
-            weights[t, ALTERATIONS.index(field), place[unknown]] = 1.0
-    return RoughToolings(tuple(spreads), np.array(list(spreads.values())), weights)
 
 
 class ToolingAt(NamedTuple):

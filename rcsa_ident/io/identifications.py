@@ -18,6 +18,7 @@ from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.result import AxisResult, Identification
 from rcsa_ident.identification.status import Status
 from rcsa_ident.io.both_planes import both_planes_from_json, both_planes_to_json
+from rcsa_ident.io.drawings import axis_toolings_of, axis_toolings_to_json, known_toolings_of, known_toolings_to_json
 from rcsa_ident.io.results import AXES, SCHEMA_VERSION, spindle_from_json, spindle_to_json
 from rcsa_ident.io.setups import sensor_of
 from rcsa_ident.io.validated_table import Table, describe
@@ -25,6 +26,7 @@ from rcsa_ident.io.workpieces import workpiece_keys, workpiece_of
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machining_setup import Campaign
 from rcsa_ident.signals.recording import Quantity, Sensor
+from rcsa_ident.tool_holder.drawings import KnownToolings
 from rcsa_ident.units import from_hz, to_hz, to_rpm
 from rcsa_ident.version import __version__
 
@@ -73,6 +75,7 @@ def identification_to_json(
         **({} if campaign.workpiece is None else {"workpiece": workpiece_keys(campaign.workpiece, all_spreads=True)}),
         "coefficients": {str(each): _coefficient(each, *found) for each, found in identification.coefficients.items()},
         "band_hz": [to_hz(w) for w in identification.band],
+        **({} if identification.toolings is None else {"toolings": known_toolings_to_json(identification.toolings)}),
         "axes": _axes_to_json(identification, deviations or {}),
         **_both_planes(identification, deviations or {}),
         "delays": _delays(identification, campaign),
@@ -130,6 +133,7 @@ def _axis_to_json(axis: AxisResult, deviation: tuple[FloatArray, FloatArray] | N
         data["unknowns"] = posterior.theta.tolist()
         data["rivals"] = [rival.tolist() for rival in posterior.rivals]
         data["covariance"] = {"parameters": list(axis.parameters), "matrix": posterior.covariance.tolist()}
+        data |= axis_toolings_to_json(posterior)
     data["misfit"] = {"chi2_per_point": axis.chi2_per_point, "per_tooling": dict(axis.per_tooling)}
     data["model_error"] = axis.model_error
     if axis.standstill is not None:
@@ -206,7 +210,8 @@ def machine_from_json(data: Mapping[str, Any], where: str) -> IdentifiedMachine:
         If the identification has failed and no axis is there, or unknowns and covariance do not belong together.
     """
     top = Table(data, where)
-    axes = _axes(top)
+    toolings = known_toolings_of(top.table("toolings")) if "toolings" in top else None
+    axes = _axes(top, toolings)
     low, high = data["band_hz"]
     return IdentifiedMachine(
         axes,
@@ -218,6 +223,7 @@ def machine_from_json(data: Mapping[str, Any], where: str) -> IdentifiedMachine:
         sensors=tuple(sensor_of(name, table.data, where) for name, table in top.named_tables("sensors", default={}).items()),
         name=data["campaign"]["name"],
         whole=_whole(top),
+        toolings=toolings,
     )
 
 
@@ -234,7 +240,7 @@ def _speed_models(top: Table) -> Iterator[SpeedModel]:
             yield SpeedModel((low / to_rpm(1.0), high / to_rpm(1.0)), _axes(table), _whole(table))
 
 
-def _axes(table: Table) -> dict[Dof, MachineAxis]:
+def _axes(table: Table, toolings: KnownToolings | None = None) -> dict[Dof, MachineAxis]:
     axes = table.named_tables("axes")
     if not axes:
         table.refuse("axes", "no axis: the identification has failed", "a result with axis X, Y or both")
@@ -242,11 +248,11 @@ def _axes(table: Table) -> dict[Dof, MachineAxis]:
     for name, dof in AXES.items():
         if name in axes:
             modes, joint = spindle_from_json(axes[name].data, dof, table.where, axes[name].path)
-            machine[dof] = MachineAxis(Spindle(modes), joint, _posterior(axes[name]))
+            machine[dof] = MachineAxis(Spindle(modes), joint, _posterior(axes[name], toolings))
     return machine
 
 
-def _posterior(axis: Table) -> Posterior | None:
+def _posterior(axis: Table, toolings: KnownToolings | None) -> Posterior | None:
     if "unknowns" not in axis or "covariance" not in axis:
         return None
     unknowns = axis.numbers("unknowns", None)
@@ -258,7 +264,9 @@ def _posterior(axis: Table) -> Posterior | None:
     if not 0.0 <= low <= high:
         axis.refuse("speed_range_rpm", f"{[low, high]}", "lowest and highest speed, 0 <= lowest <= highest [rev/min]")
     speed_range = 0.5 * (low + high) / to_rpm(1.0), 0.5 * (high - low) / to_rpm(1.0)
-    return Posterior(np.array(unknowns), matrix, layout, speed_range, tuple(_rivals(axis, layout)))
+    rivals = tuple(_rivals(axis, layout))
+    of_toolings = axis_toolings_of(axis, toolings, len(unknowns), len(rivals))
+    return Posterior(np.array(unknowns), matrix, layout, speed_range, rivals, **of_toolings)
 
 
 def _layout(axis: Table, size: int) -> AxisLayout:

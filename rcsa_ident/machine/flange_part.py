@@ -68,10 +68,16 @@ class Doubt:
     steps : sequence of Perturbation
     rivals : sequence of JointedFlange
         Other models of the same data: how far each differs is one more direction.
+    shifts : array, shape (steps + rivals, u)
+        How far what is known of toolings, in its own units, moves with each of them.
+    left : array, shape (u, u)
+        Covariance of what is known of toolings, the machine given.
     """
 
     steps: Sequence[Perturbation] = ()
     rivals: Sequence[JointedFlange] = ()
+    shifts: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    left: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -25,6 +25,7 @@ from rcsa_ident.machine.tip import Side, tip_over_sides
 from rcsa_ident.machining_setup import Tooling, Workpiece
 from rcsa_ident.shown import Drawn, Shown
 from rcsa_ident.stability.tip_modes import TipModes
+from rcsa_ident.tool_holder.drawings import Drawing, FittedDrawing, KnownToolings, fitted
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.tool_holder.turning import turning_receptance
@@ -111,8 +112,11 @@ class Machine(TipSource, Drawn):
     """What stands behind the flange.
 
     A subclass says what it is by `parts` and `band`, and what else it knows of itself: how it changes with the speed (`at`, `models`,
-    `speed_range`), and what speaks against it (`remarks`).
+    `speed_range`), what speaks against it (`remarks`), and what it has learned of toolings (`toolings`).
     """
+
+    #: What its cuts told of toolings whose drawings are not exact.
+    toolings: KnownToolings | None = None
 
     @property
     @abstractmethod
@@ -164,6 +168,13 @@ class Machine(TipSource, Drawn):
         del spread
         return self
 
+    def fitted(self, tooling: Tooling | ToolAssembly) -> FittedDrawing:
+        """Return a tooling as it is believed to be, by what its drawing and the machine's cuts say; an assembly is exact."""
+        if not isinstance(tooling, Tooling):
+            return FittedDrawing(tooling)
+        drawing = Drawing(tooling.assembly, tooling.spread, tooling.tool_model, tooling.holder_model)
+        return fitted(tooling.name, drawing, self.toolings)
+
     def sides(self, omega: FloatArray) -> tuple[Side, ...]:
         """Return what a tip feels of the machine at some frequencies [rad/s]."""
         omega = frozen(omega)
@@ -193,9 +204,9 @@ class Machine(TipSource, Drawn):
         Returns
         -------
         UncertainReceptance
-            Points ``tip`` and ``spindle``; the tool-holder is taken for exact.
+            Points ``tip`` and ``spindle``; the tool-holder is taken for exactly as it is believed to be.
         """
-        assembly, omega = _assembly(tooling), frozen(omega)
+        assembly, omega = self.fitted(tooling).assembly, frozen(omega)
         turning = self.turning
         holder = tool_holder_receptance(assembly, omega) if turning is None else turning_receptance(assembly, omega, turning)
         return respond_over(self._along(axes), omega, at_ends, holder)
@@ -220,10 +231,10 @@ class Machine(TipSource, Drawn):
             Standard deviation of the tool-holder's stiffness, as a share: the mesh alone by default; 0.01 for a modulus from a handbook.
         """
         sides = self.sides(self.lines() if omega is None else omega)
-        assembly, turning = _assembly(tooling), self.turning
-        tip = tip_over_sides(sides, assembly, stiffness_spread, turning)
+        drawing, turning = self.fitted(tooling), self.turning
+        tip = tip_over_sides(sides, drawing, stiffness_spread, turning)
         if len(sides) == 1:
-            tip = replace(tip, poles=partial(poles_of, assembly, sides[0].part.believed, float(tip.omega[-1]), turning))
+            tip = replace(tip, poles=partial(poles_of, drawing.assembly, sides[0].part.believed, float(tip.omega[-1]), turning))
         return tip if spread else replace(tip, variation=None)
 
     def check_behind_joint(self, axes: Sequence[Dof] | None = None) -> None:
@@ -250,7 +261,3 @@ class Machine(TipSource, Drawn):
     def _along(self, axes: Sequence[Dof] | None) -> list[FlangePart]:
         """The parts that some axes feel."""
         return [part for part in self.parts if axes is None or any(c.dof in axes for c in part.coordinates)]
-
-
-def _assembly(tooling: Tooling | ToolAssembly) -> ToolAssembly:
-    return tooling.assembly if isinstance(tooling, Tooling) else tooling

@@ -18,6 +18,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.uncertain import Places, UncertainReceptance, Variation
 from rcsa_ident.errors import InputError
 from rcsa_ident.machine.flange_part import Doubt, FlangePart, JointedFlange
+from rcsa_ident.tool_holder.drawings import FittedDrawing
 from rcsa_ident.tool_holder.geometry import ToolAssembly, stiffened
 from rcsa_ident.tool_holder.model import tool_holder_poles
 from rcsa_ident.tool_holder.turning import both_planes, entries_at_speed
@@ -234,7 +235,7 @@ class TurningHolder(Holder):
 
 @dataclass(frozen=True, eq=False)
 class TipSpread:
-    """How a tip varies: with the machine's steps and rivals, and with the tool-holder's stiffness.
+    """How a tip varies: with the machine's steps and rivals, with what its drawing leaves open, and with the tool-holder's stiffness.
 
     Parameters
     ----------
@@ -242,7 +243,7 @@ class TipSpread:
     members : tuple of (tuple of int), one for each side
         Where its translations stand in the tip's receptance.
     holder : Holder
-    assembly : ToolAssembly
+    drawing : FittedDrawing
     stiffness_spread : float
         Standard deviation of the tool-holder's stiffness, as a share.
     turning : float or None [rad/s]
@@ -252,38 +253,67 @@ class TipSpread:
     sides: Sequence[Side]
     members: tuple[tuple[int, ...], ...]
     holder: Holder
-    assembly: ToolAssembly
+    drawing: FittedDrawing
     stiffness_spread: float
     turning: float | None = None
 
     @property
     def covers(self) -> frozenset[int]:
         """Rows of the tip's receptance that vary."""
-        return frozenset(m for side, members in zip(self.sides, self.members, strict=True) if side.part.doubt is not None for m in members)
+        return frozenset(m for _, members in self._varying for m in members)
+
+    @property
+    def _varying(self) -> list[tuple[Side, tuple[int, ...]]]:
+        both = zip(self.sides, self.members, strict=True)
+        return [(side, members) for side, members in both if side.part.doubt is not None or self.drawing.ends]
 
     @cached_property
     def _known(self) -> list[tuple[Side, tuple[int, ...]]]:
-        return [(s.doubted(), m) for s, m in zip(self.sides, self.members, strict=True) if s.part.doubt is not None]
+        return [(side.doubted(), members) for side, members in self._varying]
+
+    @cached_property
+    def _ends(self) -> list[tuple[Holder, Holder]]:
+        """The tool-holder a standard deviation ahead and behind along all that its drawing leaves open."""
+        omega = self.sides[0].omega
+        ahead, behind = ([holder_of(each, omega, self.sides, self.turning) for each in row] for row in zip(*self.drawing.ends, strict=True))
+        return list(zip(ahead, behind, strict=True))
 
     def at(self, places: Places) -> tuple[Variation, ...]:
         """Return the variations at some of the frequencies."""
         holder, omega = self.holder.at(places), self.sides[0].omega[places]
         stiffer = None
         if self.stiffness_spread > 0.0:
-            stiffer = holder_of(stiffened(self.assembly, self.stiffness_spread), omega, self.sides, self.turning)
+            stiffer = holder_of(stiffened(self.drawing.assembly, self.stiffness_spread), omega, self.sides, self.turning)
         found = []
         for side, members in self._known:
             here = holder.tip(side.nominal[places])
-            rows = [holder.changes(side, places), holder.tip(side.rivals[:, places]) - here]
+            rows = [] if side.doubt is None else [holder.changes(side, places), holder.tip(side.rivals[:, places]) - here]
+            if self.drawing.ends:
+                rows = self._with_drawing(side, places, rows)
             if stiffer is not None:
                 rows.append((stiffer.tip(side.nominal[places]) - here)[None])
             change = np.concatenate(rows)
             found.append(Variation(members, change if len(change) else np.zeros((1, *here.shape), dtype=complex)))
         return tuple(found)
 
+    def _with_drawing(self, side: Side, places: Places, rows: list[ComplexArray]) -> list[ComplexArray]:
+        """The machine's directions with the toolings that move along with them, and what the drawing leaves open beside the machine."""
+        w = side.nominal[places]
+        along = np.array([0.5 * (ahead.at(places).tip(w) - behind.at(places).tip(w)) for ahead, behind in self._ends])
+        known = self.drawing.known
+        if not known.size or side.doubt is None or not side.doubt.left.size:
+            return [*rows, along]
+        per_unit = along[: known.size] / self.drawing.deviation[:, None, None, None]
+        machine = np.concatenate(rows)
+        machine = machine + np.tensordot(side.doubt.shifts[:, known], per_unit, axes=1)
+        values, vectors = np.linalg.eigh(side.doubt.left[np.ix_(known, known)])
+        own = (vectors * np.sqrt(np.maximum(values, 0.0))).T
+        return [machine, np.tensordot(own, per_unit, axes=1), along[known.size :]]
+
     def guides(self) -> ComplexArray:
         """Return the tips of the rivals, each entry a curve."""
-        curves = [self.holder.tip(side.rivals).transpose(0, 2, 3, 1).reshape(-1, side.omega.size) for side, _ in self._known]
+        known = [(side, members) for side, members in self._known if side.doubt is not None]
+        curves = [self.holder.tip(side.rivals).transpose(0, 2, 3, 1).reshape(-1, side.omega.size) for side, _ in known]
         return np.concatenate([np.zeros((0, self.sides[0].omega.size), dtype=complex), *curves])
 
 
@@ -293,7 +323,7 @@ def holder_of(assembly: ToolAssembly, omega: FloatArray, sides: Sequence[Side], 
 
 
 def tip_over_sides(
-    sides: Sequence[Side], assembly: ToolAssembly, stiffness_spread: float, turning: float | None = None
+    sides: Sequence[Side], drawing: FittedDrawing, stiffness_spread: float, turning: float | None = None
 ) -> UncertainReceptance:
     """Return the tip's receptance of a tooling on a machine, with its spread where something is not known.
 
@@ -301,20 +331,20 @@ def tip_over_sides(
     ----------
     sides : sequence of Side
         All parts of the machine, at the same frequencies.
-    assembly : ToolAssembly
+    drawing : FittedDrawing
     stiffness_spread : float
         Standard deviation of the tool-holder's stiffness, as a share.
     turning : float or None [rad/s]
         Spindle speed of the tool-holder's gyroscopic moments, which couple the planes: the machine is one part then. None leaves them out.
     """
     omega = sides[0].omega
-    holder = holder_of(assembly, omega, sides, turning)
+    holder = holder_of(drawing.assembly, omega, sides, turning)
     axes = [c for side in sides for c in side.axes]
     values, members = np.zeros((omega.size, len(axes), len(axes)), dtype=complex), []
     for side in sides:
         own = tuple(axes.index(c) for c in side.axes)
         values[:, own[0] : own[-1] + 1, own[0] : own[-1] + 1] = holder.tip(side.nominal)
         members.append(own)
-    known = any(side.part.doubt is not None for side in sides)
-    spread = TipSpread(tuple(sides), tuple(members), holder, assembly, stiffness_spread, turning) if known else None
+    known = bool(drawing.ends) or any(side.part.doubt is not None for side in sides)
+    spread = TipSpread(tuple(sides), tuple(members), holder, drawing, stiffness_spread, turning) if known else None
     return UncertainReceptance(omega, values, tuple(axes), tuple(axes), spread)

@@ -20,7 +20,6 @@ from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import Progress
 from rcsa_ident.identification.result import Identification
-from rcsa_ident.identification.rough_toolings import Drawing, rough_toolings
 from rcsa_ident.machining_setup import Campaign, Cut, HammerTest
 from rcsa_ident.remarks import Remark
 from rcsa_ident.scaleout import Map
@@ -28,6 +27,7 @@ from rcsa_ident.signals.measurement import Reading, among_fellows, measure_cut
 from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.sweep import measure_pass
 from rcsa_ident.signals.verdict import RecordCode, Verdict
+from rcsa_ident.tool_holder.drawings import Drawing, rough_toolings
 from rcsa_ident.tool_holder.model import receptance_at_points, tool_holder_receptance
 from rcsa_ident.tool_holder.rough import rough_tool_holder
 from rcsa_ident.tool_holder.turning import turning_pair
@@ -285,7 +285,7 @@ def with_rough(data: IdentificationData, campaign: Campaign) -> IdentificationDa
         return data
     depths = [[cut.conditions.axial_depth for cut in campaign.cuts if cut.tooling == name] for name in data.toolings]
     depth = np.array([0.02e-3 / np.mean(each) for each in depths])
-    data = data.with_scales(depth, np.full(len(data.axes), 0.02))
+    data = data.with_scales(depth, np.full(len(data.axes), 0.02)).with_cross_talk(0.015)
     highest = max(float(axis.omega.max()) for axis in data.axes) / (2.0 * np.pi)
     return data.with_rough_toolings(rough, [rough_tool_holder(each.assembly, highest) for each in drawn])
 
