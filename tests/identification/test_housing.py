@@ -8,7 +8,7 @@ import pytest
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.coupled.data import couplable
-from rcsa_ident.identification.data import FLANGE_ALONE, GAP_AND_FIXTURE, ONE_PLACE, AxisData
+from rcsa_ident.identification.data import AxisData
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.hammer_data import with_tests
@@ -20,6 +20,7 @@ from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.status import Status
 from rcsa_ident.remarks import says
+from rcsa_ident.signals.motion import FLANGE_ALONE, GAP_AND_FIXTURE, ONE_PLACE
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, open_shop
 from tests.identification.models import remade, vector_of
 
