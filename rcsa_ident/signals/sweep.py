@@ -58,6 +58,10 @@ _UNEVEN, _ENTERS = 0.6, (2.0, 0.05)
 _LEAST_USABLE = 0.5
 
 
+#: Note on a pass with accelerometers on the housing beside displacement sensors.
+UNUSED = Remark(RecordCode.HOUSING, "the accelerometers on the spindle's housing are not used in a pass whose speed changes")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Turning:
     """How the spindle turned through a pass: angle [rad] at each sample, from tooth 1 at immersion 0 where that is known (`absolute`), its
@@ -152,6 +156,8 @@ def measure_pass(
     first_speed, looked_at = conditions.spindle_speed, examined(cut)
     programmed = 0.5 * (first_speed + last_speed)
     notes = looked_at.notes
+    if motion_channels(cut.sensors, axes).beside:
+        notes = (*notes, UNUSED)
 
     def left_out(*reasons: Remark) -> Reading:
         return Reading(cut_id, tooling, programmed, Verdict(reasons, notes))
