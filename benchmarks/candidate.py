@@ -8,8 +8,8 @@ import numpy as np
 
 from benchmarks.timing import best_of, row
 from rcsa_ident.identification._kernels import cross_frf, modal_cross_frf
-from rcsa_ident.identification.data import FLANGE_ALONE, GAP_AND_FIXTURE
 from rcsa_ident.identification.genetic_algorithm import modal_fractions
+from rcsa_ident.signals.motion import FLANGE_ALONE, GAP_AND_FIXTURE
 
 LINES, TOOLINGS, MODES = 164, 2, 10
 

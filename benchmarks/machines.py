@@ -65,6 +65,8 @@ class Condition(NamedTuple):
         That cut: with 3 the similar one is among them.
     housing : float or None [m]
         Where on the spindle's housing accelerometers are the only sensors, from the flange's face; None where the flange is seen.
+    beside : float or None [m]
+        Where on the housing a further pair of accelerometers stands beside all other sensors; None for none.
     passes : int
         Of four seconds each that take the place of a tooling's 40 cuts, from 8000 to 20000 rev/min one after the other; 0 for none.
     """
@@ -77,6 +79,7 @@ class Condition(NamedTuple):
     passes: int = 0
     toolings: int = 2
     housing: float | None = None
+    beside: float | None = None
 
 
 CONDITIONS = {
@@ -89,6 +92,7 @@ CONDITIONS = {
     "workshop-trigger": Condition(trigger=True, disturbances=WORKSHOP, clock="exactly"),
     "three-toolings": Condition(toolings=3),
     "housing": Condition(toolings=3, housing=0.0, campaign="three-toolings"),
+    "housing-beside": Condition(toolings=3, beside=0.35),
     "housing-two": Condition(housing=0.0, campaign="no-trigger"),
     "housing-rear": Condition(toolings=3, housing=0.35),
     "housing-loud": Condition(toolings=3, housing=0.0, disturbances=replace(WORKSHOP, machine_noise=3.4), clock="exactly"),
@@ -99,7 +103,7 @@ CONDITIONS = {
     "workshop-loud": Condition(disturbances=replace(WORKSHOP, machine_noise=3.4), clock="exactly"),
 }
 #: What sensors reach, side by side: see docs/study.md.
-SENSOR_TESTS = ("three-toolings", "housing", "housing-two", "housing-rear", "housing-loud")
+SENSOR_TESTS = ("three-toolings", "housing-beside", "housing", "housing-two", "housing-rear", "housing-loud")
 #: Those of the study; the others are asked for by name.
 USUAL = ("trigger", "no-trigger", "noise-x3")
 #: Toolings that cut, and those that never do: one in a holder that cut, one in another.
@@ -250,6 +254,9 @@ def under(machine: MachineFile, condition: str) -> MachineFile:
     place = CONDITIONS[condition].housing
     if place is not None:
         machine = replace(machine, spindle=replace(machine.spindle, fixture_position=place))
+    beside = CONDITIONS[condition].beside
+    if beside is not None:
+        machine = replace(machine, spindle=replace(machine.spindle, housing_positions=(beside,)))
     sensors = replace(sensors, trigger=trigger, gap_noise=gap, acceleration_noise=acceleration)
     if disturbances is None:
         return replace(machine, sensors=sensors, plan=plan)

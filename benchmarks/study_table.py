@@ -144,6 +144,7 @@ def _doubts(rows: Sequence[dict[str, Any]]) -> list[str]:
 #: What the sensors of a condition are, for people who decide what to buy.
 _SENSORS = {
     "three-toolings": "displacement of the flange, and accelerometers on its fixture",
+    "housing-beside": "the same, and a pair of accelerometers on the housing, 350 mm behind the flange's face",
     "housing": "accelerometers on the housing alone, level with the flange's face",
     "housing-two": "the same, two toolings",
     "housing-rear": "accelerometers on the housing alone, 350 mm behind the flange's face",

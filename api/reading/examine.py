@@ -15,8 +15,8 @@ from rcsa_ident.machining_setup import Campaign, Cut
 from rcsa_ident.remarks import Remark
 from rcsa_ident.report.summaries import recording_rows
 from rcsa_ident.signals.measurement import Reading, fits_by_chance, judge_air, measure_cut
+from rcsa_ident.signals.motion import measured_axes
 from rcsa_ident.signals.recording import Recording, Sensor
-from rcsa_ident.signals.steady import measured_axes
 from rcsa_ident.signals.sweep import judge_pass_air
 from rcsa_ident.signals.verdict import RecordCode, Verdict
 from rcsa_ident.units import to_rpm
@@ -72,7 +72,7 @@ def look(upload: Upload, text: str, cut_id: str, role: str, air: Path | None) ->
     return described(recording) | {
         "verdict": verdict,
         "spindle_speed_rpm": to_rpm(speed) if speed is not None and np.isfinite(speed) else None,
-        "harmonics_above_noise": {axis.upper(): reading.harmonics.get(axis, 0) for axis in measured_axes(recording)},
+        "harmonics_above_noise": {axis.upper(): reading.harmonics.get(axis, 0) for axis in measured_axes(recording.sensors)},
     }
 
 

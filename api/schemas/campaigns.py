@@ -63,6 +63,9 @@ class SensorKeys(Body):
     bandwidth_hz: float | None = Field(None, gt=0.0)
     role: Literal["spindle", "fixture", "table", "workpiece"] | None = Field(None, description="What an accelerometer is fixed to.")
     mount_resonance_hz: float | None = Field(None, gt=0.0, description="Of the sensor on its mount, a magnet or wax.")
+    rotation_deg: float | None = Field(
+        None, ge=-180.0, le=180.0, description="Of what the sensor measures from its axis, about the spindle's, from +X towards +Y."
+    )
     pulses_per_revolution: int | None = Field(None, ge=1, le=100_000)
     tooth_angle_deg: float | None = Field(None, ge=-360.0, le=360.0)
 
@@ -79,6 +82,7 @@ class SensorKeys(Body):
             None if self.tooth_angle_deg is None else math.radians(self.tooth_angle_deg),
             None if self.role is None else Role(self.role),
             self.mount_resonance_hz,
+            0.0 if self.rotation_deg is None else math.radians(self.rotation_deg),
         )
 
 

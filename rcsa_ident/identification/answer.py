@@ -45,6 +45,9 @@ MOSTLY_PASSES = (
     "most of the lines are from passes whose speed changes: of fourteen virtual machines one came out wrong by 7 %, and its lines did not "
     "show it; some cuts that keep their speed beside them would confirm the answer"
 )
+HOUSING_LEFT_OUT = (
+    "X and Y feel each other, and both together are fitted to the flange's motion alone: the accelerometers on the housing were not used"
+)
 #: Said of a campaign whose cuts push the tool in like directions.
 ANOTHER_FEED = "all cuts push the tool in like directions: cuts fed along Y beside those along X would about halve the uncertainty"
 
@@ -320,6 +323,8 @@ class CoupledFit(Fit):
         natural = {"X and Y": self.posterior.best.standing().omega_n}
         found = remarks(self.data, self.solution, self.misfit, self.covariance, natural)
         told = [Remark(IdentificationCode.PLANES_COUPLED, self._in_words(value))]
+        if self.data.beside:
+            told.append(Remark(IdentificationCode.HOUSING_LEFT_OUT, HOUSING_LEFT_OUT))
         if self._gain_of_another_feed() > WORTH:
             told.append(Remark(IdentificationCode.ONE_FEED, ANOTHER_FEED))
         return reasons, [*told, *found]

@@ -11,7 +11,7 @@ from rcsa_ident.cutting.force import SLOPES, ForceCoefficient, ForceTerm
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.errors import InputError
-from rcsa_ident.identification.data import LEVER, ONE_PLACE, AxisData, CutPrior, IdentificationData, Turning, nodes
+from rcsa_ident.identification.data import LEVER, AxisData, CutPrior, IdentificationData, Turning, nodes
 from rcsa_ident.identification.status import FEWEST_OF_HOUSING, FEWEST_TOOLINGS
 from rcsa_ident.signals.frf import AxisLines
 from rcsa_ident.signals.measurement import CutMeasurement
@@ -77,10 +77,7 @@ def prepare(
     data = []
     for axis in axes:
         present = [(k, m, m.axes[axis]) for k, m in enumerate(measurements) if axis in m.axes]
-        # a cut without an accelerometer's lines leaves the axis with the sum of both
-        lines = (
-            [each.summed() for _, _, each in present] if len({each.outputs for _, _, each in present}) > 1 else [e for _, _, e in present]
-        )
+        lines = _alike([each for _, _, each in present])
         free = np.concatenate([at(m, each.omega) for _, m, each in present])
         sweeps = [_sweep(m, each) for _, m, each in present] if sweeping else []
         beside = [
@@ -100,7 +97,7 @@ def prepare(
                 force_slope=np.concatenate(
                     [_slopes(each.force_slope, uncertain, toolings.index(m.tooling), len(coefficients)) for _, m, each in present]
                 ),
-                shares=ONE_PLACE if any(m.housing for _, m, _ in present) else np.zeros((0, 0)),
+                shares=lines[0].output_shares,
                 **({"sweep": np.concatenate(sweeps), "around": np.concatenate(beside)} if sweeping else {}),
                 **_both_forces([(each, toolings.index(m.tooling)) for _, m, each in present], uncertain, len(coefficients)),
             )
@@ -121,6 +118,14 @@ def prepare(
         coefficient_spread=tuple(spread),
         turning={} if turning is None else turning,
     )
+
+
+def _alike(lines: list[AxisLines]) -> list[AxisLines]:
+    """The lines of an axis with the outputs that all its cuts have: a cut without an accelerometer's lines leaves the axis without them."""
+    for fewer in (AxisLines.first, AxisLines.summed):
+        if len({each.output_shares.tobytes() for each in lines}) > 1:
+            lines = [fewer(each) for each in lines]
+    return lines
 
 
 def _sensible(measurements: Sequence[CutMeasurement], toolings: Sequence[str]) -> None:

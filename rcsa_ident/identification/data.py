@@ -12,6 +12,7 @@ from rcsa_ident.cutting.force import ForceCoefficient
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.identification.rough_toolings import RoughLines
+from rcsa_ident.signals.motion import FLANGE_ALONE, ONE_PLACE, searched, usual_shares
 from rcsa_ident.tool_holder.drawings import RoughToolings
 from rcsa_ident.tool_holder.rough import RoughToolHolder
 
@@ -19,8 +20,6 @@ from rcsa_ident.tool_holder.rough import RoughToolHolder
 LEVER = 0.1
 #: Where within the half of a frequency range a line sweeps its tool-holder is asked beside the middle: Gauss's node.
 NODE = float(np.sqrt(0.6))
-#: Shares of `AxisData` where the flange's motion, gap and fixture, or the motion of one other place is all that was measured.
-FLANGE_ALONE, GAP_AND_FIXTURE, ONE_PLACE = frozen([[1.0]]), frozen([[1.0, -1.0], [0.0, 1.0]]), frozen([[0.0, 1.0]])
 #: Half the range of the spindle speeds, over their middle, below which nothing is asked about a change with speed.
 LEAST_SPEED_RANGE = 0.05
 
@@ -137,9 +136,7 @@ class AxisData:
     @property
     def output_shares(self) -> FloatArray:
         """What of the flange's motion and of that of other places is in each output, shape (o, 1 + e) [-]."""
-        if self.shares.size:
-            return self.shares
-        return FLANGE_ALONE if self.outputs == 1 else GAP_AND_FIXTURE
+        return self.shares if self.shares.size else usual_shares(self.outputs)
 
     @property
     def places(self) -> int:
@@ -154,8 +151,7 @@ class AxisData:
     @property
     def searched(self) -> slice:
         """The outputs whose sum a search looks for: those that are the flange's motion together, or the first one."""
-        first, *others = self.output_shares[:2].sum(axis=0)
-        return slice(0, 2 if self.outputs > 1 and first == 1.0 and not any(others) else 1)
+        return searched(self.output_shares)
 
     @property
     def measured(self) -> ComplexArray:
@@ -182,6 +178,16 @@ class AxisData:
         talk = np.sum(self.talk[:, self.searched], axis=1, keepdims=True) if self.talk.size else self.talk
         shares = FLANGE_ALONE if self.of_flange else ONE_PLACE
         return replace(self, variance=self.noise[:, None], lines=lines, beside=beside, talk=talk, shares=shares)
+
+    def first(self) -> AxisData:
+        """Return the same points with the outputs alone that a search looks for, not summed: without accelerometers on the housing."""
+        own = self.searched
+        if own.stop == self.outputs:
+            return self
+        beside = self.beside[:, own] if self.beside.size else self.beside
+        shares = usual_shares(own.stop) if self.of_flange else ONE_PLACE
+        talk = self.talk[:, own] if self.talk.size else self.talk
+        return replace(self, variance=self.variance[:, own], lines=self.lines[:, own], beside=beside, talk=talk, shares=shares)
 
     def of(self, keep: np.ndarray) -> AxisData:
         """Return some of the points: a mask or indices, shape (n,)."""
@@ -497,6 +503,15 @@ class IdentificationData:
     def only(self, axis: Dof) -> IdentificationData:
         """Return the same data with one axis."""
         return replace(self, axes=tuple(a for a in self.axes if a.axis is axis), turning={})
+
+    @property
+    def beside(self) -> bool:
+        """Whether further places are among the outputs, beside those that a search looks for."""
+        return any(axis.searched.stop < axis.outputs for axis in self.axes)
+
+    def first(self) -> IdentificationData:
+        """Return the same data without those further places."""
+        return replace(self, axes=tuple(a.first() for a in self.axes)) if self.beside else self
 
     def summed(self) -> IdentificationData:
         """Return the same data with the flange's motion as the only output, and without the triggers of unknown tooth angle."""

@@ -52,6 +52,7 @@ class IdentificationCode(StrEnum):
     ONE_AXIS = "one-axis"
     ONE_FEED = "one-feed-direction"
     HOUSING_ALONE = "housing-alone"
+    HOUSING_LEFT_OUT = "housing-left-out"
     PLANES_NOT_ASKED = "planes-not-asked"
     CUTS_WEIGHTED_DOWN = "cuts-weighted-down"
     MOSTLY_PASSES = "mostly-passes"

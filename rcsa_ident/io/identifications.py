@@ -178,6 +178,8 @@ def _sensor_to_json(sensor: Sensor) -> dict[str, Any]:
         data["role"] = str(sensor.role)
     if sensor.mount_resonance is not None:
         data["mount_resonance_hz"] = sensor.mount_resonance
+    if sensor.rotation != 0.0:
+        data["rotation_deg"] = float(np.degrees(sensor.rotation))
     return data
 
 

@@ -27,8 +27,9 @@ _BEARING = ("position_mm", "stiffness", "damping", "softening_per_rpm", "angle_d
 _HOUSING = ("position_mm", "mass", "inertia", "stiffness", "damping", "tilting_stiffness", "tilting_damping", "angle_deg")
 _JOINT = ("translational_stiffness", "translational_damping", "rotational_stiffness", "rotational_damping")
 _SENSORS = (
-    "sampling_rate_hz", "fixture_position_mm", "flange_sensitivity", "flange_noise_nm", "flange_drift_um", "flange_delay_s",
-    "flange_bandwidth_hz", "fixture_sensitivity", "fixture_noise", "fixture_delay_s", "fixture_bandwidth_hz", "roundness_um",
+    "sampling_rate_hz", "fixture_position_mm", "housing_positions_mm", "flange_sensitivity", "flange_noise_nm", "flange_drift_um",
+    "flange_delay_s", "flange_bandwidth_hz", "fixture_sensitivity", "fixture_noise", "fixture_delay_s", "fixture_bandwidth_hz",
+    "roundness_um",
     "roundness_orders", "cutter_runout_um", "speed_error_percent", "trigger", "tooth_angle_deg",
 )  # fmt: skip
 _CUTS = (
@@ -107,6 +108,7 @@ def machine_of(data: Mapping[str, Any], where: str, name: str, folder: Path) -> 
             joint=_joint(top.table("joint", _JOINT)),
             gyroscopic=head.flag("gyroscopic", True),
             fixture_position=sensors.number("fixture_position_mm", "mm", 0.0, least=-1000.0, most=5000.0) * 1e-3,
+            housing_positions=_positions(sensors),
         )
         fastest = max(plan.programmed)
         for i, bearing in enumerate(spindle.bearings):
@@ -178,6 +180,12 @@ def _sensors(table: Table) -> SensorSuite:
         gap_bandwidth=table.number("flange_bandwidth_hz", "Hz", None, above=0.0),
         acceleration_bandwidth=table.number("fixture_bandwidth_hz", "Hz", None, above=0.0),
     )
+
+
+def _positions(table: Table) -> tuple[float, ...]:
+    """Of further accelerometers on the housing [m]."""
+    given = table.numbers("housing_positions_mm", None, "mm", least=-1000.0) if "housing_positions_mm" in table else []
+    return tuple(1e-3 * each for each in given)
 
 
 def _disturbances(table: Table) -> Disturbances:

@@ -132,7 +132,8 @@ _MACHINES = (
         "cuts": {
             **{key: value for key, value in _MACHINE["cuts"].items() if key != "spindle_speeds_rpm"},
             "passes_rpm": {"from": 8000.0, "to": 20_000.0, "count": 12},
-        }
+        },
+        "sensors": {"housing_positions_mm": [350.0]},
     },
 )
 _MODE = {"natural_frequency_hz": 500.0, "damping_ratio": 0.03}

@@ -33,6 +33,7 @@ from rcsa_ident.plausibility import (
     SPINDLE_SPEED,
     STICKOUT,
 )
+from rcsa_ident.signals.motion import measured_axes, motion_channels
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Role, Sensor
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, clamped
 from rcsa_ident.tool_holder.spread import EXACT, LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, SPREAD_FIELDS, Spread
@@ -59,7 +60,7 @@ SPREADS = {
     f"{field}_mm" if field in LENGTHS else f"{field}_percent": (field, 1e-3 if field in LENGTHS else 1e-2) for field in SPREAD_FIELDS
 }
 _CAMPAIGN = ("campaign", "sensors", "workpiece", "toolings", "cuts", "frfs")
-_SENSOR = ("quantity", "axis", "sensitivity", "delay_s", "bandwidth_hz", "role", "mount_resonance_hz")
+_SENSOR = ("quantity", "axis", "sensitivity", "delay_s", "bandwidth_hz", "role", "mount_resonance_hz", "rotation_deg")
 _TRIGGER = ("quantity", "sensitivity", "delay_s", "bandwidth_hz", "pulses_per_revolution", "tooth_angle_deg")
 _CUT = (
     "id",
@@ -279,7 +280,8 @@ def campaign_of(
 
 
 def _check_roles(sensors: Sequence[Sensor], top: Table) -> None:
-    """Refuse accelerometers of one axis beside its displacement sensor that do not say what they are fixed to."""
+    """Refuse accelerometers of one axis beside its displacement sensor that do not say what they are fixed to, and sensors that are turned
+    out of the machine's axes where nothing turns them back."""
     shown = {sensor.axis for sensor in sensors if sensor.quantity is Quantity.DISPLACEMENT}
     for axis in (Dof.X, Dof.Y):
         felt = [sensor for sensor in sensors if sensor.quantity is Quantity.ACCELERATION and sensor.axis is axis]
@@ -287,6 +289,9 @@ def _check_roles(sensors: Sequence[Sensor], top: Table) -> None:
         if axis in shown and len(felt) > 1 and silent:
             allowed = f"one of {', '.join(Role)}, where an axis has several accelerometers beside its displacement sensor"
             top.refuse(f"sensors.{silent[0]}.role", "nothing", allowed)
+    with top.naming({}):
+        if axes := measured_axes(sensors):
+            motion_channels(sensors, axes)
 
 
 def sensor_of(name: str, data: Any, where: str) -> Sensor:
@@ -322,6 +327,7 @@ def sensor_of(name: str, data: Any, where: str) -> Sensor:
         None if angle is None else float(np.radians(angle)),
         None if role is None else Role(role),
         table.number("mount_resonance_hz", "Hz", None, above=0.0),
+        float(np.radians(table.number("rotation_deg", "deg", 0.0, least=-180.0, most=180.0))),
     )
 
 

@@ -22,6 +22,7 @@ from rcsa_ident.io.workpieces import workpiece_keys
 from rcsa_ident.machining_setup import Tooling
 from rcsa_ident.units import to_rpm
 from rcsa_ident.virtual.campaign import SimulatedCut, TrueFlange, TrueReceptances
+from rcsa_ident.virtual.sensors import accelerometer_places
 
 Progress = Callable[[int, int], None]
 
@@ -140,9 +141,12 @@ def campaign_text(setup: MachineFile, toolings: Sequence[Tooling]) -> str:
     suite, plan = setup.sensors, setup.plan
     gap = ("displacement", suite.gap_sensitivity, suite.gap_delay, suite.gap_bandwidth)
     acceleration = ("acceleration", suite.acceleration_sensitivity, suite.acceleration_delay, suite.acceleration_bandwidth)
-    sensors = {
-        f"{place}_{axis.lower()}": _sensor(axis, *what) for place, what in (("flange", gap), ("fixture", acceleration)) for axis in "XY"
-    }
+    sensors = {f"flange_{axis.lower()}": _sensor(axis, *gap) for axis in "XY"}
+    places = accelerometer_places(len(setup.spindle.housing_positions))
+    for place in places:
+        # one accelerometer beside a displacement sensor is its fixture's, several say what they are fixed to
+        role = {"role": "fixture" if place == places[0] else "spindle"} if len(places) > 1 else {}
+        sensors |= {f"{place}_{axis.lower()}": _sensor(axis, *acceleration) | role for axis in "XY"}
     if suite.trigger:
         angle = float(f"{np.degrees(suite.tooth_angle):.9g}")
         sensors["trigger"] = {"quantity": "trigger", "pulses_per_revolution": 1, "tooth_angle_deg": angle}

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Protocol
 
 import numpy as np
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.signals.motion import FLANGE_ALONE, ONE_PLACE, searched, usual_shares
 from rcsa_ident.signals.steady import SteadyRecord
 
 
@@ -24,7 +25,7 @@ class AxisLines:
     cut, air : complex arrays, shape (n, o) [m/N]
         Displacement over the simulated force with tooth 1 at immersion 0 at the record's start; the air cut's line is turned
         by the best estimate of the angle between both records. Outputs are gap and fixture, whose sum is the flange's absolute
-        motion, or that alone.
+        motion, or that alone, where `shares` does not tell otherwise.
     variance : array, shape (n, o) [m^2/N^2]
         Of the real and of the imaginary part of cut - air each.
     coherence : array, shape (n,) [-]
@@ -34,6 +35,8 @@ class AxisLines:
         Change of the force's logarithm with `cutting.force.SLOPES`.
     across, across_slope : complex arrays of the same shapes, or None
         The force along the other machine axis in the same lines, with tooth 1 at immersion 0, too; None where it is not told.
+    shares : array, shape (o, 1 + e) or (0, 0) [-]
+        What of the flange's motion, and of that of other places of the machine, is in each output (`motion.shares_of`).
     """
 
     order: np.ndarray
@@ -46,25 +49,44 @@ class AxisLines:
     force_slope: ComplexArray
     across: ComplexArray | None = None
     across_slope: ComplexArray | None = None
+    shares: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def outputs(self) -> int:
-        """Number of outputs of each line: 1 or 2."""
+        """Number of outputs of each line."""
         return self.cut.shape[1]
 
     @property
+    def output_shares(self) -> FloatArray:
+        """What of the flange's motion and of that of other places is in each output, shape (o, 1 + e) [-]."""
+        return self.shares if self.shares.size else usual_shares(self.outputs)
+
+    @property
+    def of_flange(self) -> bool:
+        """Whether the flange's motion was measured, and not that of other places alone."""
+        return bool(self.output_shares[0, 0])
+
+    @property
     def receptance(self) -> ComplexArray:
-        """Flange displacement per tip force, up to the cut's delay, shape (n,): true value times e^{-i omega delay}."""
-        return np.sum(self.cut - self.air, axis=1)
+        """Flange displacement per tip force, or the first other place's where nothing sees the flange, up to the cut's delay, shape (n,):
+        true value times e^{-i omega delay}."""
+        return np.sum((self.cut - self.air)[:, searched(self.output_shares)], axis=1)
+
+    def first(self) -> AxisLines:
+        """Return the lines with those outputs alone that are the flange's motion together, or the first one: without further places."""
+        own = searched(self.output_shares)
+        shares = usual_shares(own.stop) if self.of_flange else ONE_PLACE
+        return replace(self, cut=self.cut[:, own], air=self.air[:, own], variance=self.variance[:, own], shares=shares)
 
     def summed(self) -> AxisLines:
-        """Return the lines with the flange's motion as the only output."""
-        cut, air, variance = (np.sum(each, axis=1, keepdims=True) for each in (self.cut, self.air, self.variance))
-        return replace(self, cut=cut, air=air, variance=variance)
+        """Return the lines with the flange's motion as the only output, or that of the first place where nothing sees the flange."""
+        first = self.first()
+        cut, air, variance = (np.sum(each, axis=1, keepdims=True) for each in (first.cut, first.air, first.variance))
+        return replace(first, cut=cut, air=air, variance=variance, shares=FLANGE_ALONE if self.of_flange else ONE_PLACE)
 
     def of(self, keep: np.ndarray) -> AxisLines:
         """Return some of the lines: a mask or indices, shape (n,)."""
-        every = ((each.name, getattr(self, each.name)) for each in fields(self))
+        every = ((each.name, getattr(self, each.name)) for each in fields(self) if each.name != "shares")
         return replace(self, **{name: value[keep] for name, value in every if value is not None})
 
 
@@ -111,22 +133,21 @@ class LineEstimator:
         force_slope: ComplexArray,
     ) -> dict[Dof, AxisLines]:
         """Return the lines; the variance is that of cut and air cut, from the noise beside them and their scatter."""
-        amplitude, noise = cut.outputs[order], cut.output_variance[order]
-        still = np.zeros_like(amplitude)
+        moved, noise = cut.outputs[order], cut.output_variance[order]
+        still = np.zeros_like(moved)
         if air is not None:
             still, still_noise = turned(air.outputs, air.output_variance, angle, int(order[-1]))
             still, noise = still[order], noise + still_noise[order]
-        variance = noise / np.abs(force[:, :, None]) ** 2
-        power = np.abs(np.sum(amplitude - still, axis=2) / force) ** 2
-        # the noise is in the power, too
-        coherence = np.clip(1.0 - 2.0 * np.sum(variance, axis=2) / np.maximum(power, 1e-300), 0.0, 1.0)
-        points = amplitude / force[:, :, None], still / force[:, :, None], variance
         found = {}
         for i, axis in enumerate(cut.axes):
-            # an axis without the fixture's acceleration has the gap alone
-            moved, unmoved, spread = (each[:, i] if cut.has_fixture(axis) else each[:, i, :1] for each in points)
-            omega = order * cut.spindle_speed
-            found[axis] = AxisLines(order, omega, moved, unmoved, spread, coherence[:, i], force[:, i], force_slope[:, i])
+            own, size = cut.channels.outputs(axis), force[:, i, None]
+            lines = moved[:, own] / size, still[:, own] / size, noise[:, own] / np.abs(size) ** 2
+            omega, certain = order * cut.spindle_speed, np.ones(order.size)
+            each = AxisLines(order, omega, *lines, certain, force[:, i], force_slope[:, i], shares=cut.channels.shares(axis))
+            # the noise is in the power, too
+            one = each.summed()
+            power = np.maximum(np.abs(each.receptance) ** 2, 1e-300)
+            found[axis] = replace(each, coherence=np.clip(1.0 - 2.0 * one.variance[:, 0] / power, 0.0, 1.0))
         return found
 
 

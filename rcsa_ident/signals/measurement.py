@@ -20,8 +20,9 @@ from rcsa_ident.shown import Shown
 from rcsa_ident.signals.alignment import angle_to_air, followed, trigger_delay
 from rcsa_ident.signals.frf import AxisLines, Estimator, LineEstimator, turned_air
 from rcsa_ident.signals.listening import heard_in_a_cut
-from rcsa_ident.signals.recording import Quantity, Recording
-from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
+from rcsa_ident.signals.motion import measured_axes, motion_channels
+from rcsa_ident.signals.recording import Recording
+from rcsa_ident.signals.steady import SteadyRecord, steady_record
 from rcsa_ident.signals.verdict import RecordCode, Verdict, chatter, examined, raw_faults, silence, smeared, speed_faults, tooth_count_fault
 from rcsa_ident.units import to_hz
 
@@ -58,8 +59,6 @@ class CutMeasurement:
     delay, delay_std : float or None [s]
         When tooth 1 stood at immersion 0, from a trigger whose tooth angle is known; else the time of the trigger's edge.
     tooth_angle_known : bool
-    housing : bool
-        Whether the lines are those of the spindle's housing, from accelerometers, and not the flange's.
     clamping : str
         Cuts of one such name share the unknown angle between the time that `delay` tells and immersion 0; by default the tooling's.
     acceleration : float [rad/s^2]
@@ -76,10 +75,14 @@ class CutMeasurement:
     delay: float | None = None
     delay_std: float | None = None
     tooth_angle_known: bool = True
-    housing: bool = False
     clamping: str = ""
     acceleration: float = 0.0
     length: float = 0.0
+
+    @property
+    def housing(self) -> bool:
+        """Whether the lines are those of the spindle's housing alone, and none of the flange's."""
+        return not any(lines.of_flange for lines in self.axes.values())
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -137,8 +140,8 @@ def measure_cut(
     cut_id, tooling : str
         Name of the cut and of its tooling, for the result and for messages.
     cut : Recording
-        Displacement channels for X and/or Y, accelerometers of the fixture where there are some; without any displacement accelerometers on
-        the spindle's housing.
+        Displacement channels for X and/or Y, accelerometers of the fixture where there are some, and accelerometers on the spindle's
+        housing beside them or in their place.
     air : Recording or None
         The same in the air, where it was recorded.
     cutter : Cutter
@@ -155,11 +158,11 @@ def measure_cut(
     InputError
         If no such channel is there, or the air cut lacks one.
     """
-    axes = measured_axes(cut)
+    axes = measured_axes(cut.sensors)
     if not axes:
         raise InputError("sensors", "no displacement", _MOTION, cut_id)
-    if air is not None and air.sensor(Quantity.DISPLACEMENT) is None and cut.sensor(Quantity.DISPLACEMENT) is not None:
-        raise InputError("sensors", f"no displacement {axes[0].upper()}", "the same sensors for a cut and its air cut")
+    if air is not None:
+        _same_sensors(cut, air, axes)
     programmed, looked_at = conditions.spindle_speed, examined(cut)
     notes = looked_at.notes
 
@@ -202,11 +205,18 @@ def measure_cut(
         return left_out(reasons, *found)
     kept = cross_lines(steady, still, angle, harmonic, cutter, conditions, coefficients, estimator)
     speed = steady.spindle_speed
-    measurement = CutMeasurement(
-        cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth, *followed(steady)), steady.housing
-    )
+    measurement = CutMeasurement(cut_id, tooling, speed, kept, alignment_std, *trigger_delay(cut, speed, cutter.teeth, *followed(steady)))
     verdict = Verdict((), (*notes, HOUSING) if steady.housing else notes if air is not None else (*notes, NO_AIR))
     return Reading(cut_id, tooling, programmed, verdict, (measurement,), *found)
+
+
+def _same_sensors(cut: Recording, air: Recording, axes: Sequence[Dof]) -> None:
+    """Refuse an air cut that lacks one of the cut's channels of motion, or has others."""
+    told, found = ([(s.quantity, s.axis) for s in motion_channels(each.sensors, axes).sensors] for each in (cut, air))
+    if told != found:
+        missing = next((each for each in told if told.count(each) > found.count(each)), None)
+        words = "other sensors" if missing is None else f"no {missing[0]} {str(missing[1]).upper()}"
+        raise InputError("sensors", f"{words} in the air cut", "the same sensors for a cut and its air cut")
 
 
 def cross_lines(
@@ -264,7 +274,7 @@ def judge_air(cut_id: str, tooling: str, air: Recording, conditions: CuttingCond
     InputError
         If there is neither a displacement channel nor an accelerometer on the spindle's housing.
     """
-    axes, programmed = measured_axes(air), conditions.spindle_speed
+    axes, programmed = measured_axes(air.sensors), conditions.spindle_speed
     if not axes:
         raise InputError("sensors", "no displacement", _MOTION)
     looked_at = examined(air)

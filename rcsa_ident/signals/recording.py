@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -71,6 +71,8 @@ class Sensor:
         spindle's housing (see `Recording.accelerometer`).
     mount_resonance : float or None [Hz]
         Of the sensor on its mount, a magnet or wax: below it motion is shown too large, by 1 / (1 - (f / resonance)^2).
+    rotation : float [rad]
+        Of the direction that it measures from its axis, about the spindle's, from +X towards +Y.
 
     Examples
     --------
@@ -91,6 +93,7 @@ class Sensor:
     tooth_angle: float | None = None
     role: Role | None = None
     mount_resonance: float | None = None
+    rotation: float = 0.0
 
     def __post_init__(self) -> None:
         # a dynamometer also feels along the spindle
@@ -105,6 +108,8 @@ class Sensor:
             positive(f"sensors.{self.name}.mount_resonance_hz", self.mount_resonance, "Hz")
         if self.role is not None and self.quantity is not Quantity.ACCELERATION:
             raise InputError(f"sensors.{self.name}.role", str(self.role), f"none: a {self.quantity} sensor has one place")
+        if self.rotation != 0.0 and self.quantity not in (Quantity.DISPLACEMENT, Quantity.ACCELERATION):
+            raise InputError(f"sensors.{self.name}.rotation_deg", f"{np.degrees(self.rotation):g}", f"none of a {self.quantity} sensor")
 
     def response(self, omega: FloatArray) -> np.ndarray:
         """Return the sensor's frequency response: delay, first-order bandwidth and its mount's resonance, shape (n,) [-]."""
@@ -163,13 +168,11 @@ class Recording(Drawn):
 
     def sensor(self, quantity: Quantity, axis: Dof | None = None) -> Sensor | None:
         """Return the first sensor of this quantity and axis, or None."""
-        return next((s for s in self.sensors if s.quantity is quantity and (axis is None or s.axis is axis)), None)
+        return first_sensor(self.sensors, quantity, axis)
 
     def accelerometer(self, axis: Dof, role: Role) -> Sensor | None:
         """Return the first accelerometer of an axis that is fixed to this, or None; `Sensor` says what one without role is fixed to."""
-        usual = Role.FIXTURE if self.sensor(Quantity.DISPLACEMENT, axis) is not None else Role.SPINDLE
-        of_axis = (s for s in self.sensors if s.quantity is Quantity.ACCELERATION and s.axis is axis)
-        return next((s for s in of_axis if (s.role or usual) is role), None)
+        return next(iter(accelerometers(self.sensors, axis, role)), None)
 
     def channel(self, quantity: Quantity, axis: Dof | None = None, part: slice = slice(None)) -> tuple[Sensor, FloatArray] | None:
         """Return the first channel of this quantity and axis with its samples, or those of a part, or None."""
@@ -179,3 +182,14 @@ class Recording(Drawn):
     def __str__(self) -> str:
         seconds = self.samples.shape[0] / self.rate
         return f"{seconds:.3g} s at {self.rate:.6g} Hz: {', '.join(sensor.name for sensor in self.sensors)}"
+
+
+def first_sensor(sensors: Sequence[Sensor], quantity: Quantity, axis: Dof | None = None) -> Sensor | None:
+    """Return the first sensor of this quantity and axis, or None."""
+    return next((s for s in sensors if s.quantity is quantity and (axis is None or s.axis is axis)), None)
+
+
+def accelerometers(sensors: Sequence[Sensor], axis: Dof, role: Role) -> tuple[Sensor, ...]:
+    """Return the accelerometers of an axis that are fixed to this; `Sensor` says what one without role is fixed to."""
+    usual = Role.FIXTURE if first_sensor(sensors, Quantity.DISPLACEMENT, axis) is not None else Role.SPINDLE
+    return tuple(s for s in sensors if s.quantity is Quantity.ACCELERATION and s.axis is axis and (s.role or usual) is role)

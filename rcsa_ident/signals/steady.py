@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
-from rcsa_ident.errors import InputError, Unsteady
+from rcsa_ident.errors import Unsteady
 from rcsa_ident.signals.loud_part import loud_part
-from rcsa_ident.signals.recording import Quantity, Recording, Role
+from rcsa_ident.signals.motion import MotionChannels, motion_channels
+from rcsa_ident.signals.recording import Recording
 from rcsa_ident.signals.rotation import Rotation, follow
 from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum, refine_speed, segment_lines
 from rcsa_ident.signals.speed_search import rotation_near
@@ -29,10 +32,9 @@ class SteadyRecord:
     Parameters
     ----------
     recording : Recording
-    axes : tuple of Dof
-        Machine axes with a displacement sensor; where there is none, those with an accelerometer on the spindle's housing.
-    columns : tuple of int
-        Channels of the recording that matter: the axes' own, then the accelerations of the displacement sensors' fixture.
+    channels : MotionChannels
+        Those of the recording that matter: of the machine's axes with a displacement sensor; where there is none, of those with an
+        accelerometer on the spindle's housing.
     window, part : slice
         What was looked at (all of a recording that is not long, see `steady_window`), and the steady part in it.
     teeth : int
@@ -41,18 +43,16 @@ class SteadyRecord:
         Lines of these channels; phases from the recording's first sample.
     deviation : array or None, shape (n,) [rad]
         Of the spindle's angle in the steady part from that at its mean speed; None where it turns evenly.
-    outputs : complex array, shape (orders, axes, o) [m]
-        Displacement at each order: gap and fixture, or the gap alone where no axis has the fixture's acceleration; the housing's, where
-        that was recorded.
-    output_variance : array, shape (orders, axes, o) [m^2]
+    outputs : complex array, shape (orders, channels) [m]
+        Displacement that each of them shows.
+    output_variance : array, shape (orders, channels) [m^2]
         Variance of the real and of the imaginary part each.
     rotation : Rotation or None
         Of the spindle in the steady part, as accelerometers on the housing told it; None where the flange's displacement did.
     """
 
     recording: Recording
-    axes: tuple[Dof, ...]
-    columns: tuple[int, ...]
+    channels: MotionChannels
     window: slice
     part: slice
     teeth: int
@@ -63,23 +63,27 @@ class SteadyRecord:
     rotation: Rotation | None = None
 
     @property
+    def axes(self) -> tuple[Dof, ...]:
+        """Machine axes whose motion was recorded."""
+        return self.channels.axes
+
+    @property
     def flange(self) -> ComplexArray:
         """Absolute displacement of the flange, or of the housing, at each order, shape (orders, axes) [m]."""
-        return np.sum(self.outputs, axis=2)
+        return self._summed(self.outputs)
 
     @property
     def variance(self) -> FloatArray:
         """Variance of its real and of its imaginary part each, shape (orders, axes) [m^2]."""
-        return np.sum(self.output_variance, axis=2)
+        return self._summed(self.output_variance)
 
-    def has_fixture(self, axis: Dof) -> bool:
-        """Return whether the fixture's motion along an axis was recorded."""
-        return not self.housing and self.recording.accelerometer(axis, Role.FIXTURE) is not None
+    def _summed(self, outputs: NDArray[Any]) -> NDArray[Any]:
+        return np.stack([np.sum(outputs[..., self.channels.searched(axis)], axis=-1) for axis in self.axes], axis=-1)
 
     @property
     def housing(self) -> bool:
-        """Whether it is the housing whose motion was recorded, and not the flange's."""
-        return self.recording.sensors[self.columns[0]].quantity is Quantity.ACCELERATION
+        """Whether it is the housing's motion alone that was recorded, and not the flange's."""
+        return not self.channels.of_flange
 
     @property
     def spindle_speed(self) -> float:
@@ -108,25 +112,25 @@ class SteadyRecord:
     @property
     def motion(self) -> FloatArray:
         """Samples of the axes' own channels in the steady part, shape (n, axes) [m], those of a housing [m/s^2]."""
-        return self.recording.samples[self.part][:, self.columns[: len(self.axes)]]
+        return self.recording.samples[self.part][:, self.channels.columns[: len(self.axes)]]
 
     def segments(self, order: np.ndarray, count: int) -> ComplexArray:
         """Return the absolute displacement in half-overlapping Hann segments, shape (count, orders, axes) [m]."""
-        samples = self.recording.samples[self.part][:, self.columns]
+        samples = self.recording.samples[self.part][:, self.channels.columns]
         omega = order * self.spindle_speed
         lines = segment_lines(samples, self.recording.rate, self.spindle_speed, order, count, self.deviation)
         lines = lines * np.exp(-1j * omega * self.part.start / self.recording.rate)[:, None]
-        return np.einsum("smc,mca->sma", lines, _weights(self.recording, self.axes, self.columns, omega))
-
-
-def measured_axes(recording: Recording) -> tuple[Dof, ...]:
-    """Return the axes with a displacement sensor; where there is none at all, those with an accelerometer on the spindle's housing."""
-    shown = tuple(axis for axis in (Dof.X, Dof.Y) if recording.sensor(Quantity.DISPLACEMENT, axis) is not None)
-    return shown or tuple(axis for axis in (Dof.X, Dof.Y) if recording.accelerometer(axis, Role.SPINDLE) is not None)
+        return self._summed(np.einsum("smc,mck->smk", lines, self.channels.weights(omega)))
 
 
 def steady_record(
-    recording: Recording, axes: Sequence[Dof], programmed: float, max_frequency: float, teeth: int, whole: bool = False
+    recording: Recording,
+    axes: Sequence[Dof],
+    programmed: float,
+    max_frequency: float,
+    teeth: int,
+    whole: bool = False,
+    housing: bool = True,
 ) -> SteadyRecord:
     """Return the steady part of a recording with its speed and lines.
 
@@ -143,11 +147,13 @@ def steady_record(
         1 for an air cut.
     whole : bool
         Look at all of a long recording, not at a window, and take its speed as constant: for who goes through all of it so.
+    housing : bool
+        Accelerometers on the housing beside displacement sensors are read, too.
 
     Raises
     ------
     InputError
-        If the displacement of an axis is missing.
+        If the displacement of an axis is missing, or as `MotionChannels`.
     Unsteady
         If there is no steady part; what was found says why.
     """
@@ -155,11 +161,12 @@ def steady_record(
     least = LEAST_REVOLUTIONS * 2.0 * np.pi / programmed * rate
     if n < least:
         raise _no_steady_part(f"too short: {n / rate:.3g} s hold fewer than {LEAST_REVOLUTIONS:.0f} revolutions")
-    columns = motion_columns(recording, axes)
+    channels = motion_channels(recording.sensors, axes, housing)
+    columns = channels.columns
     window = slice(0, n) if whole else steady_window(recording, columns[: len(axes)], programmed, teeth)
     samples = recording.samples[window][:, columns]
     displacement = samples[:, : len(axes)]
-    accelerations = recording.sensors[columns[0]].quantity is Quantity.ACCELERATION
+    accelerations = not channels.of_flange
     # idle or not: an accelerometer hears the machine's noise all along, and nothing else that turns
     rough = programmed if accelerations else refine_speed(displacement, rate, programmed)
     steady = loud_part(displacement, rate) if accelerations else steady_part(displacement, rate, rough, teeth)
@@ -174,18 +181,18 @@ def steady_record(
     elif not whole:
         speed, deviation = _turning(displacement[steady], rate, speed)
     # in acceleration lines grow with the frequency: those above what is wanted would leak into the others
-    lines = line_spectrum(samples[steady], rate, speed, rate if accelerations else max_frequency, deviation).up_to(max_frequency)
+    highest = rate if accelerations or channels.beside else max_frequency
+    lines = line_spectrum(samples[steady], rate, speed, highest, deviation).up_to(max_frequency)
     part = slice(window.start + steady.start, window.start + steady.stop)
     if part.start:
         shift = np.exp(-1j * np.arange(lines.amplitude.shape[0]) * speed * part.start / rate)
         lines = replace(lines, amplitude=lines.amplitude * shift[:, None])
-    return record_of_lines(recording, axes, columns, window, part, teeth, lines, deviation, rotation)
+    return record_of_lines(recording, channels, window, part, teeth, lines, deviation, rotation)
 
 
 def record_of_lines(
     recording: Recording,
-    axes: Sequence[Dof],
-    columns: tuple[int, ...],
+    channels: MotionChannels,
     window: slice,
     part: slice,
     teeth: int,
@@ -194,12 +201,11 @@ def record_of_lines(
     rotation: Rotation | None = None,
 ) -> SteadyRecord:
     """Return the steady record with these lines of its channels; parameters as those of `SteadyRecord`."""
-    weight = _weights(recording, axes, columns, np.arange(lines.amplitude.shape[0]) * lines.spindle_speed)
-    noise = np.stack([_line_variance(lines, c, teeth) for c in range(len(columns))], axis=1)
-    kinds = [slice(0, len(axes)), slice(len(axes), None)][: 1 if len(columns) == len(axes) else 2]
-    outputs = np.stack([np.einsum("mc,mca->ma", lines.amplitude[:, k], weight[:, k]) for k in kinds], axis=2)
-    variance = np.stack([np.einsum("mc,mca->ma", noise[:, k], np.abs(weight[:, k]) ** 2) for k in kinds], axis=2)
-    return SteadyRecord(recording, tuple(axes), columns, window, part, teeth, lines, deviation, outputs, variance, rotation)
+    weight = channels.weights(np.arange(lines.amplitude.shape[0]) * lines.spindle_speed)
+    noise = np.stack([_line_variance(lines, c, teeth) for c in range(len(channels.columns))], axis=1)
+    outputs = np.einsum("mc,mck->mk", lines.amplitude, weight)
+    variance = np.einsum("mc,mck->mk", noise, np.abs(weight) ** 2)
+    return SteadyRecord(recording, channels, window, part, teeth, lines, deviation, outputs, variance, rotation)
 
 
 def _turning(displacement: FloatArray, rate: float, speed: float) -> tuple[float, FloatArray | None]:
@@ -210,29 +216,6 @@ def _turning(displacement: FloatArray, rate: float, speed: float) -> tuple[float
 
 def _no_steady_part(found: str) -> Unsteady:
     return Unsteady("recording", found, "a steady record of the programmed speed")
-
-
-def motion_columns(recording: Recording, axes: Sequence[Dof]) -> tuple[int, ...]:
-    """Return the channels of the axes' motion, then those of the displacement sensors' fixture."""
-    shown = [recording.sensor(Quantity.DISPLACEMENT, axis) for axis in axes]
-    fixed = [recording.accelerometer(axis, Role.FIXTURE) for axis in axes]
-    if all(sensor is None for sensor in shown):
-        shown, fixed = [recording.accelerometer(axis, Role.SPINDLE) for axis in axes], []
-    for axis, sensor in zip(axes, shown, strict=True):
-        if sensor is None:
-            raise InputError("sensors", f"no displacement {axis.upper()}", "the same sensors for a cut and its air cut")
-    return tuple(recording.sensors.index(sensor) for sensor in (*shown, *fixed) if sensor is not None)
-
-
-def _weights(recording: Recording, axes: Sequence[Dof], columns: Sequence[int], omega: FloatArray) -> ComplexArray:
-    """Share of each channel in each axis: the gap plus the fixture's motion -a / omega^2, sensors undone; (orders, channels, axes)."""
-    twice = np.where(omega == 0.0, 0.0, -1.0 / np.where(omega == 0.0, 1.0, omega) ** 2)
-    weights = np.zeros((omega.size, len(columns), len(axes)), dtype=complex)
-    for c, column in enumerate(columns):
-        sensor = recording.sensors[column]
-        factor = 1.0 if sensor.quantity is Quantity.DISPLACEMENT else twice
-        weights[:, c, [axis is sensor.axis for axis in axes].index(True)] = factor / sensor.response(omega)
-    return weights
 
 
 def _line_variance(lines: LineSpectrum, channel: int, teeth: int) -> FloatArray:

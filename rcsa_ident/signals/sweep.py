@@ -26,10 +26,11 @@ from rcsa_ident.signals.measurement import (
     cut_faults,
     visible_harmonics,
 )
+from rcsa_ident.signals.motion import motion_channels
 from rcsa_ident.signals.recording import LONGEST, Quantity, Recording
 from rcsa_ident.signals.rotation import Pace, follow, speed_path
 from rcsa_ident.signals.spectra import LineSpectrum, line_spectrum
-from rcsa_ident.signals.steady import SteadyRecord, motion_columns, record_of_lines
+from rcsa_ident.signals.steady import SteadyRecord, record_of_lines
 from rcsa_ident.signals.verdict import RecordCode, Verdict, examined, raw_faults
 from rcsa_ident.units import to_hz, to_rpm
 
@@ -57,6 +58,10 @@ _UNEVEN, _ENTERS = 0.6, (2.0, 0.05)
 _LEAST_USABLE = 0.5
 
 
+#: Note on a pass with accelerometers on the housing beside displacement sensors.
+UNUSED = Remark(RecordCode.HOUSING, "the accelerometers on the spindle's housing are not used in a pass whose speed changes")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Turning:
     """How the spindle turned through a pass: angle [rad] at each sample, from tooth 1 at immersion 0 where that is known (`absolute`), its
@@ -76,12 +81,12 @@ class _Turning:
     def window(self, part: slice, axes: tuple[Dof, ...], teeth: int, max_frequency: float) -> tuple[SteadyRecord, float]:
         """The lines of a window, with phases from its first sample, and the share by which those of the teeth change within it."""
         recording = self.recording
-        columns = motion_columns(recording, axes)
+        channels = motion_channels(recording.sensors, axes, housing=False)
         cut = replace(recording, samples=recording.samples[part])
         step, middle, at = self.line(part)
         angle = self.angle[part]
         deviation = angle - middle - step * at
-        samples, rate, speed = cut.samples[:, columns], recording.rate, float(step * recording.rate)
+        samples, rate, speed = cut.samples[:, channels.columns], recording.rate, float(step * recording.rate)
         lines = line_spectrum(samples, rate, speed, max_frequency, deviation)
         # what the amplitudes change within the window is no noise, and must not leak into other orders
         lines = line_spectrum(samples - _changing(lines, angle - middle), rate, speed, max_frequency, deviation)
@@ -89,7 +94,7 @@ class _Turning:
         # neighbours differ since the speed changes, not by noise
         lines = replace(lines, scatter=np.zeros_like(lines.scatter))
         everything = slice(0, angle.size)
-        return record_of_lines(cut, axes, columns, everything, everything, teeth, lines, deviation), uneven
+        return record_of_lines(cut, channels, everything, everything, teeth, lines, deviation), uneven
 
     def line(self, part: slice) -> tuple[float, float, FloatArray]:
         """The line through a window's angles: per sample, in its middle [rad], and the samples from there, shape (n,)."""
@@ -151,6 +156,8 @@ def measure_pass(
     first_speed, looked_at = conditions.spindle_speed, examined(cut)
     programmed = 0.5 * (first_speed + last_speed)
     notes = looked_at.notes
+    if motion_channels(cut.sensors, axes).beside:
+        notes = (*notes, UNUSED)
 
     def left_out(*reasons: Remark) -> Reading:
         return Reading(cut_id, tooling, programmed, Verdict(reasons, notes))
@@ -268,7 +275,7 @@ def _moved_axes(recording: Recording) -> tuple[Dof, ...]:
 
 def _turning(recording: Recording, axes: tuple[Dof, ...], speeds: tuple[float, float], teeth: int) -> _Turning:
     """Follow the spindle through a pass; an air cut has 1 tooth."""
-    columns = motion_columns(recording, axes)[: len(axes)]
+    columns = motion_channels(recording.sensors, axes, housing=False).columns[: len(axes)]
     samples, rate = np.asarray(recording.samples)[:, columns], recording.rate
     low, high = to_hz(min(speeds)), to_hz(max(speeds))
     pace = _pace(low, high, samples.shape[0] / rate)

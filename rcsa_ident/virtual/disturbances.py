@@ -109,8 +109,10 @@ def turning(
     return even + lead - lead[first]
 
 
-def disturbed(disturbances: Disturbances, rate: float, count: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Return what is added to the gap and to the acceleration of both axes, shapes (count, 2) [m], [m/s^2].
+def disturbed(
+    disturbances: Disturbances, rate: float, count: int, rng: np.random.Generator, accelerometers: int = 1
+) -> tuple[FloatArray, FloatArray]:
+    """Return what is added to the gap and to the accelerations of both axes, shapes (count, 2) [m], (count, 2 accelerometers) [m/s^2].
 
     Parameters
     ----------
@@ -120,11 +122,13 @@ def disturbed(disturbances: Disturbances, rate: float, count: int, rng: np.rando
     count : int
     rng : numpy.random.Generator
         Not used where nothing disturbs.
+    accelerometers : int
+        Pairs of them: each feels the machine's noise for itself, and all the same knocks.
     """
     from scipy.signal import lfilter
 
     time = np.arange(count) / rate
-    gap, acceleration = np.zeros((count, 2)), np.zeros((count, 2))
+    gap, acceleration = np.zeros((count, 2)), np.zeros((count, 2 * accelerometers))
     if disturbances.hum > 0.0:
         for times, share in _HUM:
             phase = 2.0 * np.pi * rng.random(2)
@@ -132,13 +136,14 @@ def disturbed(disturbances: Disturbances, rate: float, count: int, rng: np.rando
     if disturbances.machine_noise > 0.0:
         omega = 2.0 * np.pi * _NOISE_FREQUENCY / rate
         pole = np.exp(omega * (-_NOISE_DAMPING + 1j * np.sqrt(1.0 - _NOISE_DAMPING**2)))
-        noise = lfilter([1.0, -1.0], [1.0, -2.0 * pole.real, abs(pole) ** 2], rng.normal(size=(count + 1024, 2)), axis=0)[1024:]
-        acceleration += disturbances.machine_noise * noise / noise.std(axis=0)
+        for pair in acceleration.reshape(count, accelerometers, 2).transpose(1, 0, 2):
+            noise = lfilter([1.0, -1.0], [1.0, -2.0 * pole.real, abs(pole) ** 2], rng.normal(size=(count + 1024, 2)), axis=0)[1024:]
+            pair += disturbances.machine_noise * noise / noise.std(axis=0)
     for start in time[-1] * rng.random(rng.poisson(disturbances.knocks * time[-1])) if disturbances.knocks > 0.0 else ():
         omega = 2.0 * np.pi * np.exp(rng.uniform(*np.log(_KNOCK_FREQUENCY)))
         damping, since = rng.uniform(*_KNOCK_DAMPING), np.maximum(time - start, 0.0)
         ringing = np.exp(-damping * omega * since) * np.sin(omega * since)
         seen = disturbances.knock * ringing[:, None] * rng.normal(size=2)
         gap += seen
-        acceleration -= omega**2 * seen
+        acceleration -= omega**2 * np.tile(seen, accelerometers)
     return gap, acceleration

@@ -124,6 +124,8 @@ class VirtualSpindle:
         Whether the moments of the spinning parts couple the two bending planes, as those of every real spindle do.
     fixture_position : float [m]
         Where on the housing the flange sensor is held, from the flange face towards the rear.
+    housing_positions : tuple of float [m]
+        Where on it further accelerometers stand, a pair for X and Y at each.
     """
 
     shaft: tuple[BeamSegment, ...]
@@ -132,6 +134,7 @@ class VirtualSpindle:
     joint: FlangeJoint
     gyroscopic: bool = True
     fixture_position: float = 0.0
+    housing_positions: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.shaft:

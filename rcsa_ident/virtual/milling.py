@@ -52,8 +52,8 @@ class CutHistory:
         Force on the tool, machine axes X and Y.
     tip, flange, fixture : arrays, shape (n, 2) [m]
         Absolute displacements, X and Y.
-    acceleration : array, shape (n, 2) [m/s^2]
-        Acceleration of the fixture.
+    acceleration : array, shape (n, 2 + 2 h) [m/s^2]
+        Acceleration of the fixture, then of each of h further points of the housing, X and Y.
     """
 
     step: float
@@ -89,7 +89,8 @@ def mill_cut(
     Parameters
     ----------
     dynamics : Poles, or a sequence of them
-        The machine with inputs ``tip.x``, ``tip.y`` and outputs at ``tip``, ``flange``, ``fixture``; of one that changes while it cuts, one
+        The machine with inputs ``tip.x``, ``tip.y`` and outputs at ``tip``, ``flange``, ``fixture``, and ``housing1``, ``housing2``, ...
+        where further accelerometers stand; of one that changes while it cuts, one
         for each of equal parts of the cut, in the same order and scale (`reduction.alike`).
     cutter : Cutter
     conditions : CuttingConditions
@@ -130,10 +131,12 @@ def mill_cut(
     first = np.expm1(x) / x
     second = (first - 1.0) / x
     gain = step * np.stack([first - second, second], axis=1)[:, :, :, None] * np.stack([part.inputs for part in parts])[:, None]
-    rows = [[str(c) for c in dynamics.coordinates].index(f"{point}.{axis}") for point in ("tip", "flange", "fixture") for axis in "xy"]
-    shape = 2.0 * np.stack([np.concatenate([part.outputs[rows], part.outputs[rows[4:]] * part.pole**2]) for part in parts])
+    names = [str(c) for c in dynamics.coordinates]
+    rows = [names.index(f"{point}.{axis}") for point in ("tip", "flange", "fixture") for axis in "xy"]
+    felt = rows[4:] + [k for k, name in enumerate(names) if name.startswith("housing") and "'" not in name]
+    shape = 2.0 * np.stack([np.concatenate([part.outputs[rows], part.outputs[felt] * part.pole**2]) for part in parts])
     # a force at the tip accelerates the housing at once only through what the basis leaves out
-    through = 2.0 * (dynamics.outputs[rows[4:]] * dynamics.pole) @ dynamics.inputs
+    through = 2.0 * (dynamics.outputs[felt] * dynamics.pole) @ dynamics.inputs
 
     force = np.zeros((count, 2))
     tooth, ahead, cut, turn = _cut_arrays(cutter, conditions, coefficients, step, slices)
@@ -146,7 +149,7 @@ def mill_cut(
         tip=result[:, 0:2],
         flange=result[:, 2:4],
         fixture=result[:, 4:6],
-        acceleration=result[:, 6:8] + force @ through.real.T,
+        acceleration=result[:, 6:] + force @ through.real.T,
     )
 
 

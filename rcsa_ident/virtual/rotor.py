@@ -84,8 +84,10 @@ def rotor(spindle: VirtualSpindle, tooling: ToolAssembly | None, refinement: int
     # the cutter turns from +Y to +X, against z; a slope rate in one plane asks for a moment in the other
     gyroscopic = scipy.sparse.csc_array(scipy.sparse.block_array([[None, -2.0 * turning], [2.0 * turning, None]], format="csc"))
     ports, coordinates = [], []
-    arm = spindle.housing.position - spindle.fixture_position
-    places = {"flange": ((2 * nodes[0], 1.0),), "fixture": ((2 * housing, 1.0), (2 * housing + 1, -arm))}
+    on_housing = {"fixture": spindle.fixture_position, **dict(zip(housing_points(spindle), spindle.housing_positions, strict=True))}
+    places: dict[str, tuple[tuple[int, float], ...]] = {"flange": ((2 * nodes[0], 1.0),)}
+    for name, position in on_housing.items():
+        places[name] = ((2 * housing, 1.0), (2 * housing + 1, position - spindle.housing.position))
     if tooling is not None:
         places = {"tip": ((2 * mesh.nodes[TOOL, 0], 1.0),), **places}
         on_holder = [z for body, z in mesh.nodes if body == HOLDER]
@@ -105,6 +107,11 @@ def rotor(spindle: VirtualSpindle, tooling: ToolAssembly | None, refinement: int
         ports.append(row)
         coordinates.append(Coordinate("flange", _SLOPES[axis]))
     return Rotor(gyroscopic=gyroscopic, ports=frozen(ports), coordinates=tuple(coordinates), **blocks)
+
+
+def housing_points(spindle: VirtualSpindle) -> tuple[str, ...]:
+    """Return the names of the points on the housing at which further accelerometers stand."""
+    return tuple(f"housing{k}" for k in range(1, 1 + len(spindle.housing_positions)))
 
 
 def frequency_response(

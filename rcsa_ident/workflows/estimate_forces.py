@@ -26,9 +26,10 @@ from rcsa_ident.observer.wear import WearIndicators, wear_indicators
 from rcsa_ident.shown import Drawn
 from rcsa_ident.signals.alignment import angle_to_air
 from rcsa_ident.signals.measurement import NO_AIR
+from rcsa_ident.signals.motion import measured_axes, motion_channels
 from rcsa_ident.signals.recording import Quantity, Recording, Role
 from rcsa_ident.signals.spectra import line_spectrum
-from rcsa_ident.signals.steady import SteadyRecord, measured_axes, steady_record
+from rcsa_ident.signals.steady import SteadyRecord, steady_record
 from rcsa_ident.signals.verdict import raw_faults, speed_faults
 from rcsa_ident.tool_holder.geometry import ToolAssembly
 from rcsa_ident.units import to_hz, to_rpm
@@ -140,15 +141,19 @@ def observe(
     faults = (*raw_faults(cut), *(f"air cut: {fault}" for fault in (raw_faults(air) if air is not None else ())))
     if faults:
         raise Unsteady("recording", "; ".join(faults), "a record without lost, frozen or clipped samples")
-    axes = tuple(axis for axis in measured_axes(cut) if axis in machine.axes)
+    axes = tuple(axis for axis in measured_axes(cut.sensors) if axis in machine.axes)
     if not axes or cut.sensor(Quantity.DISPLACEMENT) is None:
         raise InputError("sensors", "no displacement along an identified axis", "a displacement sensor for X or Y")
+    turned = [s for s in motion_channels(cut.sensors, axes, housing=False).sensors if s.rotation != 0.0]
+    if turned:
+        found = f"{np.degrees(turned[0].rotation):g}"
+        raise InputError(f"sensors.{turned[0].name}.rotation_deg", found, "0: forces need sensors along the machine's axes")
     machine.check_behind_joint(axes)
     programmed = trigger_speed(cut) if programmed is None else programmed
     assert machine.band is not None
     identified = machine.band
     top = min(identified[1], HIGHEST * 2.0 * np.pi * cut.rate)
-    steady = steady_record(cut, axes, programmed, top / (2.0 * np.pi), teeth, whole=True)
+    steady = steady_record(cut, axes, programmed, top / (2.0 * np.pi), teeth, whole=True, housing=False)
     speed = steady.spindle_speed
     notes: list[str] = [*speed_faults(steady.motion, steady.lines, programmed)]
     _periodic(steady, programmed, notes)
@@ -262,7 +267,7 @@ def _run_out(
     if air is None:
         notes.append(NO_AIR)
         return None
-    still = steady_record(air, axes, programmed, 1.02 * top / (2.0 * np.pi), 1, whole=True)
+    still = steady_record(air, axes, programmed, 1.02 * top / (2.0 * np.pi), 1, whole=True, housing=False)
     angle, std = angle_to_air(cut, still, teeth)
     if std > LOOSE_ANGLE:
         notes.append(f"the angle between cut and air cut is known only to {np.degrees(std):.0f}°: run-out is not subtracted")
@@ -279,8 +284,7 @@ def _run_out(
 
 
 def _kinds(steady: SteadyRecord) -> list[tuple[Quantity, Dof | None]]:
-    sensors = [steady.recording.sensors[c] for c in steady.columns]
-    return [(sensor.quantity, sensor.axis) for sensor in sensors]
+    return [(sensor.quantity, sensor.axis) for sensor in steady.channels.sensors]
 
 
 def _place(steady: SteadyRecord, kind: tuple[Quantity, Dof | None]) -> int:

@@ -171,7 +171,8 @@ class _Worker:
                 history = mill_cut(job.dynamics, cutter, conditions, coefficients, step, total, course=course).after(settling)
                 highest = int(2.0 * np.pi * TRUTH_FREQUENCIES[1] / speed)
                 lines = _lines(plan, history, lead, highest + 1)
-            channels = record(suite, job.clamping, angle[inside], job.conditions.feed_angle, OVERSAMPLING, history, job.rng, disturbances)
+            own = suite, job.clamping, angle[inside], job.conditions.feed_angle, OVERSAMPLING, history, job.rng, disturbances
+            channels = record(*own, len(self.setup.spindle.housing_positions))
             speed = float(np.mean(np.diff(angle[inside]))) * suite.rate if disturbances.speed_wander > 0.0 or change != 0.0 else speed
             records[kind] = SimulatedRecord(speed, start, channels)
         return SimulatedCut(job.id, job.tooling.name, records, lines)

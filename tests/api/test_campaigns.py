@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import io
 import json
+import math
 import tomllib
 import zipfile
 from functools import partial
@@ -375,13 +376,16 @@ def test_texts_of_campaigns_come_back_as_they_were():
     data["campaign"]["clock_error_percent"] = 0.1
     data["sensors"]["fixture_x"]["role"] = "fixture"
     data["sensors"]["felt_x"] = {"quantity": "acceleration", "axis": "X", "sensitivity": 1.0, "role": "table", "mount_resonance_hz": 8e3}
+    data["sensors"]["felt_x"]["rotation_deg"] = 2.0
     name, text, cuts = declare(data, lambda _: None)
     assert (name, cuts) == ("by hand", 2)
     assert json.loads(text)["cuts"] == data["cuts"]
     campaign = campaign_of_text(text, lambda name: Path("/x") / name)
     assert campaign.clock_error == pytest.approx(1e-3)
     assert [sensor.role for sensor in campaign.sensors if sensor.name == "felt_x"] == ["table"]
-    assert SensorKeys(**data["sensors"]["felt_x"]).sensor("felt_x").mount_resonance == 8e3
+    felt = SensorKeys(**data["sensors"]["felt_x"]).sensor("felt_x")
+    assert (felt.mount_resonance, felt.rotation) == (8e3, pytest.approx(math.radians(2.0)))
+    assert SensorKeys(quantity="displacement", axis="X").sensor("x").rotation == 0.0
     assert campaign.cuts[1].air == Path("/x/c1_air.h5")
     toml = tomllib.loads(toml_text(text))
     assert toml["sensors"] == data["sensors"]

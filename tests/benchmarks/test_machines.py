@@ -174,10 +174,12 @@ def test_conditions_change_the_sensors_only(drawn):
     assert seen["no-trigger"].sensors.gap_noise == machine.sensors.gap_noise == 2e-9
     assert seen["noise-x3"].sensors.gap_noise == pytest.approx(6e-9)
     assert seen["noise-x3"].sensors.acceleration_noise == pytest.approx(0.15)
-    assert all(s.spindle is machine.spindle for name, s in seen.items() if CONDITIONS[name].housing is None)
+    assert all(s.spindle is machine.spindle for name, s in seen.items() if CONDITIONS[name].housing is CONDITIONS[name].beside is None)
     for name, condition in CONDITIONS.items():
         if condition.housing is not None:
             assert seen[name].spindle == replace(machine.spindle, fixture_position=condition.housing)
+        if condition.beside is not None:
+            assert seen[name].spindle == replace(machine.spindle, housing_positions=(condition.beside,))
         toolings = [path.stem for path in (*seen[name].toolings, *seen[name].truth_toolings)]
         assert toolings == [*CUT, *HELD_OUT]
         assert len(seen[name].toolings) == condition.toolings

@@ -1,8 +1,9 @@
-"""The sample runs as accelerometers alone have recorded them, from files to a tool that was never cut."""
+"""From files to a tool that was never cut: accelerometers on the housing as the only sensors, and beside displacement sensors."""
 
 import json
 import re
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import rcsa_ident as ri
 from rcsa_ident.cli import app
 from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.setups import read_tooling
+from rcsa_ident.samples import simulate_campaign
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 from tests.fixtures.paths import MACHINES, SAMPLES
 
@@ -21,6 +23,21 @@ AXES = ("x", "y")
 
 def run(*arguments):
     return CliRunner().invoke(app, [str(each) for each in arguments])
+
+
+def within(result, most):
+    """Whether the tooltip FRFs of both toolings that cut, and of one in a holder that never did, are as near to the truth as this."""
+    machine, true, near = ri.read_result(result).machine, read_machine(MACHINES / "hpm.toml"), True
+    for path, bound in zip((*true.toolings, true.truth_toolings[1]), most, strict=True):
+        tooling = read_tooling(path)
+        tip = machine.tip(tooling, OMEGA)
+        values = frequency_response(rotor(true.spindle, tooling.assembly), OMEGA, 14000.0 * np.pi / 30.0, ("tip.x", "tip.y"))
+        for i, axis in enumerate(AXES):
+            error = tip.between(f"tip.{axis}", f"tip.{axis}") - values[:, i, i]
+            share = np.linalg.norm(error) / np.linalg.norm(values[:, i, i])
+            print(f"{tooling.name} {axis}: {share:.4f} off")
+            near &= bool(share < bound)
+    return near
 
 
 @pytest.fixture(scope="module")
@@ -45,15 +62,7 @@ def test_from_accelerometers_to_a_tool_that_was_never_cut(folder, tmp_path):
     assert told["status"] == "suspect"
     assert "flange over tip force" not in (tmp_path / "R.html").read_text()
     assert "housing over tip force" in (tmp_path / "R.html").read_text()
-    machine, true = ri.read_result(tmp_path / "R.json").machine, read_machine(MACHINES / "hpm.toml")
-    # those that cut, and one in a holder that never did
-    for path, most in ((true.toolings[0], 0.02), (true.toolings[1], 0.02), (true.truth_toolings[1], 0.1)):
-        tooling = read_tooling(path)
-        tip = machine.tip(tooling, OMEGA)
-        values = frequency_response(rotor(true.spindle, tooling.assembly), OMEGA, 14000.0 * np.pi / 30.0, ("tip.x", "tip.y"))
-        for i, axis in enumerate(AXES):
-            error = tip.between(f"tip.{axis}", f"tip.{axis}") - values[:, i, i]
-            assert np.linalg.norm(error) < most * np.linalg.norm(values[:, i, i]), (tooling.name, axis)
+    assert within(tmp_path / "R.json", (0.02, 0.02, 0.1))
 
 
 def test_check_says_what_such_a_cut_tells(folder):
@@ -64,3 +73,31 @@ def test_check_says_what_such_a_cut_tells(folder):
     notes = {note for recording in told["recordings"] for note in recording["notes"]}
     assert notes == {"the motion of the spindle's housing, from its acceleration: the flange's own motion follows from several toolings"}
     assert "it needs three toolings" in told["too_few"]
+
+
+@pytest.fixture(scope="module")
+def beside(tmp_path_factory):
+    """A campaign of the sample machine with a pair of accelerometers 350 mm behind the flange's face, beside all other sensors."""
+    machine = read_machine(MACHINES / "hpm.toml")
+    spindle = replace(machine.spindle, housing_positions=(0.35,))
+    plan = replace(machine.plan, spindle_speeds=tuple(np.linspace(8000.0, 20000.0, 12) * np.pi / 30.0))
+    return simulate_campaign(replace(machine, spindle=spindle, plan=plan), tmp_path_factory.mktemp("beside") / "campaign", seed=5).folder
+
+
+@pytest.mark.slow(seconds=60)
+def test_from_displacement_and_a_pair_on_the_housing(beside, tmp_path):
+    told = json.loads(run("check", beside, "--json").stdout)
+    assert told["usable"] == told["cuts"] == 24
+    assert not any(recording["notes"] for recording in told["recordings"])
+    found = run("identify", beside, "--out", tmp_path / "R.json", "--report", tmp_path / "R.html")
+    assert found.exit_code == 0, found.output
+    result = json.loads((tmp_path / "R.json").read_text())
+    assert result["status"] == "converged"
+    assert {name: sensor.get("role") for name, sensor in result["sensors"].items() if sensor["quantity"] == "acceleration"} == {
+        "fixture_x": "fixture",
+        "fixture_y": "fixture",
+        "housing_x": "spindle",
+        "housing_y": "spindle",
+    }
+    assert "flange over tip force" in (tmp_path / "R.html").read_text()
+    assert within(tmp_path / "R.json", (0.01, 0.01, 0.05))

@@ -1,4 +1,4 @@
-"""Accelerometers on the spindle's housing as the only sensors: what the flange does follows from several toolings."""
+"""Accelerometers on the housing: as the only sensors, where what the flange does follows from several toolings, and beside others."""
 
 from dataclasses import replace
 
@@ -8,18 +8,20 @@ import pytest
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
 from rcsa_ident.identification.coupled.data import couplable
-from rcsa_ident.identification.data import FLANGE_ALONE, GAP_AND_FIXTURE, ONE_PLACE, AxisData
+from rcsa_ident.identification.data import AxisData
 from rcsa_ident.identification.evidence import EvidenceSelection
 from rcsa_ident.identification.genetic_algorithm import PaperGeneticAlgorithm
 from rcsa_ident.identification.hammer_data import with_tests
 from rcsa_ident.identification.hammer_lines import HammerLines
 from rcsa_ident.identification.misfit import Misfit
-from rcsa_ident.identification.parameters import AxisLayout, Layout
+from rcsa_ident.identification.parameters import AxisLayout, Layout, unpack, with_places
 from rcsa_ident.identification.priors import Priors
 from rcsa_ident.identification.result import IdentificationCode
 from rcsa_ident.identification.search import SearchSettings
 from rcsa_ident.identification.status import Status
 from rcsa_ident.remarks import says
+from rcsa_ident.signals.motion import FLANGE_ALONE, GAP_AND_FIXTURE, ONE_PLACE, shares_of
+from rcsa_ident.virtual.rotor import frequency_response, rotor
 from tests.fixtures.virtual_shop import AXES, TIP_OMEGA, open_shop
 from tests.identification.models import remade, vector_of
 
@@ -42,8 +44,8 @@ def felt(cut, rng, gain=1.0):
         deviation = NOISE / lines.omega**2 / np.abs(lines.force)
         noise = deviation * (rng.standard_normal(lines.omega.size) + 1j * rng.standard_normal(lines.omega.size))
         moved = gain * (lines.cut - lines.air)[:, 1:] + noise[:, None]
-        axes[axis] = replace(lines, cut=moved, air=0.0 * moved, variance=deviation[:, None] ** 2)
-    return replace(cut, axes=axes, housing=True)
+        axes[axis] = replace(lines, cut=moved, air=0.0 * moved, variance=deviation[:, None] ** 2, shares=ONE_PLACE)
+    return replace(cut, axes=axes)
 
 
 def cuts_of(shop, names=None, gain=1.0):
@@ -154,6 +156,74 @@ def test_two_toolings_are_few(shop):
     found = quick.run(shop.prepare(cuts_of(shop, (first, second))), 1)
     assert found.status is Status.SUSPECT
     assert says(found.reasons, IdentificationCode.FEW_TOOLINGS)
+
+
+def beside(shop, cuts, delays, rng):
+    """The same cuts with a further accelerometer along each axis, 350 mm behind the flange's face; what it feels is the full model's."""
+    spindle = replace(shop.machine.spindle, housing_positions=(0.35,))
+    models = {name: rotor(spindle, tooling.assembly) for name, tooling in shop.toolings.items()}
+    found = []
+    for cut, delay in zip(cuts, delays, strict=True):
+        axes = {}
+        for i, (axis, lines) in enumerate(cut.axes.items()):
+            outputs = ("housing1.x", "housing1.y")
+            values = frequency_response(models[cut.tooling], lines.omega, cut.spindle_speed, outputs=outputs)
+            moved = values[:, i, i]
+            if lines.across is not None:
+                moved = moved + values[:, i, 1 - i] * lines.across / lines.force
+            deviation = NOISE / lines.omega**2 / np.abs(lines.force)
+            noise = deviation * (rng.standard_normal(deviation.size) + 1j * rng.standard_normal(deviation.size))
+            moved = moved * np.exp(-1j * lines.omega * delay) + noise
+            axes[axis] = replace(
+                lines,
+                cut=np.column_stack([lines.cut, moved]),
+                air=np.column_stack([lines.air, 0.0 * moved]),
+                variance=np.column_stack([lines.variance, deviation**2]),
+                shares=shares_of(True, True, 1),
+            )
+        found.append(replace(cut, axes=axes))
+    return found
+
+
+def test_cuts_share_the_outputs_that_all_of_them_have(shop):
+    names = tuple(shop.toolings)[:2]
+    cuts, delays = shop.measurements(np.random.default_rng(SEED), names)
+    many = beside(shop, cuts, delays, np.random.default_rng(SEED))
+    alone = shop.measurements(np.random.default_rng(SEED), names, fixture=False)[0]
+    for given, outputs, shares in (
+        (many, 3, shares_of(True, True, 1)),
+        ([*many[:5], *cuts[5:]], 2, GAP_AND_FIXTURE),
+        ([*many[:5], *alone[5:]], 1, FLANGE_ALONE),
+    ):
+        data = shop.prepare(given)
+        assert data.beside == (outputs == 3)
+        for axis in data.axes:
+            assert axis.outputs == outputs
+            np.testing.assert_array_equal(axis.output_shares, shares)
+            first = [lines.receptance for cut in cuts for name, lines in cut.axes.items() if name is axis.axis]
+            np.testing.assert_allclose(axis.measured, np.concatenate(first), rtol=1e-12)
+    data = shop.prepare(many)
+    assert data.of_flange
+    for axis, plain in zip(data.first().axes, shop.prepare(cuts).axes, strict=True):
+        np.testing.assert_array_equal(axis.lines, plain.lines)
+        np.testing.assert_array_equal(axis.output_shares, GAP_AND_FIXTURE)
+    assert shop.prepare(cuts).first().axes[0].lines.shape == shop.prepare(cuts).axes[0].lines.shape
+
+
+def test_a_vector_with_fewer_places_is_the_same_machine(data):
+    layout = Layout((AxisLayout(3, 2), AxisLayout(2, 2, softening=True)), 1)
+    theta = vector_of(layout, ((600.0, 1400.0, 2500.0), (900.0, 2100.0)))
+    fewer, short = with_places(theta, layout, (1, 0))
+    assert [axis.places for axis in short.axes] == [1, 0]
+    assert fewer.size == short.size
+    for i, (old, new) in enumerate(zip(layout.axes, short.axes, strict=True)):
+        before, after = unpack(theta[layout.axis(i)], old), unpack(fewer[short.axis(i)], new)
+        for name in ("omega_n", "psi", "factor", "residual", "softening"):
+            np.testing.assert_allclose(getattr(after, name), getattr(before, name), rtol=1e-12)
+        np.testing.assert_allclose(after.places, before.places[:, : new.places])
+        np.testing.assert_allclose(after.place_residual, before.place_residual[: new.places])
+    np.testing.assert_array_equal(fewer[short.tail :], theta[layout.tail :])
+    assert with_places(theta, layout, (2, 2))[0] is theta
 
 
 def test_what_cannot_be_told_is_refused_by_name(shop, data):

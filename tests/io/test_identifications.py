@@ -186,7 +186,7 @@ def test_a_broken_speed_band_is_not_read(path, found, key, value, words):
 
 def test_sensors_come_back_with_role_and_mount(tmp_path, found):
     campaign = by_hand.campaign(tmp_path)
-    felt = Sensor("felt_x", Quantity.ACCELERATION, Dof.X, 2.0, 1e-5, 9e3, role=Role.SPINDLE, mount_resonance=8e3)
+    felt = Sensor("felt_x", Quantity.ACCELERATION, Dof.X, 2.0, 1e-5, 9e3, role=Role.SPINDLE, mount_resonance=8e3, rotation=-0.03)
     told = replace(campaign, sensors=(*campaign.sensors, felt))
     write_result(tmp_path / "S.json", identification_to_json(replace(found, sensors=told.sensors), told, []))
     read = machine_from_json(read_result(tmp_path / "S.json"), "S.json")

@@ -342,6 +342,23 @@ def test_a_dynamometer_also_feels_along_the_spindle(campaign):
     assert Dof.Z in {sensor.axis for sensor in read_campaign(campaign).sensors if sensor.quantity is Quantity.FORCE}
 
 
+def test_a_sensor_that_is_turned_needs_its_neighbour(campaign, campaign_text):
+    path = campaign / "campaign.toml"
+    alone = campaign_text.replace("[sensors.flange_x]\n", "[sensors.flange_x]\nrotation_deg = -1.5\n")
+    other = '[sensors.flange_y]\nquantity = "displacement"\naxis = "Y"\nsensitivity = 1.0\n[sensors.trigger]'
+    told = alone.replace("[sensors.trigger]", other)
+    path.write_text(told)
+    found = {sensor.name: sensor.rotation for sensor in read_campaign(campaign).sensors}
+    assert found.pop("flange_x") == pytest.approx(np.radians(-1.5))
+    assert set(found.values()) == {0.0}
+    path.write_text(alone)
+    with pytest.raises(InputError, match=r"flange_x.rotation_deg: found -1.5, allowed is 0, or as many sensors along the other axis"):
+        read_campaign(campaign)
+    path.write_text(told.replace("-1.5", "200.0"))
+    with pytest.raises(InputError, match="rotation_deg"):
+        read_campaign(campaign)
+
+
 def test_what_an_accelerometer_is_fixed_to(campaign, campaign_text):
     text = campaign_text.replace(
         "[sensors.trigger]", '[sensors.other_x]\nquantity = "acceleration"\naxis = "X"\nsensitivity = 1.0\n[sensors.trigger]'

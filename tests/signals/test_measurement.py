@@ -216,6 +216,81 @@ def test_accelerometers_on_the_housing_alone():
     assert not made.measure().measurement.housing
 
 
+def both(made, seed=8):
+    """The pair of records with two accelerometers on the housing beside all other sensors; in the air they feel noise."""
+
+    def beside(record, felt):
+        roles = (None, None, Role.FIXTURE, Role.FIXTURE, Role.SPINDLE, Role.SPINDLE)
+        told = zip((*record.sensors, *felt.sensors), roles, strict=True)
+        sensors = tuple(dataclasses.replace(sensor, role=role) for sensor, role in told)
+        return Recording(RATE, np.hstack([record.samples, felt.samples]), sensors)
+
+    felt = housing(made, made.cut, seed=seed)
+    still = dataclasses.replace(felt, samples=0.05 * np.random.default_rng(seed + 1).normal(size=felt.samples.shape))
+    return beside(made.cut, felt), beside(made.air, still)
+
+
+def test_accelerometers_on_the_housing_beside_displacement_sensors():
+    made, off = pair(seed=31), []
+    plain = made.measure().measurement
+    for seed in range(10, 22):
+        cut, air = both(made, seed)
+        found = made.measure(cut=cut, air=air)
+        assert found.verdict.usable
+        assert found.verdict.notes == ()
+        assert not found.measurement.housing
+        for axis, lines in found.measurement.axes.items():
+            np.testing.assert_array_equal(lines.shares, [[1, -1, 0], [0, 1, 0], [0, 0, 1]])
+            # what the flange's own sensors show does not hang on those beside, but for lines above the band, which cannot leak any more
+            assert np.all(np.abs(lines.cut[:, :2] - plain.axes[axis].cut) < 0.5 * np.sqrt(lines.variance[:, :2]))
+            np.testing.assert_allclose(lines.receptance, lines.first().receptance, rtol=1e-14)
+            error = (lines.cut - lines.air)[:, 2] - FIXTURE * made.expected(lines, axis)
+            off += [*(error.real / np.sqrt(lines.variance[:, 2])), *(error.imag / np.sqrt(lines.variance[:, 2]))]
+    assert np.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.1)
+    with pytest.raises(InputError, match="no acceleration X in the air cut"):
+        made.measure(cut=both(made)[0])
+
+
+def test_two_pairs_of_accelerometers_alone():
+    """Each is an output of its own; a search looks for the first."""
+    made = pair(seed=31)
+    front, rear = (housing(made, made.cut, seed=seed) for seed in (8, 9))
+    named = tuple(dataclasses.replace(sensor, name=f"rear_{sensor.axis}") for sensor in rear.sensors)
+    four = Recording(RATE, np.hstack([front.samples, -2.0 * rear.samples]), (*front.sensors, *named))
+    one, found = (made.measure(cut=each, air=None).measurement for each in (front, four))
+    assert found.housing
+    for axis, lines in found.axes.items():
+        np.testing.assert_array_equal(lines.shares, [[0, 1, 0], [0, 0, 1]])
+        strong = np.abs(lines.cut[:, 0]) > 30.0 * np.sqrt(lines.variance[:, 0])
+        assert np.sum(strong) > 3
+        np.testing.assert_allclose(lines.cut[strong, 1], -2.0 * lines.cut[strong, 0], rtol=0.15)
+        # the angle is followed by all of them: in the first one's lines a little less noise
+        np.testing.assert_allclose(np.abs(lines.receptance[strong]), np.abs(one.axes[axis].receptance[strong]), rtol=0.02)
+
+
+@pytest.mark.parametrize("degrees", [(5.0, 5.0), (2.0, -1.0)])
+def test_sensors_that_are_turned_show_the_same_motion(degrees):
+    made = pair(seed=31)
+    a, b = np.radians(degrees)
+    mixed = np.array([[np.cos(a), np.sin(a)], [-np.sin(b), np.cos(b)]])
+
+    def turned(record, told):
+        samples = np.hstack([record.samples[:, :2] @ mixed.T, record.samples[:, 2:] @ mixed.T])
+        angles = [a, b] * 2 if told else [0.0] * 4
+        return Recording(RATE, samples, tuple(dataclasses.replace(s, rotation=r) for s, r in zip(record.sensors, angles, strict=True)))
+
+    straight = made.measure().measurement
+    told, silent = (made.measure(cut=turned(made.cut, tells), air=turned(made.air, tells)).measurement for tells in (True, False))
+    for axis, lines in straight.axes.items():
+        noise = np.sqrt(lines.variance)
+        assert np.all(np.abs(told.axes[axis].cut - lines.cut) < 0.02 * noise + 1e-6 * np.abs(lines.cut))
+        # a degree that nobody tells of is no small error
+        assert np.abs(silent.axes[axis].receptance / lines.receptance - 1.0).max() > 0.01
+    alone = dataclasses.replace(made.cut, samples=made.cut.samples[:, :1], sensors=(dataclasses.replace(made.cut.sensors[0], rotation=a),))
+    with pytest.raises(InputError, match="rotation_deg"):
+        made.measure(cut=alone, air=None)
+
+
 def test_a_housing_that_chatters_below_half_a_slow_rate():
     # orders above half the rate stand folded back; the mode beside them is what the verdict names
     rng, speed, rate, n = np.random.default_rng(5), 6900.0 * RPM, 1650.0, 16500

@@ -7,8 +7,8 @@ import pytest
 
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.errors import InputError
-from rcsa_ident.signals.recording import Quantity, Recording
-from rcsa_ident.signals.sweep import judge_pass_air
+from rcsa_ident.signals.recording import Quantity, Recording, Role, Sensor
+from rcsa_ident.signals.sweep import UNUSED, judge_pass_air
 from rcsa_ident.signals.verdict import RecordCode
 from tests.fixtures.virtual_pass import AXES, CONSTANT, RPM, SECONDS, SPEEDS, Pass
 
@@ -148,6 +148,20 @@ def test_one_axis_is_enough(plain):
         # noise, and the angle at which the air cut is taken out of the flange's own orders
         noise = np.sqrt(2.0 * beside.variance.sum(axis=1)) / np.abs(beside.receptance)
         assert np.all(np.abs(ratio - 1.0) < 3.0 * np.hypot(noise, here.alignment_std * lines.order))
+
+
+def test_accelerometers_on_the_housing_are_not_used_and_that_is_said(plain):
+    def beside(recording):
+        fixed = tuple(replace(s, role=Role.FIXTURE) if s.quantity is Quantity.ACCELERATION else s for s in recording.sensors)
+        felt = tuple(Sensor(f"rear_{axis}", Quantity.ACCELERATION, axis, role=Role.SPINDLE) for axis in AXES)
+        noise = np.random.default_rng(3).normal(size=(recording.samples.shape[0], 2))
+        return Recording(recording.rate, np.hstack([recording.samples, noise]), (*fixed, *felt))
+
+    found = plain.measure(cut=beside(plain.cut), air=beside(plain.air))
+    assert [str(note) for note in found.verdict.notes] == [str(UNUSED)]
+    for here, there in zip(found.measurements, plain.measure().measurements, strict=True):
+        for axis, lines in here.axes.items():
+            np.testing.assert_array_equal(lines.cut, there.axes[axis].cut)
 
 
 def test_a_flange_of_a_fifth_of_a_micrometre_is_enough():

@@ -56,6 +56,10 @@ def test_hum_noise_and_knocks():
     assert acceleration.std(axis=0) == pytest.approx([3.4, 3.4], rel=1e-9)
     power = np.abs(np.fft.rfft(acceleration, axis=0)) ** 2
     assert power[(frequency > 450.0) & (frequency < 1800.0)].sum() > 0.6 * power.sum()
+    _, four = disturbed(Disturbances(machine_noise=3.4), rate, count, rng, accelerometers=2)
+    assert four.shape == (count, 4)
+    assert np.abs(np.corrcoef(four.T) - np.eye(4)).max() < 0.1
+    np.testing.assert_allclose(four.std(axis=0), 3.4)
     gap, acceleration = disturbed(Disturbances(knocks=3.0, knock=1e-7), rate, count, rng)
     assert 1e-7 < np.abs(gap).max() < 1e-6
     assert np.abs(acceleration).max() > 0.1

@@ -25,6 +25,18 @@ def test_units_become_si(hpm, tooling):
     assert not hpm.spindle.speed_dependent
 
 
+def test_further_accelerometers_stand_where_the_file_says(machines_folder, tmp_path):
+    text = (machines_folder / "hpm.toml").read_text().replace('"toolings/', f'"{machines_folder}/toolings/')
+    told = text.replace("fixture_position_mm = 0.0", "fixture_position_mm = 0.0\nhousing_positions_mm = [350.0, -20.0]")
+    path = tmp_path / "machine.toml"
+    path.write_text(told)
+    assert read_machine(path).spindle.housing_positions == pytest.approx((0.35, -0.02))
+    assert read_machine(machines_folder / "hpm.toml").spindle.housing_positions == ()
+    path.write_text(told.replace("350.0", '"350"'))
+    with pytest.raises(InputError, match=r"sensors.housing_positions_mm"):
+        read_machine(path)
+
+
 def test_softening_is_per_speed(machines_folder):
     spindle = read_machine(machines_folder / "stiff.toml").spindle
     assert spindle.bearings[0].softening * 10000.0 * np.pi / 30.0 == pytest.approx(0.06)

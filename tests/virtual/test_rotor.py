@@ -13,7 +13,7 @@ from rcsa_ident.io.setups import read_tooling
 from rcsa_ident.tool_holder.geometry import BeamSegment, Material, ToolAssembly
 from rcsa_ident.tool_holder.model import tool_holder_receptance
 from rcsa_ident.virtual.machine import Bearing, FlangeJoint, Housing, VirtualSpindle
-from rcsa_ident.virtual.rotor import frequency_response, rotor
+from rcsa_ident.virtual.rotor import frequency_response, housing_points, rotor
 
 BAND = 2.0 * np.pi * np.arange(600.0, 4000.0, 20.0)
 
@@ -65,6 +65,17 @@ def test_fixture_moves_with_the_housing(hpm, tooling):
     spindles = [dataclasses.replace(hpm.spindle, fixture_position=z) for z in places]
     a, b, c = (frequency_response(rotor(s, tooling.assembly), BAND[:3], outputs=("fixture.x",))[:, 0, 0] for s in spindles)
     assert np.allclose(a + (b - a) * 1.9, c, rtol=1e-9)
+
+
+def test_further_points_of_the_housing_move_as_the_fixture_would_there(hpm, tooling):
+    spindle = dataclasses.replace(hpm.spindle, housing_positions=(0.35, -0.02))
+    assert housing_points(spindle) == ("housing1", "housing2")
+    names = tuple(f"{point}.{axis}" for point in ("fixture", "housing1", "housing2") for axis in "xy")
+    many = frequency_response(rotor(spindle, tooling.assembly), BAND[::20], outputs=names)
+    for k, place in enumerate((hpm.spindle.fixture_position, 0.35, -0.02)):
+        moved = rotor(dataclasses.replace(hpm.spindle, fixture_position=place), tooling.assembly)
+        one = frequency_response(moved, BAND[::20], outputs=("fixture.x", "fixture.y"))
+        np.testing.assert_allclose(many[:, 2 * k : 2 * k + 2], one, rtol=1e-12, atol=1e-22)
 
 
 def disc(gyroscopic: bool) -> VirtualSpindle:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from rcsa_ident.errors import InputError
 from rcsa_ident.virtual.milling import CutHistory
-from rcsa_ident.virtual.sensors import SensorSuite, clamp, decimator, out_of_round, padding, record, sample
+from rcsa_ident.virtual.sensors import UNDISTURBED, SensorSuite, clamp, decimator, out_of_round, padding, record, sample
 
 RATE, FACTOR = 25600.0, 8
 FINE = 1.0 / (RATE * FACTOR)
@@ -93,6 +93,25 @@ def test_gap_is_relative_to_the_fixture_and_signals_have_their_sensitivity():
     assert set(channels) == {"flange_x", "flange_y", "fixture_x", "fixture_y"}
     assert channels["flange_y"] == pytest.approx(1e4 * 2e-6 * np.sin(4000.0 * time), abs=1e4 * 2e-10)
     assert channels["fixture_x"] == pytest.approx(1e-3 * 16.0 * np.cos(4000.0 * time), abs=1e-3 * 2e-3)
+
+
+def test_pairs_on_the_housing_have_channels_of_their_own():
+    suite = dataclasses.replace(QUIET, acceleration_noise=0.05, acceleration_sensitivity=2.0)
+    clamping = clamp(suite, np.zeros(1), np.random.default_rng(0))
+    plain = quiet_history(256)
+    felt = np.hstack([plain.acceleration, -3.0 * plain.acceleration, 0.0 * plain.acceleration])
+    angle = turned(suite, 900.0, 0.2, 256)
+
+    def channels(history, housing):
+        return record(suite, clamping, angle, 0.0, FACTOR, history, np.random.default_rng(1), UNDISTURBED, housing)
+
+    few, many = channels(plain, 0), channels(dataclasses.replace(plain, acceleration=felt), 2)
+    assert set(many) - set(few) == {"housing_x", "housing_y", "housing2_x", "housing2_y"}
+    for name, values in few.items():
+        # what is drawn for them does not change the others
+        np.testing.assert_array_equal(many[name], values)
+    assert np.std(many["housing_x"] + 3.0 * few["fixture_x"]) == pytest.approx(2.0 * 0.05 * np.sqrt(10.0), rel=0.15)
+    assert np.std(many["housing2_y"]) == pytest.approx(2.0 * 0.05, rel=0.15)
 
 
 def test_noise_has_its_size_and_air_cuts_nothing_else():

@@ -14,7 +14,7 @@ from rcsa_ident.io.machines import read_machine
 from rcsa_ident.io.recordings import read_recording
 from rcsa_ident.io.setups import read_campaign
 from rcsa_ident.samples import simulate_campaign as simulate
-from rcsa_ident.signals.recording import Quantity
+from rcsa_ident.signals.recording import Quantity, Role
 from rcsa_ident.virtual.rotor import frequency_response, rotor
 
 
@@ -111,6 +111,31 @@ def test_recordings_hold_the_true_cross_receptance(machine, request):
                 expected = expected + h["XY" if axis == "X" else "YX"] * force[:, 1 - row]
                 assert np.linalg.norm(found - expected) < 0.5 * apart
             assert np.linalg.norm(found - expected) < 1e-2 * np.linalg.norm(expected)
+
+
+@pytest.mark.slow
+def test_a_pair_on_the_housing_feels_what_a_fixture_there_would(small, tmp_path, quick_truth):
+    """Of all records and from the campaign's own words: cuts of the same machine and the same chance whose fixture stands elsewhere."""
+    sensors = dataclasses.replace(small.sensors, acceleration_noise=0.0)
+    plan = dataclasses.replace(small.plan, spindle_speeds=small.plan.spindle_speeds[:1], duration=0.1)
+    quiet = dataclasses.replace(small, sensors=sensors, plan=plan)
+    spindles = dataclasses.replace(small.spindle, housing_positions=(0.35,)), dataclasses.replace(small.spindle, fixture_position=0.35)
+    found = []
+    for k, spindle in enumerate(spindles):
+        campaign = read_campaign(simulate(dataclasses.replace(quiet, spindle=spindle), tmp_path / f"{k}", seed=7).folder)
+        found.append((campaign, read_recording(campaign.cuts[0].recording, campaign.sensors)))
+    (campaign, beside), (_, there) = found
+    roles = {sensor.name: sensor.role for sensor in campaign.sensors if sensor.quantity is Quantity.ACCELERATION}
+    assert roles == {"fixture_x": Role.FIXTURE, "fixture_y": Role.FIXTURE, "housing_x": Role.SPINDLE, "housing_y": Role.SPINDLE}
+    for axis in (Dof.X, Dof.Y):
+        felt, expected = (
+            record.samples[:, record.sensors.index(record.accelerometer(axis, role))]
+            for record, role in ((beside, Role.SPINDLE), (there, Role.FIXTURE))
+        )
+        assert np.std(felt - expected) < 1e-6 * np.std(expected)
+        # 350 mm behind the housing tilts the other way
+        fixed = beside.samples[:, beside.sensors.index(beside.accelerometer(axis, Role.FIXTURE))]
+        assert np.std(felt - fixed) > 0.1 * np.std(fixed)
 
 
 @pytest.mark.slow

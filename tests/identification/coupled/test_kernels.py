@@ -19,10 +19,11 @@ from rcsa_ident.identification.coupled.parameters import (
     unpack,
 )
 from rcsa_ident.identification.coupled.posterior import CoupledUnknowns
-from rcsa_ident.identification.data import FLANGE_ALONE, GAP_AND_FIXTURE, LEVER
+from rcsa_ident.identification.data import LEVER
 from rcsa_ident.identification.parameters import AxisLayout, Layout, joint_of, scaled_joint
 from rcsa_ident.identification.parameters import unpack as unpack_axis
 from rcsa_ident.machine.mode_synthesis import FLANGE
+from rcsa_ident.signals.motion import FLANGE_ALONE, GAP_AND_FIXTURE
 from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, ToolAssembly
 from rcsa_ident.tool_holder.turning import turning_receptance
 from tests.identification.coupled.models import coupled_vector, dense_lines
