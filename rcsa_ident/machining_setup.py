@@ -24,9 +24,8 @@ from rcsa_ident.tool_holder.proportions import proportions
 from rcsa_ident.tool_holder.spread import EXACT, Spread
 from rcsa_ident.units import to_rpm
 
-#: Edge forces [N/m] of a cut of which nobody told any, and the standard deviation of their logarithms: the half of a normal distribution
-#: of 10 N/mm that is positive has this median, and about this spread.
-UNTOLD_EDGE, UNTOLD_EDGE_SPREAD = 6.7e3, 0.95
+#: Median of the positive half of a normal distribution over its standard deviation, and about the spread of its logarithm.
+HALF_NORMAL, HALF_NORMAL_SPREAD = 0.67, 0.95
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -72,10 +71,20 @@ class Tooling(Saved):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Workpiece(Shown):
-    """A material and its cutting coefficients with the campaign's cutters."""
+    """A material and its cutting coefficients with the campaign's cutters.
+
+    Parameters
+    ----------
+    name : str
+    coefficients : CuttingCoefficients
+    edge_force_spread : float [N/m]
+        How large edge forces of which nothing is told may be: they are positive, and as normally distributed. It counts where something
+        of the campaign's drawings is not exact, too.
+    """
 
     name: str
     coefficients: CuttingCoefficients
+    edge_force_spread: float = 10e3
 
     def __str__(self) -> str:
         return f"{self.name}: {self.coefficients}"
@@ -271,6 +280,11 @@ class Campaign(Shown):
         None of hammer tests alone.
     clock_error : float, default 0
         By what share the recorder's clock runs fast: it takes that many more samples in a second than its files say.
+    tests : tuple of HammerTest
+    depth_spread : float [m]
+        Standard deviation of the axial depth, the same in all cuts of a tooling. It counts where something of the drawings is not exact.
+    softening_spread : float [-]
+        Standard deviation of the stiffness' change from the middle to the end of the speeds, as a share.
     """
 
     name: str
@@ -281,10 +295,12 @@ class Campaign(Shown):
     cuts: tuple[Cut, ...]
     clock_error: float = 0.0
     tests: tuple[HammerTest, ...] = ()
+    depth_spread: float = 0.02e-3
+    softening_spread: float = 0.03
 
     @property
     def coefficients(self) -> CuttingCoefficients:
-        """The workpiece's cutting coefficients.
+        """The workpiece's cutting coefficients, with the edge forces that are to be expected where nothing is told of any.
 
         Raises
         ------
@@ -293,10 +309,10 @@ class Campaign(Shown):
         """
         if self.workpiece is None:
             raise InputError("workpiece", "nothing", "a table [workpiece] in the campaign of cuts")
-        told = self.workpiece.coefficients
-        if not self.rough or told.tangential_edge or told.radial_edge:
+        told, edge = self.workpiece.coefficients, HALF_NORMAL * self.workpiece.edge_force_spread
+        if not self.rough or told.tangential_edge or told.radial_edge or edge == 0.0:
             return told
-        return replace(told, tangential_edge=UNTOLD_EDGE, radial_edge=UNTOLD_EDGE, edge_spread=UNTOLD_EDGE_SPREAD)
+        return replace(told, tangential_edge=edge, radial_edge=edge, edge_spread=HALF_NORMAL_SPREAD)
 
     @property
     def rough(self) -> bool:

@@ -98,6 +98,9 @@ class EvidenceSelection:
         """
         if not_finite(data):
             return failed(data, seed, self.name)
+        told = data.softening_spread
+        if told is not None and told != self.priors.softening:
+            return replace(self, priors=replace(self.priors, softening=told)).run(data, seed, map, progress)
         try:
             sequence, trace, freed = np.random.SeedSequence(seed), list[Step](), data
             found = self._found(data, data, sequence, map, trace, progress)

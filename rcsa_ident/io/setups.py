@@ -59,8 +59,21 @@ _MATERIAL = ("youngs_modulus_gpa", "density", "poisson", "loss_factor")
 SPREADS = {
     f"{field}_mm" if field in LENGTHS else f"{field}_percent": (field, 1e-3 if field in LENGTHS else 1e-2) for field in SPREAD_FIELDS
 }
+_HEAD = ("name", "sampling_rate_hz", "clock_error_percent", "axial_depth_spread_mm", "speed_softening_percent")
 _CAMPAIGN = ("campaign", "sensors", "workpiece", "toolings", "cuts", "frfs")
-_SENSOR = ("quantity", "axis", "sensitivity", "delay_s", "bandwidth_hz", "role", "mount_resonance_hz", "rotation_deg")
+_SENSOR = (
+    "quantity",
+    "axis",
+    "sensitivity",
+    "delay_s",
+    "bandwidth_hz",
+    "role",
+    "mount_resonance_hz",
+    "rotation_deg",
+    "gain_spread_percent",
+    "cross_talk_percent",
+    "delay_spread_us",
+)
 _TRIGGER = ("quantity", "sensitivity", "delay_s", "bandwidth_hz", "pulses_per_revolution", "tooth_angle_deg")
 _CUT = (
     "id",
@@ -249,10 +262,12 @@ def campaign_of(
         Given the table of a cut and its key ``cut`` or ``air``, or that of a hammer test and ``file``, returns the file.
     """
     top = Table(data, where, known=_CAMPAIGN)
-    head = top.table("campaign", ("name", "sampling_rate_hz", "clock_error_percent"), {})
+    head = top.table("campaign", _HEAD, {})
     name = head.text("name", name)
     rate = head.number("sampling_rate_hz", "Hz", None, above=0.0, most=1e8)
     clock = head.number("clock_error_percent", "%", 0.0, least=-2.0, most=2.0) * 1e-2
+    depth = head.number("axial_depth_spread_mm", "mm", 0.02, least=0.0, most=1.0) * 1e-3
+    softening = head.number("speed_softening_percent", "%", 3.0, above=0.0, most=50.0) * 1e-2
     # hammer tests alone need neither sensors nor a workpiece
     alone = "frfs" in top and "cuts" not in top
     channels = top.table("sensors", None, {})
@@ -276,7 +291,7 @@ def campaign_of(
         if id in seen:
             raise InputError(f"{place}.id", f'"{id}", the id of {seen[id]}', "an id of its own", where)
         seen[id] = place
-    return Campaign(name, rate, sensors, workpiece, toolings, cuts, clock, tests)
+    return Campaign(name, rate, sensors, workpiece, toolings, cuts, clock, tests, depth, softening)
 
 
 def _check_roles(sensors: Sequence[Sensor], top: Table) -> None:
@@ -328,6 +343,9 @@ def sensor_of(name: str, data: Any, where: str) -> Sensor:
         None if role is None else Role(role),
         table.number("mount_resonance_hz", "Hz", None, above=0.0),
         float(np.radians(table.number("rotation_deg", "deg", 0.0, least=-180.0, most=180.0))),
+        table.number("gain_spread_percent", "%", 2.0, least=0.0, most=50.0) * 1e-2,
+        table.number("cross_talk_percent", "%", 1.5, least=0.0, most=50.0) * 1e-2,
+        table.number("delay_spread_us", "us", 5.0, least=0.0, most=1000.0) * 1e-6,
     )
 
 
