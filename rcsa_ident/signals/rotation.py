@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
-from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.signals._kernels import angle_sums, best_path, comb_scores, told_angles
+from rcsa_ident.signals._kernels import angle_sums, best_path, comb_scores, told_angles, walked
 from rcsa_ident.signals.line_gain import WINDOW, line_gain
 from rcsa_ident.signals.steady_part import hann
 
@@ -224,22 +223,9 @@ def _common_phase(lines: ComplexArray, order: np.ndarray, step: float) -> tuple[
 def _smoothed(phase: FloatArray, information: FloatArray, step: float, density: float | None) -> tuple[FloatArray, float, float]:
     """Phases whose speed walks at random, the density of its steps (as told, or under which they are likeliest), and by how much they are
     likelier under it than under the least."""
-    n = phase.size
-    # squares of second differences: D'D has five diagonals
-    diagonal, first, second = np.zeros(n), np.zeros(n), np.zeros(n)
-    diagonal[:-2] += 1.0
-    diagonal[1:-1] += 4.0
-    diagonal[2:] += 1.0
-    first[1 : n - 1] -= 2.0
-    first[2:] -= 2.0
-    second[2:] = 1.0
     best, likeliest, least, chosen = phase, -np.inf, -np.inf, 0.0
     for each in _DENSITIES if density is None else (density,):
-        scale = 1.0 / (each * step**3)
-        factor = cholesky_banded(np.array([scale * second, scale * first, scale * diagonal + information]))
-        smooth = cho_solve_banded((factor, False), information * phase)
-        cost = np.sum(information * (phase - smooth) ** 2) + scale * np.sum(np.diff(smooth, 2) ** 2)
-        likelihood = -0.5 * (cost + 2.0 * np.sum(np.log(factor[2])) - (n - 2) * np.log(scale))
+        smooth, likelihood = walked(phase, information, 1.0 / (each * step**3))
         least = max(least, likelihood) if each == _DENSITIES[0] else least
         if likelihood > likeliest:
             best, likeliest, chosen = smooth, likelihood, float(each)
