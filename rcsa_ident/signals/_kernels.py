@@ -218,6 +218,46 @@ def told_angles(lines, order, phase, reach):
 
 
 @numba.njit(cache=True)
+def walked(values, information, price):
+    """Return y, where sum(information (values - y)^2) + price sum(second differences of y)^2 is least, and the logarithm of that fit's
+    likelihood, the values' own factor left out; not a number where rounding leaves nothing to solve.
+
+    Shapes: values (n,), information (n,) -> (n,), (); n is 3 or more.
+    """
+    n = values.size
+    # Cholesky's factor of five diagonals, its inverse first diagonal
+    inverse, first, second, y = np.empty(n), np.zeros(n), np.zeros(n), np.empty(n)
+    logarithms = 0.0
+    for t in range(n):
+        own = (t < n - 2) + 4.0 * (0 < t < n - 1) + (t > 1)
+        pivot, right = price * own + information[t], information[t] * values[t]
+        if t > 1:
+            second[t] = price * inverse[t - 2]
+            pivot -= second[t] * second[t]
+            right -= second[t] * y[t - 2]
+        if t > 0:
+            beside = -2.0 * ((t < n - 1) + (t > 1))
+            first[t] = (price * beside - second[t] * first[t - 1]) * inverse[t - 1]
+            pivot -= first[t] * first[t]
+            right -= first[t] * y[t - 1]
+        pivot = math.sqrt(pivot) if pivot > 0.0 else math.nan
+        inverse[t] = 1.0 / pivot
+        logarithms += math.log(pivot)
+        y[t] = right * inverse[t]
+    for t in range(n - 1, -1, -1):
+        if t < n - 1:
+            y[t] -= first[t + 1] * y[t + 1]
+        if t < n - 2:
+            y[t] -= second[t + 2] * y[t + 2]
+        y[t] *= inverse[t]
+    cost = 0.0
+    for t in range(n):
+        off, bend = values[t] - y[t], y[t] - 2.0 * y[t - 1] + y[t - 2] if t > 1 else 0.0
+        cost += information[t] * off * off + price * bend * bend
+    return y, 0.5 * (n - 2) * math.log(price) - logarithms - 0.5 * cost
+
+
+@numba.njit(cache=True)
 def angle_signal(amplitude, angle, length):
     """Return Re sum_m amplitude[w, m] e^{i m angle[t]} over windows of `length` samples that follow each other.
 

@@ -3,6 +3,7 @@
 import numba
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from rcsa_ident.signals import _kernels
 
@@ -41,6 +42,20 @@ def test_told_angles(kernel, reach):
     np.testing.assert_allclose(
         told, np.sum(np.imag(np.conj(mean) * turned) * order[:, None] / noise, axis=0), atol=1e-9 * information.max()
     )
+
+
+@pytest.mark.parametrize("price", [1e-6, 1.0, 1e9])
+@pytest.mark.parametrize("n", [3, 4, 5, 40])
+@pytest.mark.parametrize("kernel", compiled_and_plain("walked"))
+def test_walked(kernel, n, price):
+    rng = np.random.default_rng(5)
+    values, information = rng.standard_normal(n), rng.uniform(0.5, 50.0, n)
+    found, likelihood = kernel(values, information, price)
+    second = np.diff(np.eye(n), 2, axis=0)
+    np.testing.assert_allclose(found, np.linalg.solve(np.diag(information) + price * second.T @ second, information * values), atol=1e-7)
+    # what is left of the values without a straight line has the covariance of both, theirs and that of the walk
+    left = multivariate_normal(np.zeros(n - 2), second @ (second / information).T + np.eye(n - 2) / price).logpdf(second @ values)
+    assert likelihood == pytest.approx(left + 0.5 * (n - 2) * np.log(2.0 * np.pi) - 0.5 * np.sum(np.log(information)), abs=1e-6)
 
 
 @pytest.mark.parametrize("n", [5, 128, 311])
