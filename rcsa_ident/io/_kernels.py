@@ -41,7 +41,7 @@ def decimal_rows(raw, delimiter, point, places, values):
                 if raw[at] == point:
                     behind = 1
                 else:
-                    whole, power, digits = 10 * whole + np.int64(raw[at]) - 48, power - behind, digits + 1
+                    whole, power, digits = 10 * whole + int(raw[at]) - 48, power - behind, digits + 1
                     # zeros in front count for nothing, and beyond this nothing is exact
                     if whole > _LARGEST:
                         return -1
@@ -52,7 +52,7 @@ def decimal_rows(raw, delimiter, point, places, values):
                 at += downwards or raw[at] == _PLUS
                 exponent, length = 0, 0
                 while 48 <= raw[at] <= 57 and length < 5:
-                    exponent, length, at = 10 * exponent + np.int64(raw[at]) - 48, length + 1, at + 1
+                    exponent, length, at = 10 * exponent + int(raw[at]) - 48, length + 1, at + 1
                 if not length:
                     return -1
                 power += -exponent if downwards else exponent

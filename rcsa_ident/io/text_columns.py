@@ -135,9 +135,9 @@ class _Parts:
         return TextTable(self.where, self.header, delimiter, rows, numbers)
 
     def plain(self, block: bytes, names: Sequence[str]) -> tuple[np.ndarray, list[FloatArray]] | None:
-        """Return line numbers and named columns of a part, shape (n,) each, as `next` and `TextTable.columns` would; at a fifth of their time.
+        """Return line numbers and named columns of a part, shape (n,) each, as `next` and `TextTable.columns` would.
 
-        None where something in it is not plain, and where decimal signs stand for the first time: `next` looks at that.
+        At a fifth of their time; None where something in it is not plain, and where decimal signs stand for the first time.
         """
         comma, point = (sign in block for sign in (b",", b"."))
         comma = comma and self.delimiter != ","
