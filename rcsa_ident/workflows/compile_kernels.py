@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -28,7 +26,6 @@ from rcsa_ident.identification.machine import IdentifiedMachine
 from rcsa_ident.identification.parameters import AxisLayout
 from rcsa_ident.identification.posterior import MachineAxis, Posterior
 from rcsa_ident.identification.search import SearchSettings
-from rcsa_ident.io.recordings import read_signals
 from rcsa_ident.machine.mode_synthesis import FLANGE
 from rcsa_ident.machine.spindle import Spindle
 from rcsa_ident.machine.turning_machine import TurningMachine
@@ -77,14 +74,6 @@ def _recordings() -> None:
         for each in (cut, 0.1 * air):
             records.append(Recording(rate, each[:, None] + 1e-9 * rng.standard_normal((each.size, len(sensors))), sensors))
         measure_cut("warm", "warm", records[0], records[1], _CUTTER, _CONDITIONS, _COEFFICIENTS)
-
-
-def _tables() -> None:
-    """A text table of more than one part: the first one is read without a kernel."""
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "warm.csv"
-        path.write_text("x,y\n" + 400_000 * "0.125,-1.5e-3\n", encoding="utf-8")
-        read_signals(path, ["x", "y"], 20000.0)
 
 
 def _listening() -> None:
@@ -187,7 +176,6 @@ def _virtual_machine() -> None:
 STEPS: dict[str, Callable[[], None]] = {
     "tool-holder": _tool_holder,
     "recordings": _recordings,
-    "text tables": _tables,
     "listening": _listening,
     "default method": _default_method,
     "paper's method": _paper_method,

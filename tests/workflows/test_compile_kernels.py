@@ -17,7 +17,6 @@ def test_a_step_runs(name):
     called = {
         "tool-holder": ("dynamics", "pole_sum"),
         "recordings": ("signals", "order_sums"),
-        "text tables": ("io", "decimal_rows"),
         "listening": ("signals", "sideband_scores"),
         "lobes": ("stability", "envelopes"),
     }
