@@ -25,7 +25,7 @@ from rcsa_ident.machining_setup import CutSpec, Tooling
 from rcsa_ident.stability.advice import Advice, OperatingPoint, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
 from rcsa_ident.stability.lobes import DEEPER, DRAWS, both_directions, in_proportion, stability_lobes
-from rcsa_ident.stability.methods import MethodName, StabilityMethod, Watch, Watched
+from rcsa_ident.stability.methods import StabilityMethod, Watch, Watched
 from rcsa_ident.stability.pockets import AROUND, pad_speeds, speeds_around
 from rcsa_ident.stability.result import PROBABILITY, RESERVE, TOLERANCE, Pocket, StabilityLobes
 from rcsa_ident.stability.stability_map import MonodromyMethod, StabilityMap, stability_map
@@ -44,11 +44,8 @@ BEYOND = 1.5
 ABOVE, _ABOVE_STEP, CRITICAL, _ABOVE_EVERY = 2.5, from_hz(10.0), 0.7, 4
 #: Seconds for a line and an unknown of the posterior, those of planes that feel each other, and further seconds for a speed with bands.
 _SPREAD_SECONDS, _SPREAD_SECONDS_OF_BOTH, _BAND_SECONDS = 1e-6, 9e-6, 2e-4
-#: Unequal pitch costs the zero-order method so many times as much; a machine that changes with speed so many further seconds.
-_PITCH_FACTOR, _CHANGING_SECONDS = 30.0, 4.0
-#: Where teeth differ, methods that follow a period follow a revolution: so many teeth cost once more. A simulation asks every tooth
-#: in every step, which counts from so many on.
-_TEETH_OF_PERIOD, _TEETH_OF_STEP = 2.0, 40.0
+#: A machine that changes with speed costs so many further seconds, and so many the modes of a tip.
+_CHANGING_SECONDS, _FIT_SECONDS = 4.0, 1.0
 #: What recommendations are computed by where the lobes are a preview, and at about how many speeds.
 _FITTING, _FITTED_SPEEDS = FullDiscretisation(), 35
 _UNLIMITED = SpindleDrive.flat(None, None, None)
@@ -149,31 +146,30 @@ class ToolChange:
     @property
     def omega(self) -> FloatArray:
         """Frequencies of the receptances that the limits are computed from, shape (k,) [rad/s]."""
-        return self.machine.lines(BEYOND if self.method.needs == "modes" else 1.0)
+        return self._lines_of(self.method)
+
+    def _lines_of(self, method: StabilityMethod) -> FloatArray:
+        return self.machine.lines(BEYOND if method.needs == "modes" else 1.0)
 
     @property
     def seconds(self) -> float:
         """About how long an advice takes on one core of a plain server [s], with the speeds beside those that are asked for."""
         zero_order = isinstance(self.method, ZeroOrder)
-        each = self.method.seconds_per_speed + (_BAND_SECONDS if self.draws else 0.0)
-        # lobes come closer as a spindle turns slower
-        found = each * self._teeth_factor(self.method.name) * float(np.sum(4000.0 / to_rpm(pad_speeds(self.speeds, TOLERANCE))))
+        speeds = pad_speeds(self.speeds, TOLERANCE)
+        found = float(np.sum(self._seconds_of(self.method, speeds)))
+        # of drawn machines, whose lobes come closer as a spindle turns slower
+        found += _BAND_SECONDS * float(np.sum(4000.0 / to_rpm(speeds))) if self.draws else 0.0
+        found += _FIT_SECONDS if self.method.needs == "modes" else 0.0
         if not (zero_order and self.machine.prepared):
             found += _CHANGING_SECONDS if self.machine.speed_range is not None else 0.0
             found += spread_seconds(self.machine, self.omega) if self.draws else 0.0
         if zero_order and self.recommend:
-            each = _FITTING.seconds_per_speed * self._teeth_factor(_FITTING.name)
-            found += _FITTED_SPEEDS * each * float(np.mean(4000.0 / to_rpm(self.speeds)))
+            found += _FIT_SECONDS + _FITTED_SPEEDS * float(np.mean(self._seconds_of(_FITTING, self.speeds)))
         return found
 
-    def _teeth_factor(self, method: str) -> float:
-        """How many times as long a method takes as with few equal teeth."""
-        cutter = self.process.cutter
-        uneven = np.ptp(cutter.pitch) > 1e-9
-        if method == MethodName.ZERO_ORDER:
-            return _PITCH_FACTOR if uneven else 1.0
-        factor = 1.0 + cutter.teeth / _TEETH_OF_PERIOD if uneven or np.ptp(cutter.runout) > 0.0 else 1.0
-        return factor * max(1.0, (cutter.teeth / _TEETH_OF_STEP) ** 2) if method == MethodName.TIME_DOMAIN else factor
+    def _seconds_of(self, method: StabilityMethod, speeds: FloatArray) -> FloatArray:
+        """About how long a method takes for the limit at each speed [s]."""
+        return method.seconds_per_operation * method.operations(self.process, speeds, float(self._lines_of(method)[-1]), self.max_depth)
 
     def watched(self, watch: Watch) -> ToolChange:
         """Return the same question, whose method tells each speed's limit once it is known, where it asks speed by speed."""

@@ -97,7 +97,7 @@ function makeCard() {
     h(
       "div",
       { class: "fields" },
-      field("Name", name, { name: "name", hint: "As people call it: HPM 800U" }),
+      field("Name", name, { name: "name", hint: "Such as HPM 800U" }),
       field("Where, or what", words, { name: "description" }),
     ),
     h("p", null, button),
