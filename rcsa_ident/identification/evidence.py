@@ -197,8 +197,9 @@ class EvidenceSelection:
         planes together are fitted without further places.
         """
         fewer = self._fit(data.first(), freed.first(), searched, map, report)
-        if not isinstance(fewer, PlaneFit):
+        if isinstance(fewer, CoupledFit):
             return replace(fewer, data=data)
+        assert isinstance(fewer, PlaneFit)
         smooth = freed.with_smooth_errors(SMOOTH_ERROR)
         chosen, misfit = fit_with_places(smooth, self.priors, fewer.rival, fewer.misfit, report)
         return PlaneFit(data, searched, *grow_jointly(smooth, self.priors, chosen, misfit, report))
