@@ -303,7 +303,7 @@ def _beside(part: FloatArray, rate: float, lines: OrderLines, rotation: Rotation
     """Lines beside the orders of a part."""
     order = np.arange(1, lines.power.size)
     apparent = np.abs((order * to_hz(rotation.spindle_speed) + 0.5 * rate) % rate - 0.5 * rate)
-    return off_orders(lines.rest, _typical(part, rate), rate, apparent, band, quantity is Quantity.ACCELERATION)
+    return off_orders(lines.rest(part, rotation.angle), _typical(part, rate), rate, apparent, band, quantity is Quantity.ACCELERATION)
 
 
 def _chatters(beside: OffOrders, lines: OrderLines) -> bool:

@@ -9,8 +9,8 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.signals._kernels import angle_sums, best_path, comb_scores, told_angles
-from rcsa_ident.signals.line_gain import WINDOW, line_gain
+from rcsa_ident.signals._kernels import angle_sums, best_path, comb_scores, told_angles, turned
+from rcsa_ident.signals.line_gain import PADDED, WINDOW, LineGains
 from rcsa_ident.signals.steady_part import hann
 
 #: Orders that are looked at.
@@ -121,15 +121,15 @@ class Pace:
 WANDER, RAMP = Pace(), Pace(0.25, 8e-3, 1e-3)
 
 
-def speed_path(samples: FloatArray, rate: float, lowest: float, highest: float, pace: Pace = WANDER) -> tuple[FloatArray, FloatArray]:
+def speed_path(heard: LineGains, lowest: float, highest: float, pace: Pace = WANDER) -> tuple[FloatArray, FloatArray]:
     """Return the likeliest path of the spindle's frequency through windows that overlap by half.
 
     In each window a trial frequency is worth what lines at its multiples are worth; from one window to the next it changes little.
 
     Parameters
     ----------
-    samples : array, shape (n, c)
-    rate : float [Hz]
+    heard : LineGains
+        Of the record.
     lowest, highest : float [Hz]
         Where it is looked for.
     pace : Pace
@@ -140,12 +140,11 @@ def speed_path(samples: FloatArray, rate: float, lowest: float, highest: float, 
         Samples from the first one to the windows' middles.
     frequency : array, shape (w,) [Hz]
     """
-    length = pace.length(rate, lowest, samples.shape[0])
-    gain, middles = line_gain(samples, rate, length)
+    length = pace.length(heard.rate, lowest, heard.samples.shape[0])
     trial = np.exp(np.arange(np.log(lowest), np.log(highest) + pace.step, pace.step))
-    scores = comb_scores(gain, trial * 4.0 * length / rate, ORDERS, False)
+    scores = comb_scores(heard.of(length)[0], trial * PADDED * length / heard.rate, ORDERS, False)
     path, _ = best_path(scores, max(round(_LARGEST_CHANGE * pace.change / pace.step), 1), 0.5 * (pace.step / pace.change) ** 2)
-    return middles, trial[path]
+    return heard.middles(length), trial[path]
 
 
 def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: FloatArray, teeth: int = 0) -> Rotation:
@@ -172,7 +171,7 @@ def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: Flo
         speed = PchipInterpolator(middles, frequency)(np.clip(at, middles[0], middles[-1]))
     angle = 2.0 * np.pi / rate * np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))])
     highest = max(min(int(0.45 * rate / float(frequency.max())), ORDERS), 1)
-    centred = samples - samples.mean(axis=0)
+    centred = np.ascontiguousarray(samples - samples.mean(axis=0))
     # where the speed runs away from what windows tell, low orders say where the high ones' turns begin
     for orders in (2, 8) if teeth else ():
         angle = _followed(centred, rate, angle, mean, min(orders, highest), teeth).angle
@@ -186,7 +185,7 @@ def _followed(samples: FloatArray, rate: float, angle: FloatArray, mean: float, 
     hop = max(length // 2, 1)
     starts = np.arange(0, at.size - length + 1, hop)
     window = hann(length)
-    lines = angle_sums(samples, angle, starts, 2.0 / window.sum() * window, highest)[:, 1:]
+    lines = angle_sums(samples, turned(angle), starts, 2.0 / window.sum() * window, highest)[:, 1:]
     order = np.arange(1, highest + 1)
     own = order % teeth != 0 if teeth > 1 else order > 0
     phase, information, evidence = _common_phase(lines[:, own], order[own], hop / rate)
