@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
@@ -12,6 +12,7 @@ from rcsa_ident.arrays import ComplexArray, FloatArray
 from rcsa_ident.signals._kernels import angle_sums, best_path, comb_scores, told_angles, turned
 from rcsa_ident.signals.line_gain import PADDED, WINDOW, LineGains
 from rcsa_ident.signals.steady_part import hann
+from rcsa_ident.units import to_hz
 
 #: Orders that are looked at.
 ORDERS = 40
@@ -176,6 +177,24 @@ def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: Flo
     for orders in (2, 8) if teeth else ():
         angle = _followed(centred, rate, angle, mean, min(orders, highest), teeth).angle
     return _followed(centred, rate, angle, mean, highest, teeth)
+
+
+def follow_on(samples: FloatArray, rotation: Rotation, highest: int) -> Rotation:
+    """Return a rotation that is told by orders above half the sampling rate as well, where they stand folded back.
+
+    Their phases turn faster than those of the orders below, and show errors of the angle that these do not.
+
+    Parameters
+    ----------
+    samples : array, shape (n, c)
+    rotation : Rotation
+        As the orders below half the rate tell it.
+    highest : int
+        Highest order.
+    """
+    centred = np.ascontiguousarray(samples - samples.mean(axis=0))
+    found = _followed(centred, rotation.rate, rotation.angle, to_hz(rotation.spindle_speed), highest, 0)
+    return replace(found, evidence=rotation.evidence)
 
 
 def _followed(samples: FloatArray, rate: float, angle: FloatArray, mean: float, highest: int, teeth: int) -> Rotation:
