@@ -56,12 +56,12 @@ def constant(part: FloatArray, rate: float, hertz: float, orders: int = _ORDERS)
 
 
 def told(path: Path) -> tuple[Listening, FloatArray, float, Quantity, float]:
-    """Return what a file says, its samples and rate, what they are, and the seconds that it took."""
+    """Return what a file says, its samples and rate, what they are, and the processor time that it took [s]."""
     opened = open_recording(path)
     quantity, channels = opened.of()
-    began = time.perf_counter()
+    began = time.process_time()
     answer = listen_to(opened.rate, [each.samples for each in channels], quantity, TOLD.get(path.name))
-    return answer, answer.record.samples, opened.rate, quantity, time.perf_counter() - began
+    return answer, answer.record.samples, opened.rate, quantity, time.process_time() - began
 
 
 def table(paths: Sequence[Path]) -> list[str]:

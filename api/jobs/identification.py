@@ -37,7 +37,8 @@ from rcsa_ident.workflows.identify import ReadCut, ReadTest, data_of, hammer_lin
 
 #: Returns a campaign of a group, what reads its cuts and what reads its hammer tests.
 Load = Callable[[str, str], tuple[Campaign, ReadCut, ReadTest]]
-_T, _R = TypeVar("_T"), TypeVar("_R")
+_T = TypeVar("_T")
+_R = TypeVar("_R")
 #: Cuts that are judged in one step, and points of a curve.
 CHUNK, POINTS = 4, 300
 
@@ -61,7 +62,7 @@ def carry(load: Load, job: Job, context: JobContext, spread: Map = map) -> Outco
     request = json.loads(whole(job.request, job.request_digest, f"request of the job {job.id}", "ask for the job once more"))
     start = context.jobs.text(job.id, "start")
     campaign, read, read_test = load(job.group, str(job.campaign))
-    plan = context.remember("plan", lambda: [_files(each) for each in (*campaign.cuts, *campaign.tests)])
+    plan = context.remember("plan", lambda: [_files(each) for each in _parts(campaign)])
     campaign = _planned(campaign, plan)
     readings = _readings(campaign, read, context)
     data = data_of(campaign, readings, hammer_lines(campaign, _anonymous(read_test)))
@@ -80,6 +81,10 @@ def carry(load: Load, job: Job, context: JobContext, spread: Map = map) -> Outco
     return Outcome("done", "", status=str(found.status), texts=texts, applied=applied, problem=problem)
 
 
+def _parts(campaign: Campaign) -> list[Cut | HammerTest]:
+    return [*campaign.cuts, *campaign.tests]
+
+
 def _files(each: Cut | HammerTest) -> list[str]:
     """What a cut or a hammer test is read from: the names say what is in the files."""
     if isinstance(each, HammerTest):
@@ -89,8 +94,9 @@ def _files(each: Cut | HammerTest) -> list[str]:
 
 def _planned(campaign: Campaign, plan: list[list[str]]) -> Campaign:
     """The campaign as it was when the job began: what has been uploaded since then belongs to the next one."""
-    there: dict[str, Cut | HammerTest] = {each.id: each for each in (*campaign.cuts, *campaign.tests)}
-    cuts, tests = [], []
+    there = {each.id: each for each in _parts(campaign)}
+    cuts: list[Cut] = []
+    tests: list[HammerTest] = []
     for id, recording, air in plan:
         if id not in there or _files(there[id])[1] != recording:
             raise InputError(

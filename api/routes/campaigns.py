@@ -102,8 +102,9 @@ def list_campaigns(id: MachineId, components: ThisService, caller: WhoAsks, afte
         common = {name: getattr(row, name) for name in ("id", "machine", "name", "created", "cuts")}
         missing = len(files_of(row.text)) - count.uploaded - count.air - count.hammer
         data = json.loads(row.text)
-        told = {"missing": missing, "without_air": sum("air" not in cut for cut in data["cuts"]), "hammer_tests": len(data.get("frfs", ()))}
-        items.append(CampaignSummary(**common, uploaded=count.uploaded, usable=count.usable, **told))
+        without, tests = sum("air" not in cut for cut in data["cuts"]), len(data.get("frfs", ()))
+        uploaded, usable = count.uploaded, count.usable
+        items.append(CampaignSummary(**common, uploaded=uploaded, usable=usable, missing=missing, without_air=without, hammer_tests=tests))
     return Page(items=items, next=following)
 
 
