@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from benchmarks import dynamometer
 from benchmarks.dynamometer import FILES
@@ -133,9 +134,14 @@ def costs() -> list[str]:
         signal = sum(a * np.cos(m * angle) for m, a in {1: 0.2, 4: 1.0, 5: 0.1, 8: 0.5, 12: 0.3}.items())
         records = [signal + 0.3 * rng.standard_normal(n) for _ in range(channels)]
         listen_to(rate, [each[: int(2.0 * rate)] for each in records], quantity)
-        began = time.process_time()
-        listen_to(rate, records, quantity)
-        lines.append(f"| {name} | {time.process_time() - began:.2f} |")
+        taken = []
+        for _ in range(3):
+            began = time.process_time()
+            with threadpool_limits(1):
+                listen_to(rate, records, quantity)
+            taken.append(time.process_time() - began)
+        # whatever else the host does only adds to it
+        lines.append(f"| {name} | {min(taken):.2f} |")
     return lines
 
 

@@ -123,8 +123,12 @@ def find_rotation(samples: FloatArray, rate: float, lowest: float, highest: floa
         if fit.frequency > frequency and abs(fit.frequency / frequency - round(fit.frequency / frequency)) > APART
     )
     known = {fit.frequency: fit.rotation for fit in fits} if spare == 0 else {}
-    # a constant speed that does not do for the middle does not for the whole
-    return FoundSpeed(known.get(frequency) or _fitted(whole, frequency, not best.followed).rotation, others)
+    if frequency in known:
+        return FoundSpeed(known[frequency], others)
+    if spare and best.followed:
+        # a constant speed that does not do for the middle does not for the whole
+        return FoundSpeed(follow(samples, rate, *_path(whole, frequency)), others)
+    return FoundSpeed(_fitted(whole, frequency).rotation, others)
 
 
 def _parts(heard: LineGains, frequency: float, lowest: float) -> int:
@@ -227,14 +231,17 @@ def _strongest(power: FloatArray) -> list[int]:
     return found
 
 
-def _fitted(heard: LineGains, frequency: float, may_be_constant: bool = True) -> _Fit:
+def _path(heard: LineGains, frequency: float) -> tuple[FloatArray, FloatArray]:
+    """Path of a speed that is about this frequency [Hz] through short windows, see `speed_path`."""
+    return speed_path(heard, (1.0 - APART) * frequency, (1.0 + APART) * frequency)
+
+
+def _fitted(heard: LineGains, frequency: float) -> _Fit:
     """How a spindle turns that turns at about this frequency, and its lines.
 
     The path through short windows knows how it wanders; where they say too little, the speed is the one that long windows tell.
     """
-    followed = _along(heard, *speed_path(heard, (1.0 - APART) * frequency, (1.0 + APART) * frequency), frequency)
-    if not may_be_constant:
-        return followed
+    followed = _along(heard, *_path(heard, frequency), frequency)
     steady = _along(heard, np.array([0.5 * (heard.samples.shape[0] - 1)]), np.array([frequency]), frequency)
     return followed if followed.explained > max(_CLEARLY * steady.explained, _TELLS) else steady
 

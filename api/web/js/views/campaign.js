@@ -131,10 +131,12 @@ export async function view({ id }, query, place) {
           : null,
         campaign.hammer_tests.length ? number("Hammer tests", `${tested} of ${campaign.hammer_tests.length}`) : null,
         number("Files", `${uploaded} of ${names.size}`),
-        number(
-          "Coefficient",
-          campaign.workpiece?.tangential_coefficient_mpa ? text("pressure", campaign.workpiece.tangential_coefficient_mpa) : "–",
-        ),
+        campaign.cuts.length
+          ? number(
+              "Coefficient",
+              campaign.workpiece?.tangential_coefficient_mpa ? text("pressure", campaign.workpiece.tangential_coefficient_mpa) : "–",
+            )
+          : null,
       ),
       queue.running
         ? [

@@ -18,7 +18,7 @@ export async function view({ id = null }, _query, place) {
     box,
     dropZone(
       "Drop a campaign here",
-      "Its folder, a ZIP of it, or its files: campaign.toml, tooling files, recordings (HDF5, TDMS, UFF 58, WAV and other sound, MATLAB, Parquet, CSV).",
+      "Its folder, a ZIP of it, or its files: campaign.toml, tooling files, recordings (HDF5, TDMS, UFF 58, WAV and other sound, MATLAB, Parquet, CSV), FRFs of hammer tests.",
       (files) => intake(box, files),
     ),
     campaigns.length

@@ -123,7 +123,7 @@ export function verdictTable(shown, queue, open, toggle) {
   );
 }
 
-const place = (point) => (typeof point === "number" ? `${plain(point)} mm from the tip` : point);
+const place = (point) => (typeof point === "number" ? `${plain(point, 1)} mm from the tip` : point);
 
 /** A row for each hammer test. */
 export function hammerTable(tests, queue) {
