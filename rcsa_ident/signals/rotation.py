@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from rcsa_ident.arrays import ComplexArray, FloatArray
-from rcsa_ident.signals._kernels import angle_sums, best_path, comb_scores, told_angles, walked
-from rcsa_ident.signals.line_gain import WINDOW, line_gain
+from rcsa_ident.signals._kernels import angle_sums, best_path, comb_scores, told_angles, turned, walked
+from rcsa_ident.signals.line_gain import PADDED, WINDOW, LineGains
 from rcsa_ident.signals.steady_part import hann
+from rcsa_ident.units import to_hz
 
 #: Orders that are looked at.
 ORDERS = 40
@@ -123,15 +124,15 @@ class Pace:
 WANDER, RAMP = Pace(), Pace(0.25, 8e-3, 1e-3)
 
 
-def speed_path(samples: FloatArray, rate: float, lowest: float, highest: float, pace: Pace = WANDER) -> tuple[FloatArray, FloatArray]:
+def speed_path(heard: LineGains, lowest: float, highest: float, pace: Pace = WANDER) -> tuple[FloatArray, FloatArray]:
     """Return the likeliest path of the spindle's frequency through windows that overlap by half.
 
     In each window a trial frequency is worth what lines at its multiples are worth; from one window to the next it changes little.
 
     Parameters
     ----------
-    samples : array, shape (n, c)
-    rate : float [Hz]
+    heard : LineGains
+        Of the record.
     lowest, highest : float [Hz]
         Where it is looked for.
     pace : Pace
@@ -142,12 +143,11 @@ def speed_path(samples: FloatArray, rate: float, lowest: float, highest: float, 
         Samples from the first one to the windows' middles.
     frequency : array, shape (w,) [Hz]
     """
-    length = pace.length(rate, lowest, samples.shape[0])
-    gain, middles = line_gain(samples, rate, length)
+    length = pace.length(heard.rate, lowest, heard.samples.shape[0])
     trial = np.exp(np.arange(np.log(lowest), np.log(highest) + pace.step, pace.step))
-    scores = comb_scores(gain, trial * 4.0 * length / rate, ORDERS, False)
+    scores = comb_scores(heard.of(length)[0], trial * PADDED * length / heard.rate, ORDERS, False)
     path, _ = best_path(scores, max(round(_LARGEST_CHANGE * pace.change / pace.step), 1), 0.5 * (pace.step / pace.change) ** 2)
-    return middles, trial[path]
+    return heard.middles(length), trial[path]
 
 
 def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: FloatArray, teeth: int = 0) -> Rotation:
@@ -169,11 +169,29 @@ def follow(samples: FloatArray, rate: float, middles: FloatArray, frequency: Flo
         where all do. 0 where the speed only wanders.
     """
     angle, mean, highest = _expected(samples.shape[0], rate, middles, frequency)
-    centred = samples - samples.mean(axis=0)
+    centred = np.ascontiguousarray(samples - samples.mean(axis=0))
     # where the speed runs away from what windows tell, low orders say where the high ones' turns begin
     for orders in (2, 8) if teeth else ():
         angle = _told(centred, rate, angle, mean, min(orders, highest), teeth).rotation(rate, angle).angle
     return _told(centred, rate, angle, mean, highest, teeth).rotation(rate, angle)
+
+
+def follow_on(samples: FloatArray, rotation: Rotation, highest: int) -> Rotation:
+    """Return a rotation that is told by orders above half the sampling rate as well, where they stand folded back.
+
+    Their phases turn faster than those of the orders below, and show errors of the angle that these do not.
+
+    Parameters
+    ----------
+    samples : array, shape (n, c)
+    rotation : Rotation
+        As the orders below half the rate tell it.
+    highest : int
+        Highest order.
+    """
+    centred = np.ascontiguousarray(samples - samples.mean(axis=0))
+    told = _told(centred, rotation.rate, rotation.angle, to_hz(rotation.spindle_speed), highest, 0)
+    return replace(told.rotation(rotation.rate, rotation.angle), evidence=rotation.evidence)
 
 
 def follow_changes(samples: FloatArray, rate: float, frequency: float) -> Rotation | None:
@@ -187,7 +205,7 @@ def follow_changes(samples: FloatArray, rate: float, frequency: float) -> Rotati
         The spindle's, to within a few hundredths of a turn over the record.
     """
     angle, mean, highest = _expected(samples.shape[0], rate, np.zeros(1), np.array([frequency]))
-    told = _told(samples - samples.mean(axis=0), rate, angle, mean, highest, 0)
+    told = _told(np.ascontiguousarray(samples - samples.mean(axis=0)), rate, angle, mean, highest, 0)
     return told.rotation(rate, angle) if told.evidence > _EVIDENT else None
 
 
@@ -229,7 +247,7 @@ def _told(samples: FloatArray, rate: float, angle: FloatArray, mean: float, high
     hop = max(length // 2, 1)
     starts = np.arange(0, n - length + 1, hop)
     window = hann(length)
-    lines = angle_sums(samples, angle, starts, 2.0 / window.sum() * window, highest)[:, 1:]
+    lines = angle_sums(samples, turned(angle), starts, 2.0 / window.sum() * window, highest)[:, 1:]
     order = np.arange(1, highest + 1)
     own = order % teeth != 0 if teeth > 1 else order > 0
     phase, information, evidence = _common_phase(lines[:, own], order[own], hop / rate)

@@ -109,21 +109,22 @@ def turning(n):
 
 
 @pytest.mark.parametrize("highest", [0, 3, 9])
+@pytest.mark.parametrize("length", [31, 128, 150])
 @pytest.mark.parametrize("kernel", compiled_and_plain("angle_sums"))
-def test_angle_sums(kernel, highest):
+def test_angle_sums(kernel, length, highest):
     rng = np.random.default_rng(4)
-    samples, angle, window, starts = rng.normal(size=(90, 2)), turning(90), rng.uniform(size=31), np.array([0, 17, 59])
-    found = kernel(samples, angle, starts, window, highest)
+    samples, angle, window, starts = rng.normal(size=(240, 2)), turning(240), rng.uniform(size=length), np.array([0, 17, 59])
+    found = kernel(samples, _kernels.turned(angle), starts, window, highest)
     for block, s in zip(found, starts, strict=True):
-        phase = np.exp(-1j * np.outer(np.arange(highest + 1), angle[s : s + 31]))
-        np.testing.assert_allclose(block, phase @ (window[:, None] * samples[s : s + 31]), atol=1e-11)
+        phase = np.exp(-1j * np.outer(np.arange(highest + 1), angle[s : s + length]))
+        np.testing.assert_allclose(block, phase @ (window[:, None] * samples[s : s + length]), atol=1e-11)
 
 
 @pytest.mark.parametrize("kernel", compiled_and_plain("angle_signal"))
 def test_angle_signal(kernel):
     rng = np.random.default_rng(5)
     amplitude, angle = rng.normal(size=(2, 6, 2)) + 1j * rng.normal(size=(2, 6, 2)), turning(300)
-    found = kernel(amplitude, angle, 150)
+    found = kernel(amplitude, _kernels.turned(angle), 150)
     for w in range(2):
         phase = np.exp(1j * np.outer(angle[150 * w : 150 * (w + 1)], np.arange(6)))
         np.testing.assert_allclose(found[150 * w : 150 * (w + 1)], (phase @ amplitude[w]).real, atol=1e-11)
