@@ -34,6 +34,7 @@ STUDIES = (
     "dynamometer",
     "real_machine",
     "hammer",
+    "labelled_cuts",
 )
 
 
