@@ -44,8 +44,8 @@ PAGE = Path(__file__).resolve().parents[1] / "docs" / "labelled_cuts.md"
 MODES = {Dof.X: (782.7, 0.0184, 6.5616e6), Dof.Y: (752.8, 0.0186, 4.8852e6)}
 SPREADS = (80.0, 0.008, 2e6)
 COEFFICIENTS, COEFFICIENT_SPREADS = (10.95e8, 1.76e8), (1.5e8, 0.5e8)
-#: Draws of the prior, of the seed with which the first trial was made; labels that are shown; random orders.
-POOL, SEED, LABELS, ORDERS = 6000, 11, (0, 5, 10, 20, 40), 10
+#: Draws of the prior, without softening and with it, of the seed with which the first trial was made; labels; random orders.
+POOL, SOFT_POOL, SEED, LABELS, ORDERS = 6000, 2000, 11, (0, 5, 10, 20, 40), 10
 #: Draws that stand for a posterior.
 KEPT = 400
 #: What is chosen among on the 40: deviation and length of the discrepancy, width of the boundary; the share of wrong labels is fixed.
@@ -113,11 +113,11 @@ class Pool:
         """What the scratch folder holds, or what is computed now and kept there."""
         path = scratch / f"labelled_cuts_pool{'_softening' if softening else ''}.npz"
         limits = limits_of(softening)
-        z = np.random.default_rng(SEED).standard_normal((POOL, limits.tip.size))
+        z = np.random.default_rng(SEED).standard_normal((SOFT_POOL if softening else POOL, limits.tip.size))
         if path.exists():
             return cls(z, speeds, np.load(path)["log_limit"], softening)
         with workers(2) as pool:
-            parts = list(pool.map_many(partial(limits, speeds=speeds), np.array_split(z, POOL // 20)))
+            parts = list(pool.map_many(partial(limits, speeds=speeds), np.array_split(z, len(z) // 20)))
         log_limit = np.concatenate([part.log_limit for part in parts])
         np.savez(path, log_limit=log_limit)
         return cls(z, speeds, log_limit, softening)
@@ -186,7 +186,7 @@ class Score:
 
 
 def chosen_on(pool: Pool, training: TestedCuts) -> list[tuple[float, float, float, float]]:
-    """(log score, deviation, length, width), the best first: each speed of the training cuts told from the others, no other cut looked at."""
+    """(log score, deviation, length, width), the best first: each speed of the 40 told from the others, no other cut looked at."""
     speeds, place = np.unique(training.spindle_speed, return_inverse=True)
     number = np.random.default_rng(5).standard_normal((40, speeds.size))
     tips = pool(pool.z, speeds)

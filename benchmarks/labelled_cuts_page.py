@@ -71,7 +71,7 @@ def text(found: Findings) -> str:
         for name, key in (("before any label", "before"), ("after the 40 training cuts", "training"))
     )
     curves = "\n".join(
-        f"| {n} | {_cells(found.orders[n][0])} | {_cells(found.orders[n][1])} | {_cells(found.chosen[n][0])} | {_cells(found.chosen[n][1])} |"
+        f"| {n} | {' | '.join(_cells(score) for pair in (found.orders[n], found.chosen[n]) for score in pair if score.cuts)} |"
         for n in found.orders
     )
     soft = "\n".join(

@@ -62,10 +62,11 @@ class LabelNoise:
             Logarithm of the limit [m] at each cut.
         """
         margin = log_limit - np.log(cuts.axial_depth)
-        sides = {Verdict.STABLE: self.stable(margin), Verdict.CHATTER: self.stable(-margin), Verdict.MARGINAL: self._marginal(margin)}
+        probability = {Verdict.STABLE: self.stable, Verdict.CHATTER: lambda m: self.stable(-m), Verdict.MARGINAL: self._marginal}
         found = np.zeros(log_limit.shape[:-1])
-        for verdict, p in sides.items():
-            found += np.sum(np.log(p[..., cuts.seen(verdict)]), axis=-1)
+        for verdict, p in probability.items():
+            if verdict in cuts.verdict:
+                found += np.sum(np.log(p(margin[..., cuts.seen(verdict)])), axis=-1)
         return found
 
     def heard(self, cuts: TestedCuts, chatter: FloatArray) -> FloatArray:
