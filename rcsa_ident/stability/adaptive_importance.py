@@ -12,6 +12,8 @@ from rcsa_ident.arrays import FloatArray
 
 #: Share of each further round that is drawn from the prior all the same, so that no weight can be without bound.
 _DEFENSIVE = 0.1
+#: Variance that is added to every unknown's.
+_FLOOR = 0.02
 #: Draws that stand for the posterior so far, around each of which a further round draws.
 _CENTRES = 100
 
@@ -87,9 +89,10 @@ def _mixture(
     size = z.shape[1]
     effective = 1.0 / np.sum(weight**2)
     mean = weight @ z
-    # few draws do not know all directions: the rest of the prior's width stands in for what they cannot tell
+    covariance = (weight * (z - mean).T) @ (z - mean)
+    # few draws know how wide each unknown is, but not yet which of them go together
     trust = effective / (effective + 2.0 * size)
-    covariance = trust * (weight * (z - mean).T) @ (z - mean) + (1.0 - trust) * 0.3 * np.eye(size)
+    covariance = trust * covariance + (1.0 - trust) * np.diag(np.diag(covariance)) + _FLOOR * np.eye(size)
     width = min((4.0 / (size + 2.0) / max(effective, 2.0)) ** (1.0 / (size + 4.0)), 1.0)
     root = width * np.linalg.cholesky(covariance)
     # drawn towards the mean, so that the mixture is no wider than the posterior

@@ -93,7 +93,9 @@ class UncertainTip:
         nodes = tip.thinned()
         change = _embedded_spread(nodes)
         sensitivity = _sensitivity(modes, nodes.omega)
+        # a real pole has no damping ratio of its own
         size = np.linalg.norm(sensitivity, axis=0)
+        size = np.where(size > 0.0, size, 1.0)
         scaled = np.linalg.lstsq(sensitivity / size, change.T, rcond=_NEARLY_ALIKE)[0]
         left = np.linalg.norm(change.T - sensitivity / size @ scaled) / max(float(np.linalg.norm(change)), 1e-300)
         # of many directions few matter
