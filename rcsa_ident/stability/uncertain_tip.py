@@ -20,6 +20,10 @@ _MOST_DAMPED = 0.9
 _STEP = 1e-4
 #: Singular value over the largest below which changes of modes are taken to be alike, and share of a spread that may be left out.
 _NEARLY_ALIKE, _NEGLIGIBLE = 1e-3, 0.01
+#: Largest spread over the receptance that changes of modes still tell.
+_WIDEST = 0.5
+#: How far the logarithms of natural frequencies, damping ratios and stiffnesses may change.
+_USUAL = (0.05, 0.5, 0.3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,24 +89,35 @@ class UncertainTip:
         """Return a receptance and its spread as modes that vary, and how much of the spread they miss, as a share.
 
         Each direction of the spread is a change of the receptance; the changes of frequencies, damping ratios and stiffnesses that come
-        nearest to it are a row of least squares. Directions that change the receptance alike are taken together.
+        nearest to it are found by damped least squares. Directions that change the receptance alike are taken together.
+
+        Raises
+        ------
+        InputError
+            If the spread is no small change.
         """
         both = both_directions(tip)
         known = known_modes(both)
         modes, _ = fitted_modes(both) if known is None else known
         nodes = tip.thinned()
         change = _embedded_spread(nodes)
-        sensitivity = _sensitivity(modes, nodes.omega)
-        # a real pole has no damping ratio of its own
-        size = np.linalg.norm(sensitivity, axis=0)
-        size = np.where(size > 0.0, size, 1.0)
-        scaled = np.linalg.lstsq(sensitivity / size, change.T, rcond=_NEARLY_ALIKE)[0]
-        left = np.linalg.norm(change.T - sensitivity / size @ scaled) / max(float(np.linalg.norm(change)), 1e-300)
-        # of many directions few matter
-        left_vectors, values, _ = np.linalg.svd(sensitivity / size @ scaled, full_matrices=False)
-        count = max(1, int(np.searchsorted(np.cumsum(values**2), (1.0 - _NEGLIGIBLE) * np.sum(values**2))) + 1)
-        few = left_vectors[:, :count] * values[:count]
-        root = np.linalg.lstsq(sensitivity / size, few, rcond=_NEARLY_ALIKE)[0] / size[:, None]
+        doubt = float(np.linalg.norm(change) / np.linalg.norm(nodes.values))
+        if doubt > _WIDEST:
+            found = f"a tip that is known to {100.0 * doubt:.0f} % of itself"
+            raise InputError(
+                "result", found, f"one that is known to {100.0 * _WIDEST:.0f} %: an identification with more cuts, or MODES.toml"
+            )
+        # in units of what such changes may be at most: a mode that hardly shows is not moved far for nothing
+        usual = np.repeat(_USUAL, modes.pole.size)
+        left_vectors, values, right_vectors = np.linalg.svd(_sensitivity(modes, nodes.omega) * usual, full_matrices=False)
+        damped = values / (values**2 + (_NEARLY_ALIKE * values[0]) ** 2)
+        x = right_vectors.T @ (damped[:, None] * (left_vectors.T @ change.T))
+        explained = left_vectors @ (values[:, None] * (right_vectors @ x))
+        left = np.linalg.norm(change.T - explained) / max(float(np.linalg.norm(change)), 1e-300)
+        # of many directions few matter: those of the greatest changes of the receptance
+        _, sizes, turns = np.linalg.svd(explained, full_matrices=False)
+        count = max(1, int(np.searchsorted(np.cumsum(sizes**2), (1.0 - _NEGLIGIBLE) * np.sum(sizes**2))) + 1)
+        root = usual[:, None] * (x @ turns[:count].T)
         return cls(modes, root, coefficients), float(left)
 
     @property
@@ -143,10 +158,11 @@ class UncertainTip:
 
 def _embedded_spread(tip: UncertainReceptance) -> FloatArray:
     """Changes along all directions among zeros for axes that are missing, real and imaginary parts in a row, shape (p, 8 n)."""
-    found = np.zeros((len(tip.spread), tip.omega.size, 2, 2), dtype=complex)
+    spread = tip.spread
+    found = np.zeros((len(spread), tip.omega.size, 2, 2), dtype=complex)
     places = [TIP.index(c) for c in tip.rows if c in TIP]
     own = [tip.rows.index(TIP[k]) for k in places]
-    found[np.ix_(range(len(found)), range(tip.omega.size), places, places)] = tip.spread[..., own, :][..., own]
+    found[np.ix_(range(len(found)), range(tip.omega.size), places, places)] = spread[..., own, :][..., own]
     return found.reshape(len(found), -1).view(float)
 
 
