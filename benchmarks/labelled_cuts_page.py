@@ -15,6 +15,7 @@ from rcsa_ident.stability.label_posterior import LabelModel
 from rcsa_ident.units import from_rpm
 
 Pair = tuple[Score, Score]
+_NOT_MEASURED = "Not measured yet."
 _BLUE, _RED, _GREY = "#0072B2", "#C8501A", "#52606d"
 
 
@@ -45,6 +46,8 @@ def figure(found: Findings) -> Figure:
         made = Figure(figsize=(11.0, 3.7), layout="constrained")
         right, score, curve = made.subplots(1, 3)
         for name, rows, colour in (("at random, mean of ten orders", found.orders, _GREY), ("chosen by the program", found.chosen, _BLUE)):
+            if not rows:
+                continue
             n = list(rows)
             right.plot(n, [100.0 * rows[k][0].right / rows[k][0].cuts for k in n], "o-", color=colour, label=name)
             score.plot(n, [rows[k][1].log_score for k in n], "o-", color=colour, label=name)
@@ -70,16 +73,7 @@ def text(found: Findings) -> str:
         f"| {name} | {_cells(found.told[key][0])} | {_cells(found.told[key][1])} |"
         for name, key in (("before any label", "before"), ("after the 40 training cuts", "training"))
     )
-    curves = "\n".join(
-        f"| {n} | {' | '.join(_cells(score) for pair in (found.orders[n], found.chosen[n]) for score in pair if score.cuts)} |"
-        for n in found.orders
-    )
-    soft = "\n".join(
-        f"| {name} | {evidence:.1f} | {found.evidence[name]:.1f} | {_cells(whole)} | {_cells(part)} |"
-        for name, (evidence, whole, part) in found.softening.items()
-    )
-    gain = found.evidence["with"] - found.evidence["without"]
-    helps = ": it helps." if gain > 1.0 else ": too little to say that it helps." if gain > -1.0 else ": it does not help."
+    curves, soft = (part(found) if held else _NOT_MEASURED for part, held in ((_curves, found.orders), (_softening, found.softening)))
     return f"""# What labels of real cuts teach
 
 118 cuts that others made and labelled, stable or chatter: two-flute cutter, half-immersion down-milling, 27 speeds from 5000 to
@@ -100,13 +94,7 @@ Each cell: cuts told right, mean log score, and the accuracy that the probabilit
 
 Published: 83.1 % of the 118 and 79.7 % of the 79 after the same 40. Effective draws: {found.effective:.0f}.
 
-| labels | random: all 118 | the cuts not learnt from | chosen: all 118 | the cuts not learnt from |
-|---|---|---|---|---|
 {curves}
-
-Random: the mean of {ORDERS} orders, drawn from all 118. Chosen: one after the other, each the cut whose label tells most after those before
-it (`advise --next-test`). Both by the weights of {POOL} draws of the prior alone, which is rougher than what `learn` does. Cuts that were
-learnt from are among the 118, and easier told.
 
 ## What was decided, and on what
 
@@ -122,15 +110,39 @@ those on the 40. The choice is what the rule gives, but whoever chose had seen b
 A standard deviation of {1e2 * SOFTENING * from_rpm(1000.0):g} % of the stiffness per 1000 rev/min, the published modes taken for those at
 standstill, beside none; both by the weights of the pool:
 
-| softening | log evidence of the 40 | of the 118 | all 118 | the 79 unseen |
-|---|---|---|---|---|
 {soft}
-
-Known from all 118, softening is worth {gain:+.1f} in log evidence{helps} The forty cuts, all in one lobe, say little of it, so it is off
-unless MODES.toml has `softening_sd_percent_per_1000_rpm`.
 
 `python -m benchmarks labelled_cuts --scratch FOLDER --page`
 """
+
+
+def _curves(found: Findings) -> str:
+    rows = "\n".join(
+        f"| {n} | {' | '.join(_cells(score) for pair in (found.orders[n], found.chosen[n]) for score in pair if score.cuts)} |"
+        for n in found.orders
+    )
+    return f"""| labels | random: all 118 | the cuts not learnt from | chosen: all 118 | the cuts not learnt from |
+|---|---|---|---|---|
+{rows}
+
+Random: the mean of {ORDERS} orders, drawn from all 118. Chosen: one after the other, each the cut whose label tells most after those before
+it (`advise --next-test`). Both by the weights of {POOL} draws of the prior alone, which is rougher than what `learn` does. Cuts that were
+learnt from are among the 118, and easier told."""
+
+
+def _softening(found: Findings) -> str:
+    rows = "\n".join(
+        f"| {name} | {evidence:.1f} | {found.evidence[name]:.1f} | {_cells(whole)} | {_cells(part)} |"
+        for name, (evidence, whole, part) in found.softening.items()
+    )
+    gain = found.evidence["with"] - found.evidence["without"]
+    helps = ": it helps." if gain > 1.0 else ": too little to say that it helps." if gain > -1.0 else ": it does not help."
+    return f"""| softening | log evidence of the 40 | of the 118 | all 118 | the 79 unseen |
+|---|---|---|---|---|
+{rows}
+
+Known from all 118, softening is worth {gain:+.1f} in log evidence{helps} The forty cuts, all in one lobe, say little of it, so it is off
+unless MODES.toml has `softening_sd_percent_per_1000_rpm`."""
 
 
 def _cells(score: Score) -> str:
