@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Saved, Shown
 from rcsa_ident.signals.recording import Recording, Sensor
 from rcsa_ident.tool_holder.geometry import ToolAssembly
-from rcsa_ident.tool_holder.proportions import proportions
+from rcsa_ident.tool_holder.proportions import cutter_values, proportions
 from rcsa_ident.tool_holder.spread import EXACT, Spread
 from rcsa_ident.units import to_rpm
 
@@ -67,6 +68,43 @@ class Tooling(Saved):
 
     def __str__(self) -> str:
         return f"{self.name}: {self.cutter}, {self.assembly}"
+
+
+class BareCutter(Tooling):
+    """A cutter alone, where the tip of the tool that carries it is known by itself: from modes, tap tests or labelled cuts.
+
+    Whoever asks for the tool and its holder is told that there are none.
+
+    Parameters
+    ----------
+    name : str
+    cutter : Cutter
+    """
+
+    def __init__(self, name: str, cutter: Cutter) -> None:
+        fields: dict[str, Any] = {"name": name, "cutter": cutter, "spread": EXACT, "tool_model": "", "holder_model": ""}
+        for field_name, value in fields.items():
+            object.__setattr__(self, field_name, value)
+        tuple(remarks_of(cutter_values(cutter)))  # an impossible one is refused
+
+    def __reduce__(self) -> tuple[type[BareCutter], tuple[str, Cutter]]:
+        """Pickle without the assembly that it has not."""
+        return type(self), (self.name, self.cutter)
+
+    @property
+    def assembly(self) -> ToolAssembly:
+        """Nothing, and a sentence that says so."""
+        raise InputError(
+            f"tooling {self.name}", "[cutter] alone", "tables [tool] and [holder], too: only modes or FRFs of the tip need neither"
+        )
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What is unusual about the cutter."""
+        return tuple(remarks_of(cutter_values(self.cutter)))
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.cutter}"
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -24,6 +24,7 @@ from rcsa_ident.cli import (  # noqa: E402
     export,
     forces,
     identify,
+    learn,
     listen,
     lobes,
     machine,
@@ -60,7 +61,17 @@ app = typer.Typer(
 #: In the order of the work, under headings.
 _COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
     "Identification": (demo.demo, identify.check, identify.identify, plan.plan, export.export),
-    "Tool change": (lobes.tooltip, lobes.lobes, advice.advise, cases.cases, forces.forces, tools.import_tools, tools.holders, tools.draw),
+    "Tool change": (
+        lobes.tooltip,
+        lobes.lobes,
+        advice.advise,
+        learn.learn,
+        cases.cases,
+        forces.forces,
+        tools.import_tools,
+        tools.holders,
+        tools.draw,
+    ),
     "Further measurements": (
         listen.listen,
         tap.tap,

@@ -18,7 +18,7 @@ from rcsa_ident.io.hammer_tests import HAMMER_TEST_KEYS, hammer_test_of
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table, describe
 from rcsa_ident.io.workpieces import WORKPIECE_KEYS, workpiece_of
-from rcsa_ident.machining_setup import Campaign, Cut, Tooling
+from rcsa_ident.machining_setup import BareCutter, Campaign, Cut, Tooling
 from rcsa_ident.plausibility import (
     AXIAL_DEPTH,
     CONTACT,
@@ -90,15 +90,25 @@ _CUT = (
 )
 
 
-def read_tooling(path: str | Path) -> Tooling:
+def read_tooling(path: str | Path, tip_known: bool = False) -> Tooling:
     """Return a cutter with the tool and holder that carry it, the tool cut to stickout + insertion.
+
+    Parameters
+    ----------
+    path : path
+    tip_known : bool
+        Where modes or FRFs of the tip are given a file may hold its ``[cutter]`` alone: neither ``[tool]`` nor ``[holder]``.
 
     Raises
     ------
     InputError
         Names the file, the key, what was found and what is allowed.
     """
-    return tooling_of(read_toml(path, "tooling"), str(path), Path(path).stem)
+    data = read_toml(path, "tooling")
+    if tip_known and "tool" not in data and "holder" not in data:
+        top = Table(data, str(path), known=_TOOLING)
+        return BareCutter(top.text("name", Path(path).stem), _cutter(top.table("cutter", _CUTTER)))
+    return tooling_of(data, str(path), Path(path).stem)
 
 
 def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:

@@ -19,11 +19,13 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof, plane
 from rcsa_ident.dynamics.receptance import Receptance
 from rcsa_ident.dynamics.uncertain import UncertainReceptance
 from rcsa_ident.errors import InputError
+from rcsa_ident.machine.learnt_tip import LearntTip
 from rcsa_ident.machine.machine import STIFFNESS_SPREAD, Machine, TipSource
 from rcsa_ident.machine.speed_dependence import tips_over_speed
-from rcsa_ident.machining_setup import CutSpec, Tooling
+from rcsa_ident.machining_setup import BareCutter, CutSpec, Tooling
 from rcsa_ident.stability.advice import Advice, OperatingPoint, UsableDepths, highest_removal, planned_cut, speed_windows, usable_depths
 from rcsa_ident.stability.full_discretisation import FullDiscretisation
+from rcsa_ident.stability.label_noise import LabelNoise
 from rcsa_ident.stability.lobes import DEEPER, DRAWS, both_directions, in_proportion, stability_lobes
 from rcsa_ident.stability.methods import StabilityMethod, Watch, Watched
 from rcsa_ident.stability.pockets import AROUND, pad_speeds, speeds_around
@@ -180,6 +182,8 @@ class ToolChange:
         speeds = np.unique(self.speeds if speeds is None else speeds)
         depth, draws = self.max_depth if max_depth is None else max_depth, self.draws if draws is None else draws
         process, parts, order = self.process, [], []
+        if isinstance(self.machine, LearntTip):
+            return self.machine.limits(process, speeds, depth, draws)
         for places, tip in tips_over_speed(self.machine, self.tooling, self.omega, speeds, draws > 0, self.stiffness_spread):
             order.append(places)
             parts.append(stability_lobes(tip, process, speeds[places], depth, self.method, draws))
@@ -213,6 +217,8 @@ class ToolChange:
 
     def _beyond(self, lobes: StabilityLobes) -> list[str]:
         """Sentences where the limits leave out what is there: the end of the tool's edges, a mode above the frequencies."""
+        if isinstance(self.tooling, BareCutter):
+            return []
         longest, where = edge_length(self.tooling.assembly, self.tooling.cutter)
         deeper = int(np.sum(np.minimum(lobes.limit_depth, self.max_depth) > longest * (1.0 + 1e-9)))
         told = f"at {deeper} of {lobes.spindle_speed.size} speeds the limit is deeper than the tool's {where} of {1e3 * longest:.4g} mm"
@@ -260,7 +266,7 @@ def advise(
     found = _recommended(change, lobes, usable, usable_of, tolerance)
     return Advice(
         change.tooling.name,
-        change.tooling.assembly.stickout,
+        None if isinstance(change.tooling, BareCutter) else change.tooling.assembly.stickout,
         lobes,
         usable,
         found.points,
@@ -351,8 +357,27 @@ def _limits_beside(change: ToolChange, speeds: FloatArray) -> StabilityLobes:
 def classify_tested_cuts(change: ToolChange, cuts: TestedCuts) -> Tally:
     """Return how many tested cuts lie on the side of the limit where they were seen, each asked at its own speed."""
     deepest = 1.01 * float(cuts.axial_depth.max())
-    lobes = change.limits(cuts.spindle_speed, max(change.max_depth, deepest), draws=0)
+    # a learnt tip's limit is that up to which half of its draws are stable: all of them are asked
+    draws = len(change.machine.posterior.z) if isinstance(change.machine, LearntTip) else 0
+    lobes = change.limits(cuts.spindle_speed, max(change.max_depth, deepest), draws)
     return tally(cuts, lobes.limit_depth[np.searchsorted(lobes.spindle_speed, cuts.spindle_speed)])
+
+
+def probabilities_stable(change: ToolChange, cuts: TestedCuts) -> FloatArray:
+    """Return the probability that each tested cut is called stable, shape (n,).
+
+    A machine that was identified, or modes without spreads, say it by their own limits and what those leave open, beside the doubt that
+    labels always have; a learnt tip by its draws.
+    """
+    if isinstance(change.machine, LearntTip):
+        return change.machine.probabilities(change.process, cuts)
+    deepest = max(change.max_depth, 4.0 * float(cuts.axial_depth.max()))
+    speeds, place = np.unique(cuts.spindle_speed, return_inverse=True)
+    lobes = change.limits(speeds, deepest)
+    drawn = lobes.limit_depth[None] if lobes.drawn is None else lobes.drawn
+    margin = np.log(np.minimum(drawn, deepest))[:, place] - np.log(cuts.axial_depth)
+    found: FloatArray = LabelNoise().stable(margin).mean(axis=0)
+    return found
 
 
 def map_of(change: ToolChange, depths: int = 100, full: bool = False) -> StabilityMap:
@@ -399,7 +424,7 @@ def _modes_above(machine: TipSource, tooling: Tooling, omega: FloatArray) -> lis
     What a limit depends on is how negative the real part of the tip's receptance is. A measurement says nothing beyond its end: the
     flange is then held at rest, which leaves the tool-holder's modes about where they are.
     """
-    if not (isinstance(machine, Machine) or machine.ends):
+    if not (isinstance(machine, Machine) or machine.ends) or isinstance(tooling, BareCutter):
         return []
     source, top = machine.at(None), float(omega[-1])
     above = np.arange(top, ABOVE * top, _ABOVE_STEP)
