@@ -28,6 +28,7 @@ from rcsa_ident.cli import (  # noqa: E402
     lobes,
     machine,
     plan,
+    ring,
     schema,
     tap,
     tools,
@@ -64,6 +65,7 @@ _COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
     "Further measurements": (
         listen.listen,
         tap.tap,
+        ring.ring,
         calibrate.calibrate,
         calibrate.materials,
         compare.compare,

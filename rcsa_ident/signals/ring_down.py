@@ -1,22 +1,22 @@
-"""Frequencies and damping of what rings after a hit, from a microphone: ESPRIT finds the exponentials, least squares refine them.
+"""Frequencies and damping of what rings after a hit, from a microphone: ESPRIT, and what comes again in many windows, orders and hits.
 
-Each hit is fitted by itself, all its modes at once, from where the hit itself has ended until the ring is lost in the noise [roy1989];
-the hits are then combined with the scatter between them, so that what a model of exponentials leaves out (reflections, a gain that
-moves) widens the standard deviations instead of hiding in them.
+Exponentials are taken from windows of many lengths behind each hit, where the hit itself is over, at several orders [roy1989]. Poles of
+noise are elsewhere each time; those of modes gather, as in a stabilisation diagram. The scatter over windows, which see other reflections,
+and over hits is the standard deviation.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
 import scipy.signal
 
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.errors import InputError, positive
-from rcsa_ident.signals._exponentials import Fit, esprit, refined
+from rcsa_ident.signals._exponentials import Subspace, peaks, zoomed
 from rcsa_ident.units import to_hz
 
 #: Lowest frequency that is listened to [Hz]: below it are mains, steps and doors.
@@ -30,23 +30,38 @@ _OVER_QUIET, _OVER_LOUDEST = 8.0, 0.02
 #: Quiet before a hit in which the noise is heard [s], and time in which a further onset is a second hit [s].
 _QUIET, _APART = 0.05, 0.04
 #: Longest ring [s], shortest one [s], and loudness over the noise at which it ends.
-_LONGEST, _SHORTEST, _END = 0.6, 2.5e-3, 1.5
+_LONGEST, _SHORTEST, _END = 0.6, 3.5e-3, 1.5
 #: Starts that are tried, after the loudest moment [s]: the hit itself lasts some tenths of a millisecond, with a soft hammer more.
-_STARTS = (0.3e-3, 0.6e-3, 1.0e-3, 1.6e-3, 2.5e-3)
+_STARTS = (0.3e-3, 0.6e-3, 1.0e-3, 1.6e-3)
+#: Lengths of windows [s]; up to the one whole, beyond it in bands [Hz] around so many peaks.
+_WINDOWS, _WHOLE = (2e-3, 2.5e-3, 3.2e-3, 5e-3, 8e-3, 12e-3, 20e-3, 40e-3, 80e-3, 160e-3, 320e-3), 20e-3
+_BAND, _PEAKS = 600.0, 6
+#: Orders of the subspace: of the whole signal, and of a band.
+_ORDERS, _ZOOMED = (8, 12, 16, 20, 24), (2, 3, 4, 6)
+#: Decays over a window's length between which a pole is told by it: where a ring has died, reflections are what is left.
+_SHORT, _LONG = 0.7, 3.0
 #: Share of a ring's energy that has to be over after half of it: what rings dies away, what speaks or hums goes on.
 _DIES = 0.8
-#: Largest damping ratio, and smallest decay in a ring's length: what hardly decays is a steady tone.
-_MOST_DAMPED, _STEADY = 0.2, 0.25
+#: Largest damping ratio.
+_MOST_DAMPED = 0.2
+#: Poles are one within this share of the frequency, or this share of its damping ratio, and this difference of the damping's logarithm.
+_SAME, _SAME_DAMPED, _SAME_DAMPING = 0.002, 0.4, 0.5
+#: In how many windows, starts and orders a mode comes again, on the average of its hits.
+_AGAIN = 5
+#: Standard deviation over the median of absolute differences; factor of a hit that stands alone; variance of windows that remains.
+_MAD, _ONCE, _REFLECTED = 1.48, 1.5, 0.3
 #: What is kept: standard deviations of the frequency, and of the damping ratio, as shares.
 _SURE, _SURE_DAMPING = 0.02, 0.5
-#: Lines of two hits are one within this share, or so many standard deviations.
-_SAME, _SAME_STD = 0.008, 3.0
-#: Factor on the standard deviation of what was heard once: nothing shows how it scatters.
-_ONCE = 2.0
 #: Least standard deviations, as shares: of frequency (recorders' clocks) and of damping.
 _LEAST, _LEAST_DAMPING = 2e-5, 0.01
-#: Lines below the loudest one that are still heard.
-_FAINT = 3e-3
+#: Modes fainter than this share of the loudest one, and more than so many, are not told.
+_FAINT, _MOST_MODES = 3e-3, 12
+#: A mode so many times louder, within this difference of the frequency's logarithm, makes ghosts of those beside it.
+_GHOSTS = ((4.0, 0.03), (10.0, 0.15), (40.0, 0.5))
+#: Damping ratios of a mode within which no fainter one can be told apart from it.
+_WIDTH = 1.5
+#: Power over the noise of a tone in front of a hit, and the damping below which a mode at it is that tone.
+_TONE, _STEADY = 100.0, 5e-4
 #: Change of the noise's loudness after a ring that shows a gain control, as a share.
 _GAIN = 0.25
 
@@ -110,11 +125,11 @@ class _Ring:
 
     samples: FloatArray
     rate: float
-    peak: int
-    """Sample of the loudest moment."""
     noise: float
     after: float
     """Loudness of the noise before and of what is left behind the ring."""
+    before: FloatArray
+    """Quiet in front of the hit."""
 
 
 def ring_down(recordings: Sequence[tuple[float, FloatArray]], lossy: bool = False) -> RingDown:
@@ -159,13 +174,18 @@ def ring_down(recordings: Sequence[tuple[float, FloatArray]], lossy: bool = Fals
         rings += _rings(sound, rate, loudness, loudest)
     if not rings:
         raise InputError("recording", "no hit", "a quiet moment, a hit, and what rings after it")
-    both = [fits for fits in (_fitted(ring) for ring in rings) if fits is not None]
-    fits = [fit for fit, _ in both]
-    modes = _combined(fits)
+    highest = _HEARD * min(rate for rate, _ in recordings)
+    steady = _steady_tones(rings, highest)
+    modes = tuple(mode for mode in _combined(rings, highest) if not _is_steady(mode, steady))
     if not modes:
         raise InputError("recording", f"{_count(len(rings))} after which nothing rings down", "the ring of a thing that hangs free")
     doubt = "lossy compression does not keep decays" if lossy else _gain_control(rings)
-    return RingDown(modes, len(fits), _steady_tones([tones for _, tones in both]), doubt, 2.0 * np.pi * _HEARD * min(rate for rate, _ in recordings))
+    return RingDown(modes, len(rings), steady, doubt, 2.0 * np.pi * highest)
+
+
+def _is_steady(mode: RingingMode, tones: Sequence[float]) -> bool:
+    """Whether a mode is a tone that was there before: such a one hardly decays."""
+    return mode.damping < _STEADY and any(abs(mode.omega - tone) < _SAME * tone for tone in tones)
 
 
 def _count(hits: int) -> str:
@@ -232,89 +252,131 @@ def _ring(sound: FloatArray, rate: float, loudness: FloatArray, onset: int, foll
         return None
     behind = loudness[end + 3 : min(end + int(_QUIET / _STEP), following - 2)]
     after = float(np.median(behind)) if behind.size >= 10 and over.size else noise
-    return _Ring(samples, rate, 0, noise, after)
+    quiet_from = max(0, onset - int(_QUIET / _STEP))
+    return _Ring(samples, rate, noise, after, sound[quiet_from * width : (onset - 1) * width])
 
 
-def _fitted(ring: _Ring) -> tuple[Fit, Fit] | None:
-    """What rings down and what goes on, of several starts behind the hit after that which tells the loudest mode best."""
-    starts = [start for start in (int(t * ring.rate) for t in _STARTS) if ring.samples.size - start >= 0.8 * _SHORTEST * ring.rate]
-    if not starts:
+class _Pole(NamedTuple):
+    """A pole of one hit in one window."""
+
+    omega: float
+    damping: float
+    amplitude: float
+    hit: int
+    window: int
+
+
+def _poles(ring: _Ring, hit: int, highest: float) -> list[_Pole]:
+    """Poles of a ring in windows of many lengths, at several starts and orders: what is real comes again."""
+    found: list[_Pole] = []
+    for start in _STARTS:
+        samples = ring.samples[int(start * ring.rate) :]
+        for k, length in enumerate(_WINDOWS):
+            count = int(length * ring.rate)
+            if samples.size < 0.8 * count:
+                break
+            part = samples[:count]
+            if length <= _WHOLE:
+                bands = [(part, ring.rate, 0.0)]
+            elif start == _STARTS[1]:
+                tops = peaks(part, ring.rate, LOWEST, highest, _BAND, _PEAKS)
+                bands = [(*zoomed(part, ring.rate, centre, _BAND), centre) for centre in tops]
+            else:
+                continue
+            for signal, rate, centre in bands:
+                if signal.size < 16 or not np.any(signal):
+                    continue
+                orders = _ORDERS if centre == 0.0 else _ZOOMED
+                space = Subspace(signal, orders[-1])
+                for order in orders:
+                    poles, amplitudes = space.exponentials(order, rate)
+                    poles = poles + 2j * np.pi * centre
+                    for pole, amplitude in zip(poles, amplitudes, strict=True):
+                        inside = 2.0 * np.pi * LOWEST < pole.imag < 2.0 * np.pi * highest
+                        if centre and abs(pole.imag - 2.0 * np.pi * centre) > 0.8 * np.pi * _BAND:
+                            continue
+                        decays = _SHORT < -pole.real * length < _LONG
+                        if inside and decays and -pole.real < _MOST_DAMPED * abs(pole):
+                            found.append(_Pole(float(abs(pole)), float(-pole.real / abs(pole)), float(amplitude), hit, k))
+    return found
+
+
+def _combined(rings: Sequence[_Ring], highest: float) -> tuple[RingingMode, ...]:
+    """The modes that most of the hits have in common, each where poles of many windows gather."""
+    poles = [pole for hit, ring in enumerate(rings) for pole in _poles(ring, hit, highest)]
+    modes: list[RingingMode] = []
+    left = sorted(poles, key=lambda pole: pole.omega)
+    while left:
+        omega = np.log([pole.omega for pole in left])
+        damping = np.log([pole.damping for pole in left])
+        size = np.array([pole.amplitude for pole in left])
+        # the densest place, loud poles counting more
+        reach = np.maximum(_SAME, _SAME_DAMPED * np.exp(damping))
+        near = np.array([np.sum(size[(np.abs(omega - w) < r) & (np.abs(damping - d) < _SAME_DAMPING)]) for w, d, r in zip(omega, damping, reach, strict=True)])
+        centre = int(np.argmax(near))
+        inside = (np.abs(omega - omega[centre]) < reach[centre]) & (np.abs(damping - damping[centre]) < _SAME_DAMPING)
+        mode = _mode([pole for pole, chosen in zip(left, inside, strict=True) if chosen], len(rings))
+        if mode is not None:
+            modes.append(mode)
+        # what lies about a mode is that mode seen badly
+        gone = np.abs(omega - omega[centre]) < (reach[centre] if mode is not None else 0.0)
+        left = [pole for pole, away in zip(left, gone | inside, strict=True) if not away]
+        if len(modes) == _MOST_MODES:
+            break
+    loudest = max((mode.level for mode in modes), default=1.0)
+    kept = [replace(mode, level=mode.level / loudest) for mode in modes if mode.level > _FAINT * loudest and not _is_ghost(mode, modes)]
+    return tuple(sorted(kept, key=lambda mode: mode.omega))
+
+
+def _is_ghost(mode: RingingMode, modes: Sequence[RingingMode]) -> bool:
+    """Whether a mode is what reflections make of a much louder one beside it, or lies within the width of a louder one."""
+    return any(
+        other.level > over * mode.level and abs(np.log(other.omega / mode.omega)) < apart
+        for other in modes
+        for over, apart in (*_GHOSTS, (1.0, _WIDTH * other.damping))
+    )
+
+
+def _mode(poles: Sequence[_Pole], hits: int) -> RingingMode | None:
+    """A mode of poles that gather; None where they are few."""
+    heard = sorted({pole.hit for pole in poles})
+    if 2 * len(heard) < hits or len(poles) < _AGAIN * len(heard):
         return None
-    # poles are the same wherever one starts
-    poles = esprit(ring.samples[starts[min(1, len(starts) - 1)] :], ring.rate, LOWEST, _HEARD * ring.rate)
-    if not poles.size:
+    middles, inner = [], []
+    for hit in heard:
+        own = np.array([(np.log(pole.omega), np.log(pole.damping)) for pole in poles if pole.hit == hit])
+        middles.append(np.median(own, axis=0))
+        inner.append(_MAD * np.median(np.abs(own - middles[-1]), axis=0) if len(own) > 2 else np.full(2, np.nan))
+    middle = np.median(middles, axis=0)
+    within = np.nan_to_num(np.nanmedian(inner, axis=0)) if np.isfinite(inner).any() else np.zeros(2)
+    between = np.std(middles, axis=0, ddof=1) if len(heard) > 1 else _ONCE * within
+    # windows and starts see other reflections: that does not average out over hits
+    std = np.sqrt(_REFLECTED * within**2 + between**2 / len(heard))
+    omega, damping = (float(value) for value in np.exp(middle))
+    w_std, z_std = float(np.hypot(std[0], _LEAST)), float(np.hypot(std[1], _LEAST_DAMPING))
+    if w_std > _SURE or z_std > _SURE_DAMPING:
         return None
-    fits = [refined(ring.samples[start:], ring.rate, poles, ring.noise) for start in starts]
-    # the loudest mode says how good a start is
-    scores = []
-    for fit, start in zip(fits, starts, strict=True):
-        ringing = _decaying(fit, (ring.samples.size - start) / ring.rate)
-        loud = np.argmax(np.where(ringing, fit.amplitude, -1.0))
-        scores.append(fit.std[loud] / np.abs(fit.pole[loud]) if ringing.any() else np.inf)
-    best = int(np.argmin(scores))
-    if not np.isfinite(scores[best]):
-        return None
-    fit, duration = fits[best], (ring.samples.size - starts[best]) / ring.rate
-    return fit.chosen(_decaying(fit, duration)), fit.chosen(_going_on(fit, duration, ring.noise))
+    level = float(np.median([pole.amplitude for pole in poles]))
+    return RingingMode(omega, omega * w_std, damping, damping * z_std, level, len(heard))
 
 
-def _decaying(fit: Fit, duration: float) -> np.ndarray:
-    """Which exponentials ring down: known well enough, neither steady nor dead."""
-    omega, decay = np.abs(fit.pole), -fit.pole.real
-    damping = decay / omega
-    sure = (fit.std < _SURE * omega) & (fit.std < _SURE_DAMPING * decay)
-    return np.asarray(sure & (damping < _MOST_DAMPED) & (decay * duration > _STEADY) & (fit.amplitude > _FAINT * fit.amplitude.max()))
-
-
-def _going_on(fit: Fit, duration: float, noise: float) -> np.ndarray:
-    """Which exponentials are steady tones above the noise."""
-    return np.asarray((-fit.pole.real * duration < _STEADY) & (fit.amplitude > noise) & (fit.std < _SURE * np.abs(fit.pole)))
-
-
-def _steady_tones(fits: Sequence[Fit]) -> tuple[float, ...]:
-    """Frequencies of tones that most of the hits have in common [rad/s]."""
-    tones = np.sort(np.concatenate([fit.pole.imag for fit in fits]))
+def _steady_tones(rings: Sequence[_Ring], highest: float) -> tuple[float, ...]:
+    """Frequencies of tones that were there before most of the hits [rad/s]."""
+    tones = np.sort([f for ring in rings if ring.before.size > 256 for f in _tones(ring.before, ring.rate, highest)])
+    if not tones.size:
+        return ()
     groups = np.split(tones, np.flatnonzero(np.diff(tones) > _SAME * tones[1:]) + 1)
-    return tuple(float(np.median(group)) for group in groups if 2 * group.size >= max(len(fits), 2))
+    return tuple(float(2.0 * np.pi * np.median(group)) for group in groups if 2 * group.size >= max(len(rings), 2))
 
 
-def _combined(fits: Sequence[Fit]) -> tuple[RingingMode, ...]:
-    """The modes that most of the hits have in common."""
-    lines = [(float(np.abs(s)), float(-s.real / np.abs(s)), float(d / np.abs(s)), float(a), k)
-             for k, fit in enumerate(fits) for s, d, a in zip(fit.pole, fit.std, fit.amplitude / fit.amplitude.max(), strict=True)]  # fmt: skip
-    lines.sort()
-    groups: list[list[tuple[float, float, float, float, int]]] = []
-    for line in lines:
-        near = None
-        if groups:
-            middle = float(np.median([each[0] for each in groups[-1]]))
-            reach = max(_SAME, _SAME_STD * min(line[2], 0.01))
-            # two lines of one hit are two modes
-            near = line[0] <= (1.0 + reach) * middle and all(each[4] != line[4] for each in groups[-1])
-        (groups[-1].append(line) if near else groups.append([line]))
-    needed = max(1, -(-len(fits) // 2))
-    modes = []
-    for group in groups:
-        if len(group) < needed:
-            continue
-        omega, damping, std, level, _ = (np.array(column) for column in zip(*group, strict=True))
-        w, w_std = _mean(omega, std * omega, _LEAST * omega.mean())
-        z, z_std = _mean(damping, std, _LEAST_DAMPING * float(np.median(damping)))
-        if z_std < _SURE_DAMPING * z:
-            modes.append(RingingMode(w, w_std, z, z_std, float(np.median(level)), len(group)))
-    return tuple(modes)
-
-
-def _mean(values: FloatArray, std: FloatArray, least: float) -> tuple[float, float]:
-    """Mean of values that scatter beyond their standard deviations [dersimonian1986], and its standard deviation."""
-    if values.size == 1:
-        return float(values[0]), float(np.hypot(_ONCE * std[0], least))
-    weight = 1.0 / std**2
-    middle = np.sum(weight * values) / np.sum(weight)
-    excess = np.sum(weight * (values - middle) ** 2) - (values.size - 1)
-    between = max(0.0, excess / (np.sum(weight) - np.sum(weight**2) / np.sum(weight)))
-    weight = 1.0 / (std**2 + between)
-    return float(np.sum(weight * values) / np.sum(weight)), float(np.hypot(1.0 / np.sqrt(np.sum(weight)), least))
+def _tones(before: FloatArray, rate: float, highest: float) -> list[float]:
+    """Lines that stand out of the noise in front of a hit [Hz]."""
+    power = np.abs(np.fft.rfft(before * np.hanning(before.size))) ** 2
+    frequency = np.fft.rfftfreq(before.size, 1.0 / rate)
+    inside = (frequency > LOWEST) & (frequency < highest)
+    floor = np.median(power[inside])
+    return [float(f) for f, p, left, right in zip(frequency[1:-1], power[1:-1], power[:-2], power[2:], strict=True)
+            if p > _TONE * floor and p >= left and p >= right and LOWEST < f < highest]  # fmt: skip
 
 
 def _gain_control(rings: Sequence[_Ring]) -> str:
