@@ -80,14 +80,22 @@ def main(arguments: list[str] | None = None) -> None:
     rows, names = [], ("drawn", "rung", "bare, rung", "bare, rung, weighed")
     with tempfile.TemporaryDirectory() as folder, threadpool_limits(1):
         machine = read_machine(random_machine(MACHINE, Path(folder)))
-        print(f"{'tooling':24s}{'seed':>6s}" + "".join(f"{name:>20s}" for name in names) + "   band   true-found/std: d_flute, E, k_t, k_r, c_t, c_r")
+        print(
+            f"{'tooling':24s}{'seed':>6s}"
+            + "".join(f"{name:>20s}" for name in names)
+            + "   band   true-found/std: d_flute, E, k_t, k_r, c_t, c_r"
+        )
         for name, taper in CASES:
             for seed in range(asked.first_seed, asked.first_seed + asked.seeds):
                 row = _case(machine, name, taper, seed, asked.draws, Room(gain_control=asked.gain_control))
                 if row is not None:
                     rows.append(row)
     table = np.array(rows)
-    print(f"{'median':30s}" + "".join(f"{value:20.3f}" for value in np.median(table, axis=0)[:4]) + f"{np.nanmean(table[:, 4]) if asked.draws else np.nan:7.2f}")
+    print(
+        f"{'median':30s}"
+        + "".join(f"{value:20.3f}" for value in np.median(table, axis=0)[:4])
+        + f"{np.nanmean(table[:, 4]) if asked.draws else np.nan:7.2f}"
+    )
     print(f"{'largest':30s}" + "".join(f"{value:20.3f}" for value in np.max(table, axis=0)[:4]))
 
 
@@ -113,10 +121,29 @@ def _case(machine: MachineFile, name: str, taper: str, seed: int, draws: int, ro
     band = coverage(machine, answers[-1], right, rng, draws) if draws else np.nan
     unknowns = _unknowns(drawn, true)
     away = (answers[-1].mean - unknowns) / np.where(std > 0.0, answers[-1].std, 1.0)
-    chosen = [UNKNOWNS.index(each) for each in ("fluted_diameter", "youngs_modulus", "translational_stiffness", "rotational_stiffness", "translational_damping", "rotational_damping")]
+    chosen = [
+        UNKNOWNS.index(each)
+        for each in (
+            "fluted_diameter",
+            "youngs_modulus",
+            "translational_stiffness",
+            "rotational_stiffness",
+            "translational_damping",
+            "rotational_damping",
+        )
+    ]
     doubt = f"  ({heard.damping_doubt})" if heard.damping_doubt else ""
     matched = [str(each.mode) if each.mode else "?" for each in answers[-1].lines]
-    print(line + "".join(f"{value:20.3f}" for value in errors) + f"{band:7.2f}   " + " ".join(f"{away[i]:5.1f}" for i in chosen) + f" p={answers[-1].probability:.2g} " + ",".join(matched) + doubt, flush=True)
+    print(
+        line
+        + "".join(f"{value:20.3f}" for value in errors)
+        + f"{band:7.2f}   "
+        + " ".join(f"{away[i]:5.1f}" for i in chosen)
+        + f" p={answers[-1].probability:.2g} "
+        + ",".join(matched)
+        + doubt,
+        flush=True,
+    )
     return [*errors, band]
 
 

@@ -137,9 +137,9 @@ def sound(body: ToolAssembly, rng: np.random.Generator, hits: int = 5, room: Roo
     return np.asarray(np.round(0.8 * 32767.0 * signal / np.max(np.abs(signal))) / 32768.0)
 
 
-def true_modes(body: ToolAssembly, count: int = 6) -> np.ndarray:
-    """Return the poles of its bending modes, shape (count,) [1/s]."""
-    return damped_poles(_structure(body), count)
+def true_modes(body: ToolAssembly) -> np.ndarray:
+    """Return the poles of its bending modes, in ascending order [1/s]."""
+    return damped_poles(_structure(body), 24e3)
 
 
 def _structure(body: ToolAssembly) -> Structure:

@@ -13,10 +13,13 @@ from rcsa_ident.errors import InputError
 
 @answers
 def ring(
-    tooling: Annotated[Path, typer.Argument(help="TOOLING.toml as drawn; [holder] taper tells what hangs behind the flange.", show_default=False)],
+    tooling: Annotated[
+        Path, typer.Argument(help="TOOLING.toml as drawn; [holder] taper tells what hangs behind the flange.", show_default=False)
+    ],
     out: Annotated[Path, typer.Option(help="Tooling file to write, with what was learned.", show_default=False)],
     sounds: Annotated[
-        list[Path] | None, typer.Argument(help="Sound of the tooling on a string, tapped: one with several hits, or several.", show_default=False)
+        list[Path] | None,
+        typer.Argument(help="Sound of the tooling on a string, tapped: one with several hits, or several.", show_default=False),
     ] = None,
     bare_tool: Annotated[
         list[Path] | None, typer.Option(help="Sound of the tool alone, tapped; more than once for several.", show_default=False)

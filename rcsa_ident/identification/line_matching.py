@@ -106,7 +106,9 @@ def gathered(lines: Sequence[RingingMode], teeth: int) -> tuple[Heard, ...]:
         else:
             found.append(one)
     if teeth <= 2:
-        found = [each if each.split else replace(each, omega_std=float(np.hypot(each.omega_std, _ONE_PLANE * each.omega))) for each in found]
+        found = [
+            each if each.split else replace(each, omega_std=float(np.hypot(each.omega_std, _ONE_PLANE * each.omega))) for each in found
+        ]
     return tuple(found)
 
 
@@ -160,7 +162,9 @@ def _unheard(predicted: Predicted, place: int) -> float:
 def _elsewhere(line: Heard, rods: Sequence[FreeMode], reach: float, damping: bool) -> tuple[float, int | None]:
     """Cost of a line that is no bending mode, and which of the rods' modes it is."""
     anywhere = _ANYWHERE * (2.0 if damping else 1.0)
-    costs = [(_log_density(np.log(line.omega / rod.omega), reach) + (_ANYWHERE if damping else 0.0) + _UNHEARD, i) for i, rod in enumerate(rods)]
+    costs = [
+        (_log_density(np.log(line.omega / rod.omega), reach) + (_ANYWHERE if damping else 0.0) + _UNHEARD, i) for i, rod in enumerate(rods)
+    ]
     stranger: tuple[float, int | None] = (_STRANGER + anywhere, None)
     return min([stranger, *costs], key=lambda each: each[0])
 

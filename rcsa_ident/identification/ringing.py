@@ -45,6 +45,8 @@ _MASS_STD, ANOTHER, SUSPECT = 5.0, 1e-4, 0.02
 _MODES, _STEPS = 5, 8
 #: Frequencies up to which lines are matched [Hz]: above, a chuck's modes are dead, and its drawing is too coarse.
 _HIGHEST, _HIGHEST_BARE = 12e3, 25e3
+#: Modes are computed so many times farther: those below move with the unknowns.
+_MARGIN = 1.5
 _STEP = 0.05
 _PER_GROUP = {
     "stickout": "stickout", "fluted_length": "segment_length", "fluted_diameter": "fluted_diameter", "youngs_modulus": "youngs_modulus",
@@ -193,8 +195,12 @@ def learned(tooling: Tooling, heard: RingDown | None, bare_tool: RingDown | None
     mean, covariance, misfit = _posterior(observed, prior, free)
     probability = float(scipy.stats.chi2.sf(misfit, sum(each.value.size for each in observed)))
     if probability < ANOTHER:
-        names = ", ".join(f"{to_hz(line.heard.omega):.0f} Hz" for line in lines if line.mode is not None and line.mode.motion is Motion.BENDING)
-        raise InputError("recording", f"{names or 'a mass'}, which this drawing within its spread does not give", "the ring of this very tooling")
+        names = ", ".join(
+            f"{to_hz(line.heard.omega):.0f} Hz" for line in lines if line.mode is not None and line.mode.motion is Motion.BENDING
+        )
+        raise InputError(
+            "recording", f"{names or 'a mass'}, which this drawing within its spread does not give", "the ring of this very tooling"
+        )
     lines = [_after(line, tooling, mean) for line in lines]
     after = _after_ring(tooling, mean, prior, covariance)
     return RungTooling(tooling, after, tuple(lines), frozen(mean), frozen(prior), frozen(covariance), probability, tuple(remarks))
@@ -248,7 +254,7 @@ class _Body:
         return hung(_assembly(self.tooling.assembly, unknowns), self.tooling.taper)
 
     def modes(self, unknowns: FloatArray, count: int, highest: float) -> tuple[FreeMode, ...]:
-        return bending_modes(self.at(unknowns), count, 1.2 * highest)
+        return bending_modes(self.at(unknowns), count, _MARGIN * highest)
 
 
 def _match(
@@ -260,8 +266,10 @@ def _match(
     drawn = [mode for mode in body.modes(mean, _MODES, highest) if mode.omega < from_hz(highest)]
     what = "the tool alone" if body.bare else "this tooling"
     if not drawn:
-        first = to_hz(body.modes(mean, 1, 30e3)[0].omega)
-        raise InputError("sampling_rate_hz", f"{to_hz(heard.highest) / 0.45:.0f}", f"at least {first / 0.4:.0f} [Hz]: {what} rings at {first:.0f} Hz")
+        first = to_hz(body.modes(mean, 1, 20e3)[0].omega)
+        raise InputError(
+            "sampling_rate_hz", f"{to_hz(heard.highest) / 0.45:.0f}", f"at least {first / 0.4:.0f} [Hz]: {what} rings at {first:.0f} Hz"
+        )
     predict = _frequencies_and_damping(body, len(drawn), highest)
     jacobian = _jacobian(predict, mean, prior, free)
     spread = jacobian @ covariance[np.ix_(free, free)] @ jacobian.T
@@ -387,7 +395,7 @@ def _posterior(observed: Sequence[_Observed], prior: FloatArray, free: np.ndarra
 def _after(line: RungLine, tooling: Tooling, mean: FloatArray) -> RungLine:
     if line.mode is None or line.mode.motion is not Motion.BENDING:
         return line
-    mode = _Body(tooling, line.bare).modes(mean, line.mode.order, 1.2 * to_hz(line.mode.omega))[-1]
+    mode = _Body(tooling, line.bare).modes(mean, line.mode.order, to_hz(line.mode.omega))[-1]
     return replace(line, after=mode.omega, damping_after=mode.damping)
 
 

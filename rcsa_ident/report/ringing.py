@@ -155,7 +155,11 @@ def ring_figure(found: RungTooling) -> Figure:
         rows = np.arange(len(free))
         bottom.barh(rows, 2.0, left=-1.0, height=0.7, color=_PRIOR, alpha=0.35, label="believed before, ± 1 standard deviation")
         bottom.errorbar(share, rows, xerr=left, fmt="o", color=_AFTER, capsize=3, label="after")
-        bottom.set(yticks=rows, yticklabels=[UNKNOWNS[i].replace("_", " ") for i in free], xlabel="difference from the drawing [its standard deviations]")
+        bottom.set(
+            yticks=rows,
+            yticklabels=[UNKNOWNS[i].replace("_", " ") for i in free],
+            xlabel="difference from the drawing [its standard deviations]",
+        )
         bottom.invert_yaxis()
         bottom.legend(loc="best")
     return figure

@@ -29,6 +29,8 @@ _STEP, _RISE = 1e-3, 4.0
 _OVER_QUIET, _OVER_LOUDEST = 8.0, 0.02
 #: Quiet before a hit in which the noise is heard [s], and time in which a further onset is a second hit [s].
 _QUIET, _APART = 0.05, 0.04
+#: More onsets than this within twice that quiet are speech or clatter: nobody taps so fast.
+_CLATTER = 3
 #: Longest ring [s], shortest one [s], and loudness over the noise at which it ends.
 _LONGEST, _SHORTEST, _END = 0.6, 3.5e-3, 1.5
 #: Starts that are tried, after the loudest moment [s]: the hit itself lasts some tenths of a millisecond, with a soft hammer more.
@@ -46,8 +48,8 @@ _DIES = 0.8
 _MOST_DAMPED = 0.2
 #: Poles are one within this share of the frequency, or this share of its damping ratio, and this difference of the damping's logarithm.
 _SAME, _SAME_DAMPED, _SAME_DAMPING = 0.002, 0.4, 0.5
-#: In how many windows, starts and orders a mode comes again, on the average of its hits.
-_AGAIN = 5
+#: In how many windows, starts and orders a mode comes again, on the average of its hits, and at how many starts.
+_AGAIN, _OFTEN = 5, 3
 #: Standard deviation over the median of absolute differences; factor of a hit that stands alone; variance of windows that remains.
 _MAD, _ONCE, _REFLECTED = 1.48, 1.5, 0.3
 #: What is kept: standard deviations of the frequency, and of the damping ratio, as shares.
@@ -226,6 +228,8 @@ def _rings(sound: FloatArray, rate: float, loudness: FloatArray, loudest: float)
     rings = []
     for k, onset in enumerate(onsets):
         following = onsets[k + 1] if k + 1 < len(onsets) else loudness.size
+        if sum(abs(other - onset) < 2 * before for other in onsets) > _CLATTER:
+            continue
         if following - onset <= 2 or (k and onset - onsets[k - 1] < apart and loudness[onset] < loudness[onsets[k - 1]]):
             continue
         ring = _ring(sound, rate, loudness, onset, following, width)
@@ -257,13 +261,13 @@ def _ring(sound: FloatArray, rate: float, loudness: FloatArray, onset: int, foll
 
 
 class _Pole(NamedTuple):
-    """A pole of one hit in one window."""
+    """A pole of one hit in one window, and where that starts [s]."""
 
     omega: float
     damping: float
     amplitude: float
     hit: int
-    window: int
+    start: float
 
 
 def _poles(ring: _Ring, hit: int, highest: float) -> list[_Pole]:
@@ -271,14 +275,14 @@ def _poles(ring: _Ring, hit: int, highest: float) -> list[_Pole]:
     found: list[_Pole] = []
     for start in _STARTS:
         samples = ring.samples[int(start * ring.rate) :]
-        for k, length in enumerate(_WINDOWS):
+        for length in _WINDOWS:
             count = int(length * ring.rate)
             if samples.size < 0.8 * count:
                 break
             part = samples[:count]
             if length <= _WHOLE:
                 bands = [(part, ring.rate, 0.0)]
-            elif start == _STARTS[1]:
+            elif start != _STARTS[0]:
                 tops = peaks(part, ring.rate, LOWEST, highest, _BAND, _PEAKS)
                 bands = [(*zoomed(part, ring.rate, centre, _BAND), centre) for centre in tops]
             else:
@@ -297,7 +301,7 @@ def _poles(ring: _Ring, hit: int, highest: float) -> list[_Pole]:
                             continue
                         decays = _SHORT < -pole.real * length < _LONG
                         if inside and decays and -pole.real < _MOST_DAMPED * abs(pole):
-                            found.append(_Pole(float(abs(pole)), float(-pole.real / abs(pole)), float(amplitude), hit, k))
+                            found.append(_Pole(float(abs(pole)), float(-pole.real / abs(pole)), float(amplitude), hit, start))
     return found
 
 
@@ -312,7 +316,12 @@ def _combined(rings: Sequence[_Ring], highest: float) -> tuple[RingingMode, ...]
         size = np.array([pole.amplitude for pole in left])
         # the densest place, loud poles counting more
         reach = np.maximum(_SAME, _SAME_DAMPED * np.exp(damping))
-        near = np.array([np.sum(size[(np.abs(omega - w) < r) & (np.abs(damping - d) < _SAME_DAMPING)]) for w, d, r in zip(omega, damping, reach, strict=True)])
+        near = np.array(
+            [
+                np.sum(size[(np.abs(omega - w) < r) & (np.abs(damping - d) < _SAME_DAMPING)])
+                for w, d, r in zip(omega, damping, reach, strict=True)
+            ]
+        )
         centre = int(np.argmax(near))
         inside = (np.abs(omega - omega[centre]) < reach[centre]) & (np.abs(damping - damping[centre]) < _SAME_DAMPING)
         mode = _mode([pole for pole, chosen in zip(left, inside, strict=True) if chosen], len(rings))
@@ -340,7 +349,7 @@ def _is_ghost(mode: RingingMode, modes: Sequence[RingingMode]) -> bool:
 def _mode(poles: Sequence[_Pole], hits: int) -> RingingMode | None:
     """A mode of poles that gather; None where they are few."""
     heard = sorted({pole.hit for pole in poles})
-    if 2 * len(heard) < hits or len(poles) < _AGAIN * len(heard):
+    if 2 * len(heard) < hits or len(poles) < _AGAIN * len(heard) or len({pole.start for pole in poles}) < _OFTEN:
         return None
     middles, inner = [], []
     for hit in heard:

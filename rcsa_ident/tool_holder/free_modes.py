@@ -8,21 +8,13 @@ from enum import StrEnum
 
 import numpy as np
 import scipy.linalg
-import scipy.sparse
-import scipy.sparse.linalg
 
 from rcsa_ident.arrays import FloatArray
-from rcsa_ident.dynamics.structure import Structure
+from rcsa_ident.dynamics.structure import Structure, poles
 from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
-from rcsa_ident.tool_holder.model import free_body
+from rcsa_ident.tool_holder.model import tool_holder_structure
 from rcsa_ident.tool_holder.timoshenko import ShearCoefficient, cowper
 
-#: Rigid-body motions of a plane: they are no modes.
-_RIGID = 2
-#: Undamped modes that the damped ones are made of, beyond those that are asked for.
-_MORE = 6
-#: Shift of the eigenvalues [1/s^2], small beside those of all modes.
-_SHIFT = 1e6
 #: Longest element of a rod [m].
 _ELEMENT = 2e-3
 
@@ -60,9 +52,7 @@ class FreeMode:
 
 
 def bending_modes(body: ToolAssembly, count: int, highest: float, shear_coefficient: ShearCoefficient = cowper) -> tuple[FreeMode, ...]:
-    """Return the first bending modes of a free tool-holder, in ascending order.
-
-    The undamped modes carry the damped ones: the projected quadratic problem with contact damping and loss factors is solved exactly.
+    """Return the first bending modes of a free tool-holder, in ascending order, fewer where fewer are below the highest frequency.
 
     Parameters
     ----------
@@ -70,7 +60,7 @@ def bending_modes(body: ToolAssembly, count: int, highest: float, shear_coeffici
         With what hangs behind its flange, see `rcsa_ident.tool_holder.taper.hung`; of a tool alone see `bare`.
     count : int
     highest : float [Hz]
-        The mesh is chosen for it.
+        The mesh is chosen for it, and modes end there.
     shear_coefficient : callable
         As in `rcsa_ident.tool_holder.model.tool_holder_structure`.
 
@@ -83,35 +73,25 @@ def bending_modes(body: ToolAssembly, count: int, highest: float, shear_coeffici
     >>> round(bending_modes(rod, 1, 5000.0)[0].omega / (2 * np.pi))
     1130
     """
-    poles = damped_poles(free_body(body, highest, shear_coefficient=shear_coefficient).structure, count)
-    return tuple(FreeMode(Motion.BENDING, k + 1, abs(pole), float(-pole.real / abs(pole))) for k, pole in enumerate(poles))
+    structure = tool_holder_structure(body, highest, shear_coefficient=shear_coefficient)
+    found = damped_poles(structure, highest)[:count]
+    return tuple(FreeMode(Motion.BENDING, k + 1, abs(pole), float(-pole.real / abs(pole))) for k, pole in enumerate(found))
 
 
-def damped_poles(structure: Structure, count: int) -> np.ndarray:
-    """Return the poles of a free structure's first modes above the rigid-body ones, shape (count,) [1/s].
+def damped_poles(structure: Structure, highest: float) -> np.ndarray:
+    """Return the poles of a free structure above its rigid-body motions, in ascending order [1/s].
 
     Parameters
     ----------
     structure : Structure
         Of one bending plane.
-    count : int
+    highest : float [Hz]
     """
-    stiffness, mass = (scipy.sparse.csc_array(matrix) for matrix in (structure.stiffness, structure.mass))
-    size = stiffness.shape[0]
-    # a shift below zero keeps the rigid-body motions apart, and a start of its own every run the same
-    squares, shapes = scipy.sparse.linalg.eigsh(stiffness, _RIGID + count + _MORE, mass, sigma=-_SHIFT, v0=np.cos(np.arange(size)))
-    order = np.argsort(squares)[_RIGID:]
-    shapes, squares = shapes[:, order], squares[order]
-    damping, loss = (shapes.T @ matrix @ shapes for matrix in (structure.damping, structure.structural_damping))
-    m = squares.size
-    state = np.zeros((2 * m, 2 * m), dtype=complex)
-    state[:m, m:] = np.eye(m)
-    state[m:, :m] = -(np.diag(squares) + 1j * loss)
-    state[m:, m:] = -damping
-    # the loss factor's sign holds for positive frequencies only
-    poles = np.linalg.eigvals(state)
-    poles = poles[poles.imag > 0.0]
-    return np.asarray(poles[np.argsort(np.abs(poles))][:count])
+    omega = 2.0 * np.pi * highest
+    found = poles(structure, omega).pole
+    # rigid-body motions stand as pairs at a ten-millionth of the highest frequency
+    found = found[(found.imag > 1e-3 * omega) & (np.abs(found) <= omega)]
+    return np.asarray(found[np.argsort(np.abs(found))])
 
 
 def bare(tool: Sequence[BeamSegment]) -> ToolAssembly:
