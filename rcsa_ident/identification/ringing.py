@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg
 import scipy.stats
 
 from rcsa_ident.arrays import FloatArray, frozen
@@ -266,9 +265,9 @@ def _match(
     drawn = [mode for mode in body.modes(mean, _MODES, highest) if mode.omega < from_hz(highest)]
     what = "the tool alone" if body.bare else "this tooling"
     if not drawn:
-        first = to_hz(body.modes(mean, 1, 20e3)[0].omega)
+        lowest = to_hz(body.modes(mean, 1, 20e3)[0].omega)
         raise InputError(
-            "sampling_rate_hz", f"{to_hz(heard.highest) / 0.45:.0f}", f"at least {first / 0.4:.0f} [Hz]: {what} rings at {first:.0f} Hz"
+            "sampling_rate_hz", f"{to_hz(heard.highest) / 0.45:.0f}", f"at least {lowest / 0.4:.0f} [Hz]: {what} rings at {lowest:.0f} Hz"
         )
     predict = _frequencies_and_damping(body, len(drawn), highest)
     jacobian = _jacobian(predict, mean, prior, free)

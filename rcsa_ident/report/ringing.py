@@ -42,7 +42,7 @@ class Change(NamedTuple):
     unit: str
 
     def __str__(self) -> str:
-        digits = max(0, 1 - int(np.floor(np.log10(self.after_std)))) if 0.0 < self.after_std < 100.0 else 0
+        digits = max(0, -int(np.floor(np.log10(self.after_std)))) if 0.0 < self.after_std < 100.0 else 0
         if max(abs(self.after), abs(self.before)) >= 1e5:
             return f"{self.what} {self.before:.3g} ± {self.before_std:.1g} → {self.after:.3g} ± {self.after_std:.1g} {self.unit}"
         return f"{self.what} {self.before:.{digits}f} ± {self.before_std:.1g} → {self.after:.{digits}f} ± {self.after_std:.1g} {self.unit}"
@@ -141,7 +141,8 @@ def ring_figure(found: RungTooling) -> Figure:
         top, bottom = figure.subplots(2, 1, height_ratios=(1.0, 2.0))
         figure.suptitle(f"{found.after.name}: what its ring tells", fontsize=11, fontweight="bold")
         for i, line in enumerate(known):
-            assert line.mode is not None and line.after is not None
+            assert line.mode is not None
+            assert line.after is not None
             away = 100.0 * np.log(np.array([line.mode.omega, line.after]) / line.heard.omega)
             top.plot(away[0], i, "o", color=_PRIOR, label="drawn" if i == 0 else None)
             top.plot(away[1], i, "o", color=_AFTER, label="learned" if i == 0 else None)

@@ -65,13 +65,20 @@ class Subspace:
         space = self.vectors[:, :order]
         if space.shape[1] < 1:
             return Exponentials(np.zeros(0, dtype=complex), np.zeros(0))
-        turn = np.linalg.eigvals(np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0])
+        # columns are orthonormal: without its last row the space's normal matrix is the identity less one dyad
+        last = space[-1]
+        shifted = space[:-1].conj().T @ space[1:]
+        shifted = shifted + np.outer(last.conj(), last @ shifted) / max(1.0 - float(np.vdot(last, last).real), 1e-12)
+        turn = np.linalg.eigvals(shifted)
         turn = turn[(np.abs(turn) > 0.2) & (np.abs(turn) < 1.02)]
         if not turn.size:
             return Exponentials(np.zeros(0, dtype=complex), np.zeros(0))
         waves = turn[None, :] ** np.arange(self.signal.size)[:, None]
-        weight = np.linalg.lstsq(waves, self.signal.astype(complex), rcond=1e-9)[0]
-        energy = np.sum(np.abs(waves) ** 2, axis=0) * np.abs(weight) ** 2
+        size = np.linalg.norm(waves, axis=0)
+        normal = (waves / size).conj().T @ (waves / size)
+        normal[np.diag_indices_from(normal)] += 1e-10
+        weight = np.linalg.solve(normal, (waves / size).conj().T @ self.signal) / size
+        energy = size**2 * np.abs(weight) ** 2
         strong = energy > _ENERGY * np.sum(np.abs(self.signal) ** 2)
         if np.isrealobj(self.signal):
             strong &= turn.imag > 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import pairwise
 
 import numpy as np
 import scipy.linalg
@@ -126,7 +127,7 @@ def rod_modes(body: ToolAssembly, motion: Motion, highest: float) -> tuple[FreeM
     """
     tool, holder = _rod(body.tool, motion), _rod(body.holder, motion)
     layered = body.contact is not None and body.insertion > 0.0
-    nose, end = body.stickout, body.tool_length
+    nose = body.stickout
     if not layered and body.insertion > 0.0:
         # rigid: nodes of both bodies at the same place move as one
         cuts = np.unique(np.round(np.concatenate([tool[0], nose + holder[0]]), 9))
@@ -153,7 +154,6 @@ def rod_modes(body: ToolAssembly, motion: Motion, highest: float) -> tuple[FreeM
         for z in inside:
             pair = np.ix_(*2 * ([number[0, round(z * 1e9)], number[1, round(beside[np.argmin(np.abs(beside - z))] * 1e9)]],))
             stiffness[pair] += spring * share * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    assert end > 0.0
     omega = np.sqrt(np.maximum(scipy.linalg.eigvalsh(stiffness, mass), 0.0))[1:]
     return tuple(FreeMode(motion, k + 1, float(w)) for k, w in enumerate(omega[omega <= 2.0 * np.pi * highest]))
 
@@ -166,7 +166,7 @@ def _rod(segments: Sequence[BeamSegment], motion: Motion, cuts: FloatArray | Non
         inner = np.linspace(0.0, segment.length, count + 1)
         if cuts is not None:
             inner = np.unique(np.round(np.concatenate([inner, [c - start for c in cuts if 0.0 < c - start < segment.length]]), 9))
-        pieces += [segment.part(a, b) for a, b in zip(inner[:-1], inner[1:], strict=True)]
+        pieces += [segment.part(a, b) for a, b in pairwise(inner)]
         edges += [start + b for b in inner[1:]]
         start += segment.length
     rigidity, inertia = np.array([_section(piece, motion) for piece in pieces]).T

@@ -1,4 +1,4 @@
-"""What rings tell of a tooling: truths drawn by the spreads, frequencies from finite elements of another kind, lines that are not its own."""
+"""What rings tell of a tooling: frequencies from finite elements of another kind, and lines that are not its own."""
 
 from __future__ import annotations
 
@@ -23,8 +23,14 @@ from rcsa_ident.units import from_hz, to_hz
 from tests.tool_holder.test_taper import slender
 
 HEARD = from_hz(21600.0)
-TRUE = Alteration(fluted_diameter=0.025, youngs_modulus=0.01, translational_stiffness=-0.35, rotational_stiffness=-0.3, translational_damping=0.6,
-                  rotational_damping=0.5)  # fmt: skip
+TRUE = Alteration(
+    fluted_diameter=0.025,
+    youngs_modulus=0.01,
+    translational_stiffness=-0.35,
+    rotational_stiffness=-0.3,
+    translational_damping=0.6,
+    rotational_damping=0.5,
+)
 
 
 def drawn(teeth=4, **spread):
