@@ -30,10 +30,11 @@ def ring(
     json_: Json = False,
 ) -> None:
     """Learn what a drawing does not tell from the ring of the tooling: hang it on a string, tap it, hold a phone beside it."""
+    from rcsa_ident.io.open_recording import open_recording
     from rcsa_ident.io.setups import read_tooling
     from rcsa_ident.io.toolings import tooling_keys, tooling_text, write_text
     from rcsa_ident.report.ringing import ring_row, sentences
-    from rcsa_ident.verbs import ring as learned
+    from rcsa_ident.workflows.ring import ring_tooling
 
     writable(out)
     if plot is not None:
@@ -42,7 +43,8 @@ def ring(
         raise InputError("--out", "the drawing itself", "another file: a drawing is not overwritten", str(out))
     with Stages(quiet=json_).stage("listening"):
         drawn = read_tooling(tooling)
-        found = learned(drawn, *(sounds or ()), bare_tool=bare_tool or (), mass=None if mass_g is None else 1e-3 * mass_g, rate=rate_hz)
+        heard, alone = ([open_recording(path, (), rate_hz) for path in paths or ()] for paths in (sounds, bare_tool))
+        found = ring_tooling(drawn, heard, alone, None if mass_g is None else 1e-3 * mass_g)
     said = sentences(found)
     write_text(out, tooling_text(tooling_keys(found.after), [f"learned from its ring, from {tooling.name}", *said]))
     if plot is not None:
