@@ -392,11 +392,6 @@ def ring(
         Of the tool alone.
     rate : float, optional [Hz]
         Of files that tell none.
-
-    Raises
-    ------
-    InputError
-        A file cannot be read, nothing rings, or it is another tool that rings.
     """
     from rcsa_ident.io.open_recording import open_recording
     from rcsa_ident.io.setups import read_tooling
