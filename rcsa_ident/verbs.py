@@ -386,9 +386,7 @@ def ring(
     tooling : Tooling or path
     *sounds : path
         Of the tool in its holder, one with several hits, or several files.
-    bare_tool : sequence of path
-        Of the tool alone.
-    mass : float, optional [kg]
+    bare_tool, mass : sequence of path, float [kg]
         Of the tool alone.
     rate : float, optional [Hz]
         Of files that tell none.
