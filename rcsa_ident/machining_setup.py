@@ -20,7 +20,7 @@ from rcsa_ident.plausibility import AXIAL_DEPTH, FEED_PER_TOOTH, IMMERSION, SPIN
 from rcsa_ident.remarks import Remark
 from rcsa_ident.shown import Saved, Shown
 from rcsa_ident.signals.recording import Recording, Sensor
-from rcsa_ident.tool_holder.geometry import ToolAssembly
+from rcsa_ident.tool_holder.geometry import BeamSegment, ToolAssembly
 from rcsa_ident.tool_holder.proportions import cutter_values, proportions
 from rcsa_ident.tool_holder.spread import EXACT, Spread
 from rcsa_ident.units import to_rpm
@@ -44,6 +44,11 @@ class Tooling(Saved):
     tool_model, holder_model : str
         Tools of the same model share what is not known of them, wherever they are clamped; holders of the same model (and bore) share
         their contact. Empty where nothing is shared.
+    taper : str
+        What the holder has behind its flange, one of `rcsa_ident.tool_holder.taper.tapers()`; empty where it is not told. It joins the
+        spindle there, and is part of what hangs on a string.
+    tool_behind : tuple of BeamSegment
+        What the tool has behind the insertion, from there to its rear end: of no account in the holder, part of the bare tool.
 
     Raises
     ------
@@ -57,9 +62,16 @@ class Tooling(Saved):
     spread: Spread = EXACT
     tool_model: str = ""
     holder_model: str = ""
+    taper: str = ""
+    tool_behind: tuple[BeamSegment, ...] = ()
 
     def __post_init__(self) -> None:
         proportions(self.assembly, self.cutter)
+
+    @property
+    def whole_tool(self) -> tuple[BeamSegment, ...]:
+        """The tool from its tip to its rear end, as it lies in the drawer."""
+        return (*self.assembly.tool, *self.tool_behind)
 
     @property
     def remarks(self) -> tuple[Remark, ...]:

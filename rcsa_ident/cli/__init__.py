@@ -29,6 +29,7 @@ from rcsa_ident.cli import (  # noqa: E402
     lobes,
     machine,
     plan,
+    ring,
     schema,
     tap,
     tools,
@@ -75,6 +76,7 @@ _COMMANDS: dict[str, tuple[Callable[..., Any], ...]] = {
     "Further measurements": (
         listen.listen,
         tap.tap,
+        ring.ring,
         calibrate.calibrate,
         calibrate.materials,
         compare.compare,

@@ -51,7 +51,7 @@ _TOOLINGS = (
         "name": "all",
         "cutter": _CUTTER,
         "tool": {"stickout_mm": 70.0, "segments": _SEGMENTS, "model": "EM12-4"},
-        "holder": _HOLDER | {"model": "PG25"},
+        "holder": _HOLDER | {"model": "PG25", "taper": "HSK-A63"},
         "contact": _STIFF,
         "materials": _MATERIALS,
         "spread": dict.fromkeys(SPREADS, 1.0),

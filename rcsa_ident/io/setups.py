@@ -35,8 +35,9 @@ from rcsa_ident.plausibility import (
 )
 from rcsa_ident.signals.motion import measured_axes, motion_channels
 from rcsa_ident.signals.recording import CAMPAIGN_QUANTITIES, Quantity, Role, Sensor
-from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, clamped
+from rcsa_ident.tool_holder.geometry import MATERIALS, BeamSegment, Contact, Material, behind, clamped
 from rcsa_ident.tool_holder.spread import EXACT, LARGEST_LENGTH, LARGEST_SHARE, LENGTHS, SPREAD_FIELDS, Spread
+from rcsa_ident.tool_holder.taper import tapers
 from rcsa_ident.units import from_rpm, to_rpm
 
 CAMPAIGN_FILE = "campaign.toml"
@@ -126,7 +127,7 @@ def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
     top = Table(data, where, known=_TOOLING)
     materials = material_library(top)
     tool = top.table("tool", ("stickout_mm", "segments", "model"))
-    holder = top.table("holder", ("insertion_mm", "segments", "model"))
+    holder = top.table("holder", ("insertion_mm", "segments", "model", "taper"))
     name = top.text("name", name)
     cutter = _cutter(top.table("cutter", _CUTTER))
     pieces = beam_segments(tool, materials)
@@ -135,13 +136,16 @@ def tooling_of(data: Mapping[str, Any], where: str, name: str) -> Tooling:
     carriers = beam_segments(holder, materials)
     contact = _contact(top.table("contact", _CONTACT)) if "contact" in top else None
     with top.naming({"stickout + insertion": "tool.stickout_mm + holder.insertion_mm", "insertion": "holder.insertion_mm"}):
+        assembly = clamped(pieces, carriers, stickout, insertion, contact)
         return Tooling(
             name,
             cutter,
-            clamped(pieces, carriers, stickout, insertion, contact),
+            assembly,
             spread_of(top.table("spread", tuple(SPREADS))) if "spread" in top else EXACT,
             tool.text("model", ""),
             holder.text("model", ""),
+            holder.text("taper", "", choices=tapers()),
+            behind(pieces, assembly),
         )
 
 
