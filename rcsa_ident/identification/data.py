@@ -305,30 +305,16 @@ class IdentificationData:
         points = [(axis.omega, self.cut_tooling[axis.cut]) for axis in self.axes]
         return RoughLines(self.rough, self.rough_holders, points, LEVER, self.rough_first)
 
-    def with_scales(self, depth: FloatArray, gain: FloatArray, delay: FloatArray) -> IdentificationData:
-        """Return the same data whose forces may be off by a factor of each tooling, its depth, and motions by gain and delay of each axis.
+    def with_unknowns(self, spread: tuple[float, ...], slopes: Sequence[FloatArray] | Sequence[ComplexArray] | None) -> IdentificationData:
+        """Return the same data with further unknowns behind the coefficients.
 
         Parameters
         ----------
-        depth : array, shape (toolings,) [-]
-            Standard deviation of the logarithm of each tooling's axial depth; 0 where it is known exactly.
-        gain : array, shape (axes,) [-]
-            Of that of each axis' sensor's gain.
-        delay : array, shape (axes,) [s]
-            Of each axis' sensor's delay.
+        spread : tuple of float
+            Their standard deviations.
+        slopes : sequence of array, or None
+            How the logarithms of each axis' lines change with them, shape (n, unknowns); None where they do not.
         """
-        deep, loud, late = (np.flatnonzero(each) for each in (depth, gain, delay))
-        columns = []
-        for i, axis in enumerate(self.axes):
-            of_tooling = self.cut_tooling[axis.cut][:, None] == deep
-            own = np.broadcast_to(i == loud, (axis.omega.size, loud.size))
-            lagging = -1j * axis.omega[:, None] * delay[late] * (i == late)
-            columns.append(np.hstack([of_tooling, own, lagging]))
-        # a delay stands in units of its spread
-        return self._with_unknowns((*depth[deep].tolist(), *gain[loud].tolist(), *(1.0,) * late.size), columns)
-
-    def _with_unknowns(self, spread: tuple[float, ...], slopes: Sequence[FloatArray] | Sequence[ComplexArray] | None) -> IdentificationData:
-        """The same data with further unknowns behind the coefficients, and how the logarithms of each axis' lines change with them."""
         axes = []
         for i, axis in enumerate(self.axes):
             more = np.zeros((axis.omega.size, len(spread))) if slopes is None else slopes[i]
@@ -336,46 +322,6 @@ class IdentificationData:
             across = np.pad(axis.across_slope, ((0, 0), (0, len(spread)))) if axis.across_slope.size else axis.across_slope
             axes.append(replace(axis, force_slope=np.hstack([axis.force_slope, more]), across_slope=across))
         return replace(self, axes=tuple(axes), coefficient_spread=(*self.coefficient_spread, *spread))
-
-    def with_cross_talk(self, spread: FloatArray) -> IdentificationData:
-        """Return the same data whose displacement sensors may feel a share of the other axis' motion.
-
-        Parameters
-        ----------
-        spread : array, shape (axes,) [-]
-            Standard deviation of that share; 0 where it feels nothing.
-        """
-        if len(self.axes) < 2 or not np.any(spread) or not all(axis.force.size for axis in self.axes):
-            return self
-        axes, felt = [], dict[Dof, int]()
-        for i, (axis, other) in enumerate(zip(self.axes, self.axes[::-1], strict=True)):
-            if spread[i] > 0.0:
-                felt[axis.axis] = len(self.coefficient_spread) + len(felt)
-                place = {key: k for k, key in enumerate(zip(other.cut.tolist(), other.order.tolist(), strict=True))}
-                here = np.array([place.get(key, -1) for key in zip(axis.cut.tolist(), axis.order.tolist(), strict=True)])
-                talk = np.zeros_like(axis.lines)
-                # a line that the other axis' force does not make is not among its lines, and small
-                talk[:, 0] = other.lines[here, 0] * np.where(here < 0, 0.0, other.force[here] / axis.force)[:, None]
-                axis = replace(axis, talk=talk)
-            axes.append(axis)
-        more = tuple(float(spread[i]) for i, axis in enumerate(axes) if axis.axis in felt)
-        return replace(self, axes=tuple(axes), talk_place=felt)._with_unknowns(more, None)
-
-    def with_rough_toolings(self, rough: RoughToolings, holders: Sequence[RoughToolHolder]) -> IdentificationData:
-        """Return the same data whose tool-holders are known only roughly.
-
-        Parameters
-        ----------
-        rough : RoughToolings
-            Of all toolings, in the data's order.
-        holders : sequence of RoughToolHolder
-        """
-        count, first = len(rough.unknowns), len(self.coefficient_spread)
-        # who knows a tool only roughly knows its force no better: an error of depth, edge or run-out is a share of the whole force, and
-        # where little of that points along an axis, much of the little
-        axes = tuple(replace(a, beside=(a.power.T * np.abs(a.across / a.force) ** 2).T) if a.across.size else a for a in self.axes)
-        held = replace(self, axes=axes, rough=rough, rough_holders=tuple(holders), rough_first=first, rough_start=np.zeros(count))
-        return held._with_unknowns((1.0,) * count, None)
 
     def with_toolings_at(self, values: FloatArray) -> IdentificationData:
         """Return the same data whose tool-holders stand at other values of what their drawings do not tell, shape (u,)."""

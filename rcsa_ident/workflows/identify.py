@@ -20,6 +20,7 @@ from rcsa_ident.identification.method import Method
 from rcsa_ident.identification.posterior import Posterior
 from rcsa_ident.identification.progress import Progress
 from rcsa_ident.identification.result import Identification, IdentificationCode
+from rcsa_ident.identification.rough_data import with_cross_talk, with_rough_toolings, with_scales
 from rcsa_ident.machining_setup import Campaign, Cut, HammerTest
 from rcsa_ident.remarks import Remark
 from rcsa_ident.scaleout import Map
@@ -295,9 +296,9 @@ def with_rough(data: IdentificationData, campaign: Campaign) -> IdentificationDa
         np.array([0.0 if sensor is None else getattr(sensor, name) for sensor in sensors])
         for name in ("gain_spread", "cross_talk_spread", "delay_spread")
     )
-    data = data.with_scales(campaign.depth_spread / np.array(depths), gain, delay).with_cross_talk(talk)
+    data = with_cross_talk(with_scales(data, campaign.depth_spread / np.array(depths), gain, delay), talk)
     highest = max(float(axis.omega.max()) for axis in data.axes) / (2.0 * np.pi)
-    return data.with_rough_toolings(rough, [rough_tool_holder(each.assembly, highest) for each in drawn])
+    return with_rough_toolings(data, rough, [rough_tool_holder(each.assembly, highest) for each in drawn])
 
 
 def _turning(campaign: Campaign, name: str, omega: FloatArray, ratio: FloatArray) -> tuple[ComplexArray, ComplexArray]:

@@ -7,6 +7,7 @@ import pytest
 
 from rcsa_ident.identification.data import LEVER
 from rcsa_ident.identification.evidence import EvidenceSelection
+from rcsa_ident.identification.rough_data import with_rough_toolings
 from rcsa_ident.identification.status import Status
 from rcsa_ident.io.identifications import identification_to_json, machine_from_json
 from rcsa_ident.machining_setup import Campaign
@@ -68,7 +69,7 @@ def roughly_drawn():
     told = {name: replace(each, spread=Spread()) for name, each in shop.toolings.items()}
     data = shop.prepare(cuts, spread=(0.05, 0.05, 0.0, 0.0))
     rough = rough_toolings({name: Drawing(each.assembly, each.spread) for name, each in told.items()})
-    unsure = data.with_rough_toolings(rough, [rough_tool_holder(each.assembly, 4300.0) for each in told.values()])
+    unsure = with_rough_toolings(data, rough, [rough_tool_holder(each.assembly, 4300.0) for each in told.values()])
     return shop, truly, told, EvidenceSelection().run(unsure, 1), EvidenceSelection().run(data, 1)
 
 

@@ -1,0 +1,82 @@
+"""The data of an identification whose drawings, depths and sensors are known only roughly: further unknowns with their spreads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rcsa_ident.arrays import FloatArray
+from rcsa_ident.dynamics.coordinates import Dof
+from rcsa_ident.identification.data import IdentificationData
+from rcsa_ident.tool_holder.drawings import RoughToolings
+from rcsa_ident.tool_holder.rough import RoughToolHolder
+
+
+def with_scales(data: IdentificationData, depth: FloatArray, gain: FloatArray, delay: FloatArray) -> IdentificationData:
+    """Return the same data whose forces may be off by a factor of each tooling, its depth, and motions by gain and delay of each axis.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    depth : array, shape (toolings,) [-]
+        Standard deviation of the logarithm of each tooling's axial depth; 0 where it is known exactly.
+    gain : array, shape (axes,) [-]
+        Of that of each axis' sensor's gain.
+    delay : array, shape (axes,) [s]
+        Of each axis' sensor's delay.
+    """
+    deep, loud, late = (np.flatnonzero(each) for each in (depth, gain, delay))
+    columns = []
+    for i, axis in enumerate(data.axes):
+        of_tooling = data.cut_tooling[axis.cut][:, None] == deep
+        own = np.broadcast_to(i == loud, (axis.omega.size, loud.size))
+        lagging = -1j * axis.omega[:, None] * delay[late] * (i == late)
+        columns.append(np.hstack([of_tooling, own, lagging]))
+    # a delay stands in units of its spread
+    return data.with_unknowns((*depth[deep].tolist(), *gain[loud].tolist(), *(1.0,) * late.size), columns)
+
+
+def with_cross_talk(data: IdentificationData, spread: FloatArray) -> IdentificationData:
+    """Return the same data whose displacement sensors may feel a share of the other axis' motion.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    spread : array, shape (axes,) [-]
+        Standard deviation of that share; 0 where it feels nothing.
+    """
+    if len(data.axes) < 2 or not np.any(spread) or not all(axis.force.size for axis in data.axes):
+        return data
+    axes, felt = [], dict[Dof, int]()
+    for i, (axis, other) in enumerate(zip(data.axes, data.axes[::-1], strict=True)):
+        if spread[i] > 0.0:
+            felt[axis.axis] = len(data.coefficient_spread) + len(felt)
+            place = {key: k for k, key in enumerate(zip(other.cut.tolist(), other.order.tolist(), strict=True))}
+            here = np.array([place.get(key, -1) for key in zip(axis.cut.tolist(), axis.order.tolist(), strict=True)])
+            talk = np.zeros_like(axis.lines)
+            # a line that the other axis' force does not make is not among its lines, and small
+            talk[:, 0] = other.lines[here, 0] * np.where(here < 0, 0.0, other.force[here] / axis.force)[:, None]
+            axis = replace(axis, talk=talk)
+        axes.append(axis)
+    more = tuple(float(spread[i]) for i, axis in enumerate(axes) if axis.axis in felt)
+    return replace(data, axes=tuple(axes), talk_place=felt).with_unknowns(more, None)
+
+
+def with_rough_toolings(data: IdentificationData, rough: RoughToolings, holders: Sequence[RoughToolHolder]) -> IdentificationData:
+    """Return the same data whose tool-holders are known only roughly.
+
+    Parameters
+    ----------
+    data : IdentificationData
+    rough : RoughToolings
+        Of all toolings, in the data's order.
+    holders : sequence of RoughToolHolder
+    """
+    count, first = len(rough.unknowns), len(data.coefficient_spread)
+    # who knows a tool only roughly knows its force no better: an error of depth, edge or run-out is a share of the whole force, and
+    # where little of that points along an axis, much of the little
+    axes = tuple(replace(a, beside=(a.power.T * np.abs(a.across / a.force) ** 2).T) if a.across.size else a for a in data.axes)
+    held = replace(data, axes=axes, rough=rough, rough_holders=tuple(holders), rough_first=first, rough_start=np.zeros(count))
+    return held.with_unknowns((1.0,) * count, None)
