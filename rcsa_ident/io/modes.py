@@ -17,7 +17,7 @@ from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.uncertain_tip import UncertainTip
-from rcsa_ident.units import from_hz, from_rpm
+from rcsa_ident.units import from_hz, from_rpm, to_hz
 
 _TOP = ("x", "y", "coefficients", "softening_sd_percent_per_1000_rpm")
 #: Values of a mode, each with the key of its standard deviation and its unit; of the last two a mode has one.
@@ -130,31 +130,35 @@ def _model(tables: list[Table], axis: Dof, missing: list[str]) -> tuple[ModalMod
     weights = [t.one_of(_WEIGHTS, "one of modal_mass_kg [kg] and stiffness_n_per_m [N/m]") for t in tables]
     weight = np.array([t.number(key, _VALUES[key][1], above=0.0) for t, key in zip(tables, weights, strict=True)])
     mass = np.where([key == "modal_mass_kg" for key in weights], weight, weight / omega**2)
-    spreads = [[_spread(t, key, missing) for key in (*list(_VALUES)[:2], own)] for t, own in zip(tables, weights, strict=True)]
+    spreads = [
+        [_spread(t, key, float(mean), missing) for key, mean in zip((*list(_VALUES)[:2], own), values, strict=True)]
+        for t, own, values in zip(tables, weights, zip(to_hz(omega), zeta, weight, strict=True), strict=True)
+    ]
     return normal_modes(omega, zeta, 1.0 / np.sqrt(mass)[:, None], (Coordinate("tip", axis),)), np.array(spreads).T
 
 
-def _spread(table: Table, key: str, missing: list[str]) -> float:
+def _spread(table: Table, key: str, mean: float, missing: list[str]) -> float:
     """Standard deviation over the value, NaN where none is told."""
-    name, unit = _VALUES[key]
     for other in _WEIGHTS:
         if key in _WEIGHTS and other != key and _VALUES[other][0] in table:
-            table.refuse(_VALUES[other][0], "the standard deviation of a value that is not given", name)
-    mean = table.number(key, unit, above=0.0)
-    found = table.number(name, unit, None, least=0.0, most=_WIDEST * mean)
+            table.refuse(_VALUES[other][0], "the standard deviation of a value that is not given", _VALUES[key][0])
+    return _over_value(table, *_VALUES[key], mean, missing)
+
+
+def _over_value(table: Table, name: str, unit: str, mean: float, missing: list[str]) -> float:
+    """A standard deviation over its value, NaN where none is told."""
+    found = table.number(name, unit, None, least=0.0)
     if found is None:
         missing.append(table.name(name))
         return float("nan")
+    if found > _WIDEST * mean:
+        table.refuse(name, f"{found:g}", f"at most {_WIDEST:g} times the value, {_WIDEST * mean:g} [{unit}]")
     return float(found / mean)
 
 
 def _coefficients(table: Table, missing: list[str]) -> tuple[CuttingCoefficients, tuple[float, float]]:
     means = {name: table.number(f"{name}_mpa", "MPa", above=0.0) for name in ("tangential", "radial")}
-    spreads = []
-    for name, mean in means.items():
-        spread = table.number(f"{name}_sd_mpa", "MPa", None, least=0.0, most=_WIDEST * mean)
-        missing += [] if spread is not None else [table.name(f"{name}_sd_mpa")]
-        spreads.append(np.nan if spread is None else spread / mean)
+    spreads = [_over_value(table, f"{name}_sd_mpa", "MPa", mean, missing) for name, mean in means.items()]
     with table.naming({"tangential coefficient": "coefficients.tangential_mpa", "radial_ratio": "coefficients.radial_mpa"}):
         found = CuttingCoefficients(1e6 * means["tangential"], means["radial"] / means["tangential"])
     return found, (spreads[0], spreads[1])

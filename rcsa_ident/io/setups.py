@@ -359,7 +359,7 @@ def sensor_of(name: str, data: Any, where: str) -> Sensor:
         float(np.radians(table.number("rotation_deg", "deg", 0.0, least=-180.0, most=180.0))),
         table.number("gain_spread_percent", "%", 2.0, least=0.0, most=50.0) * 1e-2,
         table.number("cross_talk_percent", "%", 1.5, least=0.0, most=50.0) * 1e-2,
-        table.number("delay_spread_us", "us", 5.0, least=0.0, most=1000.0) * 1e-6,
+        table.number("delay_spread_us", "us", 5.0, least=0.0, most=1000.0) / 1e6,
     )
 
 
