@@ -15,6 +15,7 @@ from rcsa_ident.dynamics.coordinates import Coordinate, Dof
 from rcsa_ident.dynamics.modal import ModalModel, normal_modes
 from rcsa_ident.io.toml_text import read_toml
 from rcsa_ident.io.validated_table import Table
+from rcsa_ident.plausibility import TANGENTIAL
 from rcsa_ident.stability.tip_modes import TipModes
 from rcsa_ident.stability.uncertain_tip import UncertainTip
 from rcsa_ident.units import from_hz, from_rpm, to_hz
@@ -157,7 +158,7 @@ def _over_value(table: Table, name: str, unit: str, mean: float, missing: list[s
 
 
 def _coefficients(table: Table, missing: list[str]) -> tuple[CuttingCoefficients, tuple[float, float]]:
-    means = {name: table.number(f"{name}_mpa", "MPa", above=0.0) for name in ("tangential", "radial")}
+    means = {"tangential": table.quantity("tangential_mpa", TANGENTIAL), "radial": table.number("radial_mpa", "MPa", above=0.0)}
     spreads = [_over_value(table, f"{name}_sd_mpa", "MPa", mean, missing) for name, mean in means.items()]
     with table.naming({"tangential coefficient": "coefficients.tangential_mpa", "radial_ratio": "coefficients.radial_mpa"}):
         found = CuttingCoefficients(1e6 * means["tangential"], means["radial"] / means["tangential"])

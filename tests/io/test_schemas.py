@@ -20,7 +20,7 @@ _BETWEEN_KEYS = re.compile(
     r"above from_hz|where there are cuts|at least one tooling|hammer tests \[\[frfs\]\], or both|"
     r"a point of the tool-holder, tip or mm|one or more speeds|\[\[x\]\], \[\[y\]\] or both|"
     r"stickout|insertion|softening|settling|from.*to|without it the cut keeps its speed|of change in each pass|"
-    r"times the value|of a value that is not given"
+    r"times the value|of a value that is not given|radial_mpa"
 )
 
 
