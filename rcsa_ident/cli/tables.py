@@ -13,7 +13,17 @@ from rich.table import Table
 from rcsa_ident.arrays import FloatArray
 from rcsa_ident.dynamics.coordinates import Dof
 from rcsa_ident.identification.result import Identification
-from rcsa_ident.report.summaries import ModeRow, RecordingRow, WholeModeRow, coefficient_rows, mode_rows, two_digits, whole_mode_rows
+from rcsa_ident.report.summaries import (
+    DrawingRow,
+    ModeRow,
+    RecordingRow,
+    WholeModeRow,
+    coefficient_rows,
+    drawing_rows,
+    mode_rows,
+    two_digits,
+    whole_mode_rows,
+)
 from rcsa_ident.stability.advice import Advice, Bound, OperatingPoint, PlannedCut, SpeedWindow
 from rcsa_ident.stability.methods import MethodName
 from rcsa_ident.stability.tested_cuts import Tally
@@ -100,10 +110,23 @@ def show_identification(found: Identification, deviations: Mapping[Dof, tuple[Fl
         )
     for each in coefficient_rows(found.coefficients):
         out.print(f"{escape(each.name)}: {two_digits(each.std, each.value)} ± {two_digits(each.std)} {each.unit}")
+    if found.learned:
+        show(_drawings(drawing_rows(found.learned)))
     for note in found.notes:
         if note == found.coupling:
             continue
         out.print(f"note: {escape(note)}")
+
+
+def _drawings(rows: Sequence[DrawingRow]) -> Table:
+    """What the drawings say of toolings, and what the cuts say."""
+    table = Table("tooling", "", "drawn", "±", "found", "±", "unit", "", title="toolings, as drawn and as found", title_justify="left")
+    for column in table.columns[2:6]:
+        column.justify = "right"
+    for row in rows:
+        texts = (row.toolings, row.what, row.drawn, row.spread, row.found, row.deviation, row.unit)
+        table.add_row(*map(escape, texts), "[yellow]hardly taught by the cuts[/]" if row.hardly else "")
+    return table
 
 
 def _modes(title: str, rows: Sequence[ModeRow | WholeModeRow], direction: Sequence[str] | None = None) -> Table:

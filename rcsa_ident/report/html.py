@@ -25,6 +25,7 @@ from rcsa_ident.report.lobes import stability_figure
 from rcsa_ident.report.summaries import (
     advice_summary,
     coefficient_rows,
+    drawing_rows,
     lobes_summary,
     mode_rows,
     peak_row,
@@ -127,6 +128,7 @@ def report_html(
         notes=[note for note in found.notes if note != found.coupling],
         moved="housing" if says(found.reasons, IdentificationCode.HOUSING_ALONE) else "flange",
         scales=coefficient_rows(found.coefficients),
+        drawings=drawing_rows(found.learned),
         has_std=bool(deviations),
         softening=any(part.posterior is not None and part.posterior.layout.softening for part in found.axes.values())
         or (found.whole is not None and found.whole.best.layout.softening),

@@ -22,7 +22,8 @@ from rcsa_ident.signals.tap import TapFrf
 from rcsa_ident.stability.advice import Advice, OperatingPoint, PlannedCut
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally
-from rcsa_ident.units import to_cm3_per_min, to_hz, to_rpm
+from rcsa_ident.tool_holder.learned import LearnedValue
+from rcsa_ident.units import SHOWN, to_cm3_per_min, to_hz, to_rpm
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,6 +181,47 @@ def coefficient_rows(found: Mapping[ForceCoefficient, tuple[float, float]]) -> l
             rows.append(CoefficientRow(name, value * unit, std * unit, "µm"))
         else:
             rows.append(CoefficientRow(name, float(np.exp(value)), float(np.exp(value)) * std, "times the campaign's"))
+    return rows
+
+
+@dataclass(frozen=True, slots=True)
+class DrawingRow:
+    """A number of a drawing before and after the cuts, as it is written.
+
+    Parameters
+    ----------
+    toolings, what, unit : str
+    drawn, spread, found, deviation : str
+        What the drawing says with its standard deviation, and what is believed now with its own.
+    hardly : bool
+        The cuts hardly taught it.
+    """
+
+    toolings: str
+    what: str
+    unit: str
+    drawn: str
+    spread: str
+    found: str
+    deviation: str
+    hardly: bool
+
+    def __str__(self) -> str:
+        return f"{self.toolings}: {self.what} {self.drawn} → {self.found} ± {self.deviation} {self.unit}"
+
+
+def drawing_rows(learned: Iterable[LearnedValue]) -> list[DrawingRow]:
+    """Return a row for each number of the toolings' drawings that was not exact."""
+    rows = []
+    for each in learned:
+        unit, size = SHOWN.get(each.unit, (each.unit, 1.0))
+        numbers = [[size * value for value in pair] for pair in ((each.drawn, each.spread), (each.found, each.deviation))]
+        # a contact has ten digits in front of its point
+        texts = [
+            (two_digits(std, value), two_digits(std)) if each.unit in SHOWN else (f"{value:.3g}", f"{std:.2g}") for value, std in numbers
+        ]
+        (drawn, spread), (found, deviation) = texts
+        rows.append(DrawingRow(", ".join(each.toolings), each.words, unit, drawn, spread, found, deviation, each.hardly))
     return rows
 
 
