@@ -160,6 +160,7 @@ def show_lobes(advice: Advice) -> None:
     for point in advice.recommended:
         table.add_row(f"{to_rpm(point.spindle_speed):.0f}", recommended_text(point), limit_text(point.limit, lobes.max_depth))
     show(table)
+    _tell_band(advice)
     _tell_unlimited(advice)
     peaks = ", ".join(f"{limit_text(p.limit_depth, lobes.max_depth)} mm at {to_rpm(p.spindle_speed):.0f} rev/min" for p in advice.pockets)
     out.print(f"highest stability limits: {peaks}")
@@ -240,7 +241,14 @@ def show_points(advice: Advice) -> None:
             load = f"{to_cm3_per_min(p.removal_rate):.0f}", f"{1e-3 * p.power:.2f}", f"{p.torque:.1f}"
         table.add_row(*cells, *load, _against(p))
     show(table)
+    _tell_band(advice)
     _tell_unlimited(advice)
+
+
+def _tell_band(advice: Advice, about: str = "") -> None:
+    """Print what dominates the band of the first recommended cut's limit, where something does."""
+    if advice.band is not None and advice.band.words:
+        console().print(f"{about}first recommended cut: {escape(advice.band.words)}")
 
 
 def _against(point: OperatingPoint) -> str:
@@ -301,6 +309,7 @@ def show_comparison(answers: Sequence[Advice]) -> None:
         table.add_row(escape(answer.tooling), lowest_mm, *cells)
     show(table)
     for answer in answers:
+        _tell_band(answer, f"{escape(answer.tooling)}, ")
         _tell_unlimited(answer)
 
 

@@ -298,6 +298,7 @@ def _tooling(number: int, page: ToolingPage) -> dict[str, Any]:
             stability_figure(page.advice.lobes, page.advice.recommended, page.true_limit, usable=page.advice.usable), f"lobes{number}"
         ),
         "recommended": [] if found is None else found["recommended"],
+        "band": "" if page.advice is None or page.advice.band is None else page.advice.band.words,
         "anywhere": None if found is None else found["absolute_limit_mm"],
         "critical": None if found is None else found["absolute_frequency_hz"],
     }

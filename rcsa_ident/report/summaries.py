@@ -20,6 +20,7 @@ from rcsa_ident.signals.listening import Listening
 from rcsa_ident.signals.measurement import Reading
 from rcsa_ident.signals.tap import TapFrf
 from rcsa_ident.stability.advice import Advice, OperatingPoint, PlannedCut
+from rcsa_ident.stability.dominance import BandShares
 from rcsa_ident.stability.result import StabilityLobes
 from rcsa_ident.stability.tested_cuts import Tally
 from rcsa_ident.tool_holder.learned import LearnedValue
@@ -267,6 +268,7 @@ def lobes_summary(advice: Advice) -> dict[str, Any]:
         "recommended_by": advice.recommended_by,
         "recommended": [_recommended(point, lobes) for point in advice.recommended],
         "withheld": lobes.withheld or None,
+        "band": _band(advice.band),
         "flip_speeds": int(lobes.flip.sum()),
         "tested": None if advice.tested is None else tally_summary(advice.tested),
     }
@@ -302,6 +304,7 @@ def advice_summary(advice: Advice) -> dict[str, Any]:
         "common_stable_depth_mm": None if common is None else finite(float(common.min()), 1e3),
         "withheld": advice.lobes.withheld or None,
         "recommended_by": advice.recommended_by,
+        "band": _band(advice.band),
         "highest_removal": [_point(point, advice.lobes) for point in advice.recommended],
         "windows": [
             {
@@ -314,6 +317,14 @@ def advice_summary(advice: Advice) -> dict[str, Any]:
         ],
         "planned": [_planned(cut) for cut in advice.planned],
     }
+
+
+def _band(band: BandShares | None) -> dict[str, Any] | None:
+    """What the band of the first recommended cut's limit consists of."""
+    if band is None:
+        return None
+    shares = [{"of": str(name), "share": share} for name, share in band.shares.items()]
+    return {"deviation_percent": 100.0 * band.deviation, "shares": shares, "in_words": band.words}
 
 
 def _recommended(point: OperatingPoint, lobes: StabilityLobes) -> dict[str, Any]:

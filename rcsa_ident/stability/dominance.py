@@ -60,7 +60,8 @@ class BandShares(Shown):
         """A sentence on what dominates the band and what helps; empty where nothing does."""
         if self.dominant is None:
             return ""
-        return f"{100.0 * self.shares[self.dominant]:.0f} % of this band is {self.dominant}: {_HELP[self.dominant]}"
+        share, wide = 100.0 * self.shares[self.dominant], 100.0 * self.deviation
+        return f"{share:.0f} % of the band of this limit (standard deviation {wide:.0f} %) is {self.dominant}: {_HELP[self.dominant]}"
 
     def __str__(self) -> str:
         return self.words or f"standard deviation of the limit {100.0 * self.deviation:.2g} %, nothing dominates it"
