@@ -141,7 +141,9 @@ def test_the_last_row_is_the_holders_stiffness(assembly, speed, contact):
 # drawings that are not exact
 
 
-ROUGH = Spread(stickout=0.05e-3, youngs_modulus=0.02, contact_stiffness=0.1, contact_damping=0.0, holder_diameter=0.0, reclamping=0.0)
+#: So small that a standard deviation stays linear.
+MODULUS, CONTACT, STICKOUT = 1e-3, 5e-3, 2e-6
+ROUGH = Spread(stickout=STICKOUT, youngs_modulus=MODULUS, contact_stiffness=CONTACT, contact_damping=0.0, holder_diameter=0.0, reclamping=0.0)
 UNKNOWNS = (RoughUnknown("youngs_modulus", "T1", "tooling"), RoughUnknown("translational_stiffness", "T1", "tooling"))
 
 
@@ -156,7 +158,7 @@ def told_with(machine):
         axis: replace(part, posterior=replace(part.posterior, covariance=whole[:size, :size], tooling_cross=cross, tooling_covariance=own))
         for axis, part in machine.identified.items()
     }
-    known = KnownToolings(UNKNOWNS, np.array([0.02, 0.1]), np.array([0.5, -0.3]), own, ("T1",))
+    known = KnownToolings(UNKNOWNS, np.array([MODULUS, CONTACT]), np.array([0.5, -0.3]), own, ("T1",))
     return replace(machine, identified=identified, toolings=known), whole
 
 
@@ -165,23 +167,23 @@ def test_what_cuts_told_of_machine_and_tooling_together_is_the_tips_spread():
     machine, whole = told_with(machine_of(False))
     tooling = replace(by_hand.tooling(), name="T1", spread=ROUGH)
     found = machine.tip(tooling, OMEGA, stiffness_spread=0.0)
-    values = {"youngs_modulus": 0.02 * 0.5, "translational_stiffness": 0.1 * -0.3}
+    values = {"youngs_modulus": MODULUS * 0.5, "translational_stiffness": CONTACT * -0.3}
     for axis in AXES:
         posterior = machine.identified[axis].posterior
 
         def tip(step, axis=axis, posterior=posterior):
             """The coupled tip at a step of the unknowns, the stickout's the last."""
             by = Alteration(
-                stickout=0.05e-3 * step[-1],
-                youngs_modulus=values["youngs_modulus"] + 0.02 * step[-3],
-                translational_stiffness=values["translational_stiffness"] + 0.1 * step[-2],
+                stickout=STICKOUT * step[-1],
+                youngs_modulus=values["youngs_modulus"] + MODULUS * step[-3],
+                translational_stiffness=values["translational_stiffness"] + CONTACT * step[-2],
             )
             each = posterior.candidate(axis, posterior.theta + step[:-3])
             holder = tool_holder_receptance(altered(tooling.assembly, by), OMEGA, axis)
             return couple(holder, each.flange.receptance(OMEGA), each.joint)["tip", "tip"][:, 0, 0]
 
         size = posterior.theta.size + 3
-        slopes = np.array([(tip(1e-4 * step) - tip(-1e-4 * step)) / 2e-4 for step in np.eye(size)])
+        slopes = np.array([(tip(1e-3 * step) - tip(-1e-3 * step)) / 2e-3 for step in np.eye(size)])
         covariance = np.zeros((size, size))
         covariance[:-1, :-1], covariance[-1, -1] = whole, 1.0
         rows = changes(found, axis)

@@ -57,7 +57,7 @@ def test_they_are_written_as_an_engineer_writes_them(known):
     told = [str(row) for row in drawing_rows(learned(known, DRAWINGS))]
     assert told[0] == "a: stickout 60.000 → 60.020 ± 0.048 mm"
     assert told[1] == "a, b: fluted diameter 9.60 → 9.710 ± 0.029 mm"
-    assert told[2] == "a: contact stiffness, translational, per metre 2e+10 → 2.7e+10 ± 4.1e+09 N/m²"
+    assert told[2] == "a: contact stiffness, translational, per metre 2e+10 → 2.7e+10 ± 4.2e+09 N/m²"
 
 
 def test_a_result_holds_them(known):

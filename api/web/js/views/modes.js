@@ -130,18 +130,24 @@ const power = (value) => {
   return `${digits}·10${[...String(Number(exponent))].map((c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c] ?? "⁻").join("")}`;
 };
 
-/** What the cuts taught of toolings whose drawings are not exact. */
+/** What the cuts taught of toolings whose drawings are not exact; what they hardly taught stands behind it. */
 export function drawings(modes) {
   if (!modes.toolings?.length) return null;
   const columns = [
     { name: "Tooling", cell: (r) => r.toolings.join(", ") },
-    { name: "What", cell: (r) => r.what },
+    { name: "What", cell: (r) => [r.what, h("span", { class: "soft small" }, ` ${r.unit}`)] },
     { name: "Drawn", number: true, cell: (r) => numberOf(r.drawn, r.spread) },
     { name: "Found", number: true, cell: (r) => numberOf(r.found, r.deviation) },
-    { name: "Unit", cell: (r) => r.unit },
-    { name: "", cell: (r) => (r.hardly_taught ? h("span", { class: "soft small" }, "hardly taught by the cuts") : null) },
   ];
-  const box = card("Toolings, as drawn and as found", null, table("Toolings, as drawn and as found", columns, modes.toolings));
+  const [taught, hardly] = [false, true].map((wanted) => modes.toolings.filter((r) => r.hardly_taught === wanted));
+  const box = card(
+    "Toolings, as drawn and as found",
+    null,
+    taught.length ? table("Toolings, as drawn and as found", columns, taught) : h("p", null, "The cuts taught hardly anything of them."),
+    hardly.length
+      ? h("details", null, h("summary", null, `What the cuts hardly taught: ${hardly.length}`), table("Hardly taught", columns, hardly))
+      : null,
+  );
   box.classList.add("wide");
   return box;
 }
