@@ -268,7 +268,7 @@ def lobes_summary(advice: Advice) -> dict[str, Any]:
         "recommended_by": advice.recommended_by,
         "recommended": [_recommended(point, lobes) for point in advice.recommended],
         "withheld": lobes.withheld or None,
-        "band": _band(advice.band),
+        "band": band_summary(advice.band),
         "flip_speeds": int(lobes.flip.sum()),
         "tested": None if advice.tested is None else tally_summary(advice.tested),
     }
@@ -304,7 +304,7 @@ def advice_summary(advice: Advice) -> dict[str, Any]:
         "common_stable_depth_mm": None if common is None else finite(float(common.min()), 1e3),
         "withheld": advice.lobes.withheld or None,
         "recommended_by": advice.recommended_by,
-        "band": _band(advice.band),
+        "band": band_summary(advice.band),
         "highest_removal": [_point(point, advice.lobes) for point in advice.recommended],
         "windows": [
             {
@@ -319,8 +319,8 @@ def advice_summary(advice: Advice) -> dict[str, Any]:
     }
 
 
-def _band(band: BandShares | None) -> dict[str, Any] | None:
-    """What the band of the first recommended cut's limit consists of."""
+def band_summary(band: BandShares | None) -> dict[str, Any] | None:
+    """Return what the band of the first recommended cut's limit consists of."""
     if band is None:
         return None
     shares = [{"of": str(name), "share": share} for name, share in band.shares.items()]

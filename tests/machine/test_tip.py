@@ -143,7 +143,9 @@ def test_the_last_row_is_the_holders_stiffness(assembly, speed, contact):
 
 #: So small that a standard deviation stays linear.
 MODULUS, CONTACT, STICKOUT = 1e-3, 5e-3, 2e-6
-ROUGH = Spread(stickout=STICKOUT, youngs_modulus=MODULUS, contact_stiffness=CONTACT, contact_damping=0.0, holder_diameter=0.0, reclamping=0.0)
+ROUGH = Spread(
+    stickout=STICKOUT, youngs_modulus=MODULUS, contact_stiffness=CONTACT, contact_damping=0.0, holder_diameter=0.0, reclamping=0.0
+)
 UNKNOWNS = (RoughUnknown("youngs_modulus", "T1", "tooling"), RoughUnknown("translational_stiffness", "T1", "tooling"))
 
 
@@ -172,20 +174,21 @@ def test_what_cuts_told_of_machine_and_tooling_together_is_the_tips_spread():
         posterior = machine.identified[axis].posterior
 
         def tip(step, axis=axis, posterior=posterior):
-            """The coupled tip at a step of the unknowns, the stickout's the last."""
+            """The coupled tip at a step of the unknowns; of stickout and rotational stiffness nothing was told."""
             by = Alteration(
                 stickout=STICKOUT * step[-1],
-                youngs_modulus=values["youngs_modulus"] + MODULUS * step[-3],
-                translational_stiffness=values["translational_stiffness"] + CONTACT * step[-2],
+                rotational_stiffness=CONTACT * step[-2],
+                youngs_modulus=values["youngs_modulus"] + MODULUS * step[-4],
+                translational_stiffness=values["translational_stiffness"] + CONTACT * step[-3],
             )
-            each = posterior.candidate(axis, posterior.theta + step[:-3])
+            each = posterior.candidate(axis, posterior.theta + step[:-4])
             holder = tool_holder_receptance(altered(tooling.assembly, by), OMEGA, axis)
             return couple(holder, each.flange.receptance(OMEGA), each.joint)["tip", "tip"][:, 0, 0]
 
-        size = posterior.theta.size + 3
+        size = posterior.theta.size + 4
         slopes = np.array([(tip(1e-3 * step) - tip(-1e-3 * step)) / 2e-3 for step in np.eye(size)])
         covariance = np.zeros((size, size))
-        covariance[:-1, :-1], covariance[-1, -1] = whole, 1.0
+        covariance[:-2, :-2], covariance[-2:, -2:] = whole, np.eye(2)
         rows = changes(found, axis)
         for part in (np.real, np.imag):
             expected = np.einsum("in,ij,jn->n", part(slopes), covariance, part(slopes))

@@ -135,7 +135,7 @@ export function drawings(modes) {
   if (!modes.toolings?.length) return null;
   const columns = [
     { name: "Tooling", cell: (r) => r.toolings.join(", ") },
-    { name: "What", cell: (r) => [r.what, h("span", { class: "soft small" }, ` ${r.unit}`)] },
+    { name: "What", cell: (r) => [r.what, h("span", { class: "soft small nowrap" }, ` ${r.unit}`)] },
     { name: "Drawn", number: true, cell: (r) => numberOf(r.drawn, r.spread) },
     { name: "Found", number: true, cell: (r) => numberOf(r.found, r.deviation) },
   ];
