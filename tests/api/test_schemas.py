@@ -24,9 +24,8 @@ def test_schemas_are_those_of_the_command(shop):
 
 
 def test_modes_tell_what_was_learned_of_toolings(tmp_path):
-    known = KnownToolings(
-        (RoughUnknown("fluted_diameter", "T1", "tooling"),), np.array([0.03]), np.array([0.38]), np.eye(1) * 0.01, ("T1",)
-    )
+    unknown = RoughUnknown("fluted_diameter", "T1", "tooling")
+    known = KnownToolings((unknown,), np.array([0.03]), np.array([0.38]), np.eye(1) * 0.01, ("T1",))
     rows = (LearnedValue("fluted_diameter", ("T1",), 9.6e-3, 0.288e-3, 9.71e-3, 0.03e-3),)
     told = Modes.model_validate(modes(by_hand.result_text(tmp_path, toolings=known_toolings_to_json(known, rows))))
     (row,) = told.toolings

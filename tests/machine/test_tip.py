@@ -21,7 +21,7 @@ from rcsa_ident.tool_holder.alteration import Alteration, altered
 from rcsa_ident.tool_holder.drawings import KnownToolings, RoughUnknown
 from rcsa_ident.tool_holder.geometry import stiffened
 from rcsa_ident.tool_holder.model import tool_holder_receptance
-from rcsa_ident.tool_holder.spread import Spread
+from rcsa_ident.tool_holder.spread import EXACT
 from tests.fixtures import by_hand
 from tests.machine.planes import BAND, FLANGES, JOINT, TIP, coupled_in_both_planes, oblique, tip_in_both_planes
 
@@ -143,9 +143,7 @@ def test_the_last_row_is_the_holders_stiffness(assembly, speed, contact):
 
 #: So small that a standard deviation stays linear.
 MODULUS, CONTACT, STICKOUT = 1e-3, 5e-3, 2e-6
-ROUGH = Spread(
-    stickout=STICKOUT, youngs_modulus=MODULUS, contact_stiffness=CONTACT, contact_damping=0.0, holder_diameter=0.0, reclamping=0.0
-)
+ROUGH = replace(EXACT, stickout=STICKOUT, youngs_modulus=MODULUS, contact_stiffness=CONTACT)
 UNKNOWNS = (RoughUnknown("youngs_modulus", "T1", "tooling"), RoughUnknown("translational_stiffness", "T1", "tooling"))
 
 

@@ -32,11 +32,9 @@ def test_shares_are_the_variances_of_machines_that_differ_in_one_group_alone():
     groups = {Doubted.CONTACT: np.eye(3)[:1], Doubted.TOOL: np.eye(3)[1:2]}
     found = band_shares(tip_of(shifted, groups), PROCESS, 800.0, DEEPEST, 0.01)
     assert 790.0 <= found.spindle_speed <= 810.0
-    alone = []
+    alone, speeds = [], np.array([found.spindle_speed])
     for k in range(3):
-        limits = drawn_limits(
-            tip_of(lambda values, k=k: shifted(values)[k : k + 1], {}), PROCESS, np.array([found.spindle_speed]), 1.0, 400, 5
-        )
+        limits = drawn_limits(tip_of(lambda values, k=k: shifted(values)[k : k + 1], {}), PROCESS, speeds, 1.0, 400, 5)
         alone.append(np.var(np.log(limits)))
     shares = np.array(alone) / np.sum(alone)
     assert sum(found.shares.values()) == pytest.approx(1.0)
